@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from bench.bus import Monotonic, percentiles, state
-from scm.clock import NS_PER_S, nanoseconds, next_beat_ns, seconds
+from scm.clock import NS_PER_S, nanoseconds, next_tick_ns, seconds
 from scm.selftest.city import CITY
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
@@ -139,7 +139,7 @@ def _send(stations: list[tuple[int, ZenohBus]], rate_hz: float) -> list[float]:
     lags_ms, began_ns = list[float](), time.time_ns()
     shift = began_ns / NS_PER_S - time.monotonic()
     for n in range(round(SECONDS * rate_hz)):
-        due = seconds(next_beat_ns(began_ns + nanoseconds(n / rate_hz))) - shift
+        due = seconds(next_tick_ns(began_ns + nanoseconds(n / rate_hz))) - shift
         _wait(due - time.monotonic())
         number, bus = stations[n % len(stations)]
         lags_ms.append((time.monotonic() - due) * 1e3)

@@ -53,7 +53,7 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """Return what the words after `scm` ask for."""
     joined = _joined(argv)
-    parser = build_parser(_asked(joined))
+    parser = build_parser(_command_name(joined))
     seconds = _seconds(argv)
     if seconds:
         parser.error(f"expected a second word, as in `scm {argv[0]} {seconds[0]}`: {seconds}")
@@ -75,7 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except Exception as error:  # noqa: BLE001  the edge of the process
-        return _said(arguments.command, error)
+        return _report(arguments.command, error)
     return code
 
 
@@ -92,7 +92,7 @@ def _joined(argv: Sequence[str]) -> list[str]:
     return list(argv)
 
 
-def _asked(joined: Sequence[str]) -> str | None:
+def _command_name(joined: Sequence[str]) -> str | None:
     """Return the name of the command that is meant; None: it takes all of them to say."""
     from scm.registry import names
 
@@ -112,7 +112,7 @@ def _seconds(argv: Sequence[str]) -> list[str]:
     return [] if is_whole else seconds
 
 
-def _said(command: str, error: Exception) -> int:
+def _report(command: str, error: Exception) -> int:
     """Tell what stopped a command in one message; return 2 for bad input, 1 for our fault."""
     logging.getLogger(__name__).debug("%s failed", command, exc_info=error)
     place = isinstance(error, OSError) and (error.filename or error.errno == errno.ENOSPC)

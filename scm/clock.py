@@ -12,13 +12,13 @@ from typing import Protocol
 NS_PER_S = 1_000_000_000
 NS_PER_MS = 1_000_000
 
-BEAT_NS = 25 * NS_PER_MS
+TICK_NS = 25 * NS_PER_MS
 """What many at one router keep to when any instant would do: it wakes once for all of a beat."""
 
 
-def next_beat_ns(t_ns: int) -> int:
-    """Return the first beat at or after an instant [ns]: a whole multiple of `BEAT_NS`."""
-    return -(-t_ns // BEAT_NS) * BEAT_NS
+def next_tick_ns(t_ns: int) -> int:
+    """Return the first beat at or after an instant [ns]: a whole multiple of `TICK_NS`."""
+    return -(-t_ns // TICK_NS) * TICK_NS
 
 
 def seconds(t_ns: int) -> float:
@@ -42,8 +42,8 @@ def waited_ns() -> int:
     Linux counts it per thread: the time in which it could have run, and another one did.
     """
     try:
-        with open("/proc/thread-self/schedstat", encoding="ascii") as told:  # noqa: PTH123 often
-            return int(told.read().split()[1])
+        with open("/proc/thread-self/schedstat", encoding="ascii") as stat:  # noqa: PTH123 often
+            return int(stat.read().split()[1])
     except (OSError, ValueError, IndexError):
         return 0
 
@@ -77,7 +77,7 @@ class WallClock:
 
 
 class StepClock:
-    """A clock that moves only when told to: lockstep runs and tests."""
+    """A clock that moves only when stat to: lockstep runs and tests."""
 
     def __init__(self, start_ns: int = 0) -> None:
         self._now_ns = start_ns

@@ -2,11 +2,11 @@
 
     flash        a junction's signals flash
     monitor      a junction's monitor reports a fault
-    silent       a junction's controller is not heard any more
+    silent       a junction's controller sends nothing any more
     part_lost    a part of the city is gone
     late         the computer is too slow: the world simulates less time than passes
 
-Scripts, the server and `scm up` each watch for themselves: what is lost may be a part.
+Scripts, the server and `scm up` each keep their own record: the part that is lost may be any.
 """
 
 import threading
@@ -23,16 +23,16 @@ from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spat import Spat
 
-HEARS: tuple[type[Message], ...] = (Spat, MonitorStatus, PartStatus, Presence)
+MESSAGE_KINDS: tuple[type[Message], ...] = (Spat, MonitorStatus, PartStatus, Presence)
 SILENT_NS = NS_PER_S  # no car takes a green that is older
-LATE_SHARE = 0.05  # of the time between two reports of the world that it did not simulate
-LATE_AFTER, CALM_AFTER = 3, 5  # reports in a row: a second alone is no news
+LATE_SHARE = 0.05  # of the time between two reports of the world: more lost time means late
+LATE_AFTER_REPORTS, RECOVERED_AFTER_REPORTS = 3, 5  # in a row, one per second
 VOID_SHARE = 0.01  # of a trip's time
-NEEDED = ("world", "traffic", "monitor")
-DEPTH = 1000
-OVERLOAD = "overload"  # the monitor's word for a computer that is too busy
+REQUIRED_PARTS = ("world", "traffic", "monitor")
+MAX_STORED = 1000
+OVERLOAD = "overload"  # the monitor's name for a computer that is too busy
 RESET = "A person resets the monitor, on the signals page."
-COSTLY = ("eye", "camera", "record")  # parts that a city can do without, the costliest first
+OPTIONAL_PARTS = ("eye", "camera", "record")  # the costliest first
 
 Kind = Literal["flash", "monitor", "silent", "part_lost", "late"]
 
@@ -43,7 +43,7 @@ class Disturbance(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         source: The junction or part that it concerns.
         start_ns: When it began, on the clock of whoever reports it.
-        end_ns: When it was over; None: it lasts.
+        end_ns: When it ended; None while it lasts.
         text: What is wrong, as a clause: `the signals of crossing flash`.
         advice: What a person can do, in a sentence; empty: nothing.
     """
@@ -56,67 +56,69 @@ class Disturbance(msgspec.Struct, kw_only=True, frozen=True):
     advice: str = ""
 
     def within_ns(self, start_ns: int, end_ns: int) -> int:
-        """Return how long it lasted within a span [ns]."""
+        """Return how much of a span it covers [ns]."""
         last_ns = end_ns if self.end_ns is None else self.end_ns
         return _overlap_ns(self.start_ns, last_ns, start_ns, end_ns)
 
 
 class Disturbances:
-    """Watches the messages of a city for disturbances; safe from any thread."""
+    """Tracks disturbances from the messages of a city; safe from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._news: deque[Disturbance] = deque(maxlen=DEPTH)
+        self._news: deque[Disturbance] = deque(maxlen=MAX_STORED)
         self._open: dict[tuple[Kind, str], Disturbance] = {}
-        self._over: deque[Disturbance] = deque(maxlen=DEPTH)
+        self._over: deque[Disturbance] = deque(maxlen=MAX_STORED)
         self._spat_ns: dict[str, int] = {}
         self._sessions: dict[str, set[str]] = {}
-        self._lost: deque[tuple[int, int, int]] = deque(maxlen=DEPTH)  # from, to, how much [ns]
+        self._lost: deque[tuple[int, int, int]] = deque(
+            maxlen=MAX_STORED
+        )  # from, to, how much [ns]
         self._reported: PartStatus | None = None
-        self._calm_since_ns = 0  # nothing that is over lasted until later
-        self._in_a_row = 0  # reports since the world is, or is no longer, late
+        self._undisturbed_since_ns = 0  # all that is over ended before
+        self._in_a_row = 0  # reports that contradict whether the world is late
         self._since_ns = 0
 
-    def hear(self, item: Incoming) -> None:
-        """Take a message of one of the kinds in `HEARS`."""
+    def receive(self, item: Incoming) -> None:
+        """Process a message of one of `MESSAGE_KINDS`."""
         with self._lock:
             match item.message:
                 case Spat() as spat:
-                    self._hear_spat(spat, item.t_ns)
+                    self._receive_spat(spat, item.t_ns)
                 case MonitorStatus() as status:
-                    self._hear_monitor(status)
+                    self._receive_monitor(status)
                 case PartStatus(station="world") as status:
-                    self._hear_world(status)
+                    self._receive_world(status)
                 case Presence() as presence:
-                    self._hear_presence(presence, item.t_ns)
+                    self._receive_presence(presence, item.t_ns)
 
-    def look(self, now_ns: int) -> None:
-        """Look at the time: which signals have fallen silent?"""
+    def check_silence(self, now_ns: int) -> None:
+        """Check which signals have been silent for too long."""
         with self._lock:
-            for junction, heard_ns in self._spat_ns.items():
-                self._judge_silence(junction, heard_ns, now_ns)
+            for junction, received_ns in self._spat_ns.items():
+                self._judge_silence(junction, received_ns, now_ns)
 
     def now(self) -> tuple[Disturbance, ...]:
-        """Return those that last, the oldest first."""
+        """Return those that are active, the oldest first."""
         with self._lock:
             return tuple(sorted(self._open.values(), key=lambda one: one.start_ns))
 
-    def lately(self, since_ns: int) -> tuple[Disturbance, ...]:
-        """Return those that lasted at any time since a moment, the oldest first."""
+    def recent(self, since_ns: int) -> tuple[Disturbance, ...]:
+        """Return those that were active at any time since then, the oldest first."""
         with self._lock:
             over = [one for one in self._over if one.end_ns is None or one.end_ns >= since_ns]
             return tuple(sorted((*over, *self._open.values()), key=lambda one: one.start_ns))
 
     def news(self) -> list[Disturbance]:
-        """Return what began or was over since the last call."""
+        """Return what began or ended since the last call."""
         with self._lock:
             news = list(self._news)
             self._news.clear()
             return news
 
     def void_reasons(self, start_ns: int, end_ns: int) -> tuple[str, ...]:
-        """Return why what was measured over a span is void; empty: it counts."""
-        if start_ns >= self._calm_since_ns and not self._open:
+        """Return why a measurement over a span is void; empty if it is valid."""
+        if start_ns >= self._undisturbed_since_ns and not self._open:
             return ()
         span = f"of {seconds(end_ns - start_ns):.1f} s"
         lasted: dict[str, int] = {}
@@ -134,7 +136,7 @@ class Disturbances:
             reasons.append(f"this computer did not simulate {seconds(lost_ns):.1f} {span}")
         return tuple(reasons)
 
-    def _hear_spat(self, spat: Spat, arrived_ns: int) -> None:
+    def _receive_spat(self, spat: Spat, arrived_ns: int) -> None:
         before_ns = self._spat_ns.get(spat.junction, arrived_ns)
         self._judge_silence(spat.junction, before_ns, arrived_ns)
         self._end("silent", spat.junction, arrived_ns)
@@ -144,11 +146,11 @@ class Disturbances:
         else:
             self._end("flash", spat.junction, spat.t_ns)
 
-    def _judge_silence(self, junction: str, heard_ns: int, now_ns: int) -> None:
-        if now_ns - heard_ns > SILENT_NS:
-            self._begin("silent", junction, heard_ns, f"the signals of {junction} are silent")
+    def _judge_silence(self, junction: str, received_ns: int, now_ns: int) -> None:
+        if now_ns - received_ns > SILENT_NS:
+            self._begin("silent", junction, received_ns, f"the signals of {junction} are silent")
 
-    def _hear_monitor(self, status: MonitorStatus) -> None:
+    def _receive_monitor(self, status: MonitorStatus) -> None:
         if status.fault is None:
             self._end("monitor", status.junction, status.t_ns)
         else:
@@ -157,26 +159,26 @@ class Disturbances:
             advice = _for_a_slow_computer() if status.fault == OVERLOAD else RESET
             self._begin("monitor", status.junction, status.since_ns, text, advice)
 
-    def _hear_world(self, status: PartStatus) -> None:
+    def _receive_world(self, status: PartStatus) -> None:
         """Note how much time the world did not simulate since its last report."""
         before, self._reported = self._reported, status
         if before is None or status.t_ns <= before.t_ns or not status.lost_s >= before.lost_s:
-            return  # the first, or of another world
+            return  # the first report, or one of another world
         passed_ns = status.t_ns - before.t_ns
         lost_ns = round(min(1.0, (status.lost_s - before.lost_s) / seconds(passed_ns)) * passed_ns)
         if lost_ns:
             self._lost.append((before.t_ns, status.t_ns, lost_ns))
-            self._calm_since_ns = max(self._calm_since_ns, status.t_ns)
+            self._undisturbed_since_ns = max(self._undisturbed_since_ns, status.t_ns)
         is_known = ("late", "world") in self._open
         if (lost_ns > LATE_SHARE * passed_ns) == is_known:
             self._in_a_row = 0
             return
         self._since_ns = self._since_ns if self._in_a_row else before.t_ns
         self._in_a_row += 1
-        if is_known and self._in_a_row >= CALM_AFTER:
+        if is_known and self._in_a_row >= RECOVERED_AFTER_REPORTS:
             self._in_a_row = 0
             self._end("late", "world", self._since_ns)
-        elif not is_known and self._in_a_row >= LATE_AFTER:
+        elif not is_known and self._in_a_row >= LATE_AFTER_REPORTS:
             self._in_a_row = 0
             share = 1.0 - lost_ns / passed_ns
             cars = f"{status.cars} cars" if status.cars != 1 else "1 car"
@@ -191,9 +193,9 @@ class Disturbances:
                 _for_a_slow_computer(int(share * status.cars)),
             )
 
-    def _hear_presence(self, presence: Presence, arrived_ns: int) -> None:
+    def _receive_presence(self, presence: Presence, arrived_ns: int) -> None:
         station = presence.station
-        if presence.role != "part" or not (station in NEEDED or station.startswith("eye")):
+        if presence.role != "part" or not (station in REQUIRED_PARTS or station.startswith("eye")):
             return
         sessions = self._sessions.setdefault(station, set())
         if presence.alive:
@@ -216,14 +218,14 @@ class Disturbances:
         if one is not None:
             over = msgspec.structs.replace(one, end_ns=max(one.start_ns, end_ns))
             self._over.append(over)
-            self._calm_since_ns = max(self._calm_since_ns, end_ns)
+            self._undisturbed_since_ns = max(self._undisturbed_since_ns, end_ns)
             self._news.append(over)
 
 
 def _for_a_slow_computer(cars: int = 0) -> str:
     """Return what to do on a slow computer; `cars`: how many it may manage, 0: unknown."""
     fewer = f"with at most {cars} cars" if cars else "with fewer cars"
-    parts = f"without parts that cost much (`scm up --without {','.join(COSTLY)}`)"
+    parts = f"without parts that cost much (`scm up --without {','.join(OPTIONAL_PARTS)}`)"
     return f"Start the city again {fewer} (`--hosted`, `--agents`), or {parts}."
 
 

@@ -25,7 +25,7 @@ import msgspec
 
 from scm.caller import program_name
 from scm.clock import WallClock, seconds
-from scm.disturbances import HEARS, Disturbance, Disturbances
+from scm.disturbances import MESSAGE_KINDS, Disturbance, Disturbances
 from scm.errors import RunError, ScmError, VoidError, nearest
 from scm.log import event
 from scm.maps.load import load_map
@@ -49,11 +49,11 @@ from scm.world.part import WorldPart
 R = TypeVar("R", bound=Message)
 Keep = Callable[[Incoming], bool]
 THEN = ("circulate", "stop")
-HEARD_DEPTH = 1000
-KEPT_DEPTH = (
-    1_000_000  # of mailboxes for what is wanted alone: never full, one arrival a car at most
+MAILBOX_DEPTH = 1000
+FILTERED_MAILBOX_DEPTH = 1_000_000  # never full: it stores at most one arrival per car
+REPLY_TIMEOUT_S = (
+    15.0  # the first car of a type may have to be compiled; an absent part fails at once
 )
-ASK_S = 15.0  # the first car of a kind may have to be compiled; who is not there is told at once
 
 _log = logging.getLogger(__name__)
 
@@ -66,14 +66,14 @@ class Link(Protocol):
         """The city's time [ns]."""
         ...
 
-    def ask(self, request: Request) -> Message:
+    def request(self, request: Request) -> Message:
         """Return the reply to a request, or a `Refused`."""
         ...
 
-    def hear(self, hears: Hears, keep: Keep | None = None) -> Mailbox:
-        """Return a mailbox that fills from now on, with those messages alone that `keep` wants.
+    def subscribe(self, subscription: Hears, keep: Keep | None = None) -> Mailbox:
+        """Return a mailbox that fills from now on with the messages that `keep` accepts.
 
-        `keep` may be asked on another thread.
+        `keep` may be called on another thread.
         """
         ...
 
@@ -82,7 +82,7 @@ class Link(Protocol):
         ...
 
     def run_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Let the city go on until `done()`; return whether that came in time."""
+        """Let the city run until `done()`; return whether that was in time."""
         ...
 
 
@@ -97,13 +97,13 @@ class LockstepLink:
         """The stepped clock's time [ns]."""
         return self._lockstep.now_ns
 
-    def ask(self, request: Request) -> Message:
-        """Step the city until the reply is there."""
+    def request(self, request: Request) -> Message:
+        """Step the city until the reply arrives."""
         return self._lockstep.call(request)
 
-    def hear(self, hears: Hears, keep: Keep | None = None) -> Mailbox:
+    def subscribe(self, subscription: Hears, keep: Keep | None = None) -> Mailbox:
         """Return a mailbox on the in-memory bus."""
-        return self._lockstep.hear(hears, keep)
+        return self._lockstep.hear(subscription, keep)
 
     def publish(self, message: Message) -> None:
         """Send on the in-memory bus."""
@@ -131,15 +131,17 @@ class LiveLink:
         """This process's time [ns]."""
         return self._clock.now_ns()
 
-    def ask(self, request: Request) -> Message:
+    def request(self, request: Request) -> Message:
         """Wait for the reply."""
         signed = msgspec.structs.replace(request, actor=request.actor or program_name())
-        return ask(self._bus, signed, ASK_S)
+        return ask(self._bus, signed, REPLY_TIMEOUT_S)
 
-    def hear(self, hears: Hears, keep: Keep | None = None) -> Mailbox:
+    def subscribe(self, subscription: Hears, keep: Keep | None = None) -> Mailbox:
         """Return a mailbox subscribed on the bus."""
-        mailbox = Mailbox(HEARD_DEPTH if keep is None else KEPT_DEPTH, self._wake, keep)
-        self._bus.subscribe(hears.kind, hears.where, mailbox)
+        mailbox = Mailbox(
+            MAILBOX_DEPTH if keep is None else FILTERED_MAILBOX_DEPTH, self._wake, keep
+        )
+        self._bus.subscribe(subscription.kind, subscription.where, mailbox)
         return mailbox
 
     def publish(self, message: Message) -> None:
@@ -147,7 +149,7 @@ class LiveLink:
         self._bus.publish(message)
 
     def run_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait, looking again whenever something is heard."""
+        """Wait; check again whenever a message arrives."""
         deadline = self.now_ns + round(timeout_s * 1e9)
         while not done():
             if self.now_ns >= deadline:
@@ -164,8 +166,8 @@ class Journey:
     Attributes:
         route: The lanes it follows.
         length_m: Of the route; None: it has no end.
-        started_ns, arrived_ns: On the city's clock; None while under way, as far as the script
-            knows: it learns of arrivals whenever it lets the city go on or asks it for something.
+        started_ns, arrived_ns: On the city's clock; None while under way. Updated whenever the
+            script lets the city run or sends it a request.
     """
 
     vehicle: str
@@ -178,7 +180,7 @@ class Journey:
 
     @property
     def void(self) -> tuple[str, ...]:
-        """Why its travel time says nothing of the city; empty: it counts, or is under way."""
+        """Why its travel time is void; empty if it is valid, or the trip is under way."""
         if self.started_ns is None or self.arrived_ns is None:
             return ()
         return self.disturbances.void_reasons(self.started_ns, self.arrived_ns)
@@ -237,21 +239,21 @@ class FleetCar:
         return self.city.send(request)
 
     def remove(self) -> None:
-        """Take the car off the map."""
+        """Remove the car from the map."""
         self.city.remove(self)
 
 
 class City:
-    """A script's hold on a city; what the script spawned leaves with it."""
+    """A city as a script controls it; cars that the script spawned leave with it."""
 
     def __init__(self, link: Link) -> None:
         self._link = link
         self._trip_numbers = itertools.count(1)
         self._may_arrive: dict[str, tuple[Journey, ...]] = {}  # by car: its last two journeys
-        self._arrivals = link.hear(Hears(Trip), self._is_arrival)
+        self._arrivals = link.subscribe(Hears(Trip), self._is_arrival)
         self._disturbances = Disturbances()
-        for kind in HEARS:
-            link.hear(Hears(kind), self._watch)
+        for kind in MESSAGE_KINDS:
+            link.subscribe(Hears(kind), self._watch)
         self.cars: list[FleetCar] = []
 
     @property
@@ -260,49 +262,52 @@ class City:
         return seconds(self._link.now_ns)
 
     def spawn(self, car: str = "nigel", *, at: str = "", name: str = "") -> FleetCar:
-        """Put a car to `at`, a spawn place of the map or `X,Y,DEG`, or to the first free place."""
+        """Place a car at a spawn place of the map, at `X,Y,DEG`, or at the first free place."""
         reply = self.request(SpawnRequest(vehicle=name, car=car, spawn=at), SpawnReply)
         spawned = FleetCar(reply.vehicle, self)
         self.cars.append(spawned)
         return spawned
 
     def use_plan(self, plan: str, *, junction: str = "crossing", reason: str = "") -> PlanReply:
-        """Ask for a signal plan; the kernel takes it at the next safe moment."""
+        """Request a signal plan; the kernel switches at the next safe moment."""
         request = PlanRequest(junction=junction, plan=plan, by=program_name(), reason=reason)
         return self.request(request, PlanReply)
 
     @property
     def disturbances(self) -> tuple[Disturbance, ...]:
-        """What makes measurements void at this moment, the oldest first; none: all is well."""
-        self._disturbances.look(self._link.now_ns)
+        """What makes measurements void at this moment, the oldest first."""
+        self._disturbances.check_silence(self._link.now_ns)
         return self._disturbances.now()
 
     def wait_for_disturbance(self, timeout_s: float = 120.0) -> Disturbance | None:
-        """Let the city go on until something makes measurements void; None: nothing did."""
+        """Let the city run until something makes measurements void; None if nothing does."""
         return self.disturbances[0] if self._run_until(self._is_disturbed, timeout_s) else None
 
-    def wait_for_calm(self, timeout_s: float = 120.0) -> None:
-        """Let the city go on until nothing makes measurements void any more.
+    def wait_until_undisturbed(self, timeout_s: float = 120.0) -> None:
+        """Let the city run until nothing makes measurements void any more.
 
         Raises:
-            RunError: saying what still does when the time is over.
+            RunError: when the time is over, with what still does.
         """
         if not self._run_until(lambda: not self._is_disturbed(), timeout_s):
             still = "; ".join(one.text for one in self.disturbances)
             msg = f"after {timeout_s:g} s the city is still disturbed: {still}"
             raise RunError(msg)
 
+    wait_for_calm = wait_until_undisturbed
+    """Its name in 0.1, for scripts that call it."""
+
     def run_for(self, duration_s: float) -> None:
-        """Let the city go on for a while."""
+        """Let the city run for a while."""
         end = self._link.now_ns + round(duration_s * 1e9)
         self._run_until(lambda: self._link.now_ns >= end, duration_s + 1.0)
 
     def wait(self, journeys: Sequence[Journey], timeout_s: float = 120.0) -> None:
-        """Let the city go on until all journeys have arrived, void or not.
+        """Let the city run until all journeys have arrived, void or not.
 
         Raises:
-            RunError: naming those that had not when the time was over, or never will: cars that
-                circulate, and cars that the script has removed.
+            RunError: when the time is over, or a journey can never arrive: its car circulates, or
+                the script has removed it.
         """
         here = {car.name for car in self.cars}
         for journey in journeys:
@@ -322,12 +327,12 @@ class City:
         raise RunError(msg)
 
     def request(self, request: Request, kind: type[R]) -> R:
-        """Ask and return the reply.
+        """Send a request and return the reply.
 
         Raises:
-            ScmError: with the sentence of whoever refused.
+            ScmError: when it is refused, with the reason.
         """
-        reply = self._link.ask(request)
+        reply = self._link.request(request)
         self._note_arrivals()
         if isinstance(reply, Refused):
             msg = f"{type(request).__name__}: {reply.detail}"
@@ -338,18 +343,18 @@ class City:
         return reply
 
     def new_trip_id(self, vehicle: str) -> str:
-        """Return an id that no trip of a car of this name had before, whoever sent that car."""
+        """Return a trip id that no car of this name has had before."""
         return f"{vehicle}-{self._link.now_ns}-{next(self._trip_numbers)}"
 
     def send(self, request: RouteRequest) -> Journey:
         """Send a car on a trip, named by the request's id; see `FleetCar.drive`.
 
         Raises:
-            ScmError: with the sentence of whoever refused.
+            ScmError: when it is refused, with the reason.
         """
         journey = Journey(request.vehicle, request.request_id, self._disturbances)
         before = self._may_arrive.get(request.vehicle, ())
-        # The trip before may have ended already, and be on its way to us.
+        # The arrival of the trip before may still be on its way here.
         self._may_arrive[request.vehicle] = (*before[-1:], journey)
         try:
             reply = self.request(request, RouteReply)
@@ -360,13 +365,13 @@ class City:
         return journey
 
     def remove(self, car: FleetCar) -> None:
-        """Take a car that the script has spawned off the map."""
+        """Remove a car that the script has spawned."""
         self.request(RemoveRequest(vehicle=car.name, reason=f"{program_name()} is done"), Message)
         self.cars.remove(car)
         self._may_arrive.pop(car.name, None)
 
     def leave(self) -> None:
-        """Remove every car that this script spawned, as far as the city still lets it."""
+        """Remove every car that this script spawned, as far as the city allows it."""
         for car in list(self.cars):
             try:
                 car.remove()
@@ -384,8 +389,8 @@ class City:
         return bool(self.disturbances)
 
     def _watch(self, item: Incoming) -> bool:
-        """Note what disturbs the city, as it comes; nothing of it is kept for later."""
-        self._disturbances.hear(item)
+        """Track disturbances as messages arrive; reject the message, so that none is stored."""
+        self._disturbances.receive(item)
         return False
 
     def _is_arrival(self, item: Incoming) -> bool:
@@ -418,12 +423,12 @@ def open_city(
     """Open a city for a script.
 
     Args:
-        map_name: Which map to build in lockstep; ignored live, where the city has its own.
+        map_name: Which map to build in lockstep; ignored live: the city has its own.
         connect: Router of a running city; None: a city of its own, in lockstep.
-        city: Whose keys to use.
+        city: Name of the city on the bus.
         seed: Of all randomness in lockstep.
         credentials: File of an operator, where the running city lets in nobody else; None: the
-            one that `SCM_CREDENTIALS` names, which a city tells the scripts that it runs.
+            one that `SCM_CREDENTIALS` names, as a city sets it for the scripts that it runs.
     """
     if connect is None:
         with _lockstep_city(map_name, city, seed) as lockstep:

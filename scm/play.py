@@ -96,9 +96,9 @@ class _Ear:
     def __init__(self, link: Link, vehicle: str) -> None:
         self._link, self._vehicle, self._heard = link, vehicle, Heard()
         of_car = {"vehicle": vehicle}
-        self._reports = link.hear(Hears(VehicleState, of_car))
-        self._others = [link.hear(Hears(kind, of_car)) for kind in (VehicleSensors, EyePose)]
-        self._others.append(link.hear(Hears(CityEvent)))
+        self._reports = link.subscribe(Hears(VehicleState, of_car))
+        self._others = [link.subscribe(Hears(kind, of_car)) for kind in (VehicleSensors, EyePose)]
+        self._others.append(link.subscribe(Hears(CityEvent)))
 
     def sent(self, command: DriveCommand) -> None:
         self._heard.take(command)
@@ -299,7 +299,7 @@ def _lease(link: Link, vehicle: str, verb: str, epoch: int) -> int:
         {"vehicle": vehicle, "owner": OWNER, "verb": verb, "epoch": epoch, "ttl_ms": LEASE_MS},
         LeaseRequest,
     )
-    reply: Message = link.ask(request)
+    reply: Message = link.request(request)
     if isinstance(reply, LeaseReply):
         return reply.epoch
     why = reply.detail if isinstance(reply, Refused) else type(reply).__name__

@@ -4,7 +4,7 @@ import msgspec
 
 from scm.api.replay import read
 from scm.clock import NS_PER_S
-from scm.disturbances import HEARS, Disturbance, Disturbances
+from scm.disturbances import MESSAGE_KINDS, Disturbance, Disturbances
 from scm.recorder.mcap_file import SchemaTable
 from scm.recorder.run_index import RunIndex
 from scm.v2x.exchange import Incoming
@@ -42,15 +42,15 @@ def disturbances_of(index: RunIndex) -> RecordedDisturbances:
     kinds = {
         key: kind
         for key in index.topics.values()
-        if (kind := schemas.kind_of(key)) is not None and kind in HEARS
+        if (kind := schemas.kind_of(key)) is not None and kind in MESSAGE_KINDS
     }
     for one in index.read(0, index.end_ns, kinds.__contains__):
         message = read(one, kinds[one.key])
         if message is not None:
-            watch.hear(Incoming(message, one.t_ns))
-    watch.look(index.end_ns)
+            watch.receive(Incoming(message, one.t_ns))
+    watch.check_silence(index.end_ns)
     return RecordedDisturbances(
-        disturbances=tuple(_since_begin(one, index) for one in watch.lately(index.begin_ns)),
+        disturbances=tuple(_since_begin(one, index) for one in watch.recent(index.begin_ns)),
         void=watch.void_reasons(index.begin_ns, index.end_ns),
     )
 

@@ -142,8 +142,8 @@ class CityView:
                 taker = self._takers.get(type(incoming.message))
                 if taker is not None:
                     taker(incoming.message, incoming.t_ns)
-                self._disturbances.hear(incoming)
-            self._disturbances.look(now_ns)
+                self._disturbances.receive(incoming)
+            self._disturbances.check_silence(now_ns)
             if now_ns >= self._next_forget_ns:
                 self._next_forget_ns = now_ns + NS_PER_S
                 self._forget(now_ns)

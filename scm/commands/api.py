@@ -14,28 +14,28 @@ if TYPE_CHECKING:
 
 
 def proxy_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add where people find the server behind a proxy, and which proxies are believed."""
+    """Add where people find the server behind a proxy, and which proxies are trusted."""
     parser.add_argument(
         "--base",
         default="",
         metavar="PATH",
-        help="path below which a proxy shows the dashboard, /city; it may take it off or leave it",
+        help="path under which a proxy serves the dashboard, such as /city; it may strip it or not",
     )
     parser.add_argument(
         "--origin",
         action="append",
         default=[],
         metavar="URL",
-        help="https://lab.example: where people find the dashboard, if a proxy calls it by another "
-        "name; without, changes from there are refused unless they carry an API key",
+        help="address at which people open the dashboard, such as https://lab.example, if a proxy "
+        "gives it another name; otherwise changes from there need an API key",
     )
     parser.add_argument(
         "--trust-proxy",
         action="append",
         default=[],
         metavar="ADDRESS",
-        help="a proxy, or a network of them (10.0.0.0/8), whose X-Forwarded-For is believed; "
-        "without, the address that calls is the address that is noted and braked",
+        help="a proxy, or a network of them (10.0.0.0/8), whose X-Forwarded-For is trusted; "
+        "otherwise the address of the connection is logged and rate-limited",
     )
 
 
@@ -46,34 +46,34 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keys",
         metavar="STORE",
-        help="API keys of `scm key add`, sqlite:PATH or postgresql://...: needed to bind any "
-        "address but this machine's own",
+        help="store of API keys from `scm key add`, sqlite:PATH or postgresql://...; required to "
+        "bind any address other than this machine's own",
     )
     proxy_arguments(parser)
     parser.add_argument(
         "--state",
         metavar="STORE",
-        help="the city's state, sqlite:PATH or postgresql://...: its audit log, and which events "
-        "were acknowledged",
+        help="store of the city's state, sqlite:PATH or postgresql://...: the audit log and the "
+        "acknowledged events",
     )
     parser.add_argument(
         "--data",
         metavar="FOLDER",
         type=Path,
-        help="folder of recordings; reports, scenarios, calibrations and plans lie below it",
+        help="folder of recordings, with reports, scenarios, calibrations and plans below it",
     )
     parser.add_argument(
         "--expects",
         action="append",
         default=[],
         metavar="PART",
-        help="a part that should be there: /readyz says which are not",
+        help="a part that should be running; /readyz lists those that are not",
     )
     parser.add_argument(
         "--script-credentials",
         metavar="FILE",
         type=Path,
-        help="who the scripts are that it runs, where the city lets in nobody else: an operator",
+        help="credentials of an operator, for the scripts that it runs in a guarded city",
     )
 
 
@@ -136,21 +136,21 @@ def _run(arguments: argparse.Namespace) -> int:
             site=Site(arguments.base, arguments.origin),
         )
 
-        def hear() -> None:
+        def follow() -> None:
             try:
                 run(view, bus, WallClock(), stop)
             except Exception as failure:  # noqa: BLE001  the edge of a thread; `run` has logged it
                 failures.append(failure)
             finally:
-                stop.set()  # a server that hears nothing any more would show an old city for ever
+                stop.set()  # without messages the server would show an outdated city for ever
 
-        hearing = threading.Thread(target=hear, name="view")
-        hearing.start()
+        follower = threading.Thread(target=follow, name="view")
+        follower.start()
         try:
             serve(app, arguments.host, arguments.port, stop, proxies=arguments.trust_proxy)
         finally:
             stop.set()
-            hearing.join()
+            follower.join()
     return 1 if failures else 0
 
 

@@ -1,4 +1,4 @@
-"""`scm attack`: a car of its own that lies on the air, to try the misbehaviour part on."""
+"""`scm attack`: a car that sends false messages, to test the misbehaviour part."""
 
 import argparse
 import gc
@@ -10,15 +10,21 @@ from scm.v2x.router import DEFAULT_ENDPOINT
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("attack", metavar="NAME", help=", ".join(attack_names()))
-    parser.add_argument("--car", required=True, metavar="STATION", help="its name in the city")
-    parser.add_argument("--map", default="driving_school", help="what it knows of the city")
-    parser.add_argument("--spawn", default="", help="where it comes in; without: anywhere free")
+    parser.add_argument(
+        "--car", required=True, metavar="STATION", help="the car's name in the city"
+    )
+    parser.add_argument(
+        "--map", default="driving_school", help="the city's map, name or file (%(default)s)"
+    )
+    parser.add_argument("--spawn", default="", help="where it enters; default: any free place")
     parser.add_argument(
         "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router (%(default)s)"
     )
     credentials_argument(parser)
     parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the attack (%(default)s)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of the attack's randomness (%(default)s)"
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -37,20 +43,20 @@ def _run(arguments: argparse.Namespace) -> int:
 
     name, attacks = check_name(arguments.car, "--car"), {arguments.car: arguments.attack}
     credentials = credentials_of(arguments, name)
-    say = partial(print, flush=True)
-    say(f"{name} joins the city {arguments.city!r} at {arguments.connect}; Ctrl-C: it leaves")
-    wish, done, clock = stop_on_signal(), threading.Event(), WallClock()
+    report = partial(print, flush=True)
+    report(f"{name} joins the city {arguments.city!r} at {arguments.connect}; Ctrl-C to leave")
+    stop, done, clock = stop_on_signal(), threading.Event(), WallClock()
     with ZenohBus(arguments.city, name, arguments.connect, credentials=credentials) as bus:
         agent = AgentPart(name, "nigel", arguments.spawn, bus.session, arguments.seed)
         city_map = load_map(arguments.map)
-        part = Attacker(agent, attacks, city_map, arguments.seed, say=say)
-        run(Leaving(part, wish, done), bus, clock, done)
+        part = Attacker(agent, attacks, city_map, arguments.seed, say=report)
+        run(Leaving(part, stop, done), bus, clock, done)
     gc.freeze()  # as in `scm.command.run_part`
     return 0
 
 
 COMMAND = Command(
-    help="Join as a car of its own that drives well and lies on the air.",
+    help="Join as a car that drives correctly and sends false messages.",
     example="scm attack zero_speed --car n7 --connect tcp/127.0.0.1:7447",
     arguments=_arguments,
     run=_run,

@@ -1,4 +1,4 @@
-"""`scm demand`: cars come and go as a table says."""
+"""`scm demand`: cars that enter and leave by a demand table."""
 
 import argparse
 import sys
@@ -18,9 +18,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router (%(default)s)"
     )
     credentials_argument(parser)
-    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
     parser.add_argument(
-        "--time", metavar="HH:MM", help="time of day to begin at (that of the first row)"
+        "--time", metavar="HH:MM", help="time of day to start at; default: that of the first row"
     )
 
 
@@ -30,23 +30,24 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.traffic.demand_table import load_demand, seconds_of_day
 
     begin_s = None if arguments.time is None else seconds_of_day(arguments.time, "--time")
-    flows = load_demand(arguments.table, lambda words: print(words, file=sys.stderr, flush=True))
+    flows = load_demand(arguments.table, lambda line: print(line, file=sys.stderr, flush=True))
     city_map = load_map(arguments.map)
     try:
         part = DemandPart(city_map, flows, begin_s)
     except DemandError as error:
         raise DemandError(f"{arguments.table}: {error}") from error
     code = run_part(part, arguments)
-    told = part.status
+    status = part.status
     print(
-        f"{told.wanted} wanted, {told.entered} entered, {told.arrived} arrived, "
-        f"{told.queued} waited at the end (at most {told.longest_queue}), {told.refused} refused"
+        f"{status.wanted} wanted, {status.entered} entered, {status.arrived} arrived, "
+        f"{status.queued} waited at the end (at most {status.longest_queue}), "
+        f"{status.refused} refused"
     )
     return code
 
 
 COMMAND = Command(
-    help="Cars that come, drive and leave as a demand table says.",
+    help="Let cars enter, drive and leave by a demand table.",
     example="scm demand rush.csv driving_school --connect tcp/127.0.0.1:7447",
     arguments=_arguments,
     run=_run,

@@ -64,9 +64,9 @@ def _run(arguments: argparse.Namespace) -> int:
     more.pop(city_map.tag.tag_id)
     station = eye_station(camera.name, first=camera is city_map.cameras[0])
     with state_of(arguments) as state:
-        kept = None
+        stored = None
         if state is not None:
-            kept = record(state, "calibrations", station, camera.name, SightRecord)
+            stored = record(state, "calibrations", station, camera.name, SightRecord)
         part = EyePart(
             city_map,
             camera.name,
@@ -74,7 +74,7 @@ def _run(arguments: argparse.Namespace) -> int:
             source or None,
             lens=lens,
             tags=tuple(more.values()),
-            kept=kept,
+            kept=stored,
         )
         return run_part(part, arguments, state)
 

@@ -49,11 +49,11 @@ def _run(arguments: argparse.Namespace) -> int:
         print(f"  {remark}")
     if form != "scm":
         print("  its covariance is not written: only our own format, .toml, holds it")
-    print(f"written to {arguments.out}, {_SAID[form]}")
+    print(f"written to {arguments.out}, {_DESTINATIONS[form]}")
     return 0
 
 
-_SAID = {"scm": "for `scm eye --calibration`", "ros": "as ROS camera_info",
+_DESTINATIONS = {"scm": "for `scm eye --calibration`", "ros": "as ROS camera_info",
          "opencv": "as OpenCV's FileStorage"}  # fmt: skip
 
 

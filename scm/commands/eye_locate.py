@@ -65,18 +65,18 @@ def _run(arguments: argparse.Namespace) -> int:
     seen = detect_tags(grey, Settings(quad_decimate=1.0))
     if not seen and (cause := cause_of(grey)):
         raise EyeError(f"{arguments.image}: no tag is found: {cause.said}")
-    doubt = None if lens is None else lens.lens_covariance
-    located = locate(camera, tags, seen, doubt)
+    covariance = None if lens is None else lens.lens_covariance
+    located = locate(camera, tags, seen, covariance)
     model = located.places[0].model
     for tag in seen:
         if tag.tag_id in tags:
             off = off_px(model, tags[tag.tag_id], np.array(tag.corners_px))
             left = float((off**2).sum(axis=1).mean()) ** 0.5
-            note = "  left out: not where it was said to be" * (tag.tag_id in located.wrong)
+            note = "  left out: not at its stated place" * (tag.tag_id in located.wrong)
             print(f"# tag {tag.tag_id}: {left:.3f} px off{note}")
-    print("\n".join((*_said(located), *(f"# the lens: {remark}" for remark in remarks))))
+    print("\n".join((*_solution_lines(located), *(f"# the lens: {remark}" for remark in remarks))))
     if lens is None:
-        print("# the lens is taken as exact: with --calibration its doubt is in the numbers below")
+        print("# the lens is assumed exact; with --calibration the numbers include its uncertainty")
     block = _block(located.places[0])
     print(block)
     if arguments.report:
@@ -84,18 +84,18 @@ def _run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _said(located: "Located") -> list[str]:
+def _solution_lines(located: "Located") -> list[str]:
     lines = [
-        f"# solution {'AB'[i]}: {place.rms_px:.3f} px RMS left, leans "
+        f"# solution {'AB'[i]}: {place.rms_px:.3f} px RMS, tilted "
         f"{math.degrees(place.tilt_rad):.2f} deg, weight {place.weight:.3g}"
         for i, place in enumerate(located.places)
     ]
     if len(located.places) == 1:
-        lines.append("# no other camera that looks down sees these tags so")
+        lines.append("# no other pose above the floor explains these tags")
     elif not located.is_sure:
         other = located.places[1].model.camera
         lines.append(
-            "# WARNING: the two cannot be told apart; the other is "
+            "# WARNING: the two solutions are indistinguishable; the other is "
             + ", ".join(
                 f"{name} = {getattr(other, name):.4f}"
                 for name in ("x_m", "y_m", "z_m", "yaw_rad", "tilt_x_rad", "tilt_y_rad")

@@ -73,12 +73,12 @@ def _run(arguments: argparse.Namespace) -> int:
         city_map, arguments.size, arguments.height_m, math.radians(arguments.tilt_deg),
         arguments.focal_px, fisheye=arguments.fisheye,
     )  # fmt: skip
-    taken = {
+    settings = {
         "rate_hz": arguments.rate_hz,
         "noise_sigma": arguments.noise_sigma,
         "rolling_s": arguments.rolling_ms * 1e-3,
     }
-    camera = msgspec.structs.replace(model.camera, **taken)
+    camera = msgspec.structs.replace(model.camera, **settings)
     rng = np.random.default_rng([arguments.seed, *b"traffic"])
     cars = tours(
         city_map, arguments.cars, arguments.speed_mps, arguments.frames / arguments.rate_hz, rng,

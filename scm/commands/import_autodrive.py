@@ -6,7 +6,7 @@ from pathlib import Path
 
 from scm.command import Command
 
-MOST_TOLD = 10
+MAX_PRINTED_LINES = 10
 RADIUS, COUNTS = "wheel.radius_m", "encoder.counts_per_revolution"
 
 
@@ -49,11 +49,15 @@ def _run(arguments: argparse.Namespace) -> int:
         axle_m=radius_m,
     )
     print("\n".join(made.told))
-    for one in made.left_out[:MOST_TOLD]:
+    for one in made.left_out[:MAX_PRINTED_LINES]:
         print(one)
     if made.left_out:
-        told = f", the first {MOST_TOLD} above" if len(made.left_out) > MOST_TOLD else ""
-        print(f"{len(made.left_out)} lines are left out{told}: kept in {arguments.out / LEFT_OUT}")
+        shown = (
+            f", the first {MAX_PRINTED_LINES} above"
+            if len(made.left_out) > MAX_PRINTED_LINES
+            else ""
+        )
+        print(f"{len(made.left_out)} lines are left out{shown}: kept in {arguments.out / LEFT_OUT}")
     print(f"scm replay {arguments.out}")
     return 0
 

@@ -108,8 +108,8 @@ def _report(
         pairs = [f"{edge!r} is {name!r}" for edge, name in made.renamed.items()]
         yield f"  edges under other names here: {_some(pairs)}"
     if city.junctions:
-        kept = sum(junction.plan == OWN for junction in city.junctions)
-        yield f"  the network's signal programs kept at {kept} of {len(city.junctions)} junctions"
+        own = sum(junction.plan == OWN for junction in city.junctions)
+        yield f"  the network's signal programs kept at {own} of {len(city.junctions)} junctions"
     yield from _refusals(why_not)
 
 

@@ -71,12 +71,12 @@ def _run(arguments: argparse.Namespace) -> int:
         if arguments.car is None and arguments.vehicle is None:
             cars, failed = _cars(arguments)
             cars = with_told(cars, arguments.told)
-            said, failed = _of_cars(cars, failed, arguments, out, progress, budget)
+            text, failed = _of_cars(cars, failed, arguments, out, progress, budget)
         else:
-            said, failed = _of_one(arguments, out, progress), ()
+            text, failed = _of_one(arguments, out, progress), ()
     finally:
         progress.close()
-    print(said)
+    print(text)
     for why in failed:
         print(f"scm mismatch: {why}", file=sys.stderr)
     return 0
@@ -114,8 +114,8 @@ def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> s
     progress.tell("writing the report")
     check = _check(arguments, out)
     write(found, out, check)
-    said = summary(found.diagnosis, out, found.evidence.retuned_m)
-    return _with_account(found, said, check)
+    text = summary(found.diagnosis, out, found.evidence.retuned_m)
+    return _with_account(found, text, check)
 
 
 def _of_cars(
@@ -143,8 +143,8 @@ def _of_cars(
         progress.tell("writing the report")
         check = _check(arguments, out, name if failed else "")
         write(found, out, check)
-        said = summary(found.diagnosis, out, found.evidence.retuned_m)
-        return _with_account(found, said, check), failed
+        text = summary(found.diagnosis, out, found.evidence.retuned_m)
+        return _with_account(found, text, check), failed
     several = diagnose_several(
         cars, budget_s=budget_s, strict=strict, tell=progress.tell, turn=progress.turn
     )
@@ -153,8 +153,8 @@ def _of_cars(
     write_all(several, out, lambda name: _check(arguments, out / name, name))
     diagnoses = {name: found.diagnosis for name, found in several.cars.items()}
     read = [f"{name}: {line}" for name, found in several.cars.items() for line in found.account]
-    said = several_summary(diagnoses, several.common, out)
-    return "\n".join((*read, said)), several.failed
+    text = several_summary(diagnoses, several.common, out)
+    return "\n".join((*read, text)), several.failed
 
 
 def _check(arguments: argparse.Namespace, out: Path, vehicle: str = "") -> str:
@@ -170,10 +170,10 @@ def _check(arguments: argparse.Namespace, out: Path, vehicle: str = "") -> str:
     return "" if arguments.told and spanned else shlex.join(words)
 
 
-def _with_account(found: "Found", said: str, check: str) -> str:
+def _with_account(found: "Found", text: str, check: str) -> str:
     """Return the summary between the lines on which rows were read and how to check it."""
     again = (f"  the figures again: {check}",) if check and found.diagnosis.fit else ()
-    return "\n".join((*found.account, said, *again))
+    return "\n".join((*found.account, text, *again))
 
 
 COMMAND = Command(

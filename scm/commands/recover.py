@@ -1,4 +1,4 @@
-"""`scm recover`: mend a recording whose writer was killed."""
+"""`scm recover`: repair a recording whose writer was killed."""
 
 import argparse
 from pathlib import Path
@@ -30,11 +30,11 @@ def _run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _check(broken: Path, mended: Path | None) -> None:
-    """Refuse what is no recording, and to write over a file that somebody named.
+def _check(broken: Path, repaired: Path | None) -> None:
+    """Refuse a file that is not a recording, and an output that exists.
 
     Raises:
-        RecordingError: saying which of both.
+        RecordingError: with the reason.
     """
     if broken.is_file():
         with broken.open("rb") as stream:
@@ -42,13 +42,13 @@ def _check(broken: Path, mended: Path | None) -> None:
         if begin and not MAGIC.startswith(begin):
             msg = f"{broken}: got a file that does not begin as an .mcap, expected one cut off"
             raise RecordingError(msg)
-    if mended is not None and mended.exists() and mended.resolve() != broken.resolve():
-        msg = f"--out: {mended} is there already, expected a new name"
+    if repaired is not None and repaired.exists() and repaired.resolve() != broken.resolve():
+        msg = f"--out: {repaired} already exists, expected a new name"
         raise RecordingError(msg)
 
 
 COMMAND = Command(
-    help="Mend a recording whose writer was killed.",
+    help="Repair a recording whose writer was killed.",
     example="scm recover runs/today.mcap",
     arguments=_arguments,
     run=_run,

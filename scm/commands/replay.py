@@ -124,9 +124,9 @@ def _replayed(
     left_out = "".join(f", {count} left out: {why}" for why, count in run.left_out.items())
     print(f"{path}  {who}car {car.name}: {windows}{left_out},")
     print("free run from the measured state, median and 90th percentile of the error")
-    undone = [f.kind.name for f in car.faults if any(map(f.function_for, POSES))]
-    if undone:
-        print(f"measured poses with {', '.join(undone)} of the car file taken out")
+    corrected = [f.kind.name for f in car.faults if any(map(f.function_for, POSES))]
+    if corrected:
+        print(f"measured poses with {', '.join(corrected)} of the car file taken out")
     print(_table(run, arguments.horizon_s) + "\n")
     return run
 

@@ -41,14 +41,14 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from scm.selftest.harms import harm_city
+    from scm.selftest.city_faults import inject_city_faults
     from scm.selftest.signals import faults_of
 
     if arguments.list:
         print("\n".join(_known()))
         return 0
     if arguments.faults:
-        return harm_city(arguments.map, arguments.fault, print, arguments.out)
+        return inject_city_faults(arguments.map, arguments.fault, print, arguments.out)
     faults_of(arguments.fault)
     if arguments.connect and not (arguments.yes or _agreed(arguments.connect)):
         print("nothing was disturbed")
@@ -59,15 +59,15 @@ def _run(arguments: argparse.Namespace) -> int:
 def _known() -> Iterator[str]:
     """Yield every fault's name and what it is, by the call that injects it."""
     from scm.registry import names
-    from scm.selftest.harms import HARMS
+    from scm.selftest.city_faults import CITY_FAULTS
     from scm.selftest.signals import FAULTS, faults_of
 
     yield "of signals, `scm selftest NAME ...`:"
     for name, fault in zip(names(FAULTS), faults_of(()), strict=True):
         yield f"  {name:<20} {fault.what}"
     yield "of a whole city of its own, `scm selftest --faults NAME ...`:"
-    for name, harms in HARMS.items():
-        yield f"  {name:<20} {(harms.__doc__ or '').partition(chr(10))[0]}"
+    for name, inject in CITY_FAULTS.items():
+        yield f"  {name:<20} {(inject.__doc__ or '').partition(chr(10))[0]}"
 
 
 def _agreed(endpoint: str) -> bool:
@@ -84,7 +84,7 @@ def _test_signals(arguments: argparse.Namespace) -> int:
         outcomes = []
         for outcome in trials.run(arguments.fault):
             outcomes.append(outcome)
-            print(f"  {outcome.what}: {outcome.said or 'nothing'}", flush=True)
+            print(f"  {outcome.what}: {outcome.reported or 'nothing'}", flush=True)
     rows = [outcome.row() for outcome in outcomes]
     print(text_table(HEAD, rows))
     if arguments.out:
@@ -100,7 +100,7 @@ def _trials(arguments: argparse.Namespace) -> "Iterator[SignalTrials]":
     city_map = load_map(arguments.map)
     with ExitStack() as stack:
         if arguments.connect:
-            from scm.selftest.running import send_to_part
+            from scm.selftest.part_process import send_to_part
 
             send = partial(send_to_part, "traffic", arguments.connect)
             facts = arguments.connect, arguments.city

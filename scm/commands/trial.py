@@ -59,20 +59,20 @@ def _table(arguments: argparse.Namespace, out: Path, progress: "Progress") -> li
     from scm.mismatch.trial.blind import by_engine
     from scm.mismatch.trial.reality import Wish
 
-    workers, say = arguments.workers, progress.step
+    workers, report = arguments.workers, progress.step
     if arguments.kept:
         return run.judged_again(out, arguments.trials)
     if arguments.trials:
         only = [name for name in arguments.only.split(",") if name]
         return run.on_shipped_cases(
-            arguments.trials, out, by_engine, only, workers=workers, say=say
+            arguments.trials, out, by_engine, only, workers=workers, say=report
         )
     low, high = arguments.strength
-    wish = Wish(
+    plan = Wish(
         seed=arguments.seed, cases=arguments.cases, kind=arguments.kind,
         engine=arguments.engine, strength=(low, high),
     )  # fmt: skip
-    return run.on_own_cases(wish, out, by_engine, workers=workers, say=say)
+    return run.on_own_cases(plan, out, by_engine, workers=workers, say=report)
 
 
 def _title(arguments: argparse.Namespace) -> str:

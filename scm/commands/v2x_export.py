@@ -1,4 +1,4 @@
-"""`scm v2x export`: what a run's stations said over the radio, for other people's tools."""
+"""`scm v2x export`: the radio messages of a run, for other tools."""
 
 import argparse
 from collections.abc import Container
@@ -31,24 +31,24 @@ def _run(arguments: argparse.Namespace) -> int:
         raise ScmError(msg)
     from scm.recorder.on_air import OnAir, write_json, write_pcap
 
-    said = OnAir(arguments.recording)
+    sent = OnAir(arguments.recording)
     for path, write in ((arguments.pcap, write_pcap), (arguments.json, write_json)):
         if path is not None:
             if not path.parent.is_dir():
                 raise ScmError(f"{path}: cannot be written: no folder {path.parent}")
             with path.open("wb") as stream:
-                count = write(said, stream)
+                count = write(sent, stream)
             without = ("cpm",) if write is write_pcap else ()
-            print(f"{path}: {count} messages ({_counted(said, without)})")
-    if arguments.pcap is not None and said.counts["cpm"]:
-        print(f"{arguments.pcap}: {said.counts['cpm']} CPMs are not in it: they have no UPER here")
-    if said.unreadable:
-        print(f"{arguments.recording}: {said.unreadable} messages cannot be read: left out")
+            print(f"{path}: {count} messages ({_counted(sent, without)})")
+    if arguments.pcap is not None and sent.counts["cpm"]:
+        print(f"{arguments.pcap}: {sent.counts['cpm']} CPMs are not in it: they have no UPER here")
+    if sent.unreadable:
+        print(f"{arguments.recording}: {sent.unreadable} messages cannot be read: left out")
     return 0
 
 
-def _counted(said: "OnAir", without: Container[str]) -> str:
-    counts = sorted(said.counts.items())
+def _counted(sent: "OnAir", without: Container[str]) -> str:
+    counts = sorted(sent.counts.items())
     return ", ".join(f"{count} {kind.upper()}" for kind, count in counts if kind not in without)
 
 

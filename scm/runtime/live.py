@@ -12,7 +12,7 @@ from types import FrameType
 
 import msgspec
 
-from scm.clock import NS_PER_MS, NS_PER_S, Clock, next_beat_ns
+from scm.clock import NS_PER_MS, NS_PER_S, Clock, next_tick_ns
 from scm.errors import LinkError, ScmError
 from scm.log import event
 from scm.runtime.part import Part
@@ -47,7 +47,7 @@ def run(
     """
     with bus:
         keeper = None if state is None else KeeperBehind(state, part.name, bus.session)
-        begin_ns = next_beat_ns(clock.now_ns()) if on_beat else clock.now_ns()
+        begin_ns = next_tick_ns(clock.now_ns()) if on_beat else clock.now_ns()
         loop = _Loop(part, Station(part, bus, keeper), clock, begin_ns)
         try:
             while not clock.wait_until(loop.due_ns, stop):

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from scm.clock import NS_PER_MS, WallClock, seconds
-from scm.disturbances import HEARS, Disturbance, Disturbances
+from scm.disturbances import MESSAGE_KINDS, Disturbance, Disturbances
 from scm.errors import RunError, nearest
 from scm.eye.station import eye_station
 from scm.maps.load import is_scan, load_map
@@ -212,17 +212,17 @@ def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
     clock, heard = WallClock(), Mailbox(1000)
     crew, disturbances = Crew([*_parts(plan), *_agents(plan)], clock, say), Disturbances()
     stop = stop_on_signal()
-    for kind in HEARS:
+    for kind in MESSAGE_KINDS:
         bus.subscribe(kind, {}, heard)
     is_ready, advised = False, set[str]()
     try:
         while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, stop):
             crew.look()
             for item in heard.drain():
-                disturbances.hear(item)
+                disturbances.receive(item)
                 if isinstance(item.message, Presence):
                     crew.heard(item.message)
-            disturbances.look(clock.now_ns())
+            disturbances.check_silence(clock.now_ns())
             for one in disturbances.news():
                 if is_ready:  # parts that start are late, and are not all there
                     _say_disturbance(one, say, advised)

@@ -1,4 +1,4 @@
-"""A city of one's own to disturb: a router and every part as processes that can be hurt."""
+"""A private city for fault injection: a router and every part, each a process of its own."""
 
 import os
 import signal
@@ -29,14 +29,14 @@ ROUTER = "router"
 
 
 class City:
-    """Runs from `with` on until its end; what dies is started again, the router too when told.
+    """A context manager that runs the city and restarts what dies; the router on request.
 
     Attributes:
         endpoint: Of its router.
-        said: What its crew told, line by line.
+        output: The lines that its crew printed.
         port: Of its web address; 0: any.
         folder: Where it records.
-        proxies: Of those who stand behind one, to be stalled and cut.
+        proxies: Of the stations that connect through one, to be stalled and cut.
     """
 
     def __init__(
@@ -62,14 +62,14 @@ class City:
             behind: Those that reach the router through a proxy of their own.
         """
         self.endpoint = free_endpoint()
-        self.said: list[str] = []
+        self.output: list[str] = []
         self.port = port
         self._map, self.folder, self._hosted = map_name, folder, hosted
         self.proxies = {name: FaultyProxy(self.endpoint) for name in behind}
         self._number = 0
         jobs = [job for job in self._jobs() if parts is None or job.name in parts]
         self._crew = Crew(
-            [*jobs, *(self._agent(name) for name in agents)], WallClock(), self.said.append
+            [*jobs, *(self._agent(name) for name in agents)], WallClock(), self.output.append
         )
         self._router: subprocess.Popen[bytes] | None = None
         self._over, self._ready = threading.Event(), threading.Event()
@@ -77,18 +77,18 @@ class City:
 
     @property
     def names(self) -> list[str]:
-        """All processes but the router."""
+        """All processes except the router."""
         return list(self._crew.members)
 
     def pid(self, name: str) -> int:
         """Return the process id of a member, or of the router.
 
         Raises:
-            RunError: when it does not run now.
+            RunError: when it is not running.
         """
         process = self._router if name == ROUTER else self._crew.members[name].process
         if process is None:
-            msg = f"{name}: does not run now"
+            msg = f"{name}: is not running"
             raise RunError(msg)
         return process.pid
 
@@ -97,7 +97,7 @@ class City:
         os.kill(self.pid(name), number)
 
     def start_router(self) -> None:
-        """Start the router, and wait until it lets somebody in."""
+        """Start the router again."""
         self.stop_router()
         program = [sys.executable, "-m", "scm.selftest.router", self.endpoint]
         self._router = subprocess.Popen(with_parent(program), start_new_session=True)
@@ -116,7 +116,7 @@ class City:
         self._thread.start()
         if not self._ready.wait(START_S):
             self.__exit__()
-            msg = "the city did not come up:\n" + "\n".join(self.said)
+            msg = "the city did not come up:\n" + "\n".join(self.output)
             raise RunError(msg)
         return self
 
@@ -129,13 +129,13 @@ class City:
 
     def _keep(self) -> None:
         """Keep all processes alive; the thread that starts them must outlive them."""
-        clock, heard = WallClock(), Mailbox(1000)
+        clock, presence = WallClock(), Mailbox(1000)
         try:
             with self._bus() as bus:
-                bus.subscribe(Presence, {}, heard)
+                bus.subscribe(Presence, {}, presence)
                 while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, self._over):
                     self._crew.look()
-                    for item in heard.drain():
+                    for item in presence.drain():
                         if isinstance(item.message, Presence):
                             self._crew.heard(item.message)
                     if self._crew.settled:

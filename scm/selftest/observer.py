@@ -1,4 +1,4 @@
-"""A station that only listens: everything it hears, when, and what a car would make of it."""
+"""A station that only listens: what it receives, when, and what a car would conclude from it."""
 
 import threading
 from collections.abc import Callable
@@ -32,11 +32,11 @@ M = TypeVar("M", bound=Message)
 
 
 class Observer:
-    """Hears a city; a context manager. All times are of its own clock.
+    """Receives a city's messages; a context manager. All times are on its own clock.
 
     Attributes:
         clock: Its clock.
-        bus: Its connection; for questions too.
+        bus: Its connection; for requests too.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Observer:
         self.clock = WallClock()
         self.bus = ZenohBus(city, name, endpoint, credentials=credentials)
         self._boxes = {kind: Mailbox(DEPTH) for kind in KINDS}
-        self._heard: dict[type[Message], list[Incoming]] = {kind: [] for kind in KINDS}
+        self._received: dict[type[Message], list[Incoming]] = {kind: [] for kind in KINDS}
         self._view = SignalView(city_map)
         self._groups = [(j.name, group.name) for j in city_map.junctions for group in j.groups]
         self._went_ns: dict[str, int] = {}
@@ -66,10 +66,10 @@ class Observer:
         self.bus.close()
 
     def look(self) -> None:
-        """Take in what arrived, and see with a car's eyes which signals it may pass."""
+        """Process what arrived, and note which signals a car could pass now."""
         for kind, box in self._boxes.items():
             for item in box.drain():
-                self._heard[kind].append(item)
+                self._received[kind].append(item)
                 self._show(item)
         now_ns = self.clock.now_ns()
         for junction, group in self._groups:
@@ -83,11 +83,11 @@ class Observer:
             self._view.hear_spatem(item.message.body, item.t_ns)
 
     def went_ns(self, junction: str) -> int:
-        """Return when a car could last have passed a signal of a junction; 0: never."""
+        """Return when a car could last have passed a signal of a junction; 0 if never."""
         return self._went_ns.get(junction, 0)
 
     def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
-        """Listen until something holds; return whether it does."""
+        """Listen until a condition holds; return whether it does."""
         end_ns = self.clock.now_ns() + nanoseconds(timeout_s)
         while True:
             self.look()
@@ -102,21 +102,21 @@ class Observer:
         """Listen for a while."""
         self.wait(lambda: False, span_s)
 
-    def heard(self, kind: type[M], since_ns: int = 0) -> list[tuple[int, M]]:
+    def received(self, kind: type[M], since_ns: int = 0) -> list[tuple[int, M]]:
         """Return (arrival [ns], message) of a class, in order, from a time on."""
         found: list[tuple[int, M]] = []
-        for item in reversed(self._heard[kind]):
+        for item in reversed(self._received[kind]):
             if item.t_ns < since_ns:
                 break
             found.append((item.t_ns, cast("M", item.message)))
         return found[::-1]
 
     def first_ns(self, kind: type[M], since_ns: int, of: Callable[[M], bool]) -> int | None:
-        """Return when the first message of a class arrived that is so; None: none has."""
-        return next((t_ns for t_ns, m in self.heard(kind, since_ns) if of(m)), None)
+        """Return when the first message of a class that matches arrived, or None."""
+        return next((t_ns for t_ns, m in self.received(kind, since_ns) if of(m)), None)
 
-    def ask(self, request: Request, timeout_s: float = 2.0) -> Message | None:
-        """Ask and wait for the answer, still listening; None: none came."""
+    def request(self, request: Request, timeout_s: float = 2.0) -> Message | None:
+        """Send a request and return the reply, or None; messages are received meanwhile."""
         answers: list[Message] = []
         self.bus.call(Call(request, timeout_s), lambda item: answers.append(item.message))
         self.wait(lambda: bool(answers), timeout_s + 1.0)

@@ -10,7 +10,7 @@ from scm.errors import ScmError
 from scm.recorder.mcap_file import read_run
 from scm.recorder.recover import recover
 from scm.selftest.city import ROUTER, City
-from scm.selftest.harm import Harm, Watch
+from scm.selftest.city_fault import FaultOutcome, StreamMonitor
 from scm.v2x.messages.city_event import CityEvent
 
 NOTICED_S = 1.2
@@ -21,95 +21,95 @@ LOST_S = 0.5
 ROOM_BYTES = 200_000
 
 
-def kills(city: City, watch: Watch) -> Iterator[Harm]:
+def kills(city: City, streams: StreamMonitor) -> Iterator[FaultOutcome]:
     """Kill each process in turn, and wait until it is back."""
     for name in city.names:
         recording = city.recording
-        began_ns = watch.observer.clock.now_ns()
+        began_ns = streams.observer.clock.now_ns()
         city.send(name, signal.SIGKILL)
-        gone_ns = watch.wait_gone(name, began_ns, 5.0)
-        back_ns = _back(watch, name, gone_ns or began_ns, RESTARTED_S)
-        watch.observer.listen(3.0)
-        said, missed = _recorded(recording, began_ns) if name == "record" else ("", "")
-        yield Harm(
+        gone_ns = streams.wait_gone(name, began_ns, 5.0)
+        back_ns = _back(streams, name, gone_ns or began_ns, RESTARTED_S)
+        streams.observer.listen(3.0)
+        notes, missed = _recorded(recording, began_ns) if name == "record" else ("", "")
+        yield FaultOutcome(
             what=f"{name} killed",
             noticed_ns=_since(began_ns, gone_ns),
             back_ns=_since(began_ns, back_ns),
-            silence_ns=watch.silence_ns(name, began_ns),
-            lost=watch.lost(began_ns),
-            said=said,
+            silence_ns=streams.silence_ns(name, began_ns),
+            lost=streams.lost(began_ns),
+            notes=notes,
             missed=missed,
         ).short_of(noticed_s=NOTICED_S, back_s=RESTARTED_S)
 
 
-def freezes(city: City, watch: Watch) -> Iterator[Harm]:
+def freezes(city: City, streams: StreamMonitor) -> Iterator[FaultOutcome]:
     """Stop each process for ten seconds, and let it go on."""
     for name in city.names:
-        began_ns = watch.observer.clock.now_ns()
+        began_ns = streams.observer.clock.now_ns()
         city.send(name, signal.SIGSTOP)
-        gone_ns = watch.wait_gone(name, began_ns, FROZEN_S)
-        watch.observer.listen(FROZEN_S - seconds(watch.observer.clock.now_ns() - began_ns))
-        woken_ns = watch.observer.clock.now_ns()
+        gone_ns = streams.wait_gone(name, began_ns, FROZEN_S)
+        streams.observer.listen(FROZEN_S - seconds(streams.observer.clock.now_ns() - began_ns))
+        woken_ns = streams.observer.clock.now_ns()
         city.send(name, signal.SIGCONT)
-        back_ns = _back(watch, name, woken_ns, RESTARTED_S)
-        watch.observer.listen(3.0)
-        yield Harm(
+        back_ns = _back(streams, name, woken_ns, RESTARTED_S)
+        streams.observer.listen(3.0)
+        yield FaultOutcome(
             what=f"{name} frozen for {FROZEN_S:g} s",
             noticed_ns=_since(began_ns, gone_ns),
             back_ns=_since(woken_ns, back_ns),
-            silence_ns=watch.silence_ns(name, began_ns),
-            lost=watch.lost(began_ns),
+            silence_ns=streams.silence_ns(name, began_ns),
+            lost=streams.lost(began_ns),
         ).short_of(noticed_s=NOTICED_S, back_s=RESTARTED_S)
 
 
-def router(city: City, watch: Watch) -> Iterator[Harm]:
+def router(city: City, streams: StreamMonitor) -> Iterator[FaultOutcome]:
     """Kill the router and start it again at once: all streams are back, no event is lost."""
     names = ["traffic", "monitor", "world"]
-    began_ns = watch.observer.clock.now_ns()
+    began_ns = streams.observer.clock.now_ns()
     city.stop_router()
     city.start_router()
-    started_ns = watch.observer.clock.now_ns()
+    started_ns = streams.observer.clock.now_ns()
 
     def all_back_ns() -> int | None:
-        first = [next(iter(watch.arrivals(name, started_ns)), None) for name in names]
+        first = [next(iter(streams.arrivals(name, started_ns)), None) for name in names]
         times = [t_ns for t_ns in first if t_ns is not None]
         return max(times) if len(times) == len(names) else None
 
-    back_ns = watch.wait(all_back_ns, RESTARTED_S)
-    watch.observer.listen(8.0)
-    missed = "" if watch.events_lost(began_ns).startswith("0 ") else "no event lost"
-    yield Harm(
+    back_ns = streams.wait(all_back_ns, RESTARTED_S)
+    streams.observer.listen(8.0)
+    missed = "" if streams.events_lost(began_ns).startswith("0 ") else "no event lost"
+    yield FaultOutcome(
         what=f"{ROUTER} killed and started",
         noticed_ns=0,
         back_ns=_since(began_ns, back_ns),
-        silence_ns=max(watch.silence_ns(name, began_ns) for name in names),
-        lost=watch.lost(began_ns),
+        silence_ns=max(streams.silence_ns(name, began_ns) for name in names),
+        lost=streams.lost(began_ns),
         missed=missed,
     ).short_of(back_s=STREAMS_BACK_S)
 
 
-def full_disk(city: City, watch: Watch) -> Iterator[Harm]:
+def full_disk(city: City, streams: StreamMonitor) -> Iterator[FaultOutcome]:
     """Let the recording's file not grow any more: the recorder says so, and takes a new one."""
     recording = city.recording
     most = recording.stat().st_size + ROOM_BYTES
-    began_ns = watch.observer.clock.now_ns()
+    began_ns = streams.observer.clock.now_ns()
     resource.prlimit(city.pid("record"), resource.RLIMIT_FSIZE, (most, most))
 
-    def told_ns() -> int | None:
-        return watch.observer.first_ns(CityEvent, began_ns, lambda e: e.name == "part_failed")
+    def failure_ns() -> int | None:
+        return streams.observer.first_ns(CityEvent, began_ns, lambda e: e.name == "part_failed")
 
-    failed_ns = watch.wait(told_ns, 60.0)
-    gone_ns = watch.wait(lambda: watch.gone_ns("record", began_ns), 10.0)
-    back_ns = _back(watch, "record", gone_ns or began_ns, RESTARTED_S)
-    watch.observer.listen(3.0)
-    said, missed = _recorded(recording, gone_ns or began_ns)
-    yield Harm(
+    failed_ns = streams.wait(failure_ns, 60.0)
+    gone_ns = streams.wait(lambda: streams.gone_ns("record", began_ns), 10.0)
+    back_ns = _back(streams, "record", gone_ns or began_ns, RESTARTED_S)
+    streams.observer.listen(3.0)
+    notes, missed = _recorded(recording, gone_ns or began_ns)
+    yield FaultOutcome(
         what="disk full under the recorder",
         noticed_ns=None if gone_ns is None or failed_ns is None else max(0, gone_ns - failed_ns),
         back_ns=_since(gone_ns or began_ns, back_ns),
-        silence_ns=watch.silence_ns("record", began_ns),
-        lost=watch.lost(began_ns),
-        said=said,
+        silence_ns=streams.silence_ns("record", began_ns),
+        lost=streams.lost(began_ns),
+        notes=notes,
         missed=missed,
     ).short_of(noticed_s=2.0, back_s=RESTARTED_S)
 
@@ -118,12 +118,12 @@ def _since(began_ns: int, t_ns: int | None) -> int | None:
     return None if t_ns is None else t_ns - began_ns
 
 
-def _back(watch: Watch, name: str, since_ns: int, timeout_s: float) -> int | None:
+def _back(streams: StreamMonitor, name: str, since_ns: int, timeout_s: float) -> int | None:
     """Return when a station was there again and its stream flowed; None: it never did."""
-    came_ns = watch.wait(lambda: watch.came_ns(name, since_ns), timeout_s)
+    came_ns = streams.wait(lambda: streams.came_ns(name, since_ns), timeout_s)
     if came_ns is None:
         return None
-    return watch.wait(lambda: next(iter(watch.arrivals(name, came_ns)), None), timeout_s)
+    return streams.wait(lambda: next(iter(streams.arrivals(name, came_ns)), None), timeout_s)
 
 
 def _recorded(path: Path, until_ns: int) -> tuple[str, str]:
@@ -134,5 +134,5 @@ def _recorded(path: Path, until_ns: int) -> tuple[str, str]:
         return str(cause), "recording recovered"
     last_ns = max(message.t_ns for message in read_run(result.path))
     lost_s = max(0.0, (until_ns - last_ns) / NS_PER_S)
-    said = f"{result.messages} messages recovered, the last {lost_s:.2f} s before the end"
-    return said, "" if lost_s <= LOST_S else f"at most {LOST_S:g} s of the recording lost"
+    notes = f"{result.messages} messages recovered, the last {lost_s:.2f} s before the end"
+    return notes, "" if lost_s <= LOST_S else f"at most {LOST_S:g} s of the recording lost"

@@ -1,4 +1,4 @@
-"""A TCP proxy that delays, stalls, cuts and resets what goes through it, when told."""
+"""A TCP proxy that delays, stalls, cuts and resets the traffic through it, on command."""
 
 import asyncio
 import contextlib
@@ -11,14 +11,14 @@ class FaultyProxy:
     """Stands between a client and a Zenoh endpoint.
 
     Attributes:
-        listen: The endpoint for clients.
-        delay_s: How long each piece takes on its way.
-        stalled: While true nothing goes on, and nothing is lost either.
-        connections: How many came so far.
+        listen: The endpoint that clients connect to.
+        delay_s: Added to each piece of data.
+        stalled: While true nothing passes, and nothing is lost.
+        connections: How many were opened so far.
     """
 
     def __init__(self, endpoint: str) -> None:
-        """Listen at a free port, for what is then carried to an endpoint `tcp/HOST:PORT`."""
+        """Listen at a free port, and forward to an endpoint `tcp/HOST:PORT`."""
         host, _, port = endpoint.removeprefix("tcp/").rpartition(":")
         self._target = (host, int(port))
         self._writers: set[asyncio.StreamWriter] = set()
@@ -57,7 +57,7 @@ class FaultyProxy:
         self._loop.close()
 
     async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        with contextlib.suppress(asyncio.CancelledError):  # else Python 3.11 tells of it loudly
+        with contextlib.suppress(asyncio.CancelledError):  # else Python 3.11 logs it
             await self._pass(reader, writer)
 
     async def _pass(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -90,7 +90,7 @@ class FaultyProxy:
                 await writer.drain()
 
     def __enter__(self) -> "FaultyProxy":
-        """Begin to carry."""
+        """Begin to forward."""
         self._thread.start()
         return self
 

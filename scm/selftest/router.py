@@ -8,7 +8,7 @@ from scm.v2x.router import Router
 
 
 def main(listen: str) -> None:
-    """Route until told to stop."""
+    """Route until a signal to stop arrives."""
     stop, clock = stop_on_signal(), WallClock()
     with Router(listen):
         while not clock.wait_until(clock.now_ns() + NS_PER_S, stop):

@@ -1,10 +1,10 @@
 """Inject each signal fault in turn and measure how long it takes until the signals flash.
 
 A fault of the output is injected by a stand-in while the real controller is stopped; the time
-counts from the first wrong thing shown. Flash is shown when the monitor's verdict is out: every
-car hears it and takes the junction for flashing red, whatever the controller still says. A bar is
-missed when that takes longer than a second, when the monitor calls it something else, or when the
-city does not go on after a person's reset.
+counts from the first wrong thing shown. Flash counts from the monitor's verdict: every
+car receives it and treats the junction as flashing red, whatever the controller still shows. A bar
+is missed when that takes longer than a second, when the monitor reports another fault, or when
+the city does not recover after a person's reset.
 """
 
 import signal
@@ -18,7 +18,7 @@ from scm.errors import RunError
 from scm.records.city_map import CityMap
 from scm.registry import load, names
 from scm.selftest.observer import Observer
-from scm.selftest.signal_fault import Bend, SignalFault
+from scm.selftest.signal_fault import OutputFault, SignalFault
 from scm.selftest.stand_in import StandIn
 from scm.selftest.table import in_ms, in_s
 from scm.traffic.conflict_table import card_of
@@ -30,9 +30,9 @@ FAULTS = "scm.selftest.signal_faults"
 BAR_NS = NS_PER_S
 SHOWN_S = 30.0  # a whole cycle may pass before there is a yellow to cut short
 BACK_S = 30.0
-TAKES_OVER_S = 0.5
-CALM_NS = 600 * NS_PER_MS
-HEAD = ("fault", "monitor said", "flash after", "cars stop after", "goes on after", "")
+HANDOVER_S = 0.5
+STEADY_NS = 600 * NS_PER_MS
+HEAD = ("fault", "monitor reported", "flash after", "cars stop after", "recovered after", "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +40,7 @@ class Outcome:
     """What came of one fault.
 
     Attributes:
-        said: What the monitor called it; empty: nothing.
+        reported: The fault that the monitor reported; empty: none.
         flash_ns: From the fault to the verdict [ns]; None: never.
         red_ns: From the fault to the last moment a car took any signal for green [ns].
         back_ns: From the reset until the plan runs again [ns]; None: never.
@@ -48,7 +48,7 @@ class Outcome:
     """
 
     what: str
-    said: str
+    reported: str
     flash_ns: int | None
     red_ns: int
     back_ns: int | None
@@ -56,9 +56,9 @@ class Outcome:
 
     def row(self) -> tuple[str, ...]:
         """Return its row below `HEAD`."""
-        said, verdict = self.said or "nothing", "ok" if self.ok else "MISSED"
+        reported, verdict = self.reported or "nothing", "ok" if self.ok else "MISSED"
         times = in_ms(self.flash_ns), in_ms(self.red_ns), in_s(self.back_ns)
-        return (self.what, said, *times, verdict)
+        return (self.what, reported, *times, verdict)
 
 
 def faults_of(wanted: Sequence[str]) -> list[SignalFault]:
@@ -80,12 +80,12 @@ class SignalTrials:
         stand_in: Callable[[], StandIn],
         controller: Callable[[signal.Signals], None],
     ) -> None:
-        """Take the city.
+        """Prepare to inject.
 
         Args:
             city_map: Whose first junction is disturbed.
-            observer: Hears it.
-            stand_in: Opens a controller to bend.
+            observer: Receives its messages.
+            stand_in: Opens a controller to output_fault.
             controller: Sends a signal to the real controller's process.
 
         Raises:
@@ -94,7 +94,7 @@ class SignalTrials:
         if not city_map.junctions:
             msg = f"map {city_map.name}: has no signals to test"
             raise RunError(msg)
-        self._card = card_of(city_map, city_map.junctions[0])
+        self._conflict_table = card_of(city_map, city_map.junctions[0])
         self._junction = city_map.junctions[0].name
         self._observer = observer
         self._stand_in = stand_in
@@ -110,59 +110,63 @@ class SignalTrials:
             name: load(FAULTS, name, "FAULT", SignalFault, RunError) for name in names(FAULTS)
         }
         chosen = [load(FAULTS, name, "FAULT", SignalFault, RunError) for name in wanted or faults]
-        if self._settle() is None:
+        if self._recover() is None:
             msg = (
-                f"junction {self._junction}: got no calm signals within {BACK_S:g} s, expected "
-                "their plan and a monitor that believes it before anything is disturbed"
+                f"junction {self._junction}: got no steady signals within {BACK_S:g} s, expected "
+                "their plan and a monitor without a fault before a fault is injected"
             )
             raise RunError(msg)
         for fault in chosen:
             if fault.process is not None:
-                yield self._hurt(fault, fault.process)
-        if any(fault.bends for fault in chosen):
+                yield self._inject_process_fault(fault, fault.process)
+        if any(fault.output for fault in chosen):
             with self._in_its_place() as stand_in:
                 for fault in chosen:
-                    if fault.bends is not None:
-                        yield self._bend(fault, fault.bends(self._card), stand_in)
+                    if fault.output is not None:
+                        yield self._inject_output_fault(
+                            fault, fault.output(self._conflict_table), stand_in
+                        )
 
     @contextmanager
     def _in_its_place(self) -> Iterator[StandIn]:
         self._controller(signal.SIGSTOP)
         try:
             with self._stand_in() as stand_in:
-                self._take_over()
+                self._wait_for_handover()
                 yield stand_in
         finally:
             self._controller(signal.SIGCONT)
-            self._take_over()
+            self._wait_for_handover()
 
-    def _take_over(self) -> None:
-        """Let one controller follow another until nothing of the first is heard of any more."""
-        self._observer.listen(seconds(CALM_NS) + TAKES_OVER_S)
-        self._settle()
+    def _wait_for_handover(self) -> None:
+        """Let one controller follow another until nothing of the first is received of any more."""
+        self._observer.listen(seconds(STEADY_NS) + HANDOVER_S)
+        self._recover()
 
-    def _hurt(self, fault: SignalFault, number: signal.Signals) -> Outcome:
+    def _inject_process_fault(self, fault: SignalFault, number: signal.Signals) -> Outcome:
         began_ns = self._observer.clock.now_ns()
         self._controller(number)
-        said, flash_ns = self._verdict(began_ns)
+        reported, flash_ns = self._verdict(began_ns)
         red_ns = self._red_after(began_ns)
         if number == signal.SIGSTOP:
             self._controller(signal.SIGCONT)
-        return self._outcome(fault, said, flash_ns, red_ns)
+        return self._outcome(fault, reported, flash_ns, red_ns)
 
-    def _bend(self, fault: SignalFault, bend: Bend, stand_in: StandIn) -> Outcome:
+    def _inject_output_fault(
+        self, fault: SignalFault, output_fault: OutputFault, stand_in: StandIn
+    ) -> Outcome:
         part = stand_in.part
-        asked_ns = self._observer.clock.now_ns()
-        part.bent_ns, part.bend = None, bend
-        self._observer.wait(lambda: part.bent_ns is not None, SHOWN_S)
-        began_ns = asked_ns if part.bent_ns is None else part.bent_ns
-        said, flash_ns = self._verdict(began_ns)
+        requested_ns = self._observer.clock.now_ns()
+        part.first_fault_ns, part.output_fault = None, output_fault
+        self._observer.wait(lambda: part.first_fault_ns is not None, SHOWN_S)
+        began_ns = requested_ns if part.first_fault_ns is None else part.first_fault_ns
+        reported, flash_ns = self._verdict(began_ns)
         red_ns = self._red_after(began_ns)
-        part.bend = None
-        return self._outcome(fault, said, flash_ns, red_ns)
+        part.output_fault = None
+        return self._outcome(fault, reported, flash_ns, red_ns)
 
     def _verdict(self, began_ns: int) -> tuple[str, int | None]:
-        """Return what the monitor says, and how long after the fault."""
+        """Return the fault that the monitor reports, and how long after the injection."""
 
         def is_flash(status: MonitorStatus) -> bool:
             return status.junction == self._junction and status.fault is not None
@@ -171,7 +175,7 @@ class SignalTrials:
         observer.wait(
             lambda: observer.first_ns(MonitorStatus, began_ns, is_flash) is not None, SHOWN_S / 6
         )
-        for arrived_ns, status in observer.heard(MonitorStatus, began_ns):
+        for arrived_ns, status in observer.received(MonitorStatus, began_ns):
             if is_flash(status):
                 return status.fault or "", arrived_ns - began_ns
         return "", None
@@ -180,22 +184,29 @@ class SignalTrials:
         self._observer.listen(0.3)
         return max(0, self._observer.went_ns(self._junction) - began_ns)
 
-    def _outcome(self, fault: SignalFault, said: str, flash_ns: int | None, red_ns: int) -> Outcome:
-        back_ns = self._settle()
+    def _outcome(
+        self, fault: SignalFault, reported: str, flash_ns: int | None, red_ns: int
+    ) -> Outcome:
+        back_ns = self._recover()
         in_time = flash_ns is not None and max(flash_ns, red_ns) <= BAR_NS
-        ok = in_time and said in fault.expects and back_ns is not None
+        ok = in_time and reported in fault.expects and back_ns is not None
         return Outcome(
-            what=fault.what, said=said, flash_ns=flash_ns, red_ns=red_ns, back_ns=back_ns, ok=ok
+            what=fault.what,
+            reported=reported,
+            flash_ns=flash_ns,
+            red_ns=red_ns,
+            back_ns=back_ns,
+            ok=ok,
         )
 
-    def _settle(self) -> int | None:
+    def _recover(self) -> int | None:
         """Reset the monitor until the signals run their plan; return how long it took."""
         observer = self._observer
         began_ns = observer.clock.now_ns()
         while observer.clock.now_ns() - began_ns < BACK_S * NS_PER_S:
             if self._is_faulty():
                 self._reset()
-            if observer.wait(self._is_calm, 1.0):
+            if observer.wait(self._is_steady, 1.0):
                 return observer.clock.now_ns() - began_ns
         return None
 
@@ -206,23 +217,25 @@ class SignalTrials:
             reason="the injected fault is over",
             request_id=uuid.uuid4().hex,
         )
-        self._observer.ask(reset)
+        self._observer.request(reset)
         self._observer.listen(0.2)
 
     def _is_faulty(self) -> bool:
-        told = self._observer.heard(MonitorStatus)
-        return any(s.fault is not None for _, s in told[-8:] if s.junction == self._junction)
+        statuses = self._observer.received(MonitorStatus)
+        return any(s.fault is not None for _, s in statuses[-8:] if s.junction == self._junction)
 
-    def _is_calm(self) -> bool:
-        """Say whether the plan has run for a while, the monitor believes it, and both is news."""
-        since_ns = self._observer.clock.now_ns() - CALM_NS
-        shown = [s for _, s in self._observer.heard(Spat, since_ns) if s.junction == self._junction]
-        told = [
+    def _is_steady(self) -> bool:
+        """Return whether plan and monitor have been fault-free for a while, by recent messages."""
+        since_ns = self._observer.clock.now_ns() - STEADY_NS
+        shown = [
+            s for _, s in self._observer.received(Spat, since_ns) if s.junction == self._junction
+        ]
+        statuses = [
             s
-            for _, s in self._observer.heard(MonitorStatus, since_ns)
+            for _, s in self._observer.received(MonitorStatus, since_ns)
             if s.junction == self._junction
         ]
         runs = len(shown) >= 3 and all(spat.mode == "plan" for spat in shown)
-        believed = bool(told) and all(status.fault is None for status in told)
-        # A busy observer may hear what is long past, and a busy monitor judge it.
-        return runs and believed and min(shown[-1].t_ns, told[-1].t_ns) > since_ns
+        no_fault = bool(statuses) and all(status.fault is None for status in statuses)
+        # A busy observer may receive old messages, and a busy monitor judge them.
+        return runs and no_fault and min(shown[-1].t_ns, statuses[-1].t_ns) > since_ns

@@ -126,14 +126,14 @@ class PostgresStore:
         """Begin a transaction; nothing has happened yet, so a broken connection may be replaced."""
         with self._errors():
             try:
-                return self._take_turn(self._connected())
+                return self._begin_exclusive(self._connected())
             except psycopg.OperationalError:
                 if self._connection is None or not self._connection.closed:
                     raise
-                return self._take_turn(self._connected())
+                return self._begin_exclusive(self._connected())
 
     @staticmethod
-    def _take_turn(connection: "psycopg.Connection[Any]") -> "psycopg.Connection[Any]":
+    def _begin_exclusive(connection: "psycopg.Connection[Any]") -> "psycopg.Connection[Any]":
         try:
             connection.execute("BEGIN")
             connection.execute("SELECT pg_advisory_xact_lock(%s)", [_TURN])

@@ -33,9 +33,9 @@ def world(time_s, lost_s):
 def heard(*messages, look_s=None):
     watch = Disturbances()
     for message, time_s in messages:
-        watch.hear(Incoming(message, ns(time_s)))
+        watch.receive(Incoming(message, ns(time_s)))
     if look_s is not None:
-        watch.look(ns(look_s))
+        watch.check_silence(ns(look_s))
     return watch
 
 
@@ -77,7 +77,7 @@ def test_a_latched_monitor_is_named_until_it_is_reset():
     said = "the monitor of crossing reports stale: no signal phase for 536 ms"
     assert texts(watch) == [said]
     assert watch.void_reasons(0, ns(10)) == (f"{said} for 7.0 of 10.0 s",)
-    watch.hear(Incoming(MonitorStatus(t_ns=ns(5), fault=None, **status), ns(5)))
+    watch.receive(Incoming(MonitorStatus(t_ns=ns(5), fault=None, **status), ns(5)))
     assert texts(watch) == []
     assert watch.void_reasons(0, ns(10)) == (f"{said} for 2.0 of 10.0 s",)
 
@@ -97,7 +97,7 @@ def test_a_lost_part_is_lost_until_one_of_its_name_is_there():
     gone = (presence("a", alive=False), 3)
     watch = heard((presence("a", alive=True), 0), gone)
     assert texts(watch) == ["the part traffic is gone"]
-    watch.hear(Incoming(presence("b", alive=True), ns(5)))
+    watch.receive(Incoming(presence("b", alive=True), ns(5)))
     assert texts(watch) == []
     assert watch.void_reasons(ns(1), ns(4)) == ("the part traffic is gone for 1.0 of 3.0 s",)
     both = heard((presence("a", alive=True), 0), (presence("b", alive=True), 1), gone)
@@ -115,7 +115,7 @@ def test_a_world_that_is_late_voids_by_how_much_of_the_trip_was_lost():
     assert why == "this computer did not simulate 0.4 of 10.0 s"
     assert watch.void_reasons(ns(2), ns(10)) == ()
     assert watch.void_reasons(ns(2), ns(52)) == ()  # 0.8 % of it
-    watch.hear(Incoming(world(13, 0.6), ns(13)))
+    watch.receive(Incoming(world(13, 0.6), ns(13)))
     assert texts(watch) == [
         "this computer is too slow for 6 cars: it simulates 0.80 s of each second"
     ]
@@ -124,12 +124,12 @@ def test_a_world_that_is_late_voids_by_how_much_of_the_trip_was_lost():
     assert "`scm up --without eye,camera,record`" in advice
     assert watch.now()[0].start_ns == ns(10)
     for t in range(14, 18):
-        watch.hear(Incoming(world(t, 0.6), ns(t)))
+        watch.receive(Incoming(world(t, 0.6), ns(t)))
     assert len(watch.now()) == 1
-    watch.hear(Incoming(world(18, 0.6), ns(18)))
+    watch.receive(Incoming(world(18, 0.6), ns(18)))
     assert watch.now() == ()
-    assert watch.lately(ns(12))[0].end_ns == ns(13)
-    assert watch.lately(ns(14)) == ()
+    assert watch.recent(ns(12))[0].end_ns == ns(13)
+    assert watch.recent(ns(14)) == ()
 
 
 def test_another_world_counts_what_it_lost_from_nought():
@@ -169,7 +169,7 @@ def test_a_script_cannot_read_a_travel_time_of_flashing_signals_by_mistake(locks
         _ = spoilt.travel_time_s
     assert spoilt.duration_s > 1.0
     city.use_plan("calm")
-    city.wait_for_calm(30.0)
+    city.wait_until_undisturbed(30.0)
     assert city.disturbances == ()
     again = car.drive("west_loop", "east_loop")
     city.wait([again])

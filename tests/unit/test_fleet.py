@@ -89,7 +89,7 @@ def test_a_city_that_does_not_run_is_told_within_seconds() -> None:
 @pytest.fixture
 def live(monkeypatch: pytest.MonkeyPatch) -> Iterator[Router]:
     """A router with a world that runs."""
-    monkeypatch.setattr("scm.fleet.ASK_S", 120.0)
+    monkeypatch.setattr("scm.fleet.REPLY_TIMEOUT_S", 120.0)
     world = WorldPart(load_map("driving_school"))
     stop = threading.Event()
     with Router(free_endpoint()) as router, ZenohBus("city", "world", router.listen) as bus:

@@ -83,15 +83,15 @@ def test_where_the_servo_stood_before_the_drive_is_recorded_too(link, tmp_path):
 
 
 class Through(LockstepLink):
-    """A link that hears into mailboxes of a test's own."""
+    """A link that receives into mailboxes of a test's own."""
 
     def __init__(self, lockstep, mailbox):
         super().__init__(lockstep)
         self.bus, self.mailbox = lockstep.bus, mailbox
 
-    def hear(self, hears):
+    def subscribe(self, subscription):
         box = self.mailbox()
-        self.bus.subscribe(hears.kind, hears.where, box)
+        self.bus.subscribe(subscription.kind, subscription.where, box)
         return box
 
 

@@ -31,7 +31,7 @@ def test_a_file_that_is_there_is_not_written_over(tmp_path, capsys):
     other.write_bytes(b"precious")
     code, text = said(capsys, cut, "--out", other)
     assert code != 0
-    assert "other.mcap is there already, expected a new name" in text
+    assert "other.mcap already exists, expected a new name" in text
     assert other.read_bytes() == b"precious"
 
 

@@ -29,7 +29,7 @@ def router(city: City) -> APIRouter:
     )
     async def disturbances() -> Response:
         picture = city.view.picture()
-        lately = picture.disturbances.lately(picture.now_ns - SHOWN_NS)
+        lately = picture.disturbances.recent(picture.now_ns - SHOWN_NS)
         return json_response(DisturbanceList(disturbances=lately))
 
     return routes

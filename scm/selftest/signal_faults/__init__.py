@@ -1,1 +1,1 @@
-"""What can be wrong with signals: one module a fault, its constant is `FAULT`."""
+"""Ways in which signals can fail: one module per fault, with a constant `FAULT`."""

@@ -3,20 +3,20 @@
 import msgspec
 
 from scm.clock import NS_PER_S
-from scm.selftest.signal_fault import Bend, SignalFault
+from scm.selftest.signal_fault import OutputFault, SignalFault
 from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 JUMP_NS = 2 * NS_PER_S
 
 
-def _bends(card: Card) -> Bend:
-    del card
+def _output_fault(table: Card) -> OutputFault:
+    del table
 
-    def bend(spat: Spat) -> Spat:
+    def output_fault(spat: Spat) -> Spat:
         return msgspec.structs.replace(spat, t_ns=spat.t_ns + JUMP_NS)
 
-    return bend
+    return output_fault
 
 
-FAULT = SignalFault(what="clock jumps forward", expects=("clock_jump",), bends=_bends)
+FAULT = SignalFault(what="clock jumps forward", expects=("clock_jump",), output=_output_fault)

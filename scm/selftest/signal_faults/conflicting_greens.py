@@ -1,20 +1,27 @@
-"""Two that would collide both have green, and keep it."""
+"""Two conflicting groups turn green and stay green."""
 
-from scm.selftest.signal_fault import Bend, SignalFault, long_green, recolour, rivals
+from scm.selftest.signal_fault import (
+    OutputFault,
+    SignalFault,
+    conflicting_groups,
+    long_green,
+    recolour,
+)
 from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Colour, Spat
 
 
-def _bends(card: Card) -> Bend:
+def _output_fault(table: Card) -> OutputFault:
     stuck: dict[str, Colour] = {}
 
-    def bend(spat: Spat) -> Spat:
+    def output_fault(spat: Spat) -> Spat:
         green = None if stuck else long_green(spat)
         if green is not None:
-            stuck.update({green.group: "green", rivals(card, green.group)[0]: "green"})
+            other = conflicting_groups(table, green.group)[0]
+            stuck.update({green.group: "green", other: "green"})
         return recolour(spat, stuck)
 
-    return bend
+    return output_fault
 
 
-FAULT = SignalFault(what="conflicting greens", expects=("conflict",), bends=_bends)
+FAULT = SignalFault(what="conflicting greens", expects=("conflict",), output=_output_fault)

@@ -2,18 +2,18 @@
 
 import msgspec
 
-from scm.selftest.signal_fault import Bend, SignalFault
+from scm.selftest.signal_fault import OutputFault, SignalFault
 from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 
-def _bends(card: Card) -> Bend:
-    def bend(spat: Spat) -> Spat:
-        red = [g for g in spat.groups if g.colour == "red" and g.group == card.groups[0].name]
+def _output_fault(table: Card) -> OutputFault:
+    def output_fault(spat: Spat) -> Spat:
+        red = [g for g in spat.groups if g.colour == "red" and g.group == table.groups[0].name]
         twice = tuple(msgspec.structs.replace(group, colour="yellow") for group in red)
         return msgspec.structs.replace(spat, groups=spat.groups + twice)
 
-    return bend
+    return output_fault
 
 
-FAULT = SignalFault(what="dual indication", expects=("dual",), bends=_bends)
+FAULT = SignalFault(what="dual indication", expects=("dual",), output=_output_fault)

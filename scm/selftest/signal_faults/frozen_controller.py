@@ -1,4 +1,4 @@
-"""The controller's process stops in the middle of whatever it did."""
+"""The controller's process stops at an arbitrary point."""
 
 from signal import SIGSTOP
 

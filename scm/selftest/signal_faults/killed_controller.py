@@ -1,4 +1,4 @@
-"""The controller's process is gone at once."""
+"""The controller's process is killed."""
 
 from signal import SIGKILL
 

@@ -5,5 +5,5 @@ from scm.selftest.signal_fault import SignalFault, cut_short
 FAULT = SignalFault(
     what="short green",
     expects=("short_green",),
-    bends=cut_short("green", "yellow", after_ms=300),
+    output=cut_short("green", "yellow", after_ms=300),
 )

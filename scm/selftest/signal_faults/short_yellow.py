@@ -5,5 +5,5 @@ from scm.selftest.signal_fault import SignalFault, cut_short
 FAULT = SignalFault(
     what="short yellow",
     expects=("short_yellow",),
-    bends=cut_short("yellow", "red", after_ms=100),
+    output=cut_short("yellow", "red", after_ms=100),
 )

@@ -1,18 +1,18 @@
-"""The controller runs, but nothing it shows arrives."""
+"""The controller runs, but none of its output arrives."""
 
-from scm.selftest.signal_fault import Bend, SignalFault
+from scm.selftest.signal_fault import OutputFault, SignalFault
 from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 
-def _bends(card: Card) -> Bend:
-    del card
+def _output_fault(table: Card) -> OutputFault:
+    del table
 
-    def bend(spat: Spat) -> Spat | None:
+    def output_fault(spat: Spat) -> Spat | None:
         del spat
         return None
 
-    return bend
+    return output_fault
 
 
-FAULT = SignalFault(what="silent output", expects=("stale", "overload"), bends=_bends)
+FAULT = SignalFault(what="silent output", expects=("stale", "overload"), output=_output_fault)

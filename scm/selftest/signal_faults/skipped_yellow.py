@@ -5,5 +5,5 @@ from scm.selftest.signal_fault import SignalFault, cut_short
 FAULT = SignalFault(
     what="skipped yellow",
     expects=("skipped_yellow",),
-    bends=cut_short("yellow", "red", after_ms=0),
+    output=cut_short("yellow", "red", after_ms=0),
 )

@@ -1,19 +1,21 @@
-"""The same old sample is shown again and again."""
+"""The same old sample is sent again and again."""
 
-from scm.selftest.signal_fault import Bend, SignalFault
+from scm.selftest.signal_fault import OutputFault, SignalFault
 from scm.traffic.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 
-def _bends(card: Card) -> Bend:
-    del card
+def _output_fault(table: Card) -> OutputFault:
+    del table
     first: list[Spat] = []
 
-    def bend(spat: Spat) -> Spat:
+    def output_fault(spat: Spat) -> Spat:
         first.append(spat)
         return first[0]
 
-    return bend
+    return output_fault
 
 
-FAULT = SignalFault(what="stale output, sent again", expects=("stale", "overload"), bends=_bends)
+FAULT = SignalFault(
+    what="stale output, sent again", expects=("stale", "overload"), output=_output_fault
+)

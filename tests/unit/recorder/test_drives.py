@@ -74,7 +74,7 @@ def hand_driven(path: Path, own_s: float, by_hand_s: float) -> Path:
         rows = [(t, 0.25, 0.2 * math.sin(2.0 * t)) for t in turns]
         link = LockstepLink(city)
         play(link, "n1", [*rows, (by_hand_s, 0.0, 0.0)])
-        link.ask(RouteRequest(vehicle="n1"))
+        link.request(RouteRequest(vehicle="n1"))
         city.run_for(0.5 * own_s)
     return path
 

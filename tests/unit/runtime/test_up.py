@@ -7,7 +7,7 @@ import pytest
 
 from scm.__main__ import parse
 from scm.commands.up import wanted_of
-from scm.disturbances import COSTLY, Disturbance
+from scm.disturbances import OPTIONAL_PARTS, Disturbance
 from scm.errors import MapError, RunError, ScmError
 from scm.runtime.up import OPTIONAL, Wanted, _parts, _say_disturbance, _settled, run_city
 from scm.v2x.router import Router, free_endpoint
@@ -97,7 +97,7 @@ def test_parts_may_be_left_out_and_the_server_knows_which_should_be_there(tmp_pa
     assert parse(jobs[-1].command()[3:]).expects == there
     whole = {job.name for job in _parts(_settled(wanted_of(parse(words))))}
     assert whole >= {"eye", "record"}
-    assert set(OPTIONAL) >= set(COSTLY)
+    assert set(OPTIONAL) >= set(OPTIONAL_PARTS)
 
 
 @pytest.mark.parametrize(

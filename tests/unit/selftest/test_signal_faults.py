@@ -7,7 +7,7 @@ from scm.maps.load import load_map
 from scm.registry import load, names
 from scm.selftest.signal_fault import SignalFault
 from scm.selftest.signals import FAULTS, Outcome
-from scm.selftest.stand_in import BentTraffic
+from scm.selftest.stand_in import FaultyTraffic
 from scm.selftest.table import markdown_table, text_table
 from scm.traffic.conflict_table import card_of
 from scm.traffic.monitor import Monitor
@@ -26,56 +26,56 @@ def fault_of(name):
     return load(FAULTS, name, "FAULT", SignalFault)
 
 
-BENT = [name for name in names(FAULTS) if fault_of(name).bends is not None]
+WITH_OUTPUT_FAULT = [name for name in names(FAULTS) if fault_of(name).output is not None]
 
 
-def drive(bend, monitor, until_ns=LONG_NS):
-    """Run a bent controller under a monitor; return when it was first wrong, and when found."""
-    part = BentTraffic(CITY, JUNCTION.name)
+def drive(output_fault, monitor, until_ns=LONG_NS):
+    """Run a faulty controller under a monitor; return when it was first wrong, and when found."""
+    part = FaultyTraffic(CITY, JUNCTION.name)
     for t_ns in range(0, until_ns, STEP_NS):
         if t_ns == WARM_NS:
-            part.bend = bend
+            part.output_fault = output_fault
         for item in part.step(t_ns, []):
             if isinstance(item, Spat):
                 monitor.see(item, t_ns)
         monitor.tick(t_ns)
         if monitor.fault is not None:
-            return part.bent_ns, t_ns
-    return part.bent_ns, None
+            return part.first_fault_ns, t_ns
+    return part.first_fault_ns, None
 
 
-@pytest.mark.parametrize("name", BENT)
+@pytest.mark.parametrize("name", WITH_OUTPUT_FAULT)
 def test_it_is_found_by_its_name_within_a_second(name):
     fault, monitor = fault_of(name), Monitor(CARD, 0)
-    bent_ns, found_ns = drive(fault.bends(CARD), monitor)
+    first_fault_ns, found_ns = drive(fault.output(CARD), monitor)
     assert monitor.fault in fault.expects
-    assert found_ns - bent_ns <= NS_PER_S
+    assert found_ns - first_fault_ns <= NS_PER_S
 
 
-def test_an_unbent_controller_is_believed():
+def test_a_controller_without_a_fault_raises_no_alarm():
     monitor = Monitor(CARD, 0)
     assert drive(None, monitor) == (None, None)
 
 
-def test_flash_is_shown_unbent():
-    part = BentTraffic(CITY, JUNCTION.name)
-    part.bend = lambda spat: None
+def test_flash_is_never_corrupted():
+    part = FaultyTraffic(CITY, JUNCTION.name)
+    part.output_fault = lambda spat: None
     verdict = MonitorStatus(junction=JUNCTION.name, t_ns=0, fault="conflict", since_ns=0)
     shown = part.step(0, [Incoming(verdict, 0)]) + part.step(STEP_NS, [])
     flashing = [item for item in shown if isinstance(item, Spat)][-1]
     assert {group.colour for group in flashing.groups} == {"flashing_red"}
 
 
-def test_every_fault_says_what_it_is_and_how_it_is_injected():
+def test_every_fault_has_a_description_and_one_way_of_injection():
     for name in names(FAULTS):
         fault = fault_of(name)
         assert fault.what
         assert fault.expects
-        assert (fault.bends is None) != (fault.process is None)
+        assert (fault.output is None) != (fault.process is None)
 
 
 def test_a_missed_bar_stands_in_both_tables():
-    missed = Outcome(what="x", said="", flash_ns=None, red_ns=0, back_ns=None, ok=False)
+    missed = Outcome(what="x", reported="", flash_ns=None, red_ns=0, back_ns=None, ok=False)
     head = ("a", "b", "c", "d", "e", "f")
     for table in (text_table(head, [missed.row()]), markdown_table(head, [missed.row()])):
         assert "nothing" in table

@@ -21,7 +21,7 @@ WARM_S = 12.0
 
 
 class Freezing:
-    """A controller whose process can be stopped, and told to go on."""
+    """A controller whose process can be stopped and continued."""
 
     def __init__(self):
         self._real = TrafficPart(CITY, "brisk")
@@ -43,7 +43,7 @@ class Freezing:
         return self._real.finish(now_ns)
 
 
-class Ears:
+class LockstepObserver:
     """What an observer offers, in a city's own time; `late_s`: how long verdicts take."""
 
     def __init__(self, city, late_s=0.0):
@@ -51,14 +51,14 @@ class Ears:
         self._boxes = {kind: city.hear(Hears(kind)) for kind in (Spat, MonitorStatus)}
         self._all = {kind: [] for kind in self._boxes}
 
-    def heard(self, kind, since_ns=0):
+    def received(self, kind, since_ns=0):
         self._all[kind] += self._boxes[kind].drain()
         late_ns = self._late_ns if kind is MonitorStatus else 0
         came = [(item.t_ns + late_ns, item.message) for item in self._all[kind]]
         return [one for one in came if since_ns <= one[0] <= self.clock.now_ns()]
 
     def first_ns(self, kind, since_ns, of):
-        return next((t_ns for t_ns, message in self.heard(kind, since_ns) if of(message)), None)
+        return next((t_ns for t_ns, message in self.received(kind, since_ns) if of(message)), None)
 
     def listen(self, span_s):
         self._city.run_for(span_s)
@@ -71,7 +71,7 @@ class Ears:
             self.listen(LOOK_S)
         return True
 
-    def ask(self, request):
+    def request(self, request):
         return self._city.call(request)
 
     def went_ns(self, junction):
@@ -91,7 +91,7 @@ def city(traffic):
 
 
 def frozen(city, traffic, late_s=0.0):
-    trials = SignalTrials(CITY, Ears(city, late_s), lambda: None, traffic.send)
+    trials = SignalTrials(CITY, LockstepObserver(city, late_s), lambda: None, traffic.send)
     (outcome,) = trials.run(["frozen_controller"])
     return outcome
 
@@ -100,17 +100,17 @@ def test_a_frozen_controller_is_found_whenever_it_freezes_and_goes_on(city, traf
     for part_of_a_step in range(10):
         city.run_for(0.1 + 0.013 * part_of_a_step)
         outcome = frozen(city, traffic)
-        assert (outcome.said, outcome.ok) == ("stale", True)
+        assert (outcome.reported, outcome.ok) == ("stale", True)
         assert 450 * NS_PER_MS < outcome.flash_ns <= NS_PER_S
 
 
 def test_signals_that_do_not_run_are_not_tested(city, traffic):
     traffic.send(signal.SIGSTOP)
-    with pytest.raises(RunError, match="crossing: got no calm signals within 30 s"):
+    with pytest.raises(RunError, match="crossing: got no steady signals within 30 s"):
         frozen(city, traffic)
 
 
-def test_who_hears_verdicts_of_long_ago_begins_no_trial(city, traffic):
+def test_an_observer_that_receives_old_verdicts_begins_no_trial(city, traffic):
     assert frozen(city, traffic, late_s=0.05).ok
-    with pytest.raises(RunError, match="no calm signals"):
+    with pytest.raises(RunError, match="no steady signals"):
         frozen(city, traffic, late_s=2.0)

@@ -1,4 +1,4 @@
-"""The processes of a city that somebody else started on this machine."""
+"""The processes of a city that runs on this machine already."""
 
 import os
 from pathlib import Path

@@ -1,7 +1,7 @@
-"""Measure what a harm does to a living city: who notices, who comes back when, what is lost.
+"""Measure what a fault does to a running city: who notices, when it is back, what is lost.
 
-One harm at a time. A talker sends numbered events all along; every signal phase and every snapshot
-is numbered by its sender, so that what is missing can be counted.
+One fault at a time. A talker sends numbered events throughout; senders number every signal phase
+and snapshot, so that losses can be counted.
 """
 
 import threading
@@ -24,7 +24,7 @@ from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 TALK_NS = 200 * NS_PER_MS
-HEAD = ("harm", "noticed after", "back after", "longest silence", "lost", "said", "")
+HEAD = ("fault", "noticed after", "back after", "longest silence", "lost", "notes", "")
 OWN: dict[str, type[Message]] = {
     "traffic": Spat,
     "monitor": MonitorStatus,
@@ -33,15 +33,15 @@ OWN: dict[str, type[Message]] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Harm:
-    """What came of one harm.
+class FaultOutcome:
+    """What one fault did to the city.
 
     Attributes:
-        noticed_ns: From the harm until the city was told; None: never.
-        back_ns: From the end of the harm until its stream came again; None: never.
+        noticed_ns: From the fault until the city was informed; None: never.
+        back_ns: From the end of the fault until its stream was back; None: never.
         silence_ns: The longest time without a sample of that stream.
         lost: What of signal phases, snapshots and events never arrived.
-        said: More that a person should know.
+        notes: Further facts for a person.
         missed: Which bar was missed; empty: none.
     """
 
@@ -50,16 +50,18 @@ class Harm:
     back_ns: int | None = None
     silence_ns: int = 0
     lost: str = ""
-    said: str = ""
+    notes: str = ""
     missed: str = ""
 
     def row(self) -> tuple[str, ...]:
         """Return its row below `HEAD`."""
         times = in_ms(self.noticed_ns), in_s(self.back_ns), in_s(self.silence_ns)
         verdict = f"MISSED: {self.missed}" if self.missed else "ok"
-        return (self.what, *times, self.lost, self.said, verdict)
+        return (self.what, *times, self.lost, self.notes, verdict)
 
-    def short_of(self, noticed_s: float | None = None, back_s: float | None = None) -> "Harm":
+    def short_of(
+        self, noticed_s: float | None = None, back_s: float | None = None
+    ) -> "FaultOutcome":
         """Return it with the bars it missed."""
         missed = [self.missed] if self.missed else []
         for name, got_ns, bar_s in (
@@ -109,8 +111,8 @@ class Talker:
         self._bus.close()
 
 
-class Watch:
-    """Counts and times what happens to a city's streams."""
+class StreamMonitor:
+    """Counts and times the samples of a city's streams."""
 
     def __init__(self, observer: Observer, talker: Talker, agents: Sequence[str]) -> None:
         self.observer = observer
@@ -121,25 +123,25 @@ class Watch:
         """Return when samples of the stream that a process is for came, from a time on [ns]."""
         observer = self.observer
         if name in self._agents:
-            heard = observer.heard(VehicleState, since_ns)
-            return [t_ns for t_ns, state in heard if state.vehicle == name]
+            received = observer.received(VehicleState, since_ns)
+            return [t_ns for t_ns, state in received if state.vehicle == name]
         if name in OWN:
-            return [t_ns for t_ns, _ in observer.heard(OWN[name], since_ns)]
-        status = observer.heard(PartStatus, since_ns)
+            return [t_ns for t_ns, _ in observer.received(OWN[name], since_ns)]
+        status = observer.received(PartStatus, since_ns)
         return [t_ns for t_ns, vital in status if vital.station == name]
 
     def gone_ns(self, name: str, since_ns: int) -> int | None:
-        """Return when a station's end was told; None: not yet."""
+        """Return when a station was reported gone; None: not yet."""
         return self.observer.first_ns(
             Presence, since_ns, lambda one: one.station == name and not one.alive
         )
 
     def wait_gone(self, name: str, since_ns: int, timeout_s: float) -> int | None:
-        """Listen until a station's end is told; return when, or None when it never was."""
+        """Listen until a station is reported gone; return when, or None when it never was."""
         return self.wait(lambda: self.gone_ns(name, since_ns), timeout_s)
 
     def came_ns(self, name: str, since_ns: int) -> int | None:
-        """Return when a station was told to be there; None: not yet."""
+        """Return when a station was reported present; None: not yet."""
         return self.observer.first_ns(
             Presence, since_ns, lambda one: one.station == name and one.alive
         )
@@ -154,15 +156,15 @@ class Watch:
         observer = self.observer
         observer.look()
         before_ns = since_ns - NS_PER_S
-        phases = _missing([m.seq for _, m in observer.heard(Spat, before_ns)])
-        ticks = _missing([m.tick for _, m in observer.heard(WorldSnapshot, before_ns)])
+        phases = _missing([m.seq for _, m in observer.received(Spat, before_ns)])
+        ticks = _missing([m.tick for _, m in observer.received(WorldSnapshot, before_ns)])
         return f"{phases} phases, {ticks} snapshots, {self.events_lost(since_ns)}"
 
     def events_lost(self, since_ns: int) -> str:
         """Return how many of the talker's events never came, in words."""
-        heard = self.observer.heard(CityEvent, since_ns)
-        told = [m.text for _, m in heard if m.source == "talker" and m.name == "talk"]
-        got = {int(text) for text in told if text.isascii() and text.isdecimal()}
+        received = self.observer.received(CityEvent, since_ns)
+        texts = [m.text for _, m in received if m.source == "talker" and m.name == "talk"]
+        got = {int(text) for text in texts if text.isascii() and text.isdecimal()}
         now_ns = self.observer.clock.now_ns()
         sent = {
             number

@@ -1,4 +1,4 @@
-"""All harms that are done to a whole city, and the run that does them one after the other."""
+"""All faults of a whole city, and the run that injects them one after the other."""
 
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -8,16 +8,16 @@ from pathlib import Path
 from scm.errors import RunError, nearest
 from scm.maps.load import load_map
 from scm.selftest.city import CITY, City
-from scm.selftest.harm import HEAD, Harm, Talker, Watch
+from scm.selftest.city_fault import HEAD, FaultOutcome, StreamMonitor, Talker
 from scm.selftest.links import commander, links
 from scm.selftest.load import flood, fuzz, stuck
 from scm.selftest.observer import Observer
 from scm.selftest.processes import freezes, full_disk, kills, router
 from scm.selftest.table import markdown_table, text_table
 
-Harms = Callable[[City, Watch], Iterator[Harm]]
+CityFault = Callable[[City, StreamMonitor], Iterator[FaultOutcome]]
 
-HARMS: dict[str, Harms] = {
+CITY_FAULTS: dict[str, CityFault] = {
     "kill": kills,
     "freeze": freezes,
     "router": router,
@@ -32,20 +32,21 @@ AGENT = "n3"
 WARM_S = 8.0
 
 
-def harm_city(
-    map_name: str, wanted: Sequence[str], say: Callable[[str], None], out: Path | None
+def inject_city_faults(
+    map_name: str, wanted: Sequence[str], report: Callable[[str], None], out: Path | None
 ) -> int:
-    """Start a city, do it these harms, tell what came of them; return the exit code.
+    """Start a city, inject these faults, report the outcomes; return the exit code.
 
     Raises:
-        RunError: when a harm is not known, or the city does not come up.
+        RunError: when a fault is not known, or the city does not come up.
     """
     for name in wanted:
-        if name not in HARMS:
-            msg = f"harm: got {name!r}{nearest(name, list(HARMS))}, expected one of {list(HARMS)}"
+        if name not in CITY_FAULTS:
+            known = list(CITY_FAULTS)
+            msg = f"fault: got {name!r}{nearest(name, known)}, expected one of {known}"
             raise RunError(msg)
     city_map = load_map(map_name)
-    done: list[Harm] = []
+    done: list[FaultOutcome] = []
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         pulls = not wanted or not {"links", "commander"}.isdisjoint(wanted)
@@ -55,12 +56,12 @@ def harm_city(
         observer = stack.enter_context(Observer(city_map, city.endpoint, CITY))
         talker = stack.enter_context(Talker(city.endpoint, CITY))
         observer.listen(WARM_S)
-        for name in wanted or HARMS:
-            for harm in HARMS[name](city, Watch(observer, talker, (AGENT,))):
-                done.append(harm)
-                say("  " + ", ".join(cell for cell in harm.row() if cell))
-    rows = [harm.row() for harm in done]
-    say(text_table(HEAD, rows))
+        for name in wanted or CITY_FAULTS:
+            for outcome in CITY_FAULTS[name](city, StreamMonitor(observer, talker, (AGENT,))):
+                done.append(outcome)
+                report("  " + ", ".join(cell for cell in outcome.row() if cell))
+    rows = [outcome.row() for outcome in done]
+    report(text_table(HEAD, rows))
     if out is not None:
         out.write_text(markdown_table(HEAD, rows) + "\n")
-    return 1 if any(harm.missed for harm in done) else 0
+    return 1 if any(outcome.missed for outcome in done) else 0
