@@ -18,8 +18,8 @@ import numpy as np
 from scm.clock import processor_s
 from scm.data_quality.check import check
 from scm.data_quality.prepare import prepare
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.parts import split
+from scm.mismatch.fit.data_split import split
+from scm.mismatch.fit.likelihood import Likelihood
 from scm.recording.read import Channel, Recording
 from scm.replay.drive import Drive
 from scm.replay.free_run import free_run

@@ -17,8 +17,8 @@ import numpy as np
 from scm.data_quality.prepare import prepare
 from scm.mismatch.diagnose import Found, diagnose, write
 from scm.mismatch.evidence import FreeRuns
-from scm.mismatch.judge import judge
-from scm.mismatch.parts import split
+from scm.mismatch.fit.data_split import split
+from scm.mismatch.validate.free_runs import judge
 from scm.recording.read import read_recordings
 from scm.replay.free_run import FreeRun, free_run
 from scm.vehicles.car import Car, load_car
@@ -55,7 +55,7 @@ def main(names: list[str]) -> None:
         paths = [ROOT / "recordings" / folder / file for file in files]
         if name in REPLAYED:
             _replay(paths, DATA / folder, REPLAYED[name])
-        found = diagnose(paths, None, DATA / folder, budget_s=BUDGET_S, tell=_tell)
+        found = diagnose(paths, None, DATA / folder, budget_s=BUDGET_S, notify=_tell)
         _say(f"{name}: {len(files)} recordings, {found.diagnosis.runtime_s:.0f} s")
         report = ROOT / "runs" / f"diagnosis-{name}"
         write(found, report)

@@ -60,7 +60,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
     from scm.mismatch.progress import Progress
-    from scm.mismatch.several import with_told
+    from scm.mismatch.several.diagnose import with_told
 
     name = arguments.recording[0].resolve()
     title = name.parent.name if name.name == "recording.yaml" else name.stem
@@ -85,7 +85,7 @@ def _run(arguments: argparse.Namespace) -> int:
 def _cars(arguments: argparse.Namespace) -> "tuple[dict[str, list[Recording]], tuple[str, ...]]":
     """Return the recordings of each car, and why there are none of others."""
     from scm.errors import RecordingError
-    from scm.mismatch.several import cars_of
+    from scm.mismatch.several.diagnose import cars_of
     from scm.recording.span import part_of
 
     cars: dict[str, list[Recording]] = {}
@@ -109,9 +109,9 @@ def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> s
     found = diagnose(
         arguments.recording, arguments.car, arguments.data, vehicle=arguments.vehicle,
         span_s=(arguments.from_s, arguments.to_s), told=arguments.told,
-        budget_s=arguments.budget_s, strict=arguments.strict, tell=progress.tell,
+        budget_s=arguments.budget_s, strict=arguments.strict, notify=progress.notify,
     )  # fmt: skip
-    progress.tell("writing the report")
+    progress.notify("writing the report")
     check = _check(arguments, out)
     write(found, out, check)
     text = summary(found.diagnosis, out, found.evidence.retuned_m)
@@ -134,22 +134,22 @@ def _of_cars(
     from scm.mismatch.diagnose import write
     from scm.mismatch.report.several_page import several_summary
     from scm.mismatch.report.summary import summary
-    from scm.mismatch.several import diagnose_one, diagnose_several, write_all
+    from scm.mismatch.several.diagnose import diagnose_one, diagnose_several, write_all
 
     budget_s, strict = arguments.budget_s, arguments.strict
     if len(cars) == 1:
         ((name, recordings),) = cars.items()
-        found = diagnose_one(recordings, budget=budget, strict=strict, tell=progress.tell)
-        progress.tell("writing the report")
+        found = diagnose_one(recordings, budget=budget, strict=strict, notify=progress.notify)
+        progress.notify("writing the report")
         check = _check(arguments, out, name if failed else "")
         write(found, out, check)
         text = summary(found.diagnosis, out, found.evidence.retuned_m)
         return _with_account(found, text, check), failed
     several = diagnose_several(
-        cars, budget_s=budget_s, strict=strict, tell=progress.tell, turn=progress.turn
+        cars, budget_s=budget_s, strict=strict, notify=progress.notify, turn=progress.turn
     )
     several = replace(several, failed=(*failed, *several.failed))
-    progress.tell("writing the reports")
+    progress.notify("writing the reports")
     write_all(several, out, lambda name: _check(arguments, out / name, name))
     diagnoses = {name: found.diagnosis for name, found in several.cars.items()}
     read = [f"{name}: {line}" for name, found in several.cars.items() for line in found.account]

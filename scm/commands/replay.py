@@ -82,7 +82,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _of_report(arguments: argparse.Namespace) -> int:
     """Print a report's figures beside the same ones worked out again."""
-    from scm.mismatch.check_report import check_report
+    from scm.mismatch.validate.check_report import check_report
     from scm.recorder.drives import recordings_of
     from scm.recording.span import part_of
 

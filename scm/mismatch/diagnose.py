@@ -18,30 +18,30 @@ from scm.data_quality.suspicion import Quality
 from scm.data_quality.track import clean, recorded_s
 from scm.errors import RecordingError, ScmError
 from scm.mismatch.budget import DEFAULT_S, Budget, Question
-from scm.mismatch.curves import curve
+from scm.mismatch.discovery.curves import discovered_curves
+from scm.mismatch.discovery.decide import Lawful, is_discovered
+from scm.mismatch.discovery.seek import Sought, with_general_effect
+from scm.mismatch.effect_catalogue import Candidate, candidates, placed, shown_by, terms_needed
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns, Tried
 from scm.mismatch.experiment.folders import folders_of
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.suggest import Suggestion
-from scm.mismatch.explain import effect_of, ordinary_of, tried_of, undecided_of, widened_of
 from scm.mismatch.findings import Diagnosis, Effect, Fit, Unanswered, Undecided, Verdict
-from scm.mismatch.fit import Fitted, Fitter
-from scm.mismatch.judge import judge, nothing_got_worse
-from scm.mismatch.law_rivals import Standing, standing
-from scm.mismatch.laws.curves import law_curves
-from scm.mismatch.laws.decide import Lawful, is_law
-from scm.mismatch.laws.seek import Sought, with_laws
-from scm.mismatch.leftover import on_one_axis
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.listed import Candidate, candidates, placed, shown_by, terms_needed
-from scm.mismatch.locate import locate
-from scm.mismatch.parts import Parts, split
-from scm.mismatch.patch import CarFiles, as_written, on
+from scm.mismatch.fit.data_split import Parts, split
+from scm.mismatch.fit.fitter import Fitted, Fitter
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.sample import sampled
 from scm.mismatch.report.write import write_report
-from scm.mismatch.rough import SETTLES_FAR, is_far, roughly, strays
-from scm.mismatch.sample import sampled
-from scm.mismatch.search import Search
-from scm.mismatch.strayed import strayed
+from scm.mismatch.select.alternatives import Standing, standing
+from scm.mismatch.select.many_effects import SETTLES_FAR, by_windows, is_far, strays
+from scm.mismatch.select.search import Search
+from scm.mismatch.validate.curves import curve
+from scm.mismatch.validate.explain import effect_of, ordinary_of, tried_of, undecided_of, widened_of
+from scm.mismatch.validate.found_car import CarFiles, as_written, on
+from scm.mismatch.validate.free_runs import judge, nothing_got_worse
+from scm.mismatch.validate.locate import locate
+from scm.mismatch.validate.residual_forces import on_one_axis
+from scm.mismatch.validate.strayed import strayed
 from scm.recorder.drives import SUFFIX, recordings_of_one
 from scm.recording.read import Recording
 from scm.recording.span import part_of
@@ -54,7 +54,7 @@ POSE_X, SHORTEST_S = "pose.x", 20.0  # of several recordings together, where eac
 OF_SHORT = ("no_verdict", "too_short")
 TAIL = 1.0  # what follows a search takes as long as its first fit
 STRAYS = 3.0  # times what noise alone makes of a free run's error; 70 healthy drives: 2.3 at most
-Tell = Callable[[str], None]
+Notify = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,7 @@ def diagnose(
     told: Sequence[Path | str] = (),
     budget_s: float = DEFAULT_S,
     strict: bool = False,
-    tell: Tell = lambda _: None,
+    notify: Notify = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
     """Return what a simulator lacks to explain recordings of one car.
@@ -136,7 +136,7 @@ def diagnose(
         told: Recordings of the same car by `scm play`, whatever they call it; taken whole.
         budget_s: What is not found in time to be told after so long, is not looked for.
         strict: Refuse recordings in which anything has to be left out or repaired.
-        tell: Is told what is being tried.
+        notify: Is told what is being tried.
         clock: For the time it takes.
 
     Raises:
@@ -152,7 +152,7 @@ def diagnose(
     if car_file is None and any(r.vehicle != file for r in recordings):
         msg = f"{paths[0]}: recordings of several cars; say which with --car"
         raise RecordingError(msg)
-    return diagnose_car(recordings, car, budget=budget, strict=strict, tell=tell)
+    return diagnose_car(recordings, car, budget=budget, strict=strict, notify=notify)
 
 
 def diagnose_car(
@@ -162,7 +162,7 @@ def diagnose_car(
     budget_s: float = DEFAULT_S,
     budget: Budget | None = None,
     strict: bool = False,
-    tell: Tell = lambda _: None,
+    notify: Notify = lambda _: None,
     clock: Clock | None = None,
 ) -> Found:
     """Return what `diagnose` does, of recordings that were read already, all of one car.
@@ -172,15 +172,15 @@ def diagnose_car(
         car: As given.
         budget_s: As in `diagnose`.
         budget: One that began with the reading, in place of `budget_s`.
-        strict: As in `diagnose`, like `tell` and `clock`.
-        tell: Is told what is being tried.
+        strict: As in `diagnose`, like `notify` and `clock`.
+        notify: Is told what is being tried.
         clock: For the time it takes.
 
     Raises:
         ScmError: when a recording cannot be used as such a car's.
     """
     budget = budget or Budget(budget_s, clock or WallClock())
-    tell("doubting the data")
+    notify("doubting the data")
     prepared = [prepare(recording, car, strict=strict) for recording in recordings]
     usable, problems = _usable(recordings, prepared)
     account = tuple(one.account[0] for one in prepared)  # what was done is in the problems
@@ -188,7 +188,7 @@ def diagnose_car(
         return replace(_nothing(recordings, car, problems, budget.spent_s()), account=account)
     usable, partly = sampled(usable, budget.allowed_s())
     with threadpool_limits(1):  # two threads drive already: more for small matrices only wait
-        found = _searched(usable, car, tell, budget)
+        found = _searched(usable, car, notify, budget)
     diagnosis = structs.replace(
         found.diagnosis, data=(*problems, *partly), runtime_s=budget.spent_s(),
         processor_share=budget.processor_share(), compared_s=budget.allowed_s(),
@@ -268,8 +268,8 @@ def write(found: Found, out: Path, check: str = "") -> None:
 
 def _curves(model: Likelihood, best: Fitted, sought: Sought | None) -> tuple[Curve, ...]:
     """Return the effects found as curves; a law with its bins beside it."""
-    drawn = [curve(model, best, e) for e in best.effects if not is_law(e)]
-    of_laws = law_curves(best, sought) if sought is not None else ()
+    drawn = [curve(model, best, e) for e in best.effects if not is_discovered(e)]
+    of_laws = discovered_curves(best, sought) if sought is not None else ()
     return (*(c for c in drawn if c is not None), *of_laws)
 
 
@@ -370,17 +370,17 @@ def _title(recording: Recording) -> str:
     return path.parent.name if path.name == "recording.yaml" else path.stem
 
 
-def _searched(recordings: Sequence[Recording], car: Car, tell: Tell, budget: Budget) -> Found:
+def _searched(recordings: Sequence[Recording], car: Car, notify: Notify, budget: Budget) -> Found:
     big = car.with_terms(terms_needed(car))
     drives = [Drive(recording, big) for recording in recordings]
-    model: Likelihood = with_laws(Likelihood(drives, big))
+    model: Likelihood = with_general_effect(Likelihood(drives, big))
     parts = split(model)
     library = placed(shown_by(candidates(big), drives), drives)
-    search = Search(model, parts.fit.weight + parts.choose.weight, library, tell, budget=budget)
+    search = Search(model, parts.fit.weight + parts.choose.weight, library, notify, budget=budget)
     begun_s, held, sought = budget.spent_s(), None, None
     far, unseen = is_far(search), parts.confirm.weight  # the car's own numbers are fitted here
     budget.keep(TAIL * (budget.spent_s() - begun_s))
-    laws = Lawful(search, unseen, tell)
+    laws = Lawful(search, unseen, notify)
     if far:  # maybe for one large effect, which the re-tuned car takes for disturbances
         search.settles, search.explained = SETTLES_FAR, lambda _: strays(model)
     else:
@@ -397,25 +397,25 @@ def _searched(recordings: Sequence[Recording], car: Car, tell: Tell, budget: Bud
         model, parts, search = many or (model, parts, search)
         best = search.run() if rough else search.retuned
         tried = tried_of(search)
-    tell("judging on what the fit did not see")
+    notify("judging on what the fit did not see")
     best = search.confirmed(best, parts.confirm.weight)
     searched = Searched(
         recordings, drives, car, model, parts, search, best, rough, tried, held, sought,
         budget.unasked,
     )  # fmt: skip
-    return told(searched, tell)
+    return told(searched, notify)
 
 
 def _by_strides(
     search: Search, car: Car, library: Sequence[Candidate]
 ) -> tuple[Likelihood, Parts, Search]:
-    """Return what `roughly` does, the car's own numbers fitted."""
-    many = roughly(search.model.drives, car, library, search.tell, search.budget)
+    """Return what `by_windows` does, the car's own numbers fitted."""
+    many = by_windows(search.model.drives, car, library, search.notify, search.budget)
     many[2].retuned  # noqa: B018 it is fitted when first asked for
     return many
 
 
-def told(searched: Searched, tell: Tell) -> Found:
+def told(searched: Searched, notify: Notify) -> Found:
     """Return the diagnosis that a search's best model is, judged, located and put into words."""
     model, search = searched.model, searched.search
     car, best, rough = searched.car, searched.best, searched.rough
@@ -436,7 +436,7 @@ def told(searched: Searched, tell: Tell) -> Found:
         fit, free_runs = _judged(searched, car)
     retuned_m = retuned_error(searched, retuned_car, found_car) if best.effects else None
     located, residuals = locate(model, search.retuned, best)
-    suggestions = () if rough else undecided_of(model, search, best, tell)
+    suggestions = () if rough else undecided_of(model, search, best, notify)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = verdict_of(effects, undecided, fit)
     if verdict is Verdict.MISMATCH and not effects and fit and free_runs:

@@ -51,7 +51,7 @@ class Progress:
             self._share, self._next = 0.0, STEPS[1][1]
             self._of, self._from, self._part = f"{name}: ", number / count, 1.0 / count
 
-    def tell(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         """Say what is tried from now on."""
         with self._lock:
             self._shown = self._done()

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from scm.clock import WallClock
-from scm.mismatch import budget, sample
+from scm.mismatch import budget
 from scm.mismatch import diagnose as module
-from scm.mismatch.check_report import check_report
 from scm.mismatch.diagnose import diagnose_car, write
-from scm.mismatch.listed import candidates
+from scm.mismatch.effect_catalogue import candidates
+from scm.mismatch.fit import sample
+from scm.mismatch.validate.check_report import check_report
 from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import made_drive, nigel
 from tests.unit.mismatch.test_budget import Batches

@@ -8,13 +8,13 @@ import numpy as np
 
 from scm.arrays import Bools, Floats
 from scm.geometry import Pose2
+from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.experiment.manoeuvres import ROW_S, Manoeuvre
 from scm.mismatch.experiment.pace import SIDEWAYS_M_S2, Pace
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.listed import Candidate
-from scm.mismatch.noise import Noise
-from scm.mismatch.predict import Prediction
-from scm.mismatch.rollouts import Rollouts
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.noise import Noise
+from scm.mismatch.fit.rollouts import Rollouts
+from scm.mismatch.fit.sensor_prediction import Prediction
 from scm.recording.read import Channel, Recording
 from scm.replay.commands import FULL_SPEED
 from scm.replay.drive import STEP_S, Drive
@@ -69,7 +69,7 @@ def numbers_of(effects: Sequence[Candidate], values: Floats) -> dict[str, float]
     """Return the numbers of effects by key, ordinary ones left at the file's."""
     found, at = dict[str, float](), 0
     for effect in effects:
-        n = len(effect.knobs)
+        n = len(effect.parameters)
         found |= effect.numbers(tuple(values[at : at + n]))
         at += n
     return found

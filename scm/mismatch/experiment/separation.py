@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Floats
+from scm.mismatch.effect_catalogue import Parameter
 from scm.mismatch.experiment.plan import Planned, Rival, numbers_of
-from scm.mismatch.fit import FARTHEST, SMALL, TAIL, Fitted, Fitter
-from scm.mismatch.likelihood import Ordinary
-from scm.mismatch.listed import Knob
+from scm.mismatch.fit.fitter import FARTHEST, SMALL, TAIL, Fitted, Fitter
+from scm.mismatch.fit.likelihood import NominalParameter
 
 ROUNDS = 3
 
@@ -47,12 +47,12 @@ def quick(planned: Planned, rivals: Sequence[Rival]) -> Apart:
         planned: Of the first rival's motion.
         rivals: All of them.
     """
-    own, knobs = planned.ordinary, [_knobs(r) for r in rivals]
+    own, parameters = planned.nominal, [_parameters(r) for r in rivals]
     n, e = len(rivals), np.nan_to_num(planned(_sets(planned, rivals))[0])
     common = (e[:, n : n + len(own)] - e[:, :1]) / np.array([_side(o) for o in own])
     lambdas, z, at = np.zeros((n, n)), np.zeros((n, n, len(own))), n + len(own)
     values = list[list[Floats]]()
-    for j, mine in enumerate(knobs):
+    for j, mine in enumerate(parameters):
         slopes = e[:, at : at + len(mine)] - e[:, j : j + 1]
         at += len(mine)
         jacobian = np.concatenate((common, slopes), axis=1)
@@ -95,11 +95,11 @@ def _sets(planned: Planned, rivals: Sequence[Rival]) -> list[dict[str, float]]:
     """Return each rival's numbers, then small steps of the car's own, then of every knob."""
     bases = [numbers_of(r.effects, r.values) for r in rivals]
     sets = list(bases)
-    sets += [{**bases[0], o.key: o.mean + _side(o) * o.std} for o in planned.ordinary]
+    sets += [{**bases[0], o.key: o.mean + _side(o) * o.std} for o in planned.nominal]
     for rival in rivals:
-        for k, knob in enumerate(_knobs(rival)):
+        for k, parameter in enumerate(_parameters(rival)):
             values = np.array(rival.values, dtype=np.float64)
-            values[k] += _step(knob, values[k])
+            values[k] += _step(parameter, values[k])
             sets.append(numbers_of(rival.effects, values))
     return sets
 
@@ -108,24 +108,28 @@ def _loss(e: Floats) -> Floats:
     return np.asarray((TAIL * np.log1p(e * e / TAIL)).sum(axis=0))
 
 
-def _knobs(rival: Rival) -> list[Knob]:
-    return [knob for effect in rival.effects for knob in effect.knobs]
+def _parameters(rival: Rival) -> list[Parameter]:
+    return [parameter for effect in rival.effects for parameter in effect.parameters]
 
 
-def _side(ordinary: Ordinary) -> float:
+def _side(nominal: NominalParameter) -> float:
     """Return a small step of an ordinary number that stays within its bounds."""
-    o = ordinary
+    o = nominal
     return -SMALL if o.mean + SMALL * o.std > o.bounds[1] else SMALL
 
 
-def _step(knob: Knob, value: float) -> float:
-    return -0.5 * knob.step if value + 0.5 * knob.step > knob.bounds[1] else 0.5 * knob.step
+def _step(parameter: Parameter, value: float) -> float:
+    return (
+        -0.5 * parameter.step
+        if value + 0.5 * parameter.step > parameter.bounds[1]
+        else 0.5 * parameter.step
+    )
 
 
-def _moved(rival: Rival, knobs: Sequence[Knob], move: Floats) -> Floats:
+def _moved(rival: Rival, parameters: Sequence[Parameter], move: Floats) -> Floats:
     """Return a rival's values moved by so many of the small steps, within their bounds."""
     values = np.array(rival.values, dtype=np.float64)
-    for k, knob in enumerate(knobs):
-        values[k] += move[k] * _step(knob, values[k])
-        values[k] = min(max(values[k], knob.bounds[0]), knob.bounds[1])
+    for k, parameter in enumerate(parameters):
+        values[k] += move[k] * _step(parameter, values[k])
+        values[k] = min(max(values[k], parameter.bounds[0]), parameter.bounds[1])
     return values

@@ -10,7 +10,7 @@ from scm.mismatch.experiment.pace import Floor, Pace, pace_of
 from scm.mismatch.experiment.plan import Placed, Planned, Rival, numbers_of, place
 from scm.mismatch.experiment.separation import Apart, exact, quick
 from scm.mismatch.findings import Undecided
-from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.fit.likelihood import Likelihood
 
 NOBODY, ANYBODY = 10.0, 25.0
 PLENTY = 400.0  # twenty sigma: what would be better still need not be looked for
@@ -24,7 +24,7 @@ TWINS: Mapping[frozenset[str], str] = {
 MOST_RIVALS = 4
 MOST_EXACT = 6
 SLOPE = "grade.slope"
-Tell = Callable[[str], None]
+Notify = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Suggestion:
 
 def suggest(
     model: Likelihood, rivals: Sequence[Rival], floor: Floor | None = None,
-    tell: Tell = lambda _: None,
+    notify: Notify = lambda _: None,
 ) -> Suggestion:  # fmt: skip
     """Return the drive that would tell rivals apart, or that none can and what would.
 
@@ -71,7 +71,7 @@ def suggest(
         model: Of the recording that leaves them undecided: its sensors, noise and car.
         rivals: Two or more explanations with their fitted values; the four likeliest count.
         floor: Free to drive on; None: where the recording was made, 0.3 m around it.
-        tell: Hears what is being tried.
+        notify: Hears what is being tried.
     """
     counted = rivals[:MOST_RIVALS]
     pace = pace_of(model.car, model.drives, floor)
@@ -79,14 +79,14 @@ def suggest(
     twins = next((why for pair, why in TWINS.items() if set(between) <= pair), "")
     weighed = list[Weighed]()
     if not twins:
-        tell(f"simulating {len(MANOEUVRES)} drives under each rival")
+        notify(f"simulating {len(MANOEUVRES)} drives under each rival")
         drives = [drive_alone(build, name) for name, build in MANOEUVRES.items()]
         weighed = _search(model, counted, pace, drives)
     best = weighed[0] if weighed and weighed[0].least >= NOBODY else None
     if best:
         said, hoped = _sentence(best), best.least
     else:
-        tell("no drive tells them apart: trying a ramp, a known mass, other changes")
+        notify("no drive tells them apart: trying a ramp, a known mass, other changes")
         changed = _search(model, counted, pace, _changes(model, counted))
         best = changed[0] if changed and changed[0].least >= NOBODY else None
         said = (twins or _no_drive(weighed, pace)) + _instead(best, rivals)

@@ -25,7 +25,7 @@ from scm.mismatch.report.wording import (
     title_of,
 )
 from scm.mismatch.report.write import PAGE
-from scm.mismatch.several_findings import CarSight, Cause, Common, Sight
+from scm.mismatch.several.findings import CarSight, Cause, Common, Sight
 
 CARS, POSITION = "cars.json", "position_m"
 _SAYS: Mapping[Sight, str] = {

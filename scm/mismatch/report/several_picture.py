@@ -9,7 +9,7 @@ from scm.mismatch.report.first_screen import name_of
 from scm.mismatch.report.html_text import around, figure
 from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
 from scm.mismatch.report.wording import unit_text
-from scm.mismatch.several_findings import Common
+from scm.mismatch.several.findings import Common
 
 _WIDTH, _ROW, _MOST_LABEL = 440.0, 25.0, 200.0
 _WIDEST = 6.0  # times how far apart the cars' values are

@@ -10,7 +10,7 @@ from scm.arrays import Floats
 from scm.data_quality.problem import Span
 from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Diagnosis
-from scm.mismatch.leftover import APART_S
+from scm.mismatch.validate.residual_forces import APART_S
 
 _READABLE_S = 1e5  # a clock beyond it is no stop watch
 

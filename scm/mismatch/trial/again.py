@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scm.errors import ScmError
-from scm.mismatch.listed import terms_needed
-from scm.mismatch.patch import on
+from scm.mismatch.effect_catalogue import terms_needed
 from scm.mismatch.trial.continuous import position_error
 from scm.mismatch.trial.known import is_measure, parameters_of
 from scm.mismatch.trial.labels import Case, Label
+from scm.mismatch.validate.found_car import on
 from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.sensor_correction import without_faults

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from scm.mismatch.diagnose import Searched
-from scm.mismatch.fit import Fitted
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.listed import by_name, candidates
-from scm.mismatch.parts import split
-from scm.mismatch.search import Search, Step
+from scm.mismatch.effect_catalogue import by_name, candidates
+from scm.mismatch.fit.data_split import split
+from scm.mismatch.fit.fitter import Fitted
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.select.search import Search, Step
 from scm.replay.drive import Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive, nigel
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from scm.geometry import Pose2
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.listed import terms_needed
+from scm.mismatch.effect_catalogue import terms_needed
+from scm.mismatch.fit.likelihood import Likelihood
 from scm.recording.read import Channel, Recording
 from scm.replay.drive import Drive
 from scm.vehicles.car import load_car

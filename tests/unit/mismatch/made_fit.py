@@ -4,9 +4,9 @@ from functools import cache
 
 import numpy as np
 
-from scm.mismatch.fit import Fitter
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.listed import by_name, candidates
+from scm.mismatch.effect_catalogue import by_name, candidates
+from scm.mismatch.fit.fitter import Fitter
+from scm.mismatch.fit.likelihood import Likelihood
 from tests.unit.mismatch.made_drive import big_nigel, driven
 
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.noise import Noise
-from scm.mismatch.rollouts import Rollouts
-from scm.mismatch.strides import LENGTH_S, Strides
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.noise import Noise
+from scm.mismatch.fit.residual_windows import LENGTH_S, WindowWhitener
+from scm.mismatch.fit.rollouts import Rollouts
 from scm.replay.drive import POSES, Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
@@ -77,7 +77,7 @@ def test_a_car_that_is_not_seen_is_not_carried(drive):
 def test_no_stride_leads_through_the_dark(drive):
     noise = Noise(0.01, 0.01, 0.01, dict.fromkeys(drive.names, 0.1), {})
     cuts = np.linspace(drive.edges[0], drive.edges[-1], 5)
-    strides = Strides(drive, noise, cuts)
+    strides = WindowWhitener(drive, noise, cuts)
     begins = np.unique(strides.t) - 0.5 * LENGTH_S
     assert len(begins) > 10
     assert not np.any((begins + LENGTH_S > FIRST_S + 0.05) & (begins < LAST_S - 0.05))

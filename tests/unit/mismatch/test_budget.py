@@ -11,13 +11,13 @@ from scm.clock import StepClock, nanoseconds
 from scm.mismatch import diagnose
 from scm.mismatch.budget import DEFAULT_S, MOST_KEPT, WORDS, Budget, Question
 from scm.mismatch.diagnose import diagnose_car
-from scm.mismatch.fit import Fitter
-from scm.mismatch.laws.decide import Lawful, _Best, _Settled
-from scm.mismatch.likelihood import Likelihood
+from scm.mismatch.discovery.decide import Lawful, _Best, _Settled
+from scm.mismatch.fit.fitter import Fitter
+from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.report.first_screen import cards_of
-from scm.mismatch.rough import RoughSearch
-from scm.mismatch.search import Search
-from tests.unit.mismatch.laws import made_law
+from scm.mismatch.select.many_effects import ManyEffectsSearch
+from scm.mismatch.select.search import Search
+from tests.unit.mismatch.discovery import made_effect
 from tests.unit.mismatch.made_drive import big_nigel, driven, made_drive, nigel
 from tests.unit.mismatch.made_fit import candidate
 
@@ -177,11 +177,11 @@ def test_what_an_attempt_changed_is_put_back_where_it_is_given_up():
 @pytest.fixture
 def lawful(monkeypatch):
     """A search without a fit yet, and a law that is better than whatever it finds."""
-    search, unseen = made_law.searched(made_law.lawful_drive(seconds=6.0))
+    search, unseen = made_effect.searched(made_effect.lawful_drive(seconds=6.0))
     search.budget = budget = Batches(60.0)
     search.model.asked = budget.check
     (listed,) = search.fitter.refine([search.fitter.null()], rounds=1, fresh=True)
-    fitted = replace(listed, effects=(made_law.gust(),))
+    fitted = replace(listed, effects=(made_effect.gust(),))
     law = _Settled(fitted, search.model.noise, -math.inf, -math.inf)
     laws = Lawful(search, unseen)
     monkeypatch.setattr(laws, "_best", lambda _: _Best((), law, "what was sought"))
@@ -209,7 +209,7 @@ def test_a_law_stays_found_where_there_was_no_time_for_effects_beside_it(lawful,
 
     monkeypatch.setattr(search, "extend", extend)
     found, sought = laws.decide(listed)
-    assert found.effects == (made_law.gust(),)
+    assert found.effects == (made_effect.gust(),)
     assert sought == "what was sought"
     assert names(budget.unasked) == ["beside_law"]
 
@@ -218,7 +218,7 @@ def test_a_round_of_strides_that_is_cut_leaves_no_trace(monkeypatch):
     model, budget = Likelihood([driven(seconds=12.0)], big_nigel()), Batches(60.0)
     rare = replace(candidate("grade"), rare=5.0)
     listed = (rare, candidate("steer_trim"))
-    search = RoughSearch(model, np.ones(len(model.t)), listed, lambda _: None, budget)
+    search = ManyEffectsSearch(model, np.ones(len(model.t)), listed, lambda _: None, budget)
     search.retuned = search.fitter.null()
     search.steps = []
     fitted = replace(search.retuned, effects=(rare,))

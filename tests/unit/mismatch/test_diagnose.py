@@ -21,11 +21,11 @@ from scm.mismatch.experiment.plan import place
 from scm.mismatch.experiment.separation import Apart
 from scm.mismatch.experiment.suggest import Suggestion, Weighed
 from scm.mismatch.findings import Undecided, Verdict
-from scm.mismatch.fit import Fitter
-from scm.mismatch.judge import judge, nothing_got_worse
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.parts import split
-from scm.mismatch.patch import patched
+from scm.mismatch.fit.data_split import split
+from scm.mismatch.fit.fitter import Fitter
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.validate.found_car import patched
+from scm.mismatch.validate.free_runs import judge, nothing_got_worse
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_drive import big_nigel, car_with, driven, healthy_model, nigel
@@ -73,7 +73,7 @@ def test_numbers_that_gained_nothing_on_unseen_parts_stay_as_the_file_has_them(t
     model, _, best = made_fit.healthy()
     fitter = Fitter(model, np.ones(len(model.t)))
     assert np.abs(best.z).max() > 0.0
-    keys = [own.key for own in model.ordinary if nigel().has(own.key)]
+    keys = [own.key for own in model.nominal if nigel().has(own.key)]
 
     def moved(fitted):
         car = patched(nigel(), model, fitted, tmp_path)

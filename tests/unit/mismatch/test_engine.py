@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.fit import Fitter, _bounded
-from scm.mismatch.learn_noise import learn_noise
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.listed import by_name, candidates
-from scm.mismatch.noise import usual_noise
-from scm.mismatch.rollouts import Rollouts, _shares
-from scm.mismatch.search import Search
-from scm.mismatch.whiten import Whitener, _Events
+from scm.mismatch.effect_catalogue import by_name, candidates
+from scm.mismatch.fit.fitter import Fitter, _bounded
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.noise import usual_noise
+from scm.mismatch.fit.noise_fit import learn_noise
+from scm.mismatch.fit.rollouts import Rollouts, _shares
+from scm.mismatch.fit.whitening import Whitener, _Events
+from scm.mismatch.select.search import Search
 from scm.replay.drive import Drive
 from scm.replay.numbers import COMMAND_CLOCK, THROTTLE_CLOCK
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
@@ -91,7 +91,7 @@ def test_a_clock_of_commands_shows_however_little_it_is_late(model):
 
 
 def test_a_motor_may_answer_milliseconds_late_without_an_effect(model):
-    assert THROTTLE_CLOCK in [own.key for own in model.ordinary]
+    assert THROTTLE_CLOCK in [own.key for own in model.nominal]
     late = {"drive.delay_s": 0.004}
     e, _ = model([{}, late, late | {THROTTLE_CLOCK: -0.004}])
     assert np.abs(e[:, 1] - e[:, 0]).max() > 0.1
@@ -179,7 +179,7 @@ def test_the_cars_own_twin_of_an_effect_stays_as_the_file_has_it():
     model = Likelihood([drive], big_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))
     (base,) = fitter.refine([fitter.null()], rounds=3, fresh=True)
-    own = [o.key for o in model.ordinary].index("steering.rate_rad_s")
+    own = [o.key for o in model.nominal].index("steering.rate_rad_s")
     assert base.z[own] < -0.2
     effect = by_name(candidates(big_nigel()), "steer_rate")
     (best,) = fitter.refine(

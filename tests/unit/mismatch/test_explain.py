@@ -5,11 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.explain import effect_of, ordinary_of, said, tried_of, upright, widened_of
+from scm.mismatch.effect_catalogue import by_name, candidates
 from scm.mismatch.findings import Estimate
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.listed import by_name, candidates
-from scm.mismatch.search import Search
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.select.search import Search
+from scm.mismatch.validate.explain import (
+    effect_of,
+    ordinary_of,
+    sentence_of,
+    tried_of,
+    upright,
+    widened_of,
+)
 from scm.replay.drive import Drive
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
@@ -31,9 +38,9 @@ def test_what_was_taken_is_shown_with_the_gain_for_which_it_was_taken():
 def test_no_recording_makes_a_number_less_sure_than_its_file_or_unphysical():
     model, _, best = made_fit.healthy()
     unsure = replace(best, z=0.0 * best.z, covariance=25.0 * np.eye(len(best.z)))
-    bounds = {own.key: own.bounds for own in model.ordinary}
+    bounds = {own.key: own.bounds for own in model.nominal}
     for own in ordinary_of(model, unsure, big_nigel()):
-        prior = next(o for o in model.ordinary if o.key == own.key)
+        prior = next(o for o in model.nominal if o.key == own.key)
         assert own.found.high - own.found.low <= 2.0 * 1.645 * prior.std + 1e-12
         assert bounds[own.key][0] <= own.found.low <= own.found.high <= bounds[own.key][1]
 
@@ -82,7 +89,7 @@ def test_a_sentence_holds_numbers_as_a_mechanic_says_them(name, numbers, sentenc
         key: Estimate(value=value, low=value, high=value, unit=unit)
         for key, (value, unit) in numbers.items()
     }
-    assert said(by_name(candidates(big_nigel()), name), estimates) == sentence
+    assert sentence_of(by_name(candidates(big_nigel()), name), estimates) == sentence
 
 
 def weighed_to(std_kg):
@@ -111,7 +118,7 @@ def test_a_stated_std_of_an_axle_lock_is_used():
     lock = replace(car.quantity("drive.axle_lock"), value=0.8, std=0.1)
     car = replace(car, values={**car.values, "drive.axle_lock": lock})
     model = Likelihood([Drive(made_drive(seconds=6.0), car)], car)
-    (own,) = [own for own in model.ordinary if own.key == "drive.axle_lock"]
+    (own,) = [own for own in model.nominal if own.key == "drive.axle_lock"]
     assert (own.mean, own.std) == (0.8, 0.1)
 
 

@@ -5,9 +5,9 @@ import pytest
 from msgspec.structs import replace
 
 from scm.errors import RecordingError
-from scm.mismatch.judge import judge, nothing_got_worse
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.parts import split
+from scm.mismatch.fit.data_split import split
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.validate.free_runs import judge, nothing_got_worse
 from tests.unit.mismatch.made_drive import big_nigel, car_with, driven
 
 TRIM = {"steering.trim_rad": 0.05}

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch import likelihood
 from scm.mismatch.budget import OutOfTimeError
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.noise import usual_noise
-from scm.mismatch.rollouts import ROWS, Rollouts, Tiles
-from scm.mismatch.whiten import Whitener
+from scm.mismatch.fit import likelihood
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.noise import usual_noise
+from scm.mismatch.fit.rollouts import ROWS, Rollouts, Tiles
+from scm.mismatch.fit.whitening import Whitener
 from scm.replay.drive import Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 

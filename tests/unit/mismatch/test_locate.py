@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from scm.mismatch.curves import curve
 from scm.mismatch.findings import Equation
-from scm.mismatch.judge import judge
-from scm.mismatch.leftover import honest, leftover, on_one_axis
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.locate import chance, locate
-from scm.mismatch.parts import split
+from scm.mismatch.fit.data_split import split
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.validate.curves import curve
+from scm.mismatch.validate.free_runs import judge
+from scm.mismatch.validate.locate import chance, locate
+from scm.mismatch.validate.residual_forces import honest, leftover, on_one_axis
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch.made_drive import big_nigel, driven
 
@@ -79,8 +79,8 @@ def test_the_angle_left_over_is_the_one_that_the_wheels_stand_off_by():
 
 
 def test_the_force_left_over_is_the_one_that_acted():
-    (knob,) = made_fit.candidate("viscous_drag").knobs
-    brake = {knob.key: 4.0}
+    (parameter,) = made_fit.candidate("viscous_drag").parameters
+    brake = {parameter.key: 4.0}
     drive = driven(tuple(brake.items()))
     residual = by_channel(leftover([drive], big_nigel(), {}, brake))["drive force"]
     x, y = drive.smoothed["pose.x"], drive.smoothed["pose.y"]

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from scm.mismatch.judge import horizon_of
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.parts import NAMES, split
+from scm.mismatch.fit.data_split import NAMES, split
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.validate.free_runs import horizon_of
 from tests.unit.mismatch.made_drive import big_nigel, driven, healthy_model
 
 

@@ -33,7 +33,7 @@ def clock():
 def test_the_share_grows_from_step_to_step_and_between_them(clock):
     progress, seen = Progress(Terminal(), clock), []
     for text in STEPS:
-        progress.tell(text)
+        progress.notify(text)
         seen.append(share(progress.line()))
         clock.set_ns(clock.now_ns() + 20_000_000_000)
         seen.append(share(progress.line()))
@@ -47,7 +47,7 @@ def test_the_bar_shows_what_is_tried_and_for_how_long(clock):
     stream = Terminal()
     progress = Progress(stream, clock)
     clock.set_ns(7_000_000_000)
-    progress.tell("trying 46 effects from 155 starts")
+    progress.notify("trying 46 effects from 155 starts")
     progress.close()
     drawn = stream.getvalue()
     assert "[" in drawn
@@ -58,7 +58,7 @@ def test_the_bar_shows_what_is_tried_and_for_how_long(clock):
 def test_elsewhere_each_step_is_a_plain_line(clock):
     stream = io.StringIO()
     progress = Progress(stream, clock)
-    progress.tell("doubting the data")
+    progress.notify("doubting the data")
     progress.close()
     assert stream.getvalue() == "    0 s    0 %  doubting the data\n"
 
@@ -68,7 +68,7 @@ def test_of_several_cars_each_takes_its_share_and_is_named(clock):
     for number, name in enumerate(("n1", "n2", "all cars")):
         progress.turn(name, number, 3)
         for text in STEPS:
-            progress.tell(text)
+            progress.notify(text)
             seen.append(share(progress.line()))
         assert f"{name}: writing" in progress.line()
     progress.close()

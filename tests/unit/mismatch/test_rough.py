@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scm.mismatch.budget import Budget
-from scm.mismatch.fit import Fitted
-from scm.mismatch.rough import RoughSearch
-from scm.mismatch.search import Step
+from scm.mismatch.fit.fitter import Fitted
+from scm.mismatch.select.many_effects import ManyEffectsSearch
+from scm.mismatch.select.search import Step
 from tests.unit.mismatch.made_fit import candidate
 
 NONE = np.zeros(0)
@@ -16,17 +16,17 @@ NONE = np.zeros(0)
 
 def hypothesis(*names):
     effects = tuple(candidate(name) for name in names)
-    return Fitted(effects, NONE, np.zeros(sum(len(e.knobs) for e in effects)), NONE, 0.0, NONE)
+    return Fitted(effects, NONE, np.zeros(sum(len(e.parameters) for e in effects)), NONE, 0.0, NONE)
 
 
-class Scripted(RoughSearch):
+class Scripted(ManyEffectsSearch):
     """A round finds a slope, or where slopes are not listed two usual effects, at given costs."""
 
     def __init__(self, costs):
         names = ("grade", "steer_trim", "pose_heading")
         self.listed, self.costs = tuple(candidate(name) for name in names), costs
         self.model = SimpleNamespace(noise="at first", believe=self.believe)
-        self.steps, self.tell, self.budget = [], lambda _: None, Budget()
+        self.steps, self.notify, self.budget = [], lambda _: None, Budget()
 
     def believe(self, noise):
         self.model.noise = noise

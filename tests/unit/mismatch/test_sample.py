@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scm.mismatch.budget import COMPARED, LEAST_COMPARED_S, Budget
-from scm.mismatch.sample import PIECE_S, sampled
+from scm.mismatch.fit.sample import PIECE_S, sampled
 from scm.recording.read import Channel, Recording
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from scm.mismatch.fit import FARTHEST, Fitted, Fitter
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.noise import CALM, calmed, usual_noise
-from scm.mismatch.rough import SETTLES_FAR
-from scm.mismatch.search import (
+from scm.mismatch.fit.fitter import FARTHEST, Fitted, Fitter
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.noise import CALM, calmed, usual_noise
+from scm.mismatch.select.many_effects import SETTLES_FAR
+from scm.mismatch.select.search import (
     DRIFTED,
     FALSE_ALARMS,
     PLENTY,
@@ -22,7 +22,7 @@ from scm.mismatch.search import (
     exceeded,
     price,
 )
-from scm.mismatch.starts import next_starts
+from scm.mismatch.select.starts import next_starts
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 
@@ -82,7 +82,7 @@ def test_calm_noise_is_no_larger_than_a_cars_usual_times_a_few(model):
 
 def test_a_fit_ends_as_deep_wherever_it_begins(model):
     search = a_search(model)
-    far = np.where(np.arange(len(model.ordinary)) % 2 == 0, FARTHEST, -FARTHEST)
+    far = np.where(np.arange(len(model.nominal)) % 2 == 0, FARTHEST, -FARTHEST)
     stuck = replace(search.fitter.null(), z=far)
     alone = search._to_the_end(stuck, [far])
     several = search._to_the_end(stuck, [far, np.zeros_like(far)])
@@ -93,7 +93,7 @@ def test_a_fit_ends_as_deep_wherever_it_begins(model):
 
 def test_hypotheses_fitted_together_end_where_each_alone_does(model):
     search = a_search(model)
-    far = np.full(len(model.ordinary), 1.5)
+    far = np.full(len(model.nominal), 1.5)
     every = [(search.fitter.null(), [far, -far]), (search.fitter.null(far), [far])]
     together = search._all_to_the_end(every)
     for fitted, (start, places) in zip(together, every, strict=True):
@@ -130,7 +130,7 @@ def test_a_round_keeps_its_rivals_without_the_derivatives_that_fill_memory(model
 
 def test_the_effect_of_a_number_at_its_limit_comes_closer_by_more(model):
     search = a_search(model, "steer_rate")
-    keys = [own.key for own in model.ordinary]
+    keys = [own.key for own in model.nominal]
     z = np.zeros(len(keys))
     z[keys.index("steering.rate_rad_s")] = -FARTHEST
     base = replace(search.fitter.null(), z=z)
@@ -147,8 +147,8 @@ def test_a_number_at_its_limit_speaks_for_no_effect_where_a_better_one_pulled_it
     model, better_by, still_at, taken
 ):
     search = a_search(model, "steer_rate", "steer_lag")
-    at = [own.key for own in model.ordinary].index("steering.rate_rad_s")
-    z, rest = np.zeros(len(model.ordinary)), np.zeros(len(model.ordinary))
+    at = [own.key for own in model.nominal].index("steering.rate_rad_s")
+    z, rest = np.zeros(len(model.nominal)), np.zeros(len(model.nominal))
     z[at], rest[at] = -FARTHEST, still_at
     base = replace(search.fitter.null(), z=z)
     mine = Fitted((candidate("steer_rate"),), 0.0 * z, np.array([0.7]), base.e, 0.0, base.jacobian)

@@ -12,9 +12,9 @@ from scm.__main__ import main
 from scm.commands import mismatch
 from scm.mismatch.findings import Estimate, Undecided, Verdict
 from scm.mismatch.report.several_page import several_html, several_summary, write_several
-from scm.mismatch.several import _is_settled, cars_of
-from scm.mismatch.several_findings import CarSight, Cause, Common, Sight
-from scm.mismatch.several_verdict import all_alike, conclusion
+from scm.mismatch.several.diagnose import _is_settled, cars_of
+from scm.mismatch.several.findings import CarSight, Cause, Common, Sight
+from scm.mismatch.several.verdict import all_alike, conclusion
 from scm.vehicles.car import load_car
 from tests.reality.several_cars import write_cars
 from tests.unit.mismatch import made_up_findings as made_up

@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from scm.mismatch.several_common import compared
-from scm.mismatch.several_findings import Cause, Sight
-from scm.mismatch.several_witness import Witness
+from scm.mismatch.several.findings import Cause, Sight
+from scm.mismatch.several.shared_effects import compared
+from scm.mismatch.several.witness import Witness
 from tests.unit.mismatch.made_cars import drive_of, searched, tagged, tilted
 
 CARS = ("a", "b", "c")
@@ -101,7 +101,7 @@ def test_a_car_s_slope_and_precision_are_those_of_its_cost():
     cars, _, _ = under_one_tilted_camera()
     effect = cars["a"].best.effects[0]
     witness = Witness(cars["b"], effect, np.array([TILT, 0.0]))
-    at, step = np.array([TILT - 0.012, 0.0]), effect.knobs[0].step
+    at, step = np.array([TILT - 0.012, 0.0]), effect.parameters[0].step
     here, (low, high) = witness.at(at), (
         witness.at(at + np.array([way, 0.0])).cost for way in (-0.5 * step, 0.5 * step)
     )  # fmt: skip

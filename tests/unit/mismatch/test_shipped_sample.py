@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from scm.mismatch.check_report import check_report
 from scm.mismatch.diagnose import diagnose, write
+from scm.mismatch.validate.check_report import check_report
 
 CONCEALED_RAD = 0.0628  # as docs/make/sample.py prints
 BUDGET_S = 240.0  # twice the usual: other tests take the processor too

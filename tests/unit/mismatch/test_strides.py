@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from scm.mismatch.budget import Budget
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.noise import usual_noise
-from scm.mismatch.parts import split
-from scm.mismatch.rough import doublings, roughly
-from scm.mismatch.strides import LENGTH_S, Striding, learn_sizes, least_sizes
+from scm.mismatch.fit.data_split import split
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.noise import usual_noise
+from scm.mismatch.fit.residual_windows import LENGTH_S, WindowedLikelihood, learn_sizes, least_sizes
+from scm.mismatch.select.many_effects import by_windows, doublings
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 
@@ -22,7 +22,7 @@ def healthy():
 
 @pytest.fixture(scope="module")
 def model(healthy):
-    return Striding([healthy], big_nigel())
+    return WindowedLikelihood([healthy], big_nigel())
 
 
 def test_strides_are_linear_in_residuals(model):
@@ -85,7 +85,7 @@ def test_two_effects_are_found_in_one_round():
     drive = driven(tuple(truth.items()), seconds=12.0)
     names = ("steer_trim", "drive_gain", "grade", "gyro_bias", "steer_gain")
     library = [candidate(name) for name in names]
-    _, _, search = roughly([drive], big_nigel(), library, lambda _: None, Budget())
+    _, _, search = by_windows([drive], big_nigel(), library, lambda _: None, Budget())
     found = search.run()
     assert set(found.names) == {"steer_trim", "drive_gain"}
     assert len(search.steps) >= 2

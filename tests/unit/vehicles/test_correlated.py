@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scm.errors import CarError
-from scm.mismatch.likelihood import prior_precision
+from scm.mismatch.fit.likelihood import prior_precision
 from scm.vehicles.car import load_car
 from scm.vehicles.car_files import TYPES_DIR
 

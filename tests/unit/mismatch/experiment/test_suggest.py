@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scm.mismatch.effect_catalogue import by_name, candidates, terms_needed
 from scm.mismatch.experiment.changed import ramp_and_mass
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES
 from scm.mismatch.experiment.pace import Floor, pace_of
@@ -13,8 +14,7 @@ from scm.mismatch.experiment.plan import Leg, Planned, Rival, numbers_of, place
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.separation import quick
 from scm.mismatch.experiment.suggest import ANYBODY, NOBODY, names_of, suggest
-from scm.mismatch.likelihood import Likelihood
-from scm.mismatch.listed import by_name, candidates, terms_needed
+from scm.mismatch.fit.likelihood import Likelihood
 from scm.play import read_drive
 from scm.recording.read import Channel, Recording
 from scm.replay.drive import Drive

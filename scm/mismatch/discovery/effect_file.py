@@ -1,0 +1,185 @@
+"""A law as a file of its own: what `terms = [..., "my_law.py"]` of a car file loads.
+
+The file is an effect like any other: straight-line laws, parameters with units, its equation in the
+docstring. Its numbers stand in the car file.
+"""
+
+import ast
+import re
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+
+from scm.errors import TermError
+from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, Values, Written
+from scm.mismatch.discovery.general_effect import GAIN, TRIM
+from scm.mismatch.effect_catalogue import Parameter
+from scm.vehicles.own_term import SUFFIX, load_own_term
+from scm.vehicles.term import Term
+
+_WIDE = 100
+_WITH = {
+    "sets steer_trimmed": ("offset", f'0.0, "rad", "{TRIM}", (-0.3, 0.3), "trim, + left"'),
+    "sets steer_scaled": ("gain", f'1.0, "1", "{GAIN}", (0.2, 2.0), "gain of the steering"'),
+}
+"""What a signal's own effect does, by target: the law that takes its place does it too."""
+
+
+def file_name(law: DictionaryEffect) -> str:
+    """Return the name of a law's file, which is its effect's: `drive_force_against_heading`."""
+    return re.sub(r"\W+", "_", law.name)
+
+
+def number_keys(law: DictionaryEffect) -> dict[str, str]:
+    """Return the car file's key of each of a law's knobs."""
+    return {parameter.name: f"{file_name(law)}.{parameter.name}" for parameter in law.parameters}
+
+
+def as_term(law: DictionaryEffect, values: Values, folder: Path) -> tuple[Term, dict[str, float]]:
+    """Write a law's file, and return the effect it holds and the car file's numbers for it.
+
+    Raises:
+        TermError: when what was written does not load; then it is our fault.
+    """
+    write_effect_file(law, values, folder / (file_name(law) + SUFFIX))
+    term = load_own_term(folder, file_name(law) + SUFFIX)
+    keys = number_keys(law)
+    return term, {keys[k.name]: v for k, v in zip(law.parameters, values, strict=True)}
+
+
+def write_effect_file(law: DictionaryEffect, values: Values, path: Path) -> None:
+    """Write the file of a law; `values` of its knobs are the defaults' place in its docstring.
+
+    Raises:
+        TermError: when the file is not named like the law.
+    """
+    if path.name != file_name(law) + SUFFIX:
+        msg = f"{path.name}: expected {file_name(law) + SUFFIX}, the law's own name"
+        raise TermError(msg)
+    parts = [_function(law, part) for part in law.written]
+    lines = [_docstring(law, values), "", *_imports(parts), "", _params(law), ""]
+    for part in parts:
+        lines += ["", "@law", part, ""]
+    lines += ["", _term(law), ""]
+    path.write_text("\n".join(lines), encoding="utf-8")
+
+
+def _docstring(law: DictionaryEffect, values: Values) -> str:
+    first = f"{law.name.capitalize()}: a law that no library holds, learned from a recording."
+    sentence = law.sentence.format(**{k.name: f"`{k.name}`" for k in law.parameters})
+    equations = [
+        f"{part.target.split()[1]} {'+=' if _adds(part) else '='} {_plain(part.returns)}"
+        for part in law.written
+    ]
+    rows = [*equations, _plain(law.curve.text), f"found as {law.formula(values)}"]
+    body = [
+        f'"""{first}', "", *(_wrapped(row, "    ") for row in rows), "", _wrapped(sentence, ""),
+        "Holds: within what the recording showed; the form is the best of a dictionary.",
+        "Shows in: the recording it was learned from.",
+        "Source: `scm mismatch`, its dictionary of laws.", '"""',
+    ]  # fmt: skip
+    return "\n".join(body)
+
+
+def _plain(text: str) -> str:
+    """Return an expression as a person writes it."""
+    return text.replace("cosine_of", "cos").replace("sine_of", "sin").replace("math.", "")
+
+
+def _wrapped(text: str, indent: str) -> str:
+    more = indent * 2 if indent else ""
+    return "\n".join(textwrap.wrap(text, 95, initial_indent=indent, subsequent_indent=more))
+
+
+def _adds(part: Written) -> bool:
+    return part.target.startswith("adds")
+
+
+def _imports(functions: Sequence[str]) -> list[str]:
+    text = "\n".join(functions)
+    names = [name for name in ("sin_cos", "soft_sign") if name in text]
+    lines = ["import math", ""] if "math." in text else []
+    lines += ["from scm.vehicles.jit import law"]
+    lines += [f"from scm.vehicles.lane_math import {', '.join(names)}"] if names else []
+    return [
+        *lines,
+        "from scm.vehicles.param import Param",
+        "from scm.vehicles.term import Per, Term",
+    ]
+
+
+def _params(law: DictionaryEffect) -> str:
+    rows = [_param(law, parameter) for parameter in law.parameters]
+    more = [_WITH[part.target] for part in law.written if part.target in _WITH]
+    rows += [f'    Param("{name}", {rest}),' for name, rest in more]
+    return "\n".join(["_PARAMS = (", *rows, ")"])
+
+
+def _param(law: DictionaryEffect, p: Parameter) -> str:
+    low, high = p.bounds
+    start = p.neutral if p is law.parameters[0] else min(max(1.0, low), high)
+    return (
+        f'    Param("{p.name}", {start}, "{p.unit}", "{number_keys(law)[p.name]}",\n'
+        f'          ({low}, {high}), "found by the search"),'
+    )
+
+
+def _function(law: DictionaryEffect, part: Written) -> str:
+    curve = f"{law.curve.text}\n" if part.keeps is None else ""
+    body, names = _straight(f"{curve}result = {part.returns}")
+    signals = [s for s in dict.fromkeys((*part.signals, *law.curve.signals)) if s in names]
+    arguments = [*signals, *(k.name for k in law.parameters if k.name in names)]
+    arguments += [_WITH[part.target][0]] if part.target in _WITH else []
+    listed = textwrap.wrap(", ".join(f"{a}: float" for a in arguments) + ",", _WIDE - 4)
+    *lines, last = body
+    return "\n".join([
+        f"def {file_name(law)}{part.suffix}(", *(f"    {line}" for line in listed),
+        ") -> float:  # fmt: skip", f'    """{part.about}"""', *(f"    {line}" for line in lines),
+        f"    return {last.removeprefix('result = ')}",
+    ])  # fmt: skip
+
+
+class _Straight(ast.NodeTransformer):
+    """Takes sines and cosines out of expressions: a law calls `sin_cos`, which gives both."""
+
+    def __init__(self) -> None:
+        self.before: list[str] = []
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        self.generic_visit(node)
+        if not isinstance(node.func, ast.Name) or node.func.id not in ("sine_of", "cosine_of"):
+            return node
+        k = len(self.before) + 1
+        name, angle = f"turned_{k}", ast.unparse(node.args[0])
+        both = f"{name}, _" if node.func.id == "sine_of" else f"_, {name}"
+        self.before.append(f"{both} = sin_cos({angle})")
+        return ast.Name(name)
+
+
+def _straight(text: str) -> tuple[list[str], set[str]]:
+    """Return lines of straight text, and the names that they read."""
+    lines, straight = list[str](), _Straight()
+    for statement in ast.parse(text).body:
+        done = len(straight.before)
+        changed = straight.visit(statement)
+        lines += straight.before[done:]
+        lines.append(ast.unparse(changed))
+    names = {n.id for line in lines for n in ast.walk(ast.parse(line)) if isinstance(n, ast.Name)}
+    return lines, names
+
+
+def _term(law: DictionaryEffect) -> str:
+    first, *more = (_term_of(law, part) for part in law.written)
+    also = "".join(f"\n        Term({row})," for row in more)
+    also = f"\n    also=({also}\n    )," if also else ""
+    return f"TERM = Term(\n    {first}{also}\n)  # fmt: skip"
+
+
+def _term_of(law: DictionaryEffect, part: Written) -> str:
+    how, target = part.target.split()
+    still = f'neutral={{"{law.parameters[0].name}": 0.0}},' if part.keeps is None else ""
+    kept = "" if part.keeps is None else f"keeps={part.keeps},"
+    return (
+        f'{file_name(law)}{part.suffix}, per=Per.{part.per.name}, {how}="{target}",\n'
+        f"    params=_PARAMS, {still}{kept}"
+    )

@@ -1,0 +1,203 @@
+"""Laws of sensors: what a channel reads too much, as an amount of something known at each sample.
+
+They need no rollout: what is measured moves, not the car. A model that knows them takes them off
+its residuals, so they are fitted beside everything else.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Bools, Floats
+from scm.mismatch.effect_catalogue import Candidate, Parameter
+from scm.mismatch.findings import Equation
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.rollouts import Motions, Tiles
+from scm.replay.drive import STEP_S, Drive
+from scm.replay.numbers import Numbers
+from scm.vehicles.car import Car
+
+PREFIX = "sensed."
+GYROS = ("imu.gyro_z", "yaw_rate")
+ENCODERS = ("encoder.left", "encoder.right")
+Known = Mapping[str, Floats]
+Reads = Mapping[str, Floats]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorEffect(Candidate):
+    """A law of a sensor, as a candidate like the library's.
+
+    Attributes:
+        reads: Too much in each channel on a drive's edges, for one unit, from what is known there.
+    """
+
+    law: str
+    reads: Callable[[Known], Reads]
+
+    @property
+    def fault(self) -> str:
+        """The key under which a car file has such a fault of measurement; empty: it has none."""
+        return IN_FILE.get(self.law, "")
+
+    def formula(self, values: tuple[float, ...]) -> str:
+        """Return the law with its number and unit."""
+        unit = "" if self.parameters[0].unit == "1" else f" {self.parameters[0].unit}"
+        return self.law.format(f"{values[0]:.3g}{unit}")
+
+
+LENS = "camera_lens"
+IN_FILE: Mapping[str, str] = {
+    "measured = true * (1 + {} * |x|)": "measure.camera_lens_x_per_m",
+    "measured = true * (1 + {} * |y|)": "measure.camera_lens_y_per_m",
+    "measured = true * (1 + {} * (x^2 + y^2))": "measure.camera_lens_per_m2",
+}
+"""Laws of the camera that are numbers of the fault `LENS`."""
+_Row = tuple[str, str, str, str, float, str, str, Callable[[Known], Reads]]
+
+
+def _gyro(value: Callable[[Known], Floats]) -> Callable[[Known], Reads]:
+    return lambda now: dict.fromkeys(GYROS, value(now))
+
+
+def _pose(scale: Callable[[Known], Floats]) -> Callable[[Known], Reads]:
+    return lambda now: {"pose.x": scale(now) * now["x"], "pose.y": scale(now) * now["y"]}
+
+
+def _counted(share: Callable[[Known], Floats]) -> Callable[[Known], Reads]:
+    def reads(now: Known) -> Reads:
+        return {
+            f"encoder.{side}": -STEP_S * np.cumsum(share(now) * now[f"rate.{side}"])
+            for side in ("left", "right")
+        }
+
+    return reads
+
+
+def _one_side(now: Known) -> Reads:
+    left = -STEP_S * np.cumsum(now["rate.left"])
+    right = STEP_S * np.cumsum(now["rate.right"])
+    return {"encoder.left": left, "encoder.right": right}
+
+
+_TABLE: tuple[_Row, ...] = (
+    ("camera scale", "position", "per_m", "1/m", 0.002,
+     "The camera's scale changes by {per_m} of the distance from the middle along x",
+     "measured = true * (1 + {} * |x|)", _pose(lambda now: np.abs(now["x"]))),
+    ("camera scale", "position", "per_m", "1/m", 0.002,
+     "The camera's scale changes by {per_m} of the distance from the middle along y",
+     "measured = true * (1 + {} * |y|)", _pose(lambda now: np.abs(now["y"]))),
+    ("camera scale", "position", "per_m2", "1/m^2", 0.002,
+     "The camera's scale changes by {per_m2} of the squared distance from the middle",
+     "measured = true * (1 + {} * (x^2 + y^2))", _pose(lambda now: now["x"] ** 2 + now["y"] ** 2)),
+    ("camera heading", "heading", "offset_rad", "rad", 0.005,
+     "The camera's heading is off by {offset_rad}, depending on the heading",
+     "measured yaw = true + {} * sin(yaw)", lambda now: {"pose.yaw": np.sin(now["yaw"])}),
+    ("camera heading", "heading", "offset_rad", "rad", 0.005,
+     "The camera's heading is off by {offset_rad}, depending on the heading",
+     "measured yaw = true + {} * cos(yaw)", lambda now: {"pose.yaw": np.cos(now["yaw"])}),
+    ("gyro", "acceleration", "per_mps2", "rad*s/m", 0.005,
+     "The gyro feels the car's acceleration along: it reads {per_mps2} of it too much",
+     "yaw rate = true + {} * acceleration along", _gyro(lambda now: now["accel"])),
+    ("gyro", "lateral acceleration", "per_mps2", "rad*s/m", 0.005,
+     "The gyro feels the car's acceleration across, whatever its sign: {per_mps2} of it",
+     "yaw rate = true + {} * |acceleration across|", _gyro(lambda now: np.abs(now["across"]))),
+    ("gyro", "time", "rad_s_per_min", "rad/s", 0.005,
+     "The gyro drifts by {rad_s_per_min} every minute",
+     "yaw rate = true + {} * t / 60 s", _gyro(lambda now: now["time"] / 60.0)),
+    ("gyro", "speed", "per_mps", "rad/m", 0.01, "The gyro reads {per_mps} of the speed too much",
+     "yaw rate = true + {} * speed", _gyro(lambda now: now["speed"])),
+    ("gyro", "yaw rate", "share", "1", 0.01,
+     "The gyro's scale differs between left and right by {share} each way",
+     "yaw rate = true + {} * |true|", _gyro(lambda now: np.abs(now["turning"]))),
+    ("gyro", "throttle", "per_throttle", "rad/s", 0.005,
+     "The gyro feels the motors: it reads {per_throttle} too much at full throttle",
+     "yaw rate = true + {} * throttle", _gyro(lambda now: now["throttle"])),
+    ("encoders", "speed", "per_mps", "s/m", 0.01,
+     "The encoders lose more counts the faster the wheels turn: {per_mps} of them",
+     "counted = true * (1 - {} * speed)", _counted(lambda now: np.abs(now["speed"]))),
+    ("encoders", "time", "per_min", "1", 0.01, "The encoders lose {per_min} more every minute",
+     "counted = true * (1 - {} * t / 60 s)", _counted(lambda now: now["time"] / 60.0)),
+    ("encoders", "side", "share", "1", 0.01,
+     "The left encoder loses {share} of its counts and the right one counts as much too many",
+     "counted = true * (1 - {}) left, (1 + the same) right", _one_side),
+)  # fmt: skip
+
+
+def sensor_effects() -> tuple[SensorEffect, ...]:
+    """Return every sensor law that may be tried."""
+    return tuple(
+        SensorEffect(
+            name=f"{channel} against {word}", equation=Equation.SENSOR, depends_on=(word,),
+            parameters=(Parameter(parameter, f"{PREFIX}{i}", unit, (-10.0, 10.0), 0.0, step),),
+            starts=(), sentence=sentence + ".", law=law, reads=reads,
+        )
+        for i, (channel, word, parameter, unit, step, sentence, law, reads) in enumerate(_TABLE)
+    )  # fmt: skip
+
+
+class SensorLikelihood(Likelihood):
+    """A likelihood that knows laws of sensors beside the car's.
+
+    Attributes:
+        learned: What each law reads too much for one unit, by key, for each drive and stream.
+    """
+
+    def __init__(self, model: Likelihood, car: Car) -> None:
+        super().__init__(model.drives, car, Tiles(car, model.tiles))
+        self.believe(model.noise)
+        self.learned: dict[str, list[list[Floats]]] = {}
+
+    def learn(self, numbers: Numbers) -> None:
+        """Work out what sensors would read too much, where the car drives with these numbers."""
+        known = [
+            _known(drive, rollouts.run([numbers]))
+            for drive, rollouts in zip(self.drives, self._rollouts, strict=True)
+        ]
+        for law in sensor_effects():
+            parts = [_read(d, law.reads(now)) for d, now in zip(self.drives, known, strict=True)]
+            if any(part.any() for one in parts for part in one):
+                self.learned[law.parameters[0].key] = parts
+
+    def residuals(self, sets: Sequence[Numbers]) -> tuple[list[list[Floats]], Bools]:
+        """Return residuals of every drive's streams, sensor laws taken off."""
+        found, ok = super().residuals(sets)
+        for row, numbers in enumerate(sets):
+            for key in self.learned.keys() & numbers.keys():
+                for streams, reads in zip(found, self.learned[key], strict=True):
+                    for residual, read in zip(streams, reads, strict=True):
+                        residual[:, row] -= numbers[key] * read
+        return found, ok
+
+    def felt(self, law: SensorEffect) -> Floats:
+        """Return what one unit of a law changes in the unit innovations, (events,)."""
+        moved = [[-r[:, None] for r in one] for one in self.learned[law.parameters[0].key]]
+        return np.asarray(self.weigh(moved)[:, 0])
+
+
+def _known(drive: Drive, motion: Motions) -> dict[str, Floats]:
+    edges = drive.edges
+    x, y, yaw = (drive.smoothed[f"pose.{n}"].at(edges) for n in ("x", "y", "yaw"))
+    throttle = drive.throttle.means(edges, np.zeros(1))[:, 0]
+    now = {
+        "x": x, "y": y, "yaw": yaw, "time": edges - edges[0], "speed": motion["speed"][:, 0],
+        "accel": motion["accel_x"][:, 0], "across": motion["accel_y"][:, 0],
+        "turning": motion["yaw_rate"][:, 0], "throttle": np.append(throttle, throttle[-1]),
+    }  # fmt: skip
+    counts = 0.0
+    if any(s.name in ENCODERS for s in drive.streams):
+        counts = drive.car.value("encoder.counts_per_revolution") / (2.0 * np.pi)
+    for side, wheel in (("left", "rl"), ("right", "rr")):
+        now[f"rate.{side}"] = counts * np.gradient(motion[f"wheel_angle.{wheel}"][:, 0], STEP_S)
+    return now
+
+
+def _read(drive: Drive, reads: Reads) -> list[Floats]:
+    """Return what each stream reads too much at its samples; zero where a law says nothing."""
+    return [
+        np.interp(s.taps, drive.edges, reads[s.name]).mean(axis=1)
+        if s.name in reads
+        else np.zeros(len(s.t))
+        for s in drive.streams
+    ]

@@ -1,0 +1,1 @@
+"""Fits hypotheses to recordings: rollouts, weighed residuals and a Gauss-Newton solver."""

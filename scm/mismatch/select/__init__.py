@@ -1,0 +1,1 @@
+"""Selects the effects that explain recordings: one at a time, or several where a car is far off."""

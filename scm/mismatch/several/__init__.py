@@ -1,0 +1,1 @@
+"""Diagnoses several cars and finds the effects that they share."""

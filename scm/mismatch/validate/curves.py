@@ -1,0 +1,229 @@
+"""An effect as a curve: what it does to the car against what it depends on, with a 90 % band.
+
+What a car does with the effect and without it, from the same measured motion and for a few tenths
+of a second, is told as the force along the body or the angle of the wheels that would do the same.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.effect_catalogue import Candidate
+from scm.mismatch.evidence import Curve
+from scm.mismatch.findings import Equation
+from scm.mismatch.fit.fitter import Fitted, Fitter
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.validate.residual_forces import (
+    ANGLE,
+    ANGLE_RAD,
+    FORCE,
+    GRAVITY,
+    LEAN,
+    MOVED,
+    RUN_S,
+    inverse_of,
+    response,
+    starts_of,
+)
+from scm.replay.camera import Camera, Moved
+from scm.replay.drive import STEP_S, Drive
+from scm.replay.numbers import Numbers
+from scm.replay.windows import Side, Windows
+
+EVERY_S = 0.5
+BINS = 12
+LEAST_IN_BIN = 4
+NINETY = 1.3 * 1.645  # curvature alone makes intervals too narrow
+POINTS = 25
+_TURNING = {"drive_asymmetry", "com_shift", "load_transfer"}  # beside steering and tyres
+
+_Line = tuple[str, str, str, str, Callable[[Floats, float], Floats]]
+_SENSORS: Mapping[str, _Line] = {
+    "clock_drift": ("time", "s", "clock ahead", "s", lambda x, v: v * (x - x[0])),
+    "pose_scale": ("distance from the origin", "m", "position error", "m",
+                   lambda x, v: (v - 1.0) * x),
+    "camera_tilt": ("position", "m", "scale error", "1", lambda x, v: 1.0 / (1.0 + v * x) - 1.0),
+    "wheel_radius": ("speed", "m/s", "wheel speed error", "m/s", lambda x, v: (1.0 / v - 1.0) * x),
+    "encoder_loss": ("speed", "m/s", "wheel speed error", "m/s", lambda x, v: -v * x),
+    "speed_scale": ("speed", "m/s", "odometer error", "m/s", lambda x, v: (v - 1.0) * x),
+    "gyro_scale": ("yaw rate", "rad/s", "gyro error", "rad/s", lambda x, v: (v - 1.0) * x),
+    "gyro_bias": ("yaw rate", "rad/s", "gyro error", "rad/s", lambda x, v: v + 0.0 * x),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Own:
+    """One effect's own numbers within a fitted model; `std` of each, `key`s in its order."""
+
+    at: slice
+    values: Floats
+    std: Floats
+
+
+def curve(model: Likelihood, best: Fitted, effect: Candidate) -> Curve | None:
+    """Return an effect of the model found as a curve, or None where a curve would say nothing.
+
+    Several drives count as one; their times follow the recordings' clocks.
+    """
+    own = _own(best, effect)
+    if effect.name in _SENSORS:
+        return _sensor_curve(model, effect, own)
+    if effect.equation is Equation.SENSOR or not effect.depends_on:
+        return None
+    turning = effect.equation in (Equation.STEERING, Equation.TYRE) or effect.name in _TURNING
+    parts = [_acted(drive, model, best, effect, own, int(turning)) for drive in model.drives]
+    x, y, band = (np.concatenate([part[i] for part in parts]) for i in range(3))
+    (y_name, y_unit), (x_name, x_unit) = (FORCE, ANGLE)[turning], _variable(effect)
+    middle, mean, half = _binned(x, y, band)
+    if len(middle) < 2:
+        return None
+    return Curve(
+        effect=effect.name, x_name=x_name, x_unit=x_unit, y_name=y_name, y_unit=y_unit,
+        x=middle, y=mean, low=mean - half, high=mean + half,
+    )  # fmt: skip
+
+
+def _own(best: Fitted, effect: Candidate) -> _Own:
+    at = 0
+    for one in best.effects:
+        if one is effect:
+            break
+        at += len(one.parameters)
+    mine = slice(at, at + len(effect.parameters))
+    steps = np.array([parameter.step for parameter in effect.parameters])
+    own = len(best.z)
+    variance = np.zeros(len(steps))
+    if best.covariance.size:
+        variance = best.covariance.diagonal()[own:][mine]
+    return _Own(mine, best.values[mine], NINETY * steps * np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _sensor_curve(model: Likelihood, effect: Candidate, own: _Own) -> Curve | None:
+    """Return what a faulty sensor is off by, from its formula; of two numbers the larger one."""
+    i = int(np.argmax(np.abs(own.values))) if effect.name == "camera_tilt" else 0
+    x_name, x_unit, y_name, y_unit, line = _SENSORS[effect.name]
+    seen = np.concatenate([_seen(drive, x_name, i) for drive in model.drives])
+    low, high = np.percentile(seen, (1.0, 99.0))
+    if x_name == "position":
+        x_name = f"position {'xy'[i]}"
+    x = np.linspace(low, high, POINTS)
+    value, std = float(own.values[i]), float(own.std[i])
+    sides = np.stack([line(x, value + side * std) for side in (-1.0, 1.0)])
+    return Curve(
+        effect=effect.name, x_name=x_name, x_unit=x_unit, y_name=y_name, y_unit=y_unit,
+        x=x, y=line(x, value), low=sides.min(axis=0), high=sides.max(axis=0),
+    )  # fmt: skip
+
+
+def _seen(drive: Drive, variable: str, axis: int) -> Floats:
+    """Return which values of a variable a drive has seen."""
+    x, y, yaw = (drive.smoothed[f"pose.{name}"] for name in ("x", "y", "yaw"))
+    if variable == "time":
+        return drive.edges
+    if variable == "speed":
+        return drive.pose_speed
+    if variable == "yaw rate":
+        return yaw.rate
+    return (x, y)[axis].value if variable == "position" else np.hypot(x.value, y.at(x.t))
+
+
+def _acted(
+    drive: Drive, model: Likelihood, best: Fitted, effect: Candidate, own: _Own, which: int
+) -> tuple[Floats, Floats, Floats]:
+    """Return what an effect depends on along a drive, what it does, and the band around that."""
+    fitter, car = Fitter(model, np.ones(len(model.t))), model.car
+
+    def numbers(values: Floats) -> Numbers:
+        changed = best.values.copy()
+        changed[own.at] = values
+        return fitter.numbers(best.effects, best.z, changed)
+
+    neutral = np.array([parameter.neutral for parameter in effect.parameters])
+    low, high = (
+        np.array([parameter.bounds[i] for parameter in effect.parameters]) for i in range(2)
+    )
+    moved = [
+        np.clip(own.values + np.where(np.arange(len(neutral)) == j, own.std, 0.0), low, high)
+        for j in range(len(neutral))
+    ]
+    force, found = LEAN * GRAVITY * car.value("body.mass_kg"), numbers(own.values)
+    camera = Camera(drive, found)
+    sides = [
+        Side(found, camera),
+        Side(found, camera, like=0, push=(force, 0.0)),
+        Side(found, camera, like=0, push=(0.0, ANGLE_RAD)),
+        *(Side(numbers(values), camera) for values in (neutral, *moved)),
+    ]
+    steps, every = round(RUN_S / STEP_S), round(EVERY_S / STEP_S)
+    at = starts_of(drive, camera, steps, every)
+    if not len(at):
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    runs = Windows(drive, car).run(sides, np.tile(at, (len(sides), 1)), steps)
+    inverse = inverse_of(response(runs, 0, ((1, force), (2, ANGLE_RAD))))
+    last = np.stack([runs[name][-1] for name in MOVED])
+    does = np.einsum("ijw,jsw->isw", inverse, last[:, [0, *range(4, len(sides))]] - last[:, 3:4])
+    does = does[which]
+    middle = drive.edges[at] + 0.5 * RUN_S
+    motion = camera.motion(middle)
+    band = np.sqrt(((does[1:] - does[0]) ** 2).sum(axis=0))
+    return _values(drive, effect, middle, motion), does[0], band
+
+
+def _variable(effect: Candidate) -> tuple[str, str]:
+    """Return name and unit of what an effect is drawn against."""
+    return _NAMED.get(effect.depends_on[0], ("time", "s"))
+
+
+_NAMED: Mapping[str, tuple[str, str]] = {
+    "speed": ("speed", "m/s"),
+    "throttle": ("throttle", "1"),
+    "torque": ("throttle", "1"),
+    "side": ("throttle", "1"),
+    "constant": ("speed", "m/s"),
+    "steering": ("steering", "1"),
+    "steering angle": ("steering", "1"),
+    "steering history": ("steering", "1"),
+    "heading": ("heading", "rad"),
+    "acceleration": ("acceleration", "m/s^2"),
+    "lateral acceleration": ("lateral acceleration", "m/s^2"),
+    "lateral force": ("lateral acceleration", "m/s^2"),
+    "slip": ("lateral acceleration", "m/s^2"),
+    "slip history": ("lateral acceleration", "m/s^2"),
+}
+
+
+def _values(drive: Drive, effect: Candidate, t: Floats, motion: Moved) -> Floats:
+    """Return the variable that an effect is drawn against, at given times."""
+    name = _variable(effect)[0]
+    if name == "speed":
+        return motion.speed
+    if name == "heading":
+        return np.arctan2(np.sin(motion.yaw), np.cos(motion.yaw))
+    if name == "lateral acceleration":
+        return motion.speed * motion.yaw_rate
+    if name == "acceleration":
+        return np.gradient(motion.speed, t)
+    if name in ("throttle", "steering"):
+        command = drive.throttle if name == "throttle" else drive.steering
+        row = np.clip(np.searchsorted(command.t, t - 0.5 * RUN_S) - 1, 0, len(command.t) - 1)
+        return command.values[row]
+    return t
+
+
+def _binned(x: Floats, y: Floats, band: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return middle, mean and half band of each bin that holds enough."""
+    known = np.isfinite(y) & np.isfinite(band)
+    if not known.any():
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    x, y, band = x[known], y[known], band[known]
+    low, high = (float(v) for v in np.percentile(x, (1.0, 99.0)))
+    cuts = np.linspace(low, high, BINS + 1)
+    which = np.clip(np.searchsorted(cuts, x, side="right") - 1, 0, BINS - 1)
+    held = [which == b for b in range(BINS) if (which == b).sum() >= LEAST_IN_BIN]
+    return (
+        np.array([float(x[mine].mean()) for mine in held]),
+        np.array([float(np.median(y[mine])) for mine in held]),
+        np.array([float(np.median(band[mine])) for mine in held]),
+    )

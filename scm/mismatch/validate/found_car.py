@@ -1,0 +1,198 @@
+"""The given car with what was found, as a car file says it: written, and read back.
+
+What a report claims of a car is computed from that file, never from the numbers of a search.
+"""
+
+import math
+import shutil
+import weakref
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import mkdtemp
+
+import numpy as np
+from msgspec import structs
+
+from scm.arrays import Bools
+from scm.errors import ScmError
+from scm.mismatch.discovery.dictionary_effect import DictionaryEffect
+from scm.mismatch.discovery.effect_file import as_term, number_keys
+from scm.mismatch.discovery.sensor_effects import LENS, PREFIX, SensorEffect
+from scm.mismatch.evidence import Evidence, RefittedParameter
+from scm.mismatch.findings import Diagnosis, Effect, Verdict
+from scm.mismatch.fit.fitter import Fitted
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.report.car_file import FILE, write_car
+from scm.mismatch.validate.explain import NINETY, ordinary_of
+from scm.vehicles.car import Car, load_car
+from scm.vehicles.correlated import Correlated
+from scm.vehicles.term import Term
+
+INFORMED = 0.8  # a posterior std over its prior, below which the recording says something
+STRONG = 0.3  # a correlation below which numbers are as good as independent
+LOOSER = 0.01  # keeps a matrix rounded to three digits positive definite
+CLOCKS = "clock."  # numbers of a recording's stamps, not of the car
+
+
+class CarFiles:
+    """Writes cars that a search finds into a folder of its own, and reads them back.
+
+    The folder lives as long as this object: effects outside the library are files in it.
+    """
+
+    def __init__(self, car: Car, model: Likelihood, recordings: tuple[str, ...]) -> None:
+        self._car, self._model, self._recordings = car, model, recordings
+        self._folder = Path(mkdtemp(prefix="scm-found-"))
+        weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
+        self._count = 0
+
+    def written(self, fitted: Fitted, effects: Sequence[Effect]) -> Car:
+        """Return the car with what was found, as its written file says.
+
+        Where all its numbers together contradict one another, those that the recordings say nothing
+        about stay as they were given, or else all but those of the effects.
+
+        Raises:
+            ScmError: when it cannot be written so that it loads.
+        """
+        std = np.sqrt(np.maximum(fitted.covariance.diagonal(), 0.0))
+        known = std if len(std) >= len(fitted.z) else np.full(len(fitted.z), math.inf)
+        for most in (math.inf, INFORMED):
+            try:
+                return self._written(fitted, effects, known[: len(fitted.z)] <= most)
+            except ScmError:
+                continue
+        return self._written(fitted, effects, np.zeros(len(fitted.z), dtype=np.bool_))
+
+    def _written(self, fitted: Fitted, effects: Sequence[Effect], own: Bools) -> Car:
+        self._count += 1
+        folder = self._folder / f"{self._count}"
+        folder.mkdir()
+        found = patched(self._car, self._model, fitted, folder, own)
+        ordinary = ordinary_of(self._model, fitted, self._car)
+        diagnosis = Diagnosis(
+            verdict=Verdict.NONE, located=(), effects=tuple(effects), undecided=(), fit=None,
+            runtime_s=0.0,
+        )  # fmt: skip
+        evidence = Evidence(vehicle=self._car.name, recordings=self._recordings, refitted=ordinary)
+        write_car(diagnosis, evidence, self._car, found, folder)
+        return load_car(folder / FILE)
+
+
+def as_written(ordinary: Sequence[RefittedParameter], car: Car) -> tuple[RefittedParameter, ...]:
+    """Return the car's own numbers as its file says them, where it says other than was found."""
+    found = list[RefittedParameter]()
+    for one in ordinary:
+        value = car.value(one.key) if car.has(one.key) else one.found.value
+        if not math.isclose(value, one.found.value, rel_tol=1e-4, abs_tol=1e-12):
+            spread = NINETY * one.given_std
+            stays = structs.replace(one.found, value=value, low=value - spread, high=value + spread)
+            found.append(replace(one, found=stays, found_std=one.given_std))
+        else:
+            found.append(one)
+    return tuple(found)
+
+
+def on(base: Car, car: Car) -> Car:
+    """Return a car on the effects of another that has all of its own, or itself where none has.
+
+    Effects at their neutral numbers leave the motion as it was, so that all cars of one search
+    share one compiled kernel.
+    """
+    if not {term.name for term in car.terms} <= {term.name for term in base.terms}:
+        return car
+    moved: Mapping[str, float] = {
+        key: quantity.value
+        for key, quantity in car.values.items()
+        if isinstance(quantity.value, float) and base.has(key) and quantity != base.quantity(key)
+    }
+    same = base.with_terms([], moved)
+    return replace(same, path=car.path, measures=car.measures, values={**same.values, **car.values})
+
+
+def patched(
+    car: Car, model: Likelihood, fitted: Fitted, folder: Path, own: Bools | None = None
+) -> Car:
+    """Return the given car with effects found and with its own numbers refitted.
+
+    A sensor's law outside the library has no place in a car file, but for the lens of a camera.
+
+    Args:
+        car: As given.
+        model: That `fitted` belongs to.
+        fitted: What was found.
+        folder: Gets the files of laws outside the library; the car needs them while it is used.
+        own: Which of the car's own numbers are refitted; None: all.
+
+    Raises:
+        ScmError: when a law's file cannot be written.
+    """
+    which = [True] * len(model.nominal) if own is None else list(own)
+    numbers = {
+        o.key: number
+        for o, moves in zip(model.nominal, which, strict=True)
+        if moves and not o.key.startswith(CLOCKS)
+        for number in (model.numbers(fitted.z)[o.key],)
+        if not car.has(o.key) or not math.isclose(number, car.value(o.key), rel_tol=1e-9)
+    }
+    terms, faults, at = list[str | Term](), list[str](), 0
+    known = {term.name for term in car.terms}
+    for effect in fitted.effects:
+        values = tuple(float(v) for v in fitted.values[at : at + len(effect.parameters)])
+        at += len(values)
+        if isinstance(effect, DictionaryEffect):
+            term, of_law = as_term(effect, values, folder)
+            terms.append(term)
+            numbers |= of_law
+            continue
+        if isinstance(effect, SensorEffect):
+            if effect.fault:
+                numbers[effect.fault] = values[0]
+                faults.append(LENS)
+            continue
+        numbers |= effect.numbers(values)
+        if effect.equation == "sensor" and effect.name != "wheel_radius":
+            faults.append(effect.name)
+        elif effect.name not in known and effect.name != "wheel_radius":
+            terms.append(effect.name)
+    if any(key.startswith("measure.pose_point") for key in numbers) and "pose_point" not in faults:
+        faults.append("pose_point")
+    sensed = {key: value for key, value in numbers.items() if key.startswith("measure.")}
+    driven = {key: value for key, value in numbers.items() if key not in sensed}
+    found = car.with_terms(terms, driven)
+    found = found.with_measures(list(dict.fromkeys(faults)), sensed) if faults else found
+    return replace(found, correlated=correlated(model, fitted, which))
+
+
+def correlated(model: Likelihood, fitted: Fitted, own: Sequence[bool]) -> tuple[Correlated, ...]:
+    """Return the groups of numbers whose errors come together, as the recordings leave them.
+
+    Args:
+        model: That `fitted` belongs to.
+        fitted: What was found.
+        own: Which of the car's own numbers count.
+    """
+    covariance = fitted.covariance
+    if not covariance.size:
+        return ()
+    keys = [o.key if moves else CLOCKS for o, moves in zip(model.nominal, own, strict=True)]
+    for effect in fitted.effects:
+        named = number_keys(effect) if isinstance(effect, DictionaryEffect) else {}
+        keys += [named.get(parameter.name, parameter.key) for parameter in effect.parameters]
+    std = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
+    counts = np.array([not key.startswith((CLOCKS, "measure.", PREFIX)) for key in keys])
+    counts &= (std > 0.0) & np.array([keys.count(key) == 1 for key in keys])
+    between = covariance / np.where(std > 0.0, np.outer(std, std), 1.0)
+    strong = (np.abs(between) >= STRONG) & np.outer(counts, counts)
+    groups, left = list[Correlated](), [int(i) for i in np.flatnonzero(counts)]
+    while left:
+        group = [left.pop(0)]
+        while more := [i for i in left if strong[i, group].any()]:
+            group += more
+            left = [i for i in left if i not in more]
+        if len(group) > 1:
+            matrix = (1.0 - LOOSER) * between[np.ix_(group, group)] + LOOSER * np.eye(len(group))
+            rows = tuple(tuple(round(float(v), 3) for v in row) for row in matrix)
+            groups.append(Correlated(tuple(keys[i] for i in group), rows))
+    return tuple(groups)

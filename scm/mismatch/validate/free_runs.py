@@ -1,0 +1,307 @@
+"""Free runs of the car as given and of the car as found, against the recording.
+
+Windows are those of `scm.replay.free_run`, so `scm replay` of a car file finds the same errors:
+those at a window's end, root mean squares over windows of one part of the recordings.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Bools, Floats
+from scm.data_quality.problem import Span
+from scm.errors import RecordingError
+from scm.mismatch.evidence import FreeRuns
+from scm.mismatch.findings import Fit, PartErrors
+from scm.mismatch.fit.data_split import NAMES, Parts
+from scm.mismatch.validate.residual_forces import on_one_axis
+from scm.mismatch.validate.window_errors import sensor_errors
+from scm.recording.motion import Poses
+from scm.replay.camera import Camera
+from scm.replay.drive import STEP_S, Drive
+from scm.replay.free_run import SAVE_EVERY_S, Replay
+from scm.replay.smooth import Smooth, smooth
+from scm.replay.windows import at_times
+from scm.vehicles.car import Car
+
+FAST_MPS, FAST_HORIZON_S, SLOW_HORIZON_S = 1.0, 1.0, 3.0
+SHORTEST_S = 0.2
+MOST_TIME = 0.8  # of a recording: blocks that make up the rest may be too short for a window
+NEXT_S = 1.0  # between the starts of windows at most
+DRAWS = 2
+START_DIGITS = 6  # of a window's start in a report [s]: whoever replays it starts there too
+WORSE = 1.02
+_BEFORE, _AFTER = 0, 1
+
+
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """One drive's windows: errors by channel, each (sides, windows, values), and what is drawn.
+
+    Attributes:
+        number: Of the drive.
+        start_s: (windows,), by the poses' stamps; `part`: of each.
+        floor: What noise alone makes of each error, (draws, windows, values).
+        shown: Poses recorded, before and after, (3, windows, times).
+    """
+
+    number: int
+    start_s: Floats
+    part: tuple[str, ...]
+    errors: Mapping[str, Floats]
+    floor: Mapping[str, Floats]
+    shown: Mapping[str, Floats]
+
+
+def horizon_of(drives: Sequence[Drive], parts: Parts) -> float:
+    """Return how long windows should be: 1 s for a fast car, 3 s for a slow one, or a block."""
+    speeds = [drive.pose_speed for drive in drives]
+    fast = float(np.percentile(np.concatenate(speeds), 90)) > FAST_MPS
+    blocks = [b - a for name in NAMES for spans in getattr(parts, name).spans for a, b in spans]
+    longest = 0.9 * _usual(blocks) if blocks else SLOW_HORIZON_S
+    return round(min(FAST_HORIZON_S if fast else SLOW_HORIZON_S, longest), 2)
+
+
+def _usual(blocks: Sequence[float]) -> float:
+    """Return the length that blocks have which are most of the time: short ones show nothing."""
+    lengths = np.sort(blocks)[::-1]
+    return float(lengths[np.searchsorted(np.cumsum(lengths), MOST_TIME * lengths.sum() - 1e-9)])
+
+
+def judge(
+    drives: Sequence[Drive],
+    before: Car,
+    after: Car,
+    parts: Parts,
+    horizon_s: float | None = None,
+) -> tuple[Fit, FreeRuns]:
+    """Return how well two cars follow the recordings on each part, and their free runs.
+
+    Args:
+        drives: The recordings.
+        before: The car as given.
+        after: The car as found.
+        parts: Of the recordings.
+        horizon_s: Length of a window; None chooses it.
+
+    Raises:
+        RecordingError: when no recording holds a whole window.
+    """
+    horizon = horizon_of(drives, parts) if horizon_s is None else horizon_s
+    horizon = max(round(horizon / STEP_S) * STEP_S, SHORTEST_S)
+    judged = [
+        one
+        for number, drive in enumerate(drives)
+        if (one := _judged(drive, (before, after), _spans(parts, number), number, horizon))
+    ]
+    if not judged:
+        msg = f"{drives[0].recording.path}: no window of {horizon:g} s without a gap in the poses"
+        raise RecordingError(msg)
+    every = {name: _part(judged, name) for name in NAMES}
+    return Fit(horizon_s=horizon, **every), _free_runs(judged, on_one_axis(drives), horizon)
+
+
+def nothing_got_worse(fit: Fit) -> tuple[str, ...]:
+    """Return the channels that got worse by more than 2 % on the part that only confirms.
+
+    What noise of measuring alone changes between two equal cars does not count.
+    """
+    part = fit.confirm
+    chance = 2.0 * np.sqrt(2.0 / max(part.windows, 1))
+    return tuple(
+        name
+        for name, was in part.before.items()
+        if part.after[name] > WORSE * was
+        and part.after[name] ** 2 - was**2 > chance * part.noise_floor.get(name, 0.0) ** 2
+    )
+
+
+def _spans(parts: Parts, drive: int) -> list[tuple[str, Span]]:
+    """Return the blocks of one drive with their parts, in time's order."""
+    found = [(name, span) for name in NAMES for span in getattr(parts, name).spans[drive]]
+    return sorted(found, key=lambda one: one[1])
+
+
+def _judged(
+    drive: Drive, cars: tuple[Car, Car], spans: Sequence[tuple[str, Span]], number: int,
+    horizon: float,
+) -> _Judged | None:  # fmt: skip
+    replays = [Replay(drive.recording, car) for car in cars]
+    starts, part = _starts(drive, replays, spans, horizon)
+    if not len(starts):
+        return None
+    noisy = [Camera(replays[_AFTER].drive, {}, poses) for poses in _draws(replays[_AFTER].drive)]
+    t_s = np.append(np.arange(0.0, horizon - 0.5 * SAVE_EVERY_S, SAVE_EVERY_S), horizon)
+    sides = [
+        _driven(replay, starts, t_s, cameras)
+        for replay, cameras in zip(replays, ((), noisy), strict=True)
+    ]
+    fine: Bools = np.asarray(np.all([side.ok for side in sides], axis=0))
+    apart = {name: [side.apart[name] for side in sides] for name in ("x", "y", "yaw")}
+    errors = {
+        "position_m": np.stack([
+            np.hypot(x[0, :, -1], y[0, :, -1])
+            for x, y in zip(apart["x"], apart["y"], strict=True)
+        ])[..., None],
+        "yaw_rad": np.stack([_wrapped(yaw[0, :, -1]) for yaw in apart["yaw"]])[..., None],
+    }  # fmt: skip
+    noise = {name: sides[_AFTER].apart[name][1:, :, -1] - apart[name][_AFTER][0, :, -1]
+             for name in apart}  # fmt: skip
+    floor = {
+        "position_m": np.hypot(noise["x"], noise["y"])[..., None],
+        "yaw_rad": _wrapped(noise["yaw"])[..., None],
+    }
+    for name, miss, chance in zip(
+        sides[_AFTER].names, _sensor_misses(sides), sides[_AFTER].chances, strict=True
+    ):
+        mine, draws = miss
+        _join(errors, name, mine)
+        _join(floor, name, np.sqrt((draws - mine[_AFTER]) ** 2 + chance))
+    measured = sides[_BEFORE].measured
+    shown = {
+        name: np.stack([measured[name], *(measured[name] + one[0] for one in apart[name])])
+        for name in measured
+    }
+    return _Judged(
+        number,
+        starts[fine],
+        tuple(name for name, ok in zip(part, fine, strict=True) if ok),
+        {name: error[:, fine] for name, error in errors.items()},
+        {name: error[:, fine] for name, error in floor.items()},
+        {name: values[:, fine] for name, values in shown.items()},
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Driven:
+    """What one car did in all windows, its own side first and then those of noisy starts.
+
+    Attributes:
+        ok: Whether all stayed within physical bounds, (windows,).
+        apart: Simulated minus measured x, y [m] and yaw [rad], each (sides, windows, times).
+        measured: What was measured, each (windows, times).
+        names: Of the other sensors' errors; `misses` and `chances` of each: the error at a window's
+            end, (sides, windows), and its own variance.
+    """
+
+    ok: Bools
+    apart: Mapping[str, Floats]
+    measured: Mapping[str, Floats]
+    names: Sequence[str]
+    misses: Sequence[Floats]
+    chances: Sequence[float]
+
+
+def _driven(replay: Replay, starts: Floats, t_s: Floats, cameras: Sequence[Camera]) -> _Driven:
+    """Drive one car through all windows, from the measured motion and from noisy ones."""
+    runs, begun, _ = replay.run(starts, float(t_s[-1]), cameras)
+    at = replay.taken((starts[:, None] + t_s).ravel()).reshape(len(starts), -1)
+    edges = replay.drive.edges[begun[0]]
+    seen = [camera.motion(at.ravel()) for camera in (replay.camera, *cameras)]
+    signals = {"x": runs["x"], "y": runs["y"], "yaw": np.unwrap(runs["yaw"], axis=0)}
+    apart, sides = dict[str, Floats](), len(seen)
+    for name, signal in signals.items():
+        driven = np.stack([at_times(signal, np.tile(t - edges, (sides, 1))) for t in at.T], axis=2)
+        real = np.stack([getattr(moved, name).reshape(at.shape) for moved in seen])
+        apart[name] = driven - real
+    measured = {name: getattr(seen[0], name).reshape(at.shape) for name in signals}
+    since = (np.tile(at[:, 0] - edges, (sides, 1)), np.tile(at[:, -1] - edges, (sides, 1)))
+    ok: Bools = np.asarray(runs.ok.all(axis=0), dtype=np.bool_)
+    found = list(sensor_errors(replay.drive, runs, begun, since))
+    return _Driven(
+        ok, apart, measured, [name for name, _, _ in found],
+        [miss for _, miss, _ in found], [chance for _, _, chance in found],
+    )  # fmt: skip
+
+
+def _sensor_misses(sides: Sequence[_Driven]) -> list[tuple[Floats, Floats]]:
+    """Return, of each sensor, both cars' errors, (2, windows), and those of noisy starts."""
+    return [
+        (np.stack([before[0], after[0]]), after[1:])
+        for before, after in zip(sides[_BEFORE].misses, sides[_AFTER].misses, strict=True)
+    ]
+
+
+def _draws(drive: Drive) -> Iterator[dict[str, Smooth]]:
+    """Yield smoothed poses as they would be with noise once more."""
+    rng = np.random.default_rng(len(drive.edges))
+    for _ in range(DRAWS):
+        yield {
+            name: smooth(s.t, s.value + std * rng.standard_normal(len(s.t)), std)
+            for name, s in drive.smoothed.items()
+            for std in (drive.stream(name).std,)
+        }
+
+
+def _starts(
+    drive: Drive, replays: Sequence[Replay], spans: Sequence[tuple[str, Span]], horizon: float
+) -> tuple[Floats, tuple[str, ...]]:
+    """Return when windows start, by the poses' stamps, and the part of each.
+
+    They lie within one block and have no gap in the poses.
+    """
+    poses = Poses(drive.recording)
+    found, part = list[float](), list[str]()
+    for name, (begin, end) in spans:
+        room = end - begin - horizon
+        if room < -1e-6:
+            continue
+        count = 1 + int(room / min(0.5 * horizon, NEXT_S) + 0.1)
+        for start in np.linspace(begin, begin + max(room, 0.0), count):
+            inside = all(replay.holds(start, start + horizon) for replay in replays)
+            if inside and poses.unbroken(start, start + horizon):
+                found.append(round(float(start), START_DIGITS))
+                part.append(name)
+    return np.array(found), tuple(part)
+
+
+def _wrapped(angle: Floats) -> Floats:
+    """Return angles in (-pi, pi]."""
+    return np.arctan2(np.sin(angle), np.cos(angle))
+
+
+def _join(errors: dict[str, Floats], name: str, more: Floats) -> None:
+    """Add one stream's errors, (sides, windows), to its channel's."""
+    more = more[..., None]
+    errors[name] = np.concatenate((errors[name], more), axis=2) if name in errors else more
+
+
+def _part(judged: Sequence[_Judged], part: str) -> PartErrors:
+    """Return the errors of all drives' windows of one part."""
+    mine = [np.array([p == part for p in one.part], dtype=np.bool_) for one in judged]
+
+    def rms(of: Sequence[Mapping[str, Floats]], side: int | slice) -> dict[str, float]:
+        names = dict.fromkeys(name for one in of for name in one)
+        found = dict[str, float]()
+        for name in names:
+            values = [one[name][side][..., keep, :].ravel()
+                      for one, keep in zip(of, mine, strict=True) if name in one]  # fmt: skip
+            together = np.concatenate(values)
+            if len(together):
+                found[name] = float(np.sqrt(np.mean(np.square(together))))
+        return found
+
+    errors = [one.errors for one in judged]
+    return PartErrors(
+        windows=int(sum(keep.sum() for keep in mine)),
+        before=rms(errors, _BEFORE),
+        after=rms(errors, _AFTER),
+        noise_floor=rms([one.floor for one in judged], slice(None)),
+    )
+
+
+def _free_runs(judged: Sequence[_Judged], moves: Sequence[float], horizon: float) -> FreeRuns:
+    sides = [
+        {name: np.concatenate([one.shown[name][i] for one in judged]) for name in ("x", "y", "yaw")}
+        for i in range(3)
+    ]
+    times = sides[0]["x"].shape[1]
+    t_s = np.append(SAVE_EVERY_S * np.arange(times - 1), horizon)
+    return FreeRuns(
+        part=tuple(name for one in judged for name in one.part),
+        recording=np.concatenate([np.full(len(one.start_s), one.number) for one in judged]),
+        stamp_s=np.concatenate([one.start_s for one in judged]),
+        start_s=np.concatenate([one.start_s + moves[one.number] for one in judged]),
+        t_s=t_s, measured=sides[0], before=sides[1], after=sides[2],
+    )  # fmt: skip
