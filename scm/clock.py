@@ -77,7 +77,7 @@ class WallClock:
 
 
 class StepClock:
-    """A clock that moves only when stat to: lockstep runs and tests."""
+    """A clock that moves only when it is set, for lockstep runs and tests."""
 
     def __init__(self, start_ns: int = 0) -> None:
         self._now_ns = start_ns
