@@ -84,7 +84,7 @@ def main() -> None:
     print(f"{'JPEG, quality 80':30}{jpeg:7.2f} ms {jpeg / limit:6.2f} warps, {size_kb:.0f} kB")
     asleep = CameraPart(CITY)
     snapshot = WorldSnapshot(t_ns=0, tick=0, vehicles=rows[0])
-    inbox = [Incoming(snapshot, 0)] if asleep.hears else []
+    inbox = [Incoming(snapshot, 0)] if asleep.subscriptions else []
     idle = median_ms(
         lambda i: [asleep.step(20 * NS_PER_MS * (50 * i + k), inbox) for k in range(50)]
     )

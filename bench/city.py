@@ -18,7 +18,7 @@ from pathlib import Path
 from scm.maps.load import load_map
 from scm.records.city_map import CityMap
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.messages.lidar_scan import LidarScan
@@ -86,7 +86,7 @@ def built(city_map: CityMap, cars: int) -> tuple[WorldPart, float]:
     gc.collect()
     before_mib = memory_mib()
     part = WorldPart(city_map, room=cars)
-    part.learn_wishes(lambda _kind, _where: False)
+    part.attach(lambda _kind, _where: False)
     roads = part.world.roads
     for lane in roads.lanes.values():
         roads.nearest(lane.at(0.0))
@@ -106,7 +106,7 @@ def run(city_map: CityMap, cars: int, stages: Stages, *, lidar: bool = False) ->
     part.world.use_threads(os.cpu_count() or 1)
     parts = [part, TrafficPart(city_map), MonitorPart(city_map)]
     with Lockstep(parts) as city:
-        scans = city.hear(Hears(LidarScan)) if lidar else None
+        scans = city.subscribe(Subscription(LidarScan)) if lidar else None
         city.run_for(WARM_S)
         stages.clear()
         if scans is not None:

@@ -22,7 +22,7 @@ from bench.city import fill
 from scm.arrays import Bools, Floats, Ints
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Subscription
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.observer_part import ObserverPart
 from scm.traffic.part import TrafficPart
@@ -46,12 +46,11 @@ POSE_STD_M, YAW_STD_RAD, SPEED_STD_MPS = 0.005, 0.01, 0.03
 EYE_PERIOD_NS = 100_000_000
 
 
-class Cameras:
+class Cameras(BasePart):
     """Stand for the overhead cameras: the world's true poses with the noise that they tell."""
 
     name, role, period_ns = "eye", "part", EYE_PERIOD_NS
-    hears: tuple[Hears, ...] = ()
-    serves: tuple[Serves, ...] = ()
+    subscriptions: tuple[Subscription, ...] = ()
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -75,11 +74,6 @@ class Cameras:
             strict=True,
         )
         return [self._track(now_ns, *row) for row in rows]
-
-    def finish(self, now_ns: int) -> list[Outgoing]:
-        """Say nothing more."""
-        del now_ns
-        return []
 
     def _track(
         self, now_ns: int, slot: int, x: float, y: float, yaw: float, speed: float
@@ -106,7 +100,7 @@ class Observed:
         self.counts: TrafficCounts | None = None
         for part in self._parts:
             city.add(part)
-        self._mailbox = city.hear(Hears(Violation))
+        self._mailbox = city.subscribe(Subscription(Violation))
 
     def look(self, passed_s: float) -> None:
         """Note what was told since; take the parts away when their time is over."""
@@ -233,7 +227,7 @@ def flow(
     part = WorldPart(city_map, room=cars)
     if loss:
         part.world = World(city_map, capacity=cars, loss=loss, prepare=["nigel"])
-    part.learn_wishes(lambda _kind, _where: False)
+    part.attach(lambda _kind, _where: False)
     fill(part.world, cars)
     parts = [part, TrafficPart(city_map, policy=policy), MonitorPart(city_map)]
     with Lockstep(parts) as city:

@@ -81,7 +81,7 @@ class Watch:
 def drive(city_map: CityMap, cars: int, span_s: float, policy: str, seed: int) -> Tally:
     """Run one city; return what its cars did after the first seconds."""
     part = WorldPart(city_map, seed, room=cars)
-    part.learn_wishes(lambda _kind, _where: False)
+    part.attach(lambda _kind, _where: False)
     world, crowd = part.world, part.world.crowd
     touched = counted(world)
     fill(world, cars)

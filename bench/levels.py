@@ -11,7 +11,7 @@ from bench.city import fill
 from bench.flow import Cameras
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.demand import DemandPart
 from scm.traffic.demand_table import Flow
 from scm.traffic.monitor_part import MonitorPart
@@ -59,7 +59,7 @@ def main() -> None:
         signals = [TrafficPart(city_map, policy=policy), MonitorPart(city_map)]
         parts = [world, *signals, demand, Cameras(world.world), observer]
         with Lockstep(parts) as city:
-            told = city.hear(Hears(Violation))
+            told = city.subscribe(Subscription(Violation))
             city.run_for(given.seconds)
             for (lane, _), per_h in WAYS.items():
                 cells = row_of(observer, lane, city.now_ns)

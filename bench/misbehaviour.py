@@ -22,7 +22,7 @@ import msgspec
 
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.part import TrafficPart
 from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.etsi.convert import read_cam
@@ -85,8 +85,11 @@ def tell(town: Town, seed: int, *, own_eye: bool = False) -> Story:
         parts.append(EyePart(city_map, seed=seed))
     rng = random.Random(seed)
     with Lockstep(parts, start_ns=START_NS) as city:
-        frames, truths = city.hear(Hears(CamTx)), city.hear(Hears(WorldSnapshot))
-        tracks = city.hear(Hears(EyeTrack))
+        frames, truths = (
+            city.subscribe(Subscription(CamTx)),
+            city.subscribe(Subscription(WorldSnapshot)),
+        )
+        tracks = city.subscribe(Subscription(EyeTrack))
         spawns = [spawn.name for spawn in city_map.spawns]
         rng.shuffle(spawns)
         for number in range(town.cars):

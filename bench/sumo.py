@@ -172,7 +172,7 @@ class Outcome:
 def drive(city_map: CityMap, flows: Sequence[Flow], span_s: float) -> Outcome:
     """Run a city with its demand; return what was seen."""
     world = WorldPart(city_map, room=MOST_CARS)
-    world.learn_wishes(lambda _kind, _where: False)
+    world.attach(lambda _kind, _where: False)
     touched = counted(world.world)
     demand = DemandPart(city_map, flows)
     slots, stands, longest = world.world.slots, np.zeros(MOST_CARS), (0.0, "")

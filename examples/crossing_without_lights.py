@@ -39,7 +39,7 @@ def crossing(radio: RadioChannel, seed: int = 0) -> WorldPart:
     ]
     city_map = grid_city(3, 3, block_m=6.0, signs=True)
     part = WorldPart(replace(city_map, signs=tuple(signs), radio=radio), seed, room=4)
-    part.learn_wishes(lambda _kind, _where: False)
+    part.attach(lambda _kind, _where: False)
     for arm, lane in ARMS.items():
         at = part.world.roads.lane(lane).at(LINE_M - BEFORE_M)
         car = part.world.host(arm, "nigel", at, 0)

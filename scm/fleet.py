@@ -30,7 +30,7 @@ from scm.errors import RunError, ScmError, VoidError, nearest
 from scm.log import event
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears, Part
+from scm.runtime.part import Part, Subscription
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.ask import ask
@@ -70,7 +70,7 @@ class Link(Protocol):
         """Return the reply to a request, or a `Refused`."""
         ...
 
-    def subscribe(self, subscription: Hears, keep: Keep | None = None) -> Mailbox:
+    def subscribe(self, subscription: Subscription, keep: Keep | None = None) -> Mailbox:
         """Return a mailbox that fills from now on with the messages that `keep` accepts.
 
         `keep` may be called on another thread.
@@ -101,9 +101,9 @@ class LockstepLink:
         """Step the city until the reply arrives."""
         return self._lockstep.call(request)
 
-    def subscribe(self, subscription: Hears, keep: Keep | None = None) -> Mailbox:
+    def subscribe(self, subscription: Subscription, keep: Keep | None = None) -> Mailbox:
         """Return a mailbox on the in-memory bus."""
-        return self._lockstep.hear(subscription, keep)
+        return self._lockstep.subscribe(subscription, keep)
 
     def publish(self, message: Message) -> None:
         """Send on the in-memory bus."""
@@ -136,7 +136,7 @@ class LiveLink:
         signed = msgspec.structs.replace(request, actor=request.actor or program_name())
         return ask(self._bus, signed, REPLY_TIMEOUT_S)
 
-    def subscribe(self, subscription: Hears, keep: Keep | None = None) -> Mailbox:
+    def subscribe(self, subscription: Subscription, keep: Keep | None = None) -> Mailbox:
         """Return a mailbox subscribed on the bus."""
         mailbox = Mailbox(
             MAILBOX_DEPTH if keep is None else FILTERED_MAILBOX_DEPTH, self._wake, keep
@@ -250,10 +250,10 @@ class City:
         self._link = link
         self._trip_numbers = itertools.count(1)
         self._may_arrive: dict[str, tuple[Journey, ...]] = {}  # by car: its last two journeys
-        self._arrivals = link.subscribe(Hears(Trip), self._is_arrival)
+        self._arrivals = link.subscribe(Subscription(Trip), self._is_arrival)
         self._disturbances = Disturbances()
         for kind in MESSAGE_KINDS:
-            link.subscribe(Hears(kind), self._watch)
+            link.subscribe(Subscription(kind), self._watch)
         self.cars: list[FleetCar] = []
 
     @property

@@ -26,7 +26,7 @@ from scm.play_watch import Watch
 from scm.recorder.driven import RUN_IN_NS, Heard, recording_of
 from scm.recording.read import Recording
 from scm.recording.table import read_table
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.drive_command import DriveCommand
@@ -96,9 +96,9 @@ class _Ear:
     def __init__(self, link: Link, vehicle: str) -> None:
         self._link, self._vehicle, self._heard = link, vehicle, Heard()
         of_car = {"vehicle": vehicle}
-        self._reports = link.subscribe(Hears(VehicleState, of_car))
-        self._others = [link.subscribe(Hears(kind, of_car)) for kind in (VehicleSensors, EyePose)]
-        self._others.append(link.subscribe(Hears(CityEvent)))
+        self._reports = link.subscribe(Subscription(VehicleState, of_car))
+        self._others = [link.subscribe(Subscription(kind, of_car)) for kind in (VehicleSensors, EyePose)]
+        self._others.append(link.subscribe(Subscription(CityEvent)))
 
     def sent(self, command: DriveCommand) -> None:
         self._heard.take(command)

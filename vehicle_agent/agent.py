@@ -13,7 +13,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MapError, RunError
 from scm.log import event
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears, IsWanted, Serves
+from scm.runtime.part import IsWanted, Service, Subscription
 from scm.v2x.exchange import Answer, Incoming, Outgoing
 from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused
@@ -112,13 +112,13 @@ class AgentPart:
             EchoRequest: self._on_echo,
             EyeTrack: self._on_eye,
         }
-        self.hears: Sequence[Hears] = self._hears()
+        self.subscriptions: Sequence[Subscription] = self._hears()
         own = {"vehicle": name}
-        self.serves: Sequence[Serves] = tuple(
-            Serves(kind, own) for kind in (RouteRequest, LightRequest, EchoRequest)
+        self.services: Sequence[Service] = tuple(
+            Service(kind, own) for kind in (RouteRequest, LightRequest, EchoRequest)
         )
 
-    def learn_wishes(self, is_wanted: IsWanted) -> None:
+    def attach(self, is_wanted: IsWanted) -> None:
         """Let no sensor be simulated from now on that nobody subscribes to."""
         self._is_wanted = is_wanted
 
@@ -164,20 +164,20 @@ class AgentPart:
         """Let go of the body, however the agent ends."""
         self._body.close()
 
-    def _hears(self) -> Sequence[Hears]:
+    def _hears(self) -> Sequence[Subscription]:
         here, own = {"receiver": self.name}, {"vehicle": self.name}
         return (
-            Hears(WorldDefinition),
-            Hears(Presence, {"role": self.role, "station": self.name}),
-            Hears(SpatemRx, here),
-            Hears(CamRx, here),
-            Hears(DenmRx, here),
-            Hears(MonitorStatus),
-            Hears(RadioStatus),
-            Hears(CityStop),
-            Hears(Contact, own),
-            Hears(DriveCommand, own),
-            *([Hears(EyeTrack, own)] if self._body.wants_eye else []),
+            Subscription(WorldDefinition),
+            Subscription(Presence, {"role": self.role, "station": self.name}),
+            Subscription(SpatemRx, here),
+            Subscription(CamRx, here),
+            Subscription(DenmRx, here),
+            Subscription(MonitorStatus),
+            Subscription(RadioStatus),
+            Subscription(CityStop),
+            Subscription(Contact, own),
+            Subscription(DriveCommand, own),
+            *([Subscription(EyeTrack, own)] if self._body.wants_eye else []),
         )
 
     def _check_losses(self, now_ns: int) -> None:

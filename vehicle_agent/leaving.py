@@ -7,7 +7,7 @@ import threading
 from collections.abc import Sequence
 
 from scm.clock import NS_PER_MS
-from scm.runtime.part import Hears, Part
+from scm.runtime.part import IsWanted, Part, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 
 PATIENCE_NS = 900 * NS_PER_MS
@@ -24,15 +24,19 @@ class Leaving:
 
     def __init__(self, part: Part, wish: threading.Event, done: threading.Event) -> None:
         self.name, self.role, self.period_ns = part.name, part.role, part.period_ns
-        self.serves = part.serves
+        self.services = part.services
         self._part, self._wish, self._done = part, wish, done
         self._since_ns: int | None = None
         self._waiting = 0
 
     @property
-    def hears(self) -> Sequence[Hears]:
+    def subscriptions(self) -> Sequence[Subscription]:
         """What the part wishes to hear now."""
-        return self._part.hears
+        return self._part.subscriptions
+
+    def attach(self, is_wanted: IsWanted) -> None:
+        """Let the part check for subscribers."""
+        self._part.attach(is_wanted)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Let the part live, or wait for the answers to its last words."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import msgspec
 
 from scm.clock import NS_PER_S
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.messages.vehicle_state import VehicleState
 
 DEPTH = 200  # reports: 4 s at 50 Hz, longer than any page takes to fetch them
@@ -66,9 +66,9 @@ class CloseUps:
         newer = tuple(state for count, state in heard if count > number)
         return (heard[-1][0] if heard else number), newer
 
-    def hears(self) -> Iterator[Hears]:
+    def subscriptions(self) -> Iterator[Subscription]:
         """Yield what has to be heard for those who watch now."""
-        return (Hears(VehicleState, {"vehicle": vehicle}) for vehicle in self._watched)
+        return (Subscription(VehicleState, {"vehicle": vehicle}) for vehicle in self._watched)
 
 
 def sample_of(state: VehicleState) -> Sample:

@@ -7,7 +7,7 @@ import msgspec
 
 from scm.api.picture import Held
 from scm.clock import NS_PER_S
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.messages.eye_track import EyeTrack
 
 WATCHED_NS = 5 * NS_PER_S
@@ -80,9 +80,9 @@ class TrackWatch:
         if self._until_ns is not None:
             self._newest[track.vehicle] = Held(track, t_ns)
 
-    def hears(self) -> tuple[Hears, ...]:
+    def subscriptions(self) -> tuple[Subscription, ...]:
         """Return what has to be heard now."""
-        return () if self._until_ns is None else (Hears(EyeTrack),)
+        return () if self._until_ns is None else (Subscription(EyeTrack),)
 
     def rows(self, now_ns: int) -> tuple[TrackRow, ...]:
         """Return the newest track of each car, by name."""

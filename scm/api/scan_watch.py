@@ -9,7 +9,7 @@ import numpy as np
 
 from scm.api.picture import Held
 from scm.geometry import Pose2
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.vehicles.car import car_names, load_car
 
@@ -68,9 +68,9 @@ class ScanWatch:
         """Return the newest scan of a watched car; None: none yet."""
         return self._newest.get(vehicle)
 
-    def hears(self) -> Iterator[Hears]:
+    def subscriptions(self) -> Iterator[Subscription]:
         """Yield what has to be heard for those who watch now."""
-        return (Hears(LidarScan, {"vehicle": vehicle}) for vehicle in self._watched)
+        return (Subscription(LidarScan, {"vehicle": vehicle}) for vehicle in self._watched)
 
 
 @lru_cache(maxsize=64)

@@ -23,7 +23,7 @@ from scm.api.stations import StationTable
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.disturbances import Disturbances
 from scm.geometry import Pose2
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
@@ -60,14 +60,13 @@ LONGEST_GAP_NS = 200 * NS_PER_MS  # between two snapshots; more is silence, not 
 MOST_REPORTED = 500
 
 
-class CityView:
+class CityView(BasePart):
     """What the city looks like from outside; hears all, says nothing."""
 
     def __init__(self) -> None:
         self.name = "api"
         self.role = "part"
         self.period_ns = 50 * NS_PER_MS
-        self.serves: Sequence[Serves] = ()
         self._lock = threading.Lock()
         self._now_ns = 0
         self._picture: Picture | None = None
@@ -102,12 +101,12 @@ class CityView:
         self._disturbances = Disturbances()
         self._log = EventLog()
         self._takers = self._always_heard()
-        self._always = tuple(Hears(kind) for kind in self._takers)
+        self._always = tuple(Subscription(kind) for kind in self._takers)
         self._takers[CameraFrame] = self._take_camera_frame
         self._takers[LidarScan] = self._scans.take
         self._takers[EyeTrack] = self._tracks.take
         self._takers[VehicleState] = self._close_ups.take
-        self.hears: Sequence[Hears] = self._always
+        self.subscriptions: Sequence[Subscription] = self._always
 
     def _always_heard(self) -> dict[type[Message], Callable[[Any, int], None]]:
         """Return who takes each message that is heard whether somebody looks or not."""
@@ -320,12 +319,12 @@ class CityView:
     def _wish(self) -> None:
         """Say what is to be heard now."""
         cameras = (
-            Hears(CameraFrame, {"vehicle": vehicle, "camera": camera})
+            Subscription(CameraFrame, {"vehicle": vehicle, "camera": camera})
             for vehicle, camera in self._watched
         )
         watched = (self._scans, self._close_ups, self._tracks)
-        asked = (hears for one in watched for hears in one.hears())
-        self.hears = (*self._always, *cameras, *asked)
+        asked = (each for one in watched for each in one.subscriptions())
+        self.subscriptions = (*self._always, *cameras, *asked)
 
     def _take_camera_frame(self, frame: CameraFrame, t_ns: int) -> None:
         which = (frame.vehicle, frame.camera)

@@ -19,7 +19,7 @@ from scm.camera.tween import between, near
 from scm.clock import NS_PER_MS, NS_PER_S, Clock, nanoseconds
 from scm.errors import EyeError
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears, IsWanted, Serves
+from scm.runtime.part import BasePart, IsWanted, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
@@ -31,8 +31,8 @@ LOOK_NS = 100 * NS_PER_MS
 FLASH_NS = 500 * NS_PER_MS
 FARTHEST_M = 12.0
 """Cars farther away are not drawn: a Nigel is 15 pixels wide there."""
-AWAKE = (Hears(WorldSnapshot), Hears(Spat))
-ASLEEP: tuple[Hears, ...] = ()
+AWAKE = (Subscription(WorldSnapshot), Subscription(Spat))
+ASLEEP: tuple[Subscription, ...] = ()
 
 Which = tuple[str, str]
 """A vehicle and one of its cameras."""
@@ -47,7 +47,7 @@ class _Counted:
     wanted: set[Which] = field(default_factory=set)
 
 
-class CameraPart:
+class CameraPart(BasePart):
     """Pictures the city through whichever cameras are wanted.
 
     Args:
@@ -60,7 +60,6 @@ class CameraPart:
     name = "camera"
     role = "part"
     period_ns = 20 * NS_PER_MS
-    serves: Sequence[Serves] = ()
 
     def __init__(
         self,
@@ -69,7 +68,7 @@ class CameraPart:
         daylight: Daylight | None = None,
         clock: Clock | None = None,
     ) -> None:
-        self.hears: Sequence[Hears] = ASLEEP
+        self.subscriptions: Sequence[Subscription] = ASLEEP
         self._map = city_map
         self._seed = seed
         self._daylight = daylight or Daylight()
@@ -84,7 +83,7 @@ class CameraPart:
         self._counted = _Counted()
         self._spent_ns = 0
 
-    def learn_wishes(self, is_wanted: IsWanted) -> None:
+    def attach(self, is_wanted: IsWanted) -> None:
         """Learn whom to ask whether a picture is wanted."""
         self._is_wanted = is_wanted
 
@@ -94,7 +93,7 @@ class CameraPart:
             self._look_ns = now_ns + LOOK_NS
             self._look()
         status = self._status(now_ns)
-        if not self.hears:
+        if not self.subscriptions:
             return status
         heard_ns: int | None = None
         for item in inbox:
@@ -107,16 +106,11 @@ class CameraPart:
             self._expose(heard_ns)
         return [*self._under_way.come_out(now_ns), *status]
 
-    def finish(self, now_ns: int) -> list[Outgoing]:
-        """Leave without a word."""
-        del now_ns
-        return []
-
     def _look(self) -> None:
         if self._is_wanted(CameraFrame, {}):
-            self.hears = AWAKE
-        elif self.hears:
-            self.hears = ASLEEP
+            self.subscriptions = AWAKE
+        elif self.subscriptions:
+            self.subscriptions = ASLEEP
             self._snapshots.clear()
             self._spats.clear()
             self._exposed_ns.clear()
@@ -197,7 +191,7 @@ class CameraPart:
             return []
         counted.told_ns = now_ns
         count = len(counted.wanted)
-        detail = "nobody looks" if not self.hears else f"{count} camera{'s' * (count != 1)}"
+        detail = "nobody looks" if not self.subscriptions else f"{count} camera{'s' * (count != 1)}"
         if counted.frames and self._clock is not None:
             detail += f", {self._spent_ns / counted.frames / NS_PER_MS:.0f} ms a frame"
         counted.frames = self._spent_ns = 0

@@ -10,7 +10,7 @@ from scm.commands.api import proxy_arguments
 from scm.commands.record import camera_arguments
 
 if TYPE_CHECKING:
-    from scm.runtime.up import Wanted
+    from scm.runtime.up import CityOptions
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -71,15 +71,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")
 
 
-def wanted_of(arguments: argparse.Namespace) -> "Wanted":
+def options_of(arguments: argparse.Namespace) -> "CityOptions":
     """Return the city that is asked for."""
-    from scm.runtime.up import Wanted
+    from scm.runtime.up import CityOptions
 
     settings = {**vars(arguments), "map_name": arguments.map}
     settings |= {
         name: tuple(settings[name]) for name in ("radio", "cameras_of", "trust_proxy", "origin")
     }
-    return Wanted(**{field.name: settings[field.name] for field in fields(Wanted)})
+    return CityOptions(**{field.name: settings[field.name] for field in fields(CityOptions)})
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -87,7 +87,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.runtime.up import run_city
 
     check_base(arguments.base)
-    return run_city(wanted_of(arguments))
+    return run_city(options_of(arguments))
 
 
 COMMAND = Command(

@@ -39,7 +39,7 @@ from scm.eye.track.tracks import Tracks
 from scm.eye.watch import Watch
 from scm.log import event
 from scm.records.city_map import CityMap, MapTag
-from scm.runtime.part import Hears, IsWanted, Serves
+from scm.runtime.part import IsWanted, Service, Subscription
 from scm.scenery.bodies import NIGEL, CarBody, car_body
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.key import is_name
@@ -110,7 +110,7 @@ class EyePart:
         self._camera_ns = round(NS_PER_S / model.camera.rate_hz)
         self.period_ns = min(self._camera_ns, TRACKS_PERIOD_NS)
         self.watch = Watch(Anchor(self._sights.now.model(), (city_map.tag, *tags)))
-        self.serves = (Serves(CalibrationRequest, {"camera": self.camera}),)
+        self.services = (Service(CalibrationRequest, {"camera": self.camera}),)
         self.tracks = Tracks([one.name for one in city_map.cameras])
         self.tells_tracks = chosen is city_map.cameras[0]
         self.name = eye_station(self.camera, first=self.tells_tracks)
@@ -122,10 +122,10 @@ class EyePart:
         self._light: WorldSnapshot | None = None
         self._is_wanted: IsWanted = _nobody
         self._due_ns: dict[type[Message], int] = {EyeFrame: 0, EyeStatus: 0, EyeTrack: 0, CpmTx: 0}
-        self.hears = (
-            Hears(WorldSnapshot),
-            *([Hears(EyePose)] if self.tells_tracks and len(city_map.cameras) > 1 else []),
-            *(self._source.hears if isinstance(self._source, Listener) else ()),
+        self.subscriptions = (
+            Subscription(WorldSnapshot),
+            *([Subscription(EyePose)] if self.tells_tracks and len(city_map.cameras) > 1 else []),
+            *(self._source.subscriptions if isinstance(self._source, Listener) else ()),
         )
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -147,7 +147,7 @@ class EyePart:
             self.period_ns = self._pause_ns(now_ns, came=frame is not None)
         return out
 
-    def learn_wishes(self, is_wanted: IsWanted) -> None:
+    def attach(self, is_wanted: IsWanted) -> None:
         """Draw over pictures only while somebody looks."""
         self._is_wanted = is_wanted
 

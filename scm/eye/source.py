@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from scm.arrays import Image
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
@@ -74,7 +74,7 @@ class Listener(Source, Protocol):
     """A source whose frames come over the bus: its part hears for it."""
 
     @property
-    def hears(self) -> Sequence[Hears]:
+    def subscriptions(self) -> Sequence[Subscription]:
         """What the part must hear besides."""
         ...
 

@@ -7,7 +7,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RecordingError
 from scm.recorder.mcap_file import MESSAGES, RunFile
 from scm.registry import load, names
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing, RawSample
 from scm.v2x.key import check_name
 from scm.v2x.message import Delivery, Message
@@ -37,7 +37,7 @@ OF_EACH_CAR = (
 )
 
 
-class RecorderPart:
+class RecorderPart(BasePart):
     """Writes every message of the city; what is older than half a second survives a kill.
 
     The Eye's pictures alone would be nearly all of the file (some 30 MB a minute at 5 Hz), so of
@@ -53,8 +53,6 @@ class RecorderPart:
     name = "record"
     role = "part"
     period_ns = 50 * NS_PER_MS
-    hears: Sequence[Hears] = ()
-    serves: Sequence[Serves] = ()
 
     def __init__(
         self,
@@ -73,9 +71,9 @@ class RecorderPart:
             EyeFrame: _period_ns("frames_hz", frames_hz),
             CameraFrame: _period_ns("cameras_hz", cameras_hz),
         }
-        self.hears_raw = not sparse
-        self.hears_raw_too = (
-            *(map(Hears, _without_cars()) if sparse else ()),
+        kinds = _without_cars() if sparse else (Message,)
+        self.subscriptions = (
+            *(Subscription(kind, raw=True) for kind in kinds),
             *(_cameras(cameras_of) if cameras_hz else ()),
         )
         self.file = RunFile(path, city)
@@ -130,7 +128,7 @@ def _without_cars() -> tuple[type[Message], ...]:
     )
 
 
-def _cameras(cars: Sequence[str]) -> tuple[Hears, ...]:
+def _cameras(cars: Sequence[str]) -> tuple[Subscription, ...]:
     """Return the wish for pictures of some cars' own cameras; of all where none is named.
 
     Raises:
@@ -138,7 +136,8 @@ def _cameras(cars: Sequence[str]) -> tuple[Hears, ...]:
     """
     for name in cars:
         check_name(name, "cameras_of")
-    return tuple(Hears(CameraFrame, {"vehicle": name}) for name in cars) or (Hears(CameraFrame),)
+    where: list[dict[str, str]] = [{"vehicle": name} for name in cars] or [{}]
+    return tuple(Subscription(CameraFrame, each, raw=True) for each in where)
 
 
 def _period_ns(name: str, rate_hz: float) -> int | None:

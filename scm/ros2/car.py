@@ -19,7 +19,7 @@ from scm.geometry import Pose2
 from scm.ros2 import convert, frames
 from scm.ros2.pilot import Pilot
 from scm.ros2.wire import Endpoint, Graph, Topic
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.exchange import Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
@@ -72,7 +72,7 @@ class RosCar:
             CameraFrame: self._show_picture,
         }
 
-    def hears(self, *, moves: bool) -> list[Hears]:
+    def subscriptions(self, *, moves: bool) -> list[Subscription]:
         """Return what it must hear for those who subscribe to it now.
 
         Args:
@@ -82,13 +82,13 @@ class RosCar:
         own = {"vehicle": self.vehicle}
         out = []
         if moves or "odom" in wanted or self._pilot.is_driving:
-            out.append(Hears(VehicleState, own))
+            out.append(Subscription(VehicleState, own))
         if "scan" in wanted:
-            out.append(Hears(LidarScan, own))
+            out.append(Subscription(LidarScan, own))
         if "imu" in wanted:
-            out.append(Hears(VehicleSensors, own))
+            out.append(Subscription(VehicleSensors, own))
         if "camera/compressed" in wanted:
-            out.append(Hears(CameraFrame, own | {"camera": FRONT}))
+            out.append(Subscription(CameraFrame, own | {"camera": FRONT}))
         return out
 
     def show(self, message: Message, now_ns: int) -> list[Any]:

@@ -23,7 +23,7 @@ from scm.ros2.car import RosCar
 from scm.ros2.names import ros_name
 from scm.ros2.types import ros
 from scm.ros2.wire import Graph
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.spat import Spat
@@ -32,23 +32,22 @@ from scm.vehicles.car import Car, load_car
 
 LOOK_NS = 200 * NS_PER_MS
 MARKERS_EVERY = 2  # snapshots
-_ALWAYS = (Hears(WorldSnapshot),)
+_ALWAYS = (Subscription(WorldSnapshot),)
 _TF = "tf2_msgs/TFMessage"
 _MARKERS = "visualization_msgs/MarkerArray"
 
 _log = logging.getLogger(__name__)
 
 
-class RosPart:
+class RosPart(BasePart):
     """The bridge; `graph` stays its owner's to close."""
 
     name = "ros2"
     role = "part"
     period_ns = 10 * NS_PER_MS
-    serves: Sequence[Serves] = ()
 
     def __init__(self, city_map: CityMap, graph: Graph) -> None:
-        self.hears: Sequence[Hears] = _ALWAYS
+        self.subscriptions: Sequence[Subscription] = _ALWAYS
         self._map = city_map
         self._graph = graph
         self._clock = graph.publisher("/clock", "rosgraph_msgs/Clock")
@@ -139,11 +138,14 @@ class RosPart:
     def _look(self) -> None:
         """Hear what is wanted now; a list that is the same stays the same object."""
         moves = self._tf.is_wanted
-        wished = [*_ALWAYS, *(h for car in self._cars.values() for h in car.hears(moves=moves))]
+        wished = [
+            *_ALWAYS,
+            *(h for car in self._cars.values() for h in car.subscriptions(moves=moves)),
+        ]
         if self._markers.is_wanted:
-            wished.append(Hears(Spat))
-        if wished != list(self.hears):
-            self.hears = wished
+            wished.append(Subscription(Spat))
+        if wished != list(self.subscriptions):
+            self.subscriptions = wished
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Give back the leases; the cars leave the ROS graph."""

@@ -1,7 +1,7 @@
 """Run one part on a real bus and clock: one process, one loop, steps on absolute deadlines.
 
 The loop decides nothing. A step that is due while the last one still runs is not made up for: the
-part simply sees more time pass, and the lateness is counted and told.
+part simply sees more time pass, and the lateness is counted and reported.
 """
 
 import gc
@@ -34,20 +34,20 @@ def run(
     stop: threading.Event,
     state: Repository | None = None,
     *,
-    on_beat: bool = False,
+    on_tick: bool = False,
 ) -> None:
-    """Step a part until `stop` is set, then let it say its last words and close the bus.
+    """Step a part until `stop` is set, then let it finish and close the bus.
 
-    With a store, answers leave only when they and what they promise are in it. `on_beat` begins at
-    a beat of the clock, for parts of which a city has many: their messages come together, at all
-    computers whose clocks agree, and wake its router and its listeners less often.
+    With a store, answers leave only when they and the state behind them are in it. `on_tick` aligns
+    the steps with the ticks of the clock, for parts of which a city has many: on all computers with
+    synchronised clocks their messages arrive together and wake the router less often.
 
-    Its vital signs (`PartStatus`) go out once a second, filled into its own ones when it sends
-    such. An exception of the part is logged, told to the city and raised: the process should die.
+    `PartStatus` goes out once a second, merged into the part's own one if it sends it. An exception
+    of the part is logged, published as a `CityEvent` and raised: the process should die.
     """
     with bus:
         keeper = None if state is None else KeeperBehind(state, part.name, bus.session)
-        begin_ns = next_tick_ns(clock.now_ns()) if on_beat else clock.now_ns()
+        begin_ns = next_tick_ns(clock.now_ns()) if on_tick else clock.now_ns()
         loop = _Loop(part, Station(part, bus, keeper), clock, begin_ns)
         try:
             while not clock.wait_until(loop.due_ns, stop):
@@ -56,7 +56,7 @@ def run(
         except Exception as cause:
             trace = None if isinstance(cause, ScmError) else cause  # bad input needs no place
             _log.error("part_failed part=%s reason=%s", part.name, cause, exc_info=trace)
-            _tell_failure(part, bus, clock, cause)
+            _publish_failure(part, bus, clock, cause)
             raise
 
 
@@ -78,7 +78,7 @@ def stop_on_signal() -> threading.Event:
 
 
 class _Loop:
-    """The steps of one part, when the next is due, and how it has been doing."""
+    """The steps of one part, when the next is due, and its timing statistics."""
 
     def __init__(self, part: Part, station: Station, clock: Clock, begin_ns: int) -> None:
         self._part = part
@@ -108,7 +108,7 @@ class _Loop:
         self.due_ns += (overdue + 1) * self._part.period_ns
 
     def finish(self) -> None:
-        """Send the part's last words."""
+        """Send the part's last messages."""
         self._station.send(self._part.finish(self._clock.now_ns()))
         self._station.close()
 
@@ -129,7 +129,7 @@ class _Loop:
         return [item for item in outbox if not isinstance(item, PartStatus)] + [status]
 
 
-def _tell_failure(part: Part, bus: Bus, clock: Clock, cause: Exception) -> None:
+def _publish_failure(part: Part, bus: Bus, clock: Clock, cause: Exception) -> None:
     text = f"{part.name} stopped: {type(cause).__name__}: {cause}"
     try:
         bus.publish(
@@ -142,4 +142,4 @@ def _tell_failure(part: Part, bus: Bus, clock: Clock, cause: Exception) -> None:
             )
         )
     except LinkError as closed:
-        event(_log, "failure_not_told", level=logging.WARNING, part=part.name, reason=closed)
+        event(_log, "failure_not_published", level=logging.WARNING, part=part.name, reason=closed)

@@ -11,7 +11,7 @@ from typing import Self
 
 from scm.clock import StepClock, nanoseconds, seconds
 from scm.errors import RunError
-from scm.runtime.part import Hears, Part
+from scm.runtime.part import Part, Subscription
 from scm.runtime.station import Station
 from scm.store.repository import Repository
 from scm.v2x.bus import Mailbox
@@ -21,11 +21,11 @@ from scm.v2x.faults import Faults
 from scm.v2x.message import Message, Request
 from scm.v2x.write_ahead import Keeper
 
-HEARD_DEPTH = 1_000_000
+SCRIPT_MAILBOX_DEPTH = 1_000_000  # a script that runs for hours and then drains loses nothing
 
 
 class Lockstep:
-    """A city of parts on a memory bus; a context manager that lets everybody finish.
+    """A city of parts on a memory bus; a context manager that lets every part finish.
 
     Args:
         parts: In the order of their steps.
@@ -35,7 +35,7 @@ class Lockstep:
 
     Attributes:
         clock: The time of the city.
-        bus: The script's own connection, station `script`: to publish, or to ask without waiting.
+        bus: The script's own connection, station `script`: to publish, or to call without waiting.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Lockstep:
         return self.clock.now_ns()
 
     def add(self, part: Part, state: Repository | None = None) -> None:
-        """Let a part join; its first step is due now. What must outlive it goes into `state`."""
+        """Add a part; its first step is due now. `state` stores what must outlive it."""
         bus = self._network.bus(self._city, part.name)
         keeper = None if state is None else Keeper(state, part.name, bus.session)
         self._running[self._added] = _Running(part, bus, Station(part, bus, keeper))
@@ -69,22 +69,22 @@ class Lockstep:
         self._added += 1
 
     def remove(self, part: Part) -> None:
-        """Let a part say its last words and leave.
+        """Let a part finish, and remove it.
 
         Raises:
             RunError: when it is not running.
         """
-        self._take(part).leave(self.now_ns)
+        self._pop(part).leave(self.now_ns)
 
     def kill(self, part: Part) -> None:
-        """End a part without its last words, as a SIGKILL would.
+        """Remove a part without letting it finish, as a SIGKILL would.
 
         Raises:
             RunError: when it is not running.
         """
-        self._take(part).die()
+        self._pop(part).die()
 
-    def _take(self, part: Part) -> "_Running":
+    def _pop(self, part: Part) -> "_Running":
         order = next((n for n, running in self._running.items() if running.part is part), None)
         if order is None:
             msg = f"{part.name} is not running: it was removed already, or never added"
@@ -95,15 +95,17 @@ class Lockstep:
         """Send a message from the script."""
         self.bus.publish(message)
 
-    def hear(self, hears: Hears, keep: Callable[[Incoming], bool] | None = None) -> Mailbox:
+    def subscribe(
+        self, subscription: Subscription, keep: Callable[[Incoming], bool] | None = None
+    ) -> Mailbox:
         """Return a mailbox that collects what matches from now on, for the script to drain.
 
         Args:
-            hears: Which messages.
+            subscription: Which messages.
             keep: Which of these are wanted; None: all.
         """
-        mailbox = Mailbox(HEARD_DEPTH, keep=keep)
-        self.bus.subscribe(hears.kind, hears.where, mailbox)
+        mailbox = Mailbox(SCRIPT_MAILBOX_DEPTH, keep=keep)
+        self.bus.subscribe(subscription.kind, subscription.where, mailbox)
         return mailbox
 
     def run_for(self, span_s: float) -> None:
@@ -114,7 +116,7 @@ class Lockstep:
         """Run instant by instant until the condition holds.
 
         Args:
-            condition: Asked before the first and after every instant.
+            condition: Checked before the first and after every instant.
             timeout_s: Of the city's time.
             what: The condition in words, for the error: `n1 waits at the red light`.
 
@@ -132,7 +134,7 @@ class Lockstep:
             raise RunError(msg)
 
     def call(self, request: Request, timeout_s: float = 5.0) -> Message:
-        """Ask a request and run the city until the reply, or a `Refused`, is there."""
+        """Send a request, run the city until the reply or a `Refused` arrives, and return it."""
         replies: list[Incoming] = []
         self.bus.call(Call(request, timeout_s), replies.append)
         self._run(self.now_ns + nanoseconds(timeout_s), lambda: bool(replies))

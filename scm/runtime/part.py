@@ -1,9 +1,8 @@
 """The contract of a part of the city: a steppable object without thread, clock or bus.
 
-A part says what it hears and what it serves; a runner (`scm.runtime.live` or
-`scm.runtime.lockstep`) ties it to a bus and a clock. Because a part only ever sees `now_ns` and its
-inbox, the same object runs live in a process of its own, and deterministically beside all the
-others on a stepped clock.
+A part names its subscriptions and services; a runner (`scm.runtime.live` or `scm.runtime.lockstep`)
+connects it to a bus and a clock. A part only ever sees `now_ns` and its inbox, so the same object
+runs live in its own process, and deterministically next to all others on a stepped clock.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,48 +14,48 @@ from scm.v2x.message import Message, Request
 
 
 @dataclass(frozen=True, slots=True)
-class Hears:
-    """A wish to receive: a message class, and values for the variable parts of its key.
+class Subscription:
+    """What a part receives: a message class, and values for the variable parts of its key.
 
-    A key part left out of `where` matches everything: `Hears(VehicleState)` hears every vehicle,
-    `Hears(VehicleState, {"vehicle": "n7"})` hears one. With `once`, of copies that differ in the
-    first variable part of their key alone (who received them), only the first is brought.
+    A key part left out of `where` matches everything: `Subscription(VehicleState)` is every
+    vehicle, `Subscription(VehicleState, {"vehicle": "n7"})` is one.
+
+    Attributes:
+        kind: The message class.
+        where: Values of variable key parts.
+        once: Of copies that differ only in the first variable part of their key (the receiver),
+            bring only the first.
+        raw: Bring messages undecoded, as `RawSample`. `Subscription(Message, raw=True)` is every
+            message of the city, except those with a verbatim chunk (`@camera`) in their key.
     """
 
     kind: type[Message]
     where: dict[str, str] = field(default_factory=dict)
     once: bool = False
+    raw: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Serves:
-    """An offer to answer requests of a class whose key parts match `where`."""
+class Service:
+    """The requests that a part answers: a class, and the key parts that must match `where`."""
 
     kind: type[Request]
     where: dict[str, str] = field(default_factory=dict)
 
 
 class IsWanted(Protocol):
-    """Tells a part whether anybody would hear what it could send."""
+    """A function of the bus that reports whether a message has subscribers."""
 
     def __call__(self, kind: type[Message], where: Mapping[str, str]) -> bool:
         """Return whether anybody subscribes to messages of a class with these key parts.
 
-        Key parts left out match everything, as in `Hears`.
+        Key parts left out match everything, as in `Subscription`.
         """
         ...
 
 
 class Part(Protocol):
-    """A steppable part of the city.
-
-    One that also sets `hears_raw = True` gets every message of the city, unread, as `RawSample`;
-    `hears_raw_too`, a list of `Hears`, adds those that come only to who names them. Without
-    `hears_raw` it gets these alone.
-
-    One that also has `learn_wishes(is_wanted)` is given an `IsWanted` before its first step: what
-    is costly to make need not be made for nobody.
-    """
+    """A steppable part of the city; `BasePart` has the members that many parts do not need."""
 
     @property
     def name(self) -> str:
@@ -74,13 +73,17 @@ class Part(Protocol):
         ...
 
     @property
-    def hears(self) -> Sequence[Hears]:
-        """What the runner subscribes to for it; when it changes, the runner follows."""
+    def subscriptions(self) -> Sequence[Subscription]:
+        """What the part receives; the runner follows changes at every step."""
         ...
 
     @property
-    def serves(self) -> Sequence[Serves]:
-        """Which requests the runner brings to it."""
+    def services(self) -> Sequence[Service]:
+        """Which requests the part answers."""
+        ...
+
+    def attach(self, is_wanted: IsWanted) -> None:
+        """Learn, before the first step, how to check for subscribers: costly messages can wait."""
         ...
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -88,5 +91,19 @@ class Part(Protocol):
         ...
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Say last words before the runner closes the bus; called once."""
+        """Return the last messages before the runner closes the bus; called once."""
         ...
+
+
+class BasePart:
+    """Defaults for a part that answers nothing, sends everything, and has no last messages."""
+
+    services: Sequence[Service] = ()
+
+    def attach(self, is_wanted: IsWanted) -> None:
+        """Ignore who subscribes."""
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Leave without a message: presence reports it."""
+        del now_ns
+        return []

@@ -1,9 +1,8 @@
-"""A part at its bus: what it hears is collected, what it sends goes out, retries get one answer.
+"""A part connected to its bus: collects its inbox, sends its outbox, answers each request once.
 
-Both runners use it. Whoever asks again with the `request_id` of an answered request gets the
-stored answer: the effect happens once, however often the network makes people ask. With a keeper
-this holds across restarts too: an answer leaves only when it, the state behind it and its entry in
-the audit log are stored.
+Both runners use it. A request whose `request_id` was answered before gets the stored answer: its
+effect happens once, however often the network repeats it. With a keeper this holds across restarts
+too: an answer leaves only when it, the state behind it and its audit entry are stored.
 """
 
 import logging
@@ -14,14 +13,14 @@ from typing import cast
 import msgspec
 
 from scm.log import event
-from scm.runtime.part import Hears, Part
+from scm.runtime.part import Part, Subscription
 from scm.store.audit import Deed
 from scm.store.repository import Table
 from scm.v2x.answers import AnswerBook
 from scm.v2x.bus import Bus, Mailbox, RawMailbox, check_reply
 from scm.v2x.exchange import Answer, Call, Incoming, Keep, Outgoing, RawSample
 from scm.v2x.mailbox import drain_all
-from scm.v2x.message import Delivery, Refused, Request, encode
+from scm.v2x.message import Delivery, Message, Refused, Request, encode
 from scm.v2x.write_ahead import Batch, Keeps
 
 DEPTH = {
@@ -32,7 +31,7 @@ DEPTH = {
     Delivery.PRESENCE: 1024,
 }
 RAW_DEPTH = 16384
-MAX_ACTOR = 128  # characters of a sender's name that the audit log keeps
+MAX_ACTOR = 128  # characters of a sender's name that the audit log stores
 
 _log = logging.getLogger(__name__)
 
@@ -43,7 +42,7 @@ class Station:
     Args:
         part: The part.
         bus: Its connection.
-        keeper: Of what must outlive this process; None: nothing must.
+        keeper: Stores what must outlive this process; None: nothing must.
     """
 
     def __init__(self, part: Part, bus: Bus, keeper: Keeps | None = None) -> None:
@@ -53,43 +52,41 @@ class Station:
         self._replies = self._mailbox(Delivery.RPC)
         self._keeper = keeper
         self._answers = AnswerBook(None if keeper is None else keeper.stored_answers())
-        self._heard: Sequence[Hears] = ()
-        self._ears: list[tuple[Hears, Mailbox]] = []
+        self._followed: Sequence[Subscription] = ()
+        self._active: list[tuple[Subscription, Mailbox]] = []
         self._follow()
-        for serves in part.serves:
-            bus.serve(serves.kind, serves.where, self._mailbox(Delivery.RPC))
-        self._hear_raw()
-        learn = getattr(part, "learn_wishes", None)
-        if learn is not None:
-            learn(bus.is_wanted)
+        for service in part.services:
+            bus.serve(service.kind, service.where, self._mailbox(Delivery.RPC))
+        self._subscribe_raw()
+        part.attach(bus.is_wanted)
         bus.announce(part.role)
 
-    def _hear_raw(self) -> None:
-        raw = RawMailbox(RAW_DEPTH)
-        if getattr(self._part, "hears_raw", False):
-            self._bus.subscribe_raw(raw)
-        for hears in getattr(self._part, "hears_raw_too", ()):
-            self._bus.subscribe_raw(raw, hears.kind, hears.where)
-        self._boxes.append(raw)
+    def _subscribe_raw(self) -> None:
+        """Subscribe to undecoded messages; these subscriptions stay as they are at the start."""
+        box = RawMailbox(RAW_DEPTH)
+        for one in self._part.subscriptions:
+            if one.raw:
+                self._bus.subscribe_raw(box, None if one.kind is Message else one.kind, one.where)
+        self._boxes.append(box)
 
     def _follow(self) -> None:
-        """Subscribe to what the part wishes to hear now, and to nothing else any more."""
-        if self._part.hears is self._heard:
+        """Make the bus subscriptions equal to those of the part."""
+        if self._part.subscriptions is self._followed:
             return
-        self._heard = self._part.hears
-        wished = list(self._heard)
-        for ear in list(self._ears):
-            hears, box = ear
-            if hears in wished:
-                wished.remove(hears)
+        self._followed = self._part.subscriptions
+        missing = [one for one in self._followed if not one.raw]
+        for pair in list(self._active):
+            subscription, box = pair
+            if subscription in missing:
+                missing.remove(subscription)
             else:
                 self._bus.unsubscribe(box)
-                self._ears.remove(ear)
+                self._active.remove(pair)
                 self._boxes.remove(box)
-        for hears in wished:
-            box = self._mailbox(hears.kind.DELIVERY, once=hears.once)
-            self._bus.subscribe(hears.kind, hears.where, box)
-            self._ears.append((hears, box))
+        for one in missing:
+            box = self._mailbox(one.kind.DELIVERY, once=one.once)
+            self._bus.subscribe(one.kind, one.where, box)
+            self._active.append((one, box))
 
     def _mailbox(self, delivery: Delivery, *, once: bool = False) -> Mailbox:
         box = Mailbox(DEPTH[delivery], once=once)
@@ -114,12 +111,12 @@ class Station:
                 if met != "do":
                     continue
             fresh.append(item)
-        # A part that asks for raw samples declares that its inbox holds them too.
+        # A part with raw subscriptions declares that its inbox holds samples too.
         return cast("list[Incoming]", fresh)
 
     def send(self, outgoing: Iterable[Outgoing]) -> None:
         """Deliver what a step returned, in its order; answers wait until they are stored."""
-        kept: list[Keep] = []
+        stored: list[Keep] = []
         answers: list[Answer] = []
         for item in outgoing:
             if isinstance(item, Call):
@@ -127,33 +124,33 @@ class Station:
             elif isinstance(item, Answer):
                 self._log_traced(item)
                 if self._keeper is None:
-                    self._settle(item)
+                    self._answer(item)
                 else:
                     check_reply(item)
                     answers.append(item)
             elif isinstance(item, Keep):
-                kept.append(item)
+                stored.append(item)
             else:
                 self._bus.publish(item)
-        if self._keeper is not None and (kept or answers):
-            self._store(self._keeper, kept, answers)
+        if self._keeper is not None and (stored or answers):
+            self._store(self._keeper, stored, answers)
 
     def close(self) -> None:
-        """Let what must be stored be stored, and its answers go; the bus stays open."""
+        """Store what is pending and send its answers; the bus stays open."""
         if self._keeper is not None:
             self._keeper.close()
             self._release()
 
     def _closed_for(self, item: Incoming) -> str:
-        """Return why a request cannot be done now: what it does could not be stored."""
+        """Return why a request must be refused: its effect could not be stored now."""
         if self._keeper is None or not _has_effect(item):
             return ""
         return self._keeper.stuck
 
-    def _store(self, keeper: Keeps, kept: Sequence[Keep], answers: Sequence[Answer]) -> None:
+    def _store(self, keeper: Keeps, stored: Sequence[Keep], answers: Sequence[Answer]) -> None:
         values: list[tuple[Table, str, bytes | None]] = [
             (item.table, item.key, None if item.value is None else msgspec.json.encode(item.value))
-            for item in kept
+            for item in stored
         ]
         for answer in answers:
             record = self._answers.record(answer)
@@ -171,17 +168,17 @@ class Station:
             self._release()
         else:
             for answer in answers:
-                self._settle(answer)
+                self._answer(answer)
 
     def _signed(self, call: Call) -> Call:
-        """Return a call whose request says who asks, this part where it names nobody itself."""
+        """Return a call whose request names its actor; this part, unless it names somebody."""
         request = call.request
         if not request.HAS_EFFECT or request.actor or _named(request):
             return call
         return replace(call, request=msgspec.structs.replace(request, actor=self._part.name))
 
     def _log_traced(self, answer: Answer) -> None:
-        """Say in the log what became of a request that somebody traces."""
+        """Log the outcome of a traced request."""
         request = cast("Request", answer.to.message)
         if request.trace_id and _has_effect(answer.to):
             kind, reply = type(request).__name__, type(answer.reply).__name__
@@ -193,20 +190,20 @@ class Station:
             t_ns=answer.to.t_ns,
             station=self._part.name,
             kind=type(request).__name__,
-            by=_asked_by(request),
+            by=_actor_of(request),
             request_id=request.request_id,
             request=msgspec.Raw(encode(request)[0]),
             reply=msgspec.Raw(encode(answer.reply)[0]),
         )
 
     def _release(self) -> None:
-        """Let the answers go whose state is safe by now."""
+        """Send the answers whose state is stored by now."""
         if self._keeper is not None:
             for batch in self._keeper.written():
                 for answer in batch.answers:
-                    self._settle(answer)
+                    self._answer(answer)
 
-    def _settle(self, answer: Answer) -> None:
+    def _answer(self, answer: Answer) -> None:
         for ready in self._answers.settle(answer):
             self._bus.answer(ready)
 
@@ -216,12 +213,12 @@ def _is_request(item: Incoming) -> bool:
 
 
 def _named(request: Request) -> str:
-    """Return who asks in the request's own words; empty: it does not say."""
+    """Return the requester named in the request itself, or an empty string."""
     return str(getattr(request, "by", "") or getattr(request, "owner", ""))
 
 
-def _asked_by(request: Request) -> str:
-    """Return who asks, for the audit: whom the request names, and who sent it if that differs."""
+def _actor_of(request: Request) -> str:
+    """Return the requester for the audit log: who is named, and who sent it if that differs."""
     named, actor = _named(request), request.actor[:MAX_ACTOR]
     if not (named and actor):
         return named or actor
@@ -229,6 +226,6 @@ def _asked_by(request: Request) -> str:
 
 
 def _has_effect(item: Incoming) -> bool:
-    """Return whether a request does more than to say, or to ask, that somebody is still there."""
+    """Return whether a request changes anything; renewing a lease does not."""
     request = cast("Request", item.message)
     return request.HAS_EFFECT and getattr(request, "verb", "") != "renew"

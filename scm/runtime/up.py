@@ -14,8 +14,8 @@ from scm.errors import RunError, nearest
 from scm.eye.station import eye_station
 from scm.maps.load import is_scan, load_map
 from scm.maps.radio import with_radio
-from scm.runtime.crew import Crew, Job, Say
 from scm.runtime.live import stop_on_signal
+from scm.runtime.supervisor import Job, PrintLine, Supervisor
 from scm.store.open import open_store
 from scm.traffic.demand import DemandPart
 from scm.traffic.demand_table import load_demand
@@ -40,12 +40,12 @@ OPTIONAL = {
 """Parts that a city can do without, and what is missing then."""
 LOOK_EVERY_NS = 50 * NS_PER_MS
 
-_say_now: Say = partial(print, flush=True)
+_print_now: PrintLine = partial(print, flush=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wanted:
-    """What city is to run.
+class CityOptions:
+    """Which city to run.
 
     Attributes:
         map_name: Of a shipped map, or the path of a map file.
@@ -98,7 +98,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Plan:
-    """What is wanted, and what was settled before anything starts.
+    """The options, and what was decided before anything starts.
 
     Attributes:
         port: One that is free.
@@ -107,7 +107,7 @@ class _Plan:
         scan: How a scanned map was read; empty: it is none.
     """
 
-    wanted: Wanted
+    options: CityOptions
     guard: Guard
     agents: tuple[str, ...]
     port: int
@@ -117,84 +117,84 @@ class _Plan:
     scan: str
 
 
-def run_city(wanted: Wanted, say: Say = _say_now) -> int:
-    """Run a city until SIGINT or SIGTERM, `say` telling a person lines; return the exit code.
+def run_city(options: CityOptions, print_line: PrintLine = _print_now) -> int:
+    """Run a city until SIGINT or SIGTERM and return the exit code; `print_line` informs a person.
 
     Raises:
         ScmError: when the map, the port or the endpoint is not to be had.
     """
-    plan = _settled(wanted)
-    name_own_folder(wanted.record_dir / "cars")
+    plan = _plan_of(options)
+    name_own_folder(options.record_dir / "cars")
     guard = plan.guard
     with (
         Router(guard.listen, guard.settings) as router,
-        ZenohBus(wanted.city, "up", guard.connect, credentials=guard.credentials("up")) as bus,
+        ZenohBus(options.city, "up", guard.connect, credentials=guard.credentials("up")) as bus,
     ):
-        say(f"scm: city {wanted.city!r} on map {wanted.map_name!r}, bus {router.listen}")
+        print_line(f"scm: city {options.city!r} on map {options.map_name!r}, bus {router.listen}")
         if plan.scan:
-            say(f"  {plan.scan}")
-        for name in wanted.without:
-            say(f"  {name:<12} left out: {OPTIONAL[name]}")
-        _watch(plan, bus, say)
+            print_line(f"  {plan.scan}")
+        for name in options.without:
+            print_line(f"  {name:<12} left out: {OPTIONAL[name]}")
+        _watch(plan, bus, print_line)
     if plan.recording.exists():
-        say(f"recorded in {plan.recording}")
+        print_line(f"recorded in {plan.recording}")
     return 0
 
 
-def _settled(wanted: Wanted) -> _Plan:
-    if wanted.keys is None and not is_loopback(wanted.host):
-        got = f"host: got {wanted.host!r} without API keys"
+def _plan_of(options: CityOptions) -> _Plan:
+    if options.keys is None and not is_loopback(options.host):
+        got = f"host: got {options.host!r} without API keys"
         msg = f"{got}, expected 127.0.0.1, or a store of `scm key add`"
         raise RunError(msg)
-    city_map = with_radio(load_map(wanted.map_name), wanted.radio)
-    _check_counts(wanted, len(city_map.spawns))
-    if wanted.demand is not None:
-        DemandPart(city_map, load_demand(wanted.demand))
-    for url in (wanted.state, wanted.keys):
+    city_map = with_radio(load_map(options.map_name), options.radio)
+    _check_counts(options, len(city_map.spawns))
+    if options.demand is not None:
+        DemandPart(city_map, load_demand(options.demand))
+    for url in (options.state, options.keys):
         if url is not None:
             open_store(url).close()
-    port = _free_port(wanted.port)
-    _make_folder(wanted.record_dir)
-    recording = wanted.record_dir / f"{wanted.city}-{_stamp()}.mcap"
+    port = _free_port(options.port)
+    _make_folder(options.record_dir)
+    recording = options.record_dir / f"{options.city}-{_stamp()}.mcap"
     eyes = {
         eye_station(camera.name, first=i == 0): camera.name
         for i, camera in enumerate(city_map.cameras)
     }
-    agents = tuple(f"n{wanted.hosted + i + 1}" for i in range(wanted.agents))
+    agents = tuple(f"n{options.hosted + i + 1}" for i in range(options.agents))
     stations = own_stations(eyes, agents)
     return _Plan(
-        wanted=wanted,
-        guard=guard_of(wanted.fleet, wanted.city, _free(wanted.listen), stations, _now()),
+        options=options,
+        guard=guard_of(options.fleet, options.city, _free(options.listen), stations, _now()),
         agents=agents,
         port=port,
         recording=recording,
-        state=wanted.state or f"sqlite:{recording.with_suffix('.db')}",
+        state=options.state or f"sqlite:{recording.with_suffix('.db')}",
         eyes=eyes,
-        scan=city_map.source if is_scan(wanted.map_name) else "",
+        scan=city_map.source if is_scan(options.map_name) else "",
     )
 
 
-def _check_counts(wanted: Wanted, places: int) -> None:
+def _check_counts(options: CityOptions, places: int) -> None:
     """Check how many of each are wanted; `places` are the map's, to put hosted cars."""
-    if not 0 <= wanted.hosted <= places:
-        got = f"hosted: got {wanted.hosted} cars"
-        msg = f"{got}, expected 0 to {places}: so many places has map {wanted.map_name!r}"
+    if not 0 <= options.hosted <= places:
+        got = f"hosted: got {options.hosted} cars"
+        msg = f"{got}, expected 0 to {places}: so many places has map {options.map_name!r}"
         raise RunError(msg)
-    if wanted.agents < 0:
-        msg = f"agents: got {wanted.agents} cars, expected 0 or more"
+    if options.agents < 0:
+        msg = f"agents: got {options.agents} cars, expected 0 or more"
         raise RunError(msg)
-    hz, cars = wanted.cameras_hz, wanted.cameras_of
+    hz, cars = options.cameras_hz, options.cameras_of
     if not 0.0 <= hz < float("inf") or (cars and not hz):
         msg = f"cameras_hz: got {hz}, expected 0 or more, and more than 0 with --cameras-of"
         raise RunError(msg)
     for name in cars:
         check_name(name, "cameras_of")
-    for name in wanted.without:
+    for name in options.without:
         if name not in OPTIONAL:
             expected = f"expected any of {', '.join(OPTIONAL)}{nearest(name, tuple(OPTIONAL))}"
             msg = f"without: got {name!r}, {expected}; every other part is needed"
             raise RunError(msg)
-    if hz and "record" in wanted.without:
+    if hz and "record" in options.without:
         msg = "without: got record with --cameras-hz, which records pictures; expected one of both"
         raise RunError(msg)
 
@@ -207,72 +207,75 @@ def _make_folder(folder: Path) -> None:
         raise RunError(msg) from cause
 
 
-def _watch(plan: _Plan, bus: ZenohBus, say: Say) -> None:
-    """Keep all processes of the city alive until told to stop."""
-    clock, heard = WallClock(), Mailbox(1000)
-    crew, disturbances = Crew([*_parts(plan), *_agents(plan)], clock, say), Disturbances()
+def _watch(plan: _Plan, bus: ZenohBus, print_line: PrintLine) -> None:
+    """Keep all processes of the city alive until a signal stops it."""
+    clock, mailbox = WallClock(), Mailbox(1000)
+    supervisor, disturbances = (
+        Supervisor([*_parts(plan), *_agents(plan)], clock, print_line),
+        Disturbances(),
+    )
     stop = stop_on_signal()
     for kind in MESSAGE_KINDS:
-        bus.subscribe(kind, {}, heard)
+        bus.subscribe(kind, {}, mailbox)
     is_ready, advised = False, set[str]()
     try:
         while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, stop):
-            crew.look()
-            for item in heard.drain():
+            supervisor.poll()
+            for item in mailbox.drain():
                 disturbances.receive(item)
                 if isinstance(item.message, Presence):
-                    crew.heard(item.message)
+                    supervisor.receive(item.message)
             disturbances.check_silence(clock.now_ns())
             for one in disturbances.news():
                 if is_ready:  # parts that start are late, and are not all there
-                    _say_disturbance(one, say, advised)
-            if crew.settled and not is_ready:
+                    _report_disturbance(one, print_line, advised)
+            if supervisor.is_ready and not is_ready:
                 is_ready = True
-                _tell_next(plan, say)
+                _show_next_steps(plan, print_line)
     finally:
-        say("stopping")
-        crew.stop()
+        print_line("stopping")
+        supervisor.stop()
 
 
-def _say_disturbance(one: Disturbance, say: Say, advised: set[str]) -> None:
-    """Say what began or is over; what to do is said once for each kind of it."""
+def _report_disturbance(one: Disturbance, print_line: PrintLine, advised: set[str]) -> None:
+    """Report what began or ended; advice is given once for each kind."""
     if one.end_ns is None:
-        say(f"  {'warning':<12} {one.text}: trips meanwhile are void")
+        print_line(f"  {'warning':<12} {one.text}: trips meanwhile are void")
         if one.advice and one.kind not in advised:
             advised.add(one.kind)
-            say(f"  {'do this':<12} {one.advice}")
+            print_line(f"  {'do this':<12} {one.advice}")
     else:
         lasted_s = seconds(one.end_ns - one.start_ns)
-        say(f"  {'over':<12} after {lasted_s:.1f} s: {one.text}")
+        print_line(f"  {'over':<12} after {lasted_s:.1f} s: {one.text}")
 
 
 def _parts(plan: _Plan) -> list[Job]:
     def scm(name: str, *more: str, station: str = "") -> Sequence[str]:
-        shared = (*_at_bus(plan, station or name), "--seed", str(plan.wanted.seed))
-        return [*SCM, name, plan.wanted.map_name, *shared, *more]
+        shared = (*_at_bus(plan, station or name), "--seed", str(plan.options.seed))
+        return [*SCM, name, plan.options.map_name, *shared, *more]
 
     def record() -> Sequence[str]:
         """Name another file when a recorder died: a recording is never written over."""
         first = plan.recording
-        out = first.with_stem(f"{plan.wanted.city}-{_stamp()}") if first.exists() else first
-        sparse = ["--sparse"] if plan.wanted.hosted > MOST_RECORDED else []
-        of = (word for name in plan.wanted.cameras_of for word in ("--cameras-of", name))
-        cameras = ("--cameras-hz", str(plan.wanted.cameras_hz), *of)
+        out = first.with_stem(f"{plan.options.city}-{_stamp()}") if first.exists() else first
+        sparse = ["--sparse"] if plan.options.hosted > MOST_RECORDED else []
+        of = (word for name in plan.options.cameras_of for word in ("--cameras-of", name))
+        cameras = ("--cameras-hz", str(plan.options.cameras_hz), *of)
         return scm("record", "--out", str(out), *sparse, *cameras)
 
     def part(name: str, what: str, *more: str) -> Job:
         return Job(name, "part", what, lambda: scm(name, *more))
 
     def eye(station: str, camera: str) -> Job:
-        command = partial(scm, "eye", "--camera", camera, *kept, station=station)
+        command = partial(scm, "eye", "--camera", camera, *stored, station=station)
         return Job(station, "part", f"overhead camera {camera}: tags, poses, tracks", command)
 
-    cars = f"cars, walls, sensors, radio; {plan.wanted.hosted} hosted"
-    kept = ("--state", plan.state)
-    air = [word for setting in plan.wanted.radio for word in ("--radio", setting)]
+    cars = f"cars, walls, sensors, radio; {plan.options.hosted} hosted"
+    stored = ("--state", plan.state)
+    air = [word for setting in plan.options.radio for word in ("--radio", setting)]
 
     def demand(table: Path) -> Job:
-        command = [*SCM, "demand", str(table), plan.wanted.map_name, *_at_bus(plan, "demand")]
+        command = [*SCM, "demand", str(table), plan.options.map_name, *_at_bus(plan, "demand")]
         return Job("demand", "part", f"cars that come and go as in {table}", lambda: command)
 
     jobs = [
@@ -283,39 +286,39 @@ def _parts(plan: _Plan) -> list[Job]:
             record,
             last=True,
         ),
-        part("traffic", "signals: safe kernel, policies, plans", *kept),
-        part("monitor", "second channel: doubts the signals, latches flash", *kept),
-        part("world", cars, "--hosted", str(plan.wanted.hosted), *air, *kept),
+        part("traffic", "signals: safe kernel, policies, plans", *stored),
+        part("monitor", "second channel: doubts the signals, latches flash", *stored),
+        part("world", cars, "--hosted", str(plan.options.hosted), *air, *stored),
         *(eye(station, camera) for station, camera in plan.eyes.items()),
         part("camera", "cars' own cameras, rendered while somebody looks"),
         part("observer", "counts, delays, and who breaks the rules"),
         part("misbehaviour", "doubts what cars claim on the air"),
     ]
-    if plan.wanted.demand is not None:
-        jobs.append(demand(plan.wanted.demand))
-    if plan.wanted.ros2:
+    if plan.options.demand is not None:
+        jobs.append(demand(plan.options.demand))
+    if plan.options.ros2:
         jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
-    left = plan.wanted.without
+    left = plan.options.without
     jobs = [job for job in jobs if ("eye" if job.name in plan.eyes else job.name) not in left]
     web = _web(plan, [job.name for job in jobs])
-    return [*jobs, part("api", "REST, event stream, dashboard", *web, *kept)]
+    return [*jobs, part("api", "REST, event stream, dashboard", *web, *stored)]
 
 
 def _web(plan: _Plan, parts: Sequence[str]) -> Sequence[str]:
     """Return where the server is found, who may call it, what it shows, and who should be there."""
-    wanted, own = plan.wanted, plan.guard.files.get(SCRIPT)
-    words = ["--host", wanted.host, "--port", str(plan.port), "--data", str(wanted.record_dir)]
-    words += ["--base", wanted.base] if wanted.base else []
-    words += [word for one in wanted.trust_proxy for word in ("--trust-proxy", one)]
-    words += [word for one in wanted.origin for word in ("--origin", one)]
+    options, own = plan.options, plan.guard.files.get(SCRIPT)
+    words = ["--host", options.host, "--port", str(plan.port), "--data", str(options.record_dir)]
+    words += ["--base", options.base] if options.base else []
+    words += [word for one in options.trust_proxy for word in ("--trust-proxy", one)]
+    words += [word for one in options.origin for word in ("--origin", one)]
     words += [word for name in parts for word in ("--expects", name)]
-    words += ["--keys", wanted.keys] if wanted.keys is not None else []
+    words += ["--keys", options.keys] if options.keys is not None else []
     return [*words, *(("--script-credentials", str(own)) if own is not None else ())]
 
 
 def _at_bus(plan: _Plan, station: str) -> Sequence[str]:
     """Return how a station's program finds the bus, and what it is let in by."""
-    shared = ("--connect", plan.guard.connect, "--city", plan.wanted.city)
+    shared = ("--connect", plan.guard.connect, "--city", plan.options.city)
     return (*shared, *plan.guard.arguments(station))
 
 
@@ -331,22 +334,26 @@ def _agents(plan: _Plan) -> list[Job]:
     ]
 
 
-def _tell_next(plan: _Plan, say: Say) -> None:
+def _show_next_steps(plan: _Plan, print_line: PrintLine) -> None:
     script = f"--connect {plan.guard.connect}"
-    at = script + ("" if plan.wanted.city == "city" else f" --city {plan.wanted.city}")
+    at = script + ("" if plan.options.city == "city" else f" --city {plan.options.city}")
     programs = Path(sys.executable).parent
     if programs.is_relative_to(Path.cwd()):
         programs = programs.relative_to(Path.cwd())
-    car = f"n{plan.wanted.hosted + len(plan.agents) + 1}"
-    say(f"dashboard: http://{plan.wanted.host}:{plan.port}{plan.wanted.base.rstrip('/')}")
-    if plan.wanted.fleet is None:
-        say("try next, in another shell:")
-        say(f"  {programs}/vehicle-agent join --name {car} {at}      another car")
-        say(f"  {programs}/python examples/travel_times.py --live {script}      a fleet script")
+    car = f"n{plan.options.hosted + len(plan.agents) + 1}"
+    print_line(f"dashboard: http://{plan.options.host}:{plan.port}{plan.options.base.rstrip('/')}")
+    if plan.options.fleet is None:
+        print_line("try next, in another shell:")
+        print_line(f"  {programs}/vehicle-agent join --name {car} {at}      another car")
+        print_line(
+            f"  {programs}/python examples/travel_times.py --live {script}      a fleet script"
+        )
     else:
-        say(f"who is in {plan.wanted.fleet} may enter: --connect and --credentials say how")
-        say(f"  {programs}/vehicle-agent join --name NAME {at} --credentials FILE      a car of it")
-    say("Ctrl-C stops the city and names its recording")
+        print_line(f"who is in {plan.options.fleet} may enter: --connect and --credentials say how")
+        print_line(
+            f"  {programs}/vehicle-agent join --name NAME {at} --credentials FILE      a car of it"
+        )
+    print_line("Ctrl-C stops the city and names its recording")
 
 
 def _now() -> datetime:

@@ -13,8 +13,8 @@ from scm.clock import NS_PER_MS, WallClock, nanoseconds
 from scm.errors import LinkError, RunError
 from scm.eye.station import eye_station
 from scm.maps.load import load_map
-from scm.runtime.crew import Crew, Job
 from scm.runtime.parent_watch import with_parent
+from scm.runtime.supervisor import Job, Supervisor
 from scm.selftest.proxy import FaultyProxy
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
@@ -33,7 +33,7 @@ class City:
 
     Attributes:
         endpoint: Of its router.
-        output: The lines that its crew printed.
+        output: The lines that its supervisor printed.
         port: Of its web address; 0: any.
         folder: Where it records.
         proxies: Of the stations that connect through one, to be stalled and cut.
@@ -68,7 +68,7 @@ class City:
         self.proxies = {name: FaultyProxy(self.endpoint) for name in behind}
         self._number = 0
         jobs = [job for job in self._jobs() if parts is None or job.name in parts]
-        self._crew = Crew(
+        self._supervisor = Supervisor(
             [*jobs, *(self._agent(name) for name in agents)], WallClock(), self.output.append
         )
         self._router: subprocess.Popen[bytes] | None = None
@@ -78,7 +78,7 @@ class City:
     @property
     def names(self) -> list[str]:
         """All processes except the router."""
-        return list(self._crew.members)
+        return list(self._supervisor.members)
 
     def pid(self, name: str) -> int:
         """Return the process id of a member, or of the router.
@@ -86,7 +86,7 @@ class City:
         Raises:
             RunError: when it is not running.
         """
-        process = self._router if name == ROUTER else self._crew.members[name].process
+        process = self._router if name == ROUTER else self._supervisor.members[name].process
         if process is None:
             msg = f"{name}: is not running"
             raise RunError(msg)
@@ -134,14 +134,14 @@ class City:
             with self._bus() as bus:
                 bus.subscribe(Presence, {}, presence)
                 while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, self._over):
-                    self._crew.look()
+                    self._supervisor.poll()
                     for item in presence.drain():
                         if isinstance(item.message, Presence):
-                            self._crew.heard(item.message)
-                    if self._crew.settled:
+                            self._supervisor.receive(item.message)
+                    if self._supervisor.is_ready:
                         self._ready.set()
         finally:
-            self._crew.stop()
+            self._supervisor.stop()
 
     def _bus(self) -> ZenohBus:
         clock = WallClock()

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from scm.clock import WallClock
 from scm.records.city_map import CityMap
 from scm.runtime.live import run
-from scm.runtime.part import Hears
 from scm.selftest.signal_fault import OutputFault
+from scm.runtime.part import BasePart, Subscription
 from scm.traffic.part import TrafficPart
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.credentials import Credentials
@@ -21,7 +21,7 @@ from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
 
 
-class FaultyTraffic:
+class FaultyTraffic(BasePart):
     """A traffic part whose output is wrong at one junction; see `scm.runtime.part.Part`.
 
     Attributes:
@@ -33,15 +33,15 @@ class FaultyTraffic:
         self._part = TrafficPart(city_map)
         self.name, self.role = self._part.name, self._part.role
         self.period_ns = self._part.period_ns
-        self.serves = self._part.serves
+        self.services = self._part.services
         self._junction = next(j for j in city_map.junctions if j.name == junction)
         self.output_fault: OutputFault | None = None
         self.first_fault_ns: int | None = None
 
     @property
-    def hears(self) -> Sequence[Hears]:
+    def subscriptions(self) -> Sequence[Subscription]:
         """What the real part hears."""
-        return self._part.hears
+        return self._part.subscriptions
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Step the real part and corrupt its output."""

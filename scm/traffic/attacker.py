@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from scm.clock import seconds
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears, IsWanted, Part, Serves
+from scm.runtime.part import IsWanted, Part, Service, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.cam_tx import CamTx
@@ -82,21 +82,19 @@ class Attacker:
         self._count = itertools.count()
 
     @property
-    def hears(self) -> Sequence[Hears]:
+    def subscriptions(self) -> Sequence[Subscription]:
         """What the part hears, and reports on its liars where somebody is told."""
-        reports = (Hears(MisbehaviourReport, {"suspect": name}) for name in self._send)
-        return (*self._part.hears, *reports) if self._is_told else self._part.hears
+        reports = (Subscription(MisbehaviourReport, {"suspect": name}) for name in self._send)
+        return (*self._part.subscriptions, *reports) if self._is_told else self._part.subscriptions
 
     @property
-    def serves(self) -> Sequence[Serves]:
+    def services(self) -> Sequence[Service]:
         """What the part serves."""
-        return self._part.serves
+        return self._part.services
 
-    def learn_wishes(self, is_wanted: IsWanted) -> None:
-        """Let the part ask what is wanted, if it cares."""
-        learn = getattr(self._part, "learn_wishes", None)
-        if learn is not None:
-            learn(is_wanted)
+    def attach(self, is_wanted: IsWanted) -> None:
+        """Let the part check for subscribers."""
+        self._part.attach(is_wanted)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Let the part act, and change what its liars say."""

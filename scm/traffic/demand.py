@@ -14,7 +14,7 @@ from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.errors import DemandError, nearest
 from scm.maps.route import MOST_PASSES, Roads
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Subscription
 from scm.traffic.demand_table import Flow, departures
 from scm.v2x.exchange import Call, Incoming, Outgoing
 from scm.v2x.message import Message, Refused
@@ -52,7 +52,7 @@ class _Entry:
     asked: bool = False
 
 
-class DemandPart:
+class DemandPart(BasePart):
     """Serves a demand table; see `scm.runtime.part.Part`.
 
     Args:
@@ -73,8 +73,7 @@ class DemandPart:
         self.name = "demand"
         self.role = "part"
         self.period_ns = PERIOD_NS
-        self.hears = (Hears(Trip),)
-        self.serves: tuple[Serves, ...] = ()
+        self.subscriptions = (Subscription(Trip),)
         ways = Ways(city_map)
         self._flows = [
             (flow, *ways.of(flow, flow.name or f"row {n}")) for n, flow in enumerate(flows, start=1)

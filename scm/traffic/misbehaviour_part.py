@@ -11,7 +11,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import CarError
 from scm.log import event
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Subscription
 from scm.traffic.cars import facts_of, outline_of
 from scm.v2x.etsi.convert import roadside_station
 from scm.v2x.exchange import Incoming, Outgoing
@@ -42,19 +42,18 @@ MOST_TOLD = 200
 """Stations in a list of scores: those that most is held against."""
 
 
-class MisbehaviourPart:
+class MisbehaviourPart(BasePart):
     """Judges what is said on the air of one city; see `scm.runtime.part.Part`."""
 
     role = "part"
     period_ns = PERIOD_NS
-    serves: Sequence[Serves] = ()
 
     def __init__(self, city_map: CityMap, sees: Sees | None = None) -> None:
         """Take the map; `sees` says what the Eye overlooks, the map's cameras if it is None."""
         self.name = NAME
         units = [roadside_station(junction.name) for junction in city_map.junctions]
-        at_units = (Hears(CamRx, {"receiver": unit}, once=True) for unit in units)
-        self.hears: Sequence[Hears] = (*at_units, Hears(EyeTrack))
+        at_units = (Subscription(CamRx, {"receiver": unit}, once=True) for unit in units)
+        self.subscriptions: Sequence[Subscription] = (*at_units, Subscription(EyeTrack))
         self.detector = Detector(Ground(city_map, sees), limits_by_car)
         self._unseen: set[str] = set()
         self._due_ns = 0
@@ -83,11 +82,6 @@ class MisbehaviourPart:
             detector.forget(now_ns)
             outbox += self._each_second(now_ns)
         return outbox
-
-    def finish(self, now_ns: int) -> list[Outgoing]:
-        """Fall silent."""
-        del now_ns
-        return []
 
     def _tell(self, found: Judged, now_ns: int) -> list[Message]:
         report = report_of(found, self.detector, now_ns)

@@ -12,7 +12,7 @@ from scm.clock import NS_PER_MS
 from scm.errors import nearest
 from scm.log import event
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Service, Subscription
 from scm.store.records import FaultRecord
 from scm.traffic.conflict_table import card_hash, card_of
 from scm.traffic.monitor import OVERLOAD, Monitor
@@ -31,7 +31,7 @@ Severity = Literal["info", "warning", "error"]
 _log = logging.getLogger(__name__)
 
 
-class MonitorPart:
+class MonitorPart(BasePart):
     """Watches all junctions of a map; see `scm.runtime.part.Part`.
 
     Args:
@@ -48,8 +48,8 @@ class MonitorPart:
         self.name = "monitor"
         self.role = "part"
         self.period_ns = PERIOD_NS
-        self.hears = (Hears(Spat),)
-        self.serves = (Serves(MonitorReset),)
+        self.subscriptions = (Subscription(Spat),)
+        self.services = (Service(MonitorReset),)
         self._cards = [card_of(city_map, junction) for junction in city_map.junctions]
         self._watches: dict[str, _Watch] = {}
         self._faults = dict(faults or {})

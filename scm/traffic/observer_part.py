@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Subscription
 from scm.traffic.counters import Counters
 from scm.traffic.observer_belief import Beliefs
 from scm.traffic.observer_follow import Follower, rules_of
@@ -26,15 +26,19 @@ PERIOD_NS = 100 * NS_PER_MS
 TELL_NS = 5 * NS_PER_S
 
 
-class ObserverPart:
+class ObserverPart(BasePart):
     """Observes the traffic of a map; see `scm.runtime.part.Part`."""
 
     def __init__(self, city_map: CityMap) -> None:
         self.name = "observer"
         self.role = "part"
         self.period_ns = PERIOD_NS
-        self.hears = (Hears(EyeTrack), Hears(VehicleState), Hears(Spat), Hears(Contact))
-        self.serves: tuple[Serves, ...] = ()
+        self.subscriptions = (
+            Subscription(EyeTrack),
+            Subscription(VehicleState),
+            Subscription(Spat),
+            Subscription(Contact),
+        )
         roads = Roads(city_map)
         lines = rules_of(roads)
         self._beliefs = Beliefs()

@@ -16,7 +16,7 @@ from scm.errors import PlanError, nearest
 from scm.log import event
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Service, Subscription
 from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller
 from scm.traffic.detectors import Seen, Watcher, reach_of
@@ -47,7 +47,7 @@ from scm.v2x.messages.srem_rx import SremRx
 _log = logging.getLogger(__name__)
 
 
-class TrafficPart:
+class TrafficPart(BasePart):
     """Controls the signals of all junctions of a map; see `scm.runtime.part.Part`."""
 
     def __init__(
@@ -76,7 +76,7 @@ class TrafficPart:
         self.name = "traffic"
         self.role = "part"
         self.period_ns = STEP_NS
-        self.serves = (Serves(PlanRequest), Serves(SignalRequest))
+        self.services = (Service(PlanRequest), Service(SignalRequest))
         roads = Roads(city_map)
         programs = {j.name: program_of(j, roads, car) for j in city_map.junctions}
         tables = tables_of(city_map, roads, programs, car)
@@ -109,15 +109,15 @@ class TrafficPart:
         self._by_station = {roadside_station(name): s for name, s in self._junctions.items()}
 
     @property
-    def hears(self) -> tuple[Hears, ...]:
+    def subscriptions(self) -> tuple[Subscription, ...]:
         """The monitor and those who ask for priority; and cars, where detectors are needed."""
         listening = [
-            Hears(CamRx, {"receiver": station})
+            Subscription(CamRx, {"receiver": station})
             for station, signals in self._by_station.items()
             if signals.controller.needs_detectors
         ]
-        tracks = (Hears(EyeTrack),) if listening else ()
-        return (Hears(MonitorStatus), Hears(SremRx), *listening, *tracks)
+        tracks = (Subscription(EyeTrack),) if listening else ()
+        return (Subscription(MonitorStatus), Subscription(SremRx), *listening, *tracks)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Hear wishes, cars and the monitor, step every junction, tell what it shows."""

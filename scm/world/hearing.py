@@ -6,7 +6,7 @@ What comes from outside never stops the city: what fits nothing is counted in `W
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.exchange import Answer, Incoming
 from scm.v2x.message import Message, Request
 from scm.v2x.messages.cam_tx import CamTx
@@ -90,11 +90,14 @@ OF_CARS: dict[type[Message], str] = {VehicleState: "vehicle", CamTx: "station"}
 """What is heard of remote cars alone, with its key part: what hosted cars say would come back."""
 
 
-def hears_of(cars: Iterable[str]) -> tuple[Hears, ...]:
+def hears_of(cars: Iterable[str]) -> tuple[Subscription, ...]:
     """Return what the world hears while these remote cars are in it."""
     shared = [
-        Hears(kind, {"role": VEHICLE_ROLE} if kind is Presence else {})
+        Subscription(kind, {"role": VEHICLE_ROLE} if kind is Presence else {})
         for kind in _HANDLERS
         if kind not in OF_CARS
     ]
-    return (*shared, *(Hears(kind, {key: car}) for car in cars for kind, key in OF_CARS.items()))
+    return (
+        *shared,
+        *(Subscription(kind, {key: car}) for car in cars for kind, key in OF_CARS.items()),
+    )

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from scm.clock import NS_PER_S
 from scm.errors import RunError, ScmError
 from scm.records.city_map import CityMap, Spawn
-from scm.runtime.part import Hears, IsWanted, Serves
+from scm.runtime.part import BasePart, IsWanted, Service, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.route_request import RouteRequest
@@ -26,7 +26,7 @@ SAY_AGAIN_NS = 10 * NS_PER_S
 them asked in vain."""
 
 
-class WorldPart:
+class WorldPart(BasePart):
     """The shared world, ready for a bus.
 
     Args:
@@ -41,7 +41,7 @@ class WorldPart:
     name = NAME
     role = "part"
     period_ns = PERIOD_NS
-    serves: Sequence[Serves] = SERVES
+    services: Sequence[Service] = SERVES
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class WorldPart:
         cars = {DEFAULT_CAR, *(car for _, car in hosted), *kept_cars}
         capacity = max(len(hosted), len(self._kept.cars)) + room
         self.world = World(city_map, seed, capacity=capacity, prepare=sorted(cars))
-        self.hears: Sequence[Hears] = hears_of(())
+        self.subscriptions: Sequence[Subscription] = hears_of(())
         self._to_spawn = hosted
         self._definition: WorldDefinition | None = None
         self._say_again_ns = 0
@@ -76,16 +76,12 @@ class WorldPart:
         joined = set(self.world.remote)
         said = tick(self.world, now_ns, inbox)
         if joined != set(self.world.remote):
-            self.hears = hears_of(self.world.remote)
+            self.subscriptions = hears_of(self.world.remote)
         return [*first, *said]
 
-    def learn_wishes(self, is_wanted: IsWanted) -> None:
+    def attach(self, is_wanted: IsWanted) -> None:
         """Ask the bus from now on before making what is dear."""
         self.world.wishes.learn(is_wanted)
-
-    def finish(self, now_ns: int) -> list[Outgoing]:
-        """Leave without a word: presence tells."""
-        return []
 
     def _open(self, now_ns: int) -> list[Outgoing]:
         world = self.world

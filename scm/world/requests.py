@@ -12,7 +12,7 @@ from scm.maps.bends import misfit
 from scm.maps.coordinates import are_coordinates
 from scm.maps.room import AHEAD_S, CLEARANCE_M
 from scm.maps.vehicle_tags import LAST_TAG_ID
-from scm.runtime.part import Serves
+from scm.runtime.part import Service
 from scm.store.records import StopRecord
 from scm.v2x.exchange import Keep
 from scm.v2x.key import check_name
@@ -278,7 +278,7 @@ _ANSWERS: dict[type[Message], Callable[[World, Any, int], Message]] = {
     StopRequest: _stop,
 }
 
-SERVES = tuple(Serves(kind) for kind in (
+SERVES = tuple(Service(kind) for kind in (
     SpawnRequest, JoinRequest, RemoveRequest, RouteRequest, LeaseRequest, LightRequest,
     BoxesRequest, EchoRequest, StopRequest,
 ))  # fmt: skip

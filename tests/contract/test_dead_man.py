@@ -9,7 +9,7 @@ import pytest
 from scm.clock import NS_PER_MS
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
@@ -28,8 +28,8 @@ class Driver:
 
     def __init__(self, city, vehicle):
         self.city, self.vehicle = city, vehicle
-        self._box = city.hear(Hears(VehicleState, {"vehicle": vehicle}))
-        self._events = city.hear(Hears(CityEvent))
+        self._box = city.subscribe(Subscription(VehicleState, {"vehicle": vehicle}))
+        self._events = city.subscribe(Subscription(CityEvent))
         self._seq = 0
         self.epoch = 0
         self.states = []

@@ -57,8 +57,8 @@ class Noted:
 
     def note(self, outbox):
         part = self._part
-        self.heard |= {self._below(selector("city", h.kind, h.where)) for h in part.hears}
-        self.served |= {self._below(selector("city", s.kind, s.where)) for s in part.serves}
+        self.heard |= {self._below(selector("city", h.kind, h.where)) for h in part.subscriptions}
+        self.served |= {self._below(selector("city", s.kind, s.where)) for s in part.services}
         for item in outbox:
             if isinstance(item, Call):
                 self.asked.add(self._below(key_of("city", item.request)))

@@ -12,7 +12,7 @@ from scm.maps.load import load_map, map_names
 from scm.maps.route import Roads
 from scm.registry import load
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic import kernel
 from scm.traffic.conflict_table import card_of
 from scm.traffic.controller import Controller
@@ -66,7 +66,10 @@ def test_a_plan_fits_the_junction_and_serves_every_group(city_map, junction, pla
 @pytest.mark.parametrize("plan", plan_names())
 def test_the_monitor_agrees_with_the_controller_for_five_minutes(city_map, plan):
     with Lockstep([TrafficPart(city_map, plan), MonitorPart(city_map)]) as city:
-        spats, statuses = city.hear(Hears(Spat)), city.hear(Hears(MonitorStatus))
+        spats, statuses = (
+            city.subscribe(Subscription(Spat)),
+            city.subscribe(Subscription(MonitorStatus)),
+        )
         city.run_for(300.0)
     assert {status.fault for status in messages(statuses)} == {None}
     shown = {(g.group, g.colour) for spat in messages(spats) for g in spat.groups}
@@ -78,7 +81,7 @@ def test_the_monitor_agrees_with_the_controller_for_five_minutes(city_map, plan)
 def test_spat_keeps_its_promises_on_the_bus_while_plans_change(city_map):
     dice = random.Random(4)
     with Lockstep([TrafficPart(city_map)]) as city:
-        spats, spatems = city.hear(Hears(Spat)), city.hear(Hears(SpatemTx))
+        spats, spatems = city.subscribe(Subscription(Spat)), city.subscribe(Subscription(SpatemTx))
         for _ in range(30):
             city.run_for(dice.uniform(1.0, 40.0))
             junction, plan = dice.choice(city_map.junctions).name, dice.choice(plan_names())

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from scm.clock import NS_PER_S, WallClock, seconds
-from scm.runtime.crew import Crew, Job
+from scm.runtime.supervisor import Job, Supervisor
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.city_event import CityEvent
@@ -133,7 +133,7 @@ def test_a_part_that_is_asked_to_stop_says_its_last_words_and_ends(watch, start,
 
 
 class Supervised:
-    """A crew of toys, watched."""
+    """A supervisor of toys."""
 
     def __init__(self, watch, clock, **behaviours):
         self.said = []
@@ -141,7 +141,7 @@ class Supervised:
             Job(name, "part", f"a toy to {how}", self._command(watch, name, how))
             for name, how in behaviours.items()
         ]
-        self.crew = Crew(jobs, clock, self.said.append)
+        self.supervisor = Supervisor(jobs, clock, self.said.append)
         self._presence = Mailbox(100)
         watch.bus.subscribe(Presence, {}, self._presence)
 
@@ -150,28 +150,28 @@ class Supervised:
         return lambda: [sys.executable, TOY, name, watch.endpoint, how]
 
     def look(self):
-        self.crew.look()
+        self.supervisor.poll()
         for item in self._presence.drain():
-            self.crew.heard(item.message)
+            self.supervisor.receive(item.message)
 
     def until(self, condition, timeout_s=LONG_S):
         return until(condition, timeout_s, also=self.look)
 
     def pids(self):
-        return [m.process.pid for m in self.crew.members.values() if m.process is not None]
+        return [m.process.pid for m in self.supervisor.members.values() if m.process is not None]
 
 
 @pytest.fixture
 def supervise(watch):
-    crews = []
+    started = []
 
     def supervise(clock=CLOCK, **behaviours):
-        crews.append(Supervised(watch, clock, **behaviours))
-        return crews[-1]
+        started.append(Supervised(watch, clock, **behaviours))
+        return started[-1]
 
     yield supervise
-    for supervised in crews:
-        supervised.crew.stop()
+    for supervised in started:
+        supervised.supervisor.stop()
 
 
 def is_running(pid):
@@ -182,16 +182,16 @@ def is_running(pid):
     return True
 
 
-def test_a_crew_says_who_is_up_with_what_it_does_and_its_process(supervise):
+def test_the_supervisor_says_who_is_up_with_what_it_does_and_its_process(supervise):
     toys = supervise(a="run", b="run")
-    toys.until(lambda: toys.crew.settled)
+    toys.until(lambda: toys.supervisor.is_ready)
     assert sorted(line.split()[0] for line in toys.said) == ["a", "b"]
     assert all("a toy to run" in line and "pid" in line for line in toys.said)
 
 
-def test_a_crew_restarts_what_dies_and_says_so(supervise):
+def test_the_supervisor_restarts_what_dies_and_says_so(supervise):
     toys = supervise(a="run")
-    toys.until(lambda: toys.crew.settled)
+    toys.until(lambda: toys.supervisor.is_ready)
     (first,) = toys.pids()
     os.kill(first, signal.SIGKILL)
     toys.until(lambda: any("is back" in line for line in toys.said))
@@ -200,9 +200,9 @@ def test_a_crew_restarts_what_dies_and_says_so(supervise):
     assert not any("is silent" in line for line in toys.said)
 
 
-def test_a_crew_says_who_is_frozen_and_who_goes_on(supervise):
+def test_the_supervisor_says_who_is_frozen_and_who_goes_on(supervise):
     toys = supervise(a="run")
-    toys.until(lambda: toys.crew.settled)
+    toys.until(lambda: toys.supervisor.is_ready)
     (pid,) = toys.pids()
     os.kill(pid, signal.SIGSTOP)
     toys.until(lambda: any("is silent: it runs" in line for line in toys.said))
@@ -211,9 +211,9 @@ def test_a_crew_says_who_is_frozen_and_who_goes_on(supervise):
     assert toys.pids() == [pid]
 
 
-def test_a_crew_gives_up_on_bad_input_at_once(supervise):
+def test_the_supervisor_gives_up_on_bad_input_at_once(supervise):
     toys = supervise(a="exit2")
-    toys.until(lambda: toys.crew.settled)
+    toys.until(lambda: toys.supervisor.is_ready)
     assert toys.said == [
         "  a            died with exit code 2: its input is bad; it is not started again"
     ]
@@ -221,16 +221,16 @@ def test_a_crew_gives_up_on_bad_input_at_once(supervise):
 
 def test_a_member_that_leaves_by_itself_is_let_go(supervise):
     toys = supervise(a="exit0")
-    toys.until(lambda: toys.crew.settled)
+    toys.until(lambda: toys.supervisor.is_ready)
     assert toys.said == ["  a            left"]
 
 
-def test_a_crew_is_stopped_within_two_seconds_even_if_one_does_not_listen(supervise):
+def test_the_supervisor_is_stopped_within_two_seconds_even_if_one_does_not_listen(supervise):
     toys = supervise(a="run", b="deaf", c="run")
-    toys.until(lambda: toys.crew.settled)
+    toys.until(lambda: toys.supervisor.is_ready)
     pids = toys.pids()
     began_ns = CLOCK.now_ns()
-    toys.crew.stop()
+    toys.supervisor.stop()
     assert CLOCK.now_ns() - began_ns < 2 * NS_PER_S
     assert len(pids) == 3
     assert not any(is_running(pid) for pid in pids)
@@ -240,10 +240,10 @@ def test_a_crew_is_stopped_within_two_seconds_even_if_one_does_not_listen(superv
 SUPERVISOR = """
 import sys, threading
 from scm.clock import WallClock
-from scm.runtime.crew import Crew, Job
+from scm.runtime.supervisor import Job, Supervisor
 toy, endpoint = sys.argv[1:]
 command = [sys.executable, toy, "orphan", endpoint]
-Crew([Job("orphan", "part", "", lambda: command)], WallClock(), print).look()
+Supervisor([Job("orphan", "part", "", lambda: command)], WallClock(), print).look()
 threading.Event().wait()
 """
 

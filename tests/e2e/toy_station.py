@@ -4,7 +4,7 @@ import sys
 
 from scm.clock import NS_PER_MS, WallClock
 from scm.runtime.live import run, stop_on_signal
-from scm.runtime.part import Hears
+from scm.runtime.part import BasePart, Subscription
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.city_event import CityEvent
@@ -12,11 +12,11 @@ from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.plan_request import PlanRequest
 
 
-class Toy:
+class Toy(BasePart):
     role = "part"
     period_ns = 20 * NS_PER_MS
-    hears = (Hears(PartStatus), Hears(CityEvent))
-    serves = ()
+    subscriptions = (Subscription(PartStatus), Subscription(CityEvent))
+    services = ()
 
     def __init__(self, name, behaviour):
         self.name = name

@@ -18,7 +18,7 @@ def city_after_two_minutes():
     """The world, pairs of cars that touched, and how long each car stood at most [s]."""
     city_map = grid_city(4, 4, signs=True)
     part = WorldPart(city_map, room=CARS)
-    part.learn_wishes(lambda _kind, _where: False)
+    part.attach(lambda _kind, _where: False)
     world, touched = part.world, set()
     spawns = city_map.spawns
     for i in range(CARS):

@@ -11,7 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from scm.clock import NS_PER_MS, seconds
 from scm.errors import StoreError
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Serves
+from scm.runtime.part import BasePart, Service
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.store.records import PlanRecord, records
@@ -58,12 +58,12 @@ class _Failing:
         return False
 
 
-class Shop:
+class Shop(BasePart):
     """Counts what it was asked to do, by request id; the counts outlive it."""
 
     name, role, period_ns = "traffic", "part", 20 * NS_PER_MS
-    hears = ()
-    serves = (Serves(PlanRequest),)
+    subscriptions = ()
+    services = (Service(PlanRequest),)
 
     def __init__(self, store):
         stored = records(store, "plans", self.name, PlanRecord)
@@ -83,10 +83,10 @@ class Shop:
         return []
 
 
-class Client:
+class Client(BasePart):
     """Asks until it is answered."""
 
-    role, period_ns, hears, serves = "client", 20 * NS_PER_MS, (), ()
+    role, period_ns, subscriptions, services = "client", 20 * NS_PER_MS, (), ()
 
     def __init__(self, name):
         self.name = name

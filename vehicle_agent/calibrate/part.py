@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.geometry import Pose2
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.drive_command import DriveCommand
@@ -31,7 +31,7 @@ WAITS = frozenset({"pose", "doubt", "stop", "lost"})
 OUTSIDE = "outside the floor"
 
 
-class CalibrationPart:
+class CalibrationPart(BasePart):
     """One car that drives the pattern.
 
     Attributes:
@@ -44,7 +44,6 @@ class CalibrationPart:
 
     role = "v"
     period_ns = 20 * NS_PER_MS
-    serves: Sequence[Serves] = ()
 
     def __init__(
         self, name: str, body: Body, limits: GuardLimits, done: threading.Event | None = None,
@@ -62,8 +61,8 @@ class CalibrationPart:
         """
         self.name = name
         mine = {"vehicle": name}
-        self.hears: Sequence[Hears] = (
-            Hears(EyeTrack, mine), Hears(EyePose, mine), Hears(CityStop)
+        self.subscriptions: Sequence[Subscription] = (
+            Subscription(EyeTrack, mine), Subscription(EyePose, mine), Subscription(CityStop)
         )  # fmt: skip
         self.recorded = Recorded()
         self.done = done or threading.Event()

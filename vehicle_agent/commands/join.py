@@ -103,7 +103,7 @@ def _run(arguments: argparse.Namespace) -> int:
             _tag_of(arguments),
         )
         try:
-            run(Leaving(part, wish, done), bus, clock, done, on_beat=True)
+            run(Leaving(part, wish, done), bus, clock, done, on_tick=True)
         finally:
             part.close()
     gc.freeze()  # taking the compiler's objects apart one by one would take a quarter of a second

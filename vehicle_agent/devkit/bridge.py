@@ -17,7 +17,7 @@ from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.errors import CarError, RunError
 from scm.log import event
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Call, Incoming, Outgoing
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.camera_frame import CameraFrame
@@ -89,7 +89,7 @@ class Wanted:
     packet: Version = "0.3"
 
 
-class DevkitPart:
+class DevkitPart(BasePart):
     """The bridge; its script is given to it later, by `meet`.
 
     Args:
@@ -100,7 +100,6 @@ class DevkitPart:
 
     role = "client"
     period_ns = 10 * NS_PER_MS
-    serves: Sequence[Serves] = ()
 
     def __init__(self, name: str, wanted: Wanted, session: str = "") -> None:
         self.name = name
@@ -124,10 +123,10 @@ class DevkitPart:
         self._told: set[str] = set()
         self._replies = 0
         self._status_ns: int | None = None
-        always = [Hears(WorldDefinition), Hears(Spat)]
-        always += [Hears(VehicleState, {"vehicle": car}) for car in wanted.cars]
+        always = [Subscription(WorldDefinition), Subscription(Spat)]
+        always += [Subscription(VehicleState, {"vehicle": car}) for car in wanted.cars]
         self._always = tuple(always)
-        self.hears: Sequence[Hears] = self._always
+        self.subscriptions: Sequence[Subscription] = self._always
         self._on_reply: dict[type[Message], Callable[[Any, Message, int], None]] = {
             LeaseRequest: self._leased,
             SignalRequest: lambda asked, reply, _: self._heads.replied(asked, reply),
@@ -255,14 +254,16 @@ class DevkitPart:
         self._blind_since_ns, self._said = now_ns, None
         self._may_be_dark = self._wanted.cosim  # its script places a car before anything sees it
         self._was_open = is_open
-        self.hears = (*self._always, *self._needed()) if is_open else self._always
+        self.subscriptions = (*self._always, *self._needed()) if is_open else self._always
 
-    def _needed(self) -> list[Hears]:
+    def _needed(self) -> list[Subscription]:
         out = []
         for car in self._wanted.cars:
             own = {"vehicle": car}
-            out += [Hears(VehicleSensors, own), Hears(LidarScan, own)]
-            out += [Hears(CameraFrame, own | {"camera": name}) for name in self._wanted.cameras]
+            out += [Subscription(VehicleSensors, own), Subscription(LidarScan, own)]
+            out += [
+                Subscription(CameraFrame, own | {"camera": name}) for name in self._wanted.cameras
+            ]
         return out
 
     def _absent(self, now_ns: int) -> list[str]:

@@ -14,7 +14,7 @@ from scm.log import event
 from scm.maps.room import CLEARANCE_M, distances_m
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears
+from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_definition import WorldDefinition
@@ -54,12 +54,11 @@ def free_place(city_map: CityMap, others: Iterable[SnapshotVehicle | EmulatedPos
     return next(free, None)
 
 
-class EmulatorPart:
+class EmulatorPart(BasePart):
     """One emulated car."""
 
     role = "client"
     period_ns = STEP_NS
-    serves = ()
 
     def __init__(
         self, vehicle: str, device: Device, wheels: Wheels, spawn: str = "", car: str = "nigel",
@@ -78,8 +77,8 @@ class EmulatorPart:
         self.name = station_of(vehicle)
         self._vehicle, self._device, self._wheels = vehicle, device, wheels
         self._spawn, self._car, self._tag_id = spawn, car, tag_id
-        self.hears: Sequence[Hears] = (
-            Hears(WorldDefinition), Hears(WorldSnapshot), Hears(EmulatedPose),
+        self.subscriptions: Sequence[Subscription] = (
+            Subscription(WorldDefinition), Subscription(WorldSnapshot), Subscription(EmulatedPose),
         )  # fmt: skip
         self._map: CityMap | None = None
         self._defined_ns: int | None = None
@@ -129,7 +128,7 @@ class EmulatorPart:
         if pose is None:
             return
         self._wheels.place(pose, now_ns)
-        self._is_placed, self.hears = True, self.hears[:1]
+        self._is_placed, self.subscriptions = True, self.subscriptions[:1]
         self._snapshot, self._emulated = None, {}
 
     def _found(self, city_map: CityMap, now_ns: int) -> Pose2 | None:

@@ -6,7 +6,7 @@ from scm.eye.picture import decode_picture
 from scm.eye.source import Frame
 from scm.eye.sources.capture import Grabbed
 from scm.eye.sources.watch import Tally, Watch
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.exchange import Incoming
 from scm.v2x.key import check_name
 from scm.v2x.messages.eye_picture_in import EyePictureIn
@@ -29,7 +29,7 @@ class BusSource:
 
     def __init__(self, camera: str, delay_s: float = 0.0) -> None:
         self.camera = check_name(camera, "camera")
-        self.hears = (Hears(EyePictureIn, {"camera": camera}),)
+        self.subscriptions = (Subscription(EyePictureIn, {"camera": camera}),)
         self._watch = Watch(nanoseconds(delay_s))
         self._newest: tuple[EyePictureIn, int] | None = None
         self._now_ns = 0

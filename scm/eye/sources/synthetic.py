@@ -21,7 +21,7 @@ from scm.eye.render.floor import draw_box, draw_scenery
 from scm.eye.source import Frame
 from scm.geometry import Pose2
 from scm.records.city_map import CityMap
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
@@ -40,7 +40,7 @@ class SyntheticSource:
     """
 
     trouble: str | None = None
-    hears = (Hears(EmulatedPose),)
+    subscriptions = (Subscription(EmulatedPose),)
 
     def __init__(self, city_map: CityMap, model: CameraModel, rng: np.random.Generator) -> None:
         self._model = model

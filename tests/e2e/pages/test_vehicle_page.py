@@ -7,7 +7,7 @@ import pytest
 
 from scm.clock import NS_PER_MS, WallClock
 from scm.runtime.live import run
-from scm.runtime.part import Serves
+from scm.runtime.part import BasePart, Service
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.messages.echo_request import EchoReply, EchoRequest
@@ -60,14 +60,14 @@ def drives_by_itself(running, name=CAR):
     wait_for(drives, 60.0, f"{name} drives by itself again")
 
 
-class Tired:
+class Tired(BasePart):
     """A real car's agent, as far as the city sees: it stands, and its battery is nearly empty.
 
     With a throttle it wants to drive.
     """
 
-    name, role, period_ns, hears = TIRED, "v", 50 * NS_PER_MS, ()
-    serves = (Serves(EchoRequest, {"vehicle": TIRED}),)
+    name, role, period_ns, subscriptions = TIRED, "v", 50 * NS_PER_MS, ()
+    services = (Service(EchoRequest, {"vehicle": TIRED}),)
 
     def __init__(self, session, throttle):
         self.session, self.throttle, self.seq = session, throttle, 0

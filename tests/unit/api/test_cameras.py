@@ -18,7 +18,7 @@ def frame(t_ns=1, vehicle="n1", camera="front"):
 
 
 def watched(view):
-    return [hears.where for hears in view.hears if hears.kind is CameraFrame]
+    return [one.where for one in view.subscriptions if one.kind is CameraFrame]
 
 
 def test_a_camera_is_heard_for_as_long_as_anybody_watches_it(view):

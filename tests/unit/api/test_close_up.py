@@ -11,7 +11,7 @@ from scm.api.close_up import DEPTH, sample_of
 from scm.api.routes.close_up import _reports
 from scm.api.routes.scan import Turns
 from scm.api.stream import Stream
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_state import VehicleState
 
@@ -29,11 +29,11 @@ def report():
 
 
 def test_reports_are_heard_only_while_somebody_looks(view):
-    wish = Hears(VehicleState, {"vehicle": "n1"})
-    assert wish not in view.hears
+    wish = Subscription(VehicleState, {"vehicle": "n1"})
+    assert wish not in view.subscriptions
     with view.watching_closely("n1"), view.watching_closely("n1"):
-        assert list(view.hears).count(wish) == 1
-    assert wish not in view.hears
+        assert list(view.subscriptions).count(wish) == 1
+    assert wish not in view.subscriptions
 
 
 def test_each_report_is_told_once_and_in_order(view, hear, report):
@@ -86,7 +86,7 @@ def test_scans_come_with_the_reports_for_who_asks_and_null_where_there_is_no_lid
     assert reports.startswith(b"event: reports")
     assert json.loads(turn.split(b"data: ")[1])["ranges_m"] == [1.0, 2.0]
     assert asyncio.run(heard(None))[1] == b"event: scan\ndata: null\n\n"
-    assert not any(wish.kind is LidarScan for wish in view.hears)
+    assert not any(wish.kind is LidarScan for wish in view.subscriptions)
 
 
 def test_a_car_that_is_not_there_has_no_reports(client):

@@ -10,7 +10,7 @@ from scm.api.deeds import Words
 from scm.api.keys import KeyRing
 from scm.clock import StepClock
 from scm.registry import names
-from scm.runtime.part import Serves
+from scm.runtime.part import Service
 from scm.runtime.station import Station
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
@@ -118,12 +118,12 @@ def test_a_body_that_names_nobody_is_signed_by_the_program(view, fake_city, city
 class Door:
     """A part with nothing but one request that it serves."""
 
-    name, role, period_ns, hears = "world", "part", 1, ()
-    serves = (Serves(RemoveRequest), Serves(StopRequest))
+    name, role, period_ns, subscriptions = "world", "part", 1, ()
+    services = (Service(RemoveRequest), Service(StopRequest))
 
 
 class Other(Door):
-    name, serves = "demand", ()
+    name, services = "demand", ()
 
 
 @pytest.mark.parametrize(

@@ -487,7 +487,7 @@ def track(vehicle="n1", **more):
 
 def test_tracks_of_all_cameras_are_heard_while_somebody_asks_for_them(client, view, hear):
     def hears():
-        return EyeTrack in {one.kind for one in view.hears}
+        return EyeTrack in {one.kind for one in view.subscriptions}
 
     hear(1.0, track())
     assert (hears(), client("GET", f"{EYE}/tracks").json()) == (False, {"tracks": []})

@@ -30,7 +30,7 @@ def scan(at_s=1.0, vehicle="n1", ranges=(1.0, float("inf"), 2.5, 0.5)):
 
 
 def heard(view):
-    return [hears.where for hears in view.hears if hears.kind is LidarScan]
+    return [one.where for one in view.subscriptions if one.kind is LidarScan]
 
 
 def test_a_scan_is_heard_for_as_long_as_anybody_watches_it(view, hear):

@@ -10,7 +10,7 @@ from scm.api.audit_trail import newest_first
 from scm.api.deeds import Words
 from scm.api.trace import HEADER, Traced, trace_id, trace_id_of, traced
 from scm.clock import StepClock
-from scm.runtime.part import Serves
+from scm.runtime.part import Service
 from scm.runtime.station import Station
 from scm.store.memory import MemoryStore
 from scm.v2x.bus_memory import MemoryNetwork
@@ -71,8 +71,8 @@ def test_what_is_asked_of_the_city_carries_it(view, fake_city, city_map, client_
 class Button:
     """A part with nothing but a red button."""
 
-    name, role, period_ns, hears = "world", "part", 1, ()
-    serves = (Serves(StopRequest),)
+    name, role, period_ns, subscriptions = "world", "part", 1, ()
+    services = (Service(StopRequest),)
 
 
 def test_a_station_says_in_log_and_audit_under_which_trace_it_did_something(caplog):

@@ -36,7 +36,7 @@ def frame(number):
 
 def test_the_view_says_nothing_and_serves_nothing(view, hear, snapshot):
     assert hear(1.0, snapshot(n1=(0.0, 0.0, 0.0))) == []
-    assert not view.serves
+    assert not view.services
     assert view.finish(2) == []
 
 

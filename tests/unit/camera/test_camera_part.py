@@ -10,19 +10,19 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.recorder.mcap_file import read_run
 from scm.recorder.part import RecorderPart
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import BasePart, Subscription
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
-N1_FRONT = Hears(CameraFrame, {"vehicle": "n1", "camera": "front"})
+N1_FRONT = Subscription(CameraFrame, {"vehicle": "n1", "camera": "front"})
 
 
-class Stage:
+class Stage(BasePart):
     """A world that only tells where its two cars are, 20 times a second."""
 
     name, role, period_ns = "world", "part", 50 * NS_PER_MS
-    hears = serves = ()
+    subscriptions = services = ()
 
     def __init__(self, car):
         self._car = car
@@ -59,14 +59,14 @@ def city(car, spy):
 
 
 def test_while_nobody_looks_nothing_is_read_or_sent(city, spy):
-    status = city.hear(Hears(PartStatus))
+    status = city.subscribe(Subscription(PartStatus))
     city.run_for(1.5)
     assert spy.read == 0
     assert status.drain()[-1].message.detail == "nobody looks"
 
 
 def test_a_subscriber_gets_frames_at_the_cameras_rate_and_times(city):
-    frames = city.hear(N1_FRONT)
+    frames = city.subscribe(N1_FRONT)
     city.run_for(0.5)
     frames.drain()
     city.run_for(1.0)
@@ -78,14 +78,14 @@ def test_a_subscriber_gets_frames_at_the_cameras_rate_and_times(city):
 
 
 def test_only_what_is_asked_for_is_pictured(city):
-    city.hear(N1_FRONT)
-    every = city.hear(Hears(CameraFrame, {"vehicle": "n2"}))
+    city.subscribe(N1_FRONT)
+    every = city.subscribe(Subscription(CameraFrame, {"vehicle": "n2"}))
     city.run_for(0.5)
     assert {item.message.camera for item in every.drain()} == {"front", "rear"}
 
 
 def test_rendering_ends_with_the_last_subscriber(city, spy):
-    frames = city.hear(N1_FRONT)
+    frames = city.subscribe(N1_FRONT)
     city.run_for(0.5)
     assert frames.drain()
     city.bus.unsubscribe(frames)
@@ -93,7 +93,7 @@ def test_rendering_ends_with_the_last_subscriber(city, spy):
     before = spy.read
     city.run_for(0.5)
     assert spy.read == before
-    again = city.hear(N1_FRONT)
+    again = city.subscribe(N1_FRONT)
     city.run_for(0.5)
     assert again.drain()
 
@@ -118,7 +118,7 @@ def test_the_same_city_gives_the_same_pictures(city_map, car):
     runs = []
     for _ in range(2):
         with Lockstep([Stage(car), CameraPart(city_map, seed=4)]) as city:
-            frames = city.hear(N1_FRONT)
+            frames = city.subscribe(N1_FRONT)
             city.run_for(0.5)
             runs.append([(item.message.t_ns, item.message.payload) for item in frames.drain()])
     assert runs[0]
@@ -139,7 +139,7 @@ def own_facts(monkeypatch, optics):
 
 def arrivals(city, seconds=1.5, which=N1_FRONT):
     """Return when each frame was exposed and when it came [ns]."""
-    frames = city.hear(which)
+    frames = city.subscribe(which)
     city.run_for(seconds)
     return [(item.message.t_ns, item.t_ns) for item in frames.drain()]
 
@@ -162,7 +162,7 @@ def test_a_camera_without_latency_is_a_snapshot_late_at_most(city, own_facts):
 
 def test_frames_under_way_end_with_the_last_subscriber(city, own_facts):
     own_facts(latency_s=1.0)
-    frames = city.hear(N1_FRONT)
+    frames = city.subscribe(N1_FRONT)
     city.run_for(0.8)
     city.bus.unsubscribe(frames)
     city.run_for(0.2)
@@ -173,7 +173,7 @@ def test_drop_out_loses_some_frames_and_no_others_change(city_map, car, own_fact
     def run(wanted, drop_out):
         own_facts(drop_out=drop_out, read_noise=2.0)
         with Lockstep([Stage(car), CameraPart(city_map, seed=4)]) as city:
-            frames = city.hear(wanted)
+            frames = city.subscribe(wanted)
             city.run_for(3.0)
             got = [item.message for item in frames.drain()]
         return {frame.t_ns: frame.payload for frame in got if frame.camera == "front"}
@@ -181,7 +181,7 @@ def test_drop_out_loses_some_frames_and_no_others_change(city_map, car, own_fact
     whole, some = run(N1_FRONT, 0.0), run(N1_FRONT, 0.5)
     assert 0.25 * len(whole) < len(some) < 0.75 * len(whole)
     assert some.items() <= whole.items()
-    assert run(Hears(CameraFrame, {"vehicle": "n1"}), 0.5) == some
+    assert run(Subscription(CameraFrame, {"vehicle": "n1"}), 0.5) == some
 
 
 def test_between_two_snapshots_cars_are_on_their_way(car):

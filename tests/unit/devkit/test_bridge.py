@@ -9,7 +9,7 @@ import pytest
 from scm.errors import RunError
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.exchange import Call, Incoming
@@ -51,10 +51,12 @@ class Stage:
         self.lockstep = Lockstep(parts)
         self.part = DevkitPart("devkit-4567", wanted, "session")
         self.part.meet(self.script)
-        self.snapshots = self.lockstep.hear(Hears(WorldSnapshot))
-        self.spats = self.lockstep.hear(Hears(Spat))
-        self.statuses = self.lockstep.hear(Hears(PartStatus, {"station": "devkit-4567"}))
-        self.commands = self.lockstep.hear(Hears(DriveCommand))
+        self.snapshots = self.lockstep.subscribe(Subscription(WorldSnapshot))
+        self.spats = self.lockstep.subscribe(Subscription(Spat))
+        self.statuses = self.lockstep.subscribe(
+            Subscription(PartStatus, {"station": "devkit-4567"})
+        )
+        self.commands = self.lockstep.subscribe(Subscription(DriveCommand))
         self.cars = {}
         self.lockstep.run_for(0.2)
         self.lockstep.add(self.part)
@@ -230,16 +232,16 @@ def test_without_any_picture_packets_are_black_in_the_end_and_the_bridge_says_so
 
 
 def test_nothing_costly_is_heard_while_no_script_is_there(stage):
-    kinds = {hears.kind for hears in stage.part.hears}
+    kinds = {one.kind for one in stage.part.subscriptions}
     assert {LidarScan, CameraFrame} <= kinds
     stage.script.is_open = False
     stage.wait(0.1)
-    assert not {LidarScan, CameraFrame} & {hears.kind for hears in stage.part.hears}
+    assert not {LidarScan, CameraFrame} & {one.kind for one in stage.part.subscriptions}
 
 
 @pytest.mark.parametrize("stage", [(Wanted(("n1",), cameras=("front",)),)], indirect=True)
 def test_only_the_cameras_that_are_wanted_are_asked_for(stage):
-    wished = [h.where["camera"] for h in stage.part.hears if h.kind is CameraFrame]
+    wished = [h.where["camera"] for h in stage.part.subscriptions if h.kind is CameraFrame]
     assert wished == ["front"]
 
 

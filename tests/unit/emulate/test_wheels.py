@@ -207,7 +207,7 @@ def test_where_no_place_is_free_it_waits_and_says_so_once(caplog):
 def test_it_does_not_listen_to_other_cars_once_it_stands():
     emulator = part()
     emulator.step(0, [world()])
-    assert [hears.kind for hears in emulator.hears] == [WorldDefinition]
+    assert [one.kind for one in emulator.subscriptions] == [WorldDefinition]
 
 
 def test_it_takes_the_cable_away_at_the_end():
@@ -221,7 +221,9 @@ def test_a_guarded_city_lets_it_say_the_truth_and_no_vehicle_hear_it():
     key = key.removeprefix(prefix("city"))
     rights = rights_of("emulator", station_of("n7"))
     assert any(fnmatchcase(key, pattern) for pattern in rights.says)
-    heard = [selector("city", wish.kind, wish.where) for wish in part().hears]
+    heard = [selector("city", wish.kind, wish.where) for wish in part().subscriptions]
     assert [prefix("city") + pattern for pattern in rights.hears] == heard
-    assert not any(fnmatchcase(key, pattern) for pattern in rights_of("vehicle", "n7").hears)
-    assert any(fnmatchcase(key, pattern) for pattern in rights_of("part", "eye").hears)
+    assert not any(
+        fnmatchcase(key, pattern) for pattern in rights_of("vehicle", "n7").subscriptions
+    )
+    assert any(fnmatchcase(key, pattern) for pattern in rights_of("part", "eye").subscriptions)

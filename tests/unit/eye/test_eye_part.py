@@ -57,7 +57,7 @@ def test_it_steps_often_enough_for_tracks_and_hears_the_snapshot_and_emulated_ca
     assert eye.period_ns == PERIOD_NS // 2
     fast = msgspec.structs.replace(CITY.cameras[0], rate_hz=40.0)
     assert EyePart(msgspec.structs.replace(CITY, cameras=(fast,))).period_ns == PERIOD_NS // 4
-    assert [hears.kind for hears in eye.hears] == [WorldSnapshot, EmulatedPose]
+    assert [one.kind for one in eye.subscriptions] == [WorldSnapshot, EmulatedPose]
 
 
 def test_a_step_without_a_snapshot_is_silent():
@@ -339,7 +339,7 @@ def test_what_tracks_say_is_sent_on_the_air():
 def test_pictures_are_drawn_over_only_for_who_asks():
     eye = EyePart(CITY, seed=3)
     assert of(EyePreview, see(eye, light(1, CAR))) == []
-    eye.learn_wishes(lambda kind, where: (kind, where) == (EyePreview, {"camera": "overhead"}))
+    eye.attach(lambda kind, where: (kind, where) == (EyePreview, {"camera": "overhead"}))
     out = see(eye, light(10, CAR))
     (bare,), (drawn,) = of(EyeFrame, out), of(EyePreview, out)
     assert drawn.payload != bare.payload
@@ -350,8 +350,8 @@ def test_only_the_first_camera_of_a_map_tells_tracks_and_hears_the_others():
     other = msgspec.structs.replace(CITY.cameras[0], name="side")
     both = msgspec.structs.replace(CITY, cameras=(*CITY.cameras, other))
     first, second = EyePart(both, seed=3), EyePart(both, "side", seed=4)
-    assert EyePose in [hears.kind for hears in first.hears]
-    assert EyePose not in [hears.kind for hears in second.hears]
+    assert EyePose in [one.kind for one in first.subscriptions]
+    assert EyePose not in [one.kind for one in second.subscriptions]
     for tick in range(1, 6):
         snapshot = light(tick, CAR)
         out = see(second, snapshot)

@@ -12,7 +12,7 @@ from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.store.records import record
@@ -88,10 +88,10 @@ class City:
         still.due_ns = 0
         self.eye = EyePart(city_map, source=still, kept=kept_in(state))
         self.lockstep = Lockstep(())
-        self.poses = self.lockstep.hear(Hears(EyePose))
-        self.statuses = self.lockstep.hear(Hears(EyeStatus))
-        self.tracks = self.lockstep.hear(Hears(EyeTrack))
-        self.events = self.lockstep.hear(Hears(CityEvent))
+        self.poses = self.lockstep.subscribe(Subscription(EyePose))
+        self.statuses = self.lockstep.subscribe(Subscription(EyeStatus))
+        self.tracks = self.lockstep.subscribe(Subscription(EyeTrack))
+        self.events = self.lockstep.subscribe(Subscription(CityEvent))
         self.lockstep.add(self.eye, state)
         self.lockstep.publish(WorldSnapshot(t_ns=0, tick=0, vehicles=(CAR,)))
         self.lockstep.run_for(0.3)

@@ -48,8 +48,8 @@ def test_a_picture_on_the_bus_is_heard_by_who_listens_for_its_camera():
     assert isinstance(source, Listener)
     box = Mailbox(4)
     with network.bus("city", "eye") as ear, network.bus("city", "roof-pc") as mouth:
-        for hears in source.hears:
-            ear.subscribe(hears.kind, hears.where, box)
+        for one in source.subscriptions:
+            ear.subscribe(one.kind, one.where, box)
         for camera in ("door", "roof"):
             mouth.publish(EyePictureIn(camera=camera, t_ns=NOW_NS - 5, payload=jpeg()))
         items = box.drain()

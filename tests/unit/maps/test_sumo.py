@@ -21,7 +21,7 @@ from scm.maps.sumo_program import stages_of
 from scm.maps.sumo_read import NetPhase
 from scm.maps.sumo_toml import map_toml
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.own_plan import adopted
 from scm.traffic.part import TrafficPart
 from scm.v2x.etsi.topology import mapem_of
@@ -90,7 +90,7 @@ def test_its_map_file_reads_back_equal(imported, tmp_path):
 def test_cars_go_round_in_their_lanes(imported):
     city_map, _ = adopted(imported.city_map)
     part = WorldPart(city_map, room=CARS)
-    part.learn_wishes(lambda _kind, _where: False)
+    part.attach(lambda _kind, _where: False)
     world = part.world
     streets, spawns = world.crowd.streets, city_map.spawns
     places = [s for s in spawns if streets.goes_round[streets.numbers[s.lane]]]
@@ -125,7 +125,7 @@ def test_a_signal_program_of_the_network_runs_at_its_junction(tmp_path):
     path = tmp_path / "town.toml"
     path.write_text(map_toml(city), encoding="utf-8")
     with Lockstep([TrafficPart(load_map(path))]) as lockstep:
-        spats = lockstep.hear(Hears(Spat, {"junction": "b1"}))
+        spats = lockstep.subscribe(Subscription(Spat, {"junction": "b1"}))
         lockstep.run_for(200.0)
         told = [item.message for item in spats.drain()]
     greens = [tuple(g.group for g in spat.groups if g.colour == "green") for spat in told]

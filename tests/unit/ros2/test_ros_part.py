@@ -11,7 +11,7 @@ from scm.ros2 import markers
 from scm.ros2.frames import vector
 from scm.ros2.part import RosPart
 from scm.ros2.types import ros, to_cdr
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.part import TrafficPart
 from scm.v2x.exchange import Incoming
 from scm.v2x.message import Refused
@@ -38,8 +38,8 @@ class Driven:
 
     def __init__(self, city):
         self.city = city
-        self.box = city.lockstep.hear(Hears(WorldSnapshot))
-        self.commands = city.lockstep.hear(Hears(DriveCommand))
+        self.box = city.lockstep.subscribe(Subscription(WorldSnapshot))
+        self.commands = city.lockstep.subscribe(Subscription(DriveCommand))
 
     def drive(self, span_s, speed=SPEED, rate=0.0):
         for _ in range(round(span_s * 10)):
@@ -97,14 +97,14 @@ def test_what_nobody_subscribes_to_is_not_made(city):
     for topic in ("odom", "scan", "imu", "camera/compressed"):
         assert city.graph.sent(f"/n1/{topic}") == []
     assert city.graph.sent("/city/markers") == []
-    assert [hears.kind for hears in city.ros.hears] == [WorldSnapshot]
+    assert [one.kind for one in city.ros.subscriptions] == [WorldSnapshot]
 
 
 def test_a_scan_is_asked_for_of_the_car_that_is_looked_at(city):
     city.graph.wanted = {"/n1/scan"}
     city.lockstep.run_for(1.0)
-    assert Hears(LidarScan, {"vehicle": "n1"}) in city.ros.hears
-    assert Hears(LidarScan, {"vehicle": "n2"}) not in city.ros.hears
+    assert Subscription(LidarScan, {"vehicle": "n1"}) in city.ros.subscriptions
+    assert Subscription(LidarScan, {"vehicle": "n2"}) not in city.ros.subscriptions
     scans = city.graph.sent("/n1/scan")
     assert 4 <= len(scans) <= 7  # 7 Hz, from the next look on
     assert len(scans[-1].ranges) == 360

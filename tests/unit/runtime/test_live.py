@@ -6,7 +6,7 @@ import pytest
 
 from scm.clock import NS_PER_MS, NS_PER_S, StepClock
 from scm.runtime.live import run
-from scm.runtime.part import Hears
+from scm.runtime.part import BasePart, Subscription
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.messages.city_event import CityEvent
@@ -23,7 +23,7 @@ class City:
         self.stop = threading.Event()
         self._listener = self.network.bus("city", "listener")
 
-    def hear(self, kind):
+    def subscribe(self, kind):
         mailbox = Mailbox(1000)
         self._listener.subscribe(kind, {}, mailbox)
         return mailbox
@@ -32,12 +32,12 @@ class City:
         run(part, self.network.bus("city", part.name), self.clock, self.stop, **options)
 
 
-class Stepping:
+class Stepping(BasePart):
     """A part that takes `costs_ms` for its steps in turn and stops the run after `steps`."""
 
     name, role = "stepping", "part"
     period_ns = 20 * NS_PER_MS
-    hears, serves = (), ()
+    subscriptions, services = (), ()
 
     def __init__(self, city, steps, costs_ms=()):
         self.city = city
@@ -77,7 +77,7 @@ def test_steps_keep_to_absolute_deadlines_whatever_they_cost(city):
 def test_many_of_a_kind_step_together_at_beats_of_the_clock(city):
     city.clock.set_ns(NS_PER_S + 3 * NS_PER_MS)
     part = Stepping(city, 4, costs_ms=[1, 25])
-    city.run(part, on_beat=True)
+    city.run(part, on_tick=True)
     assert part.began == [25, 45, 70, 85]
 
 
@@ -88,13 +88,13 @@ def test_a_step_that_overruns_coalesces_the_ones_it_covered(city):
 
 
 def test_steps_that_were_late_by_a_period_or_more_are_counted(city):
-    statuses = city.hear(PartStatus)
+    statuses = city.subscribe(PartStatus)
     city.run(Stepping(city, 60, costs_ms=[0, 75]))
     assert messages(statuses)[0].late_steps == 2
 
 
 def test_a_step_less_than_a_period_late_is_not_counted(city):
-    statuses = city.hear(PartStatus)
+    statuses = city.subscribe(PartStatus)
     part = Stepping(city, 60, costs_ms=[0, 39])
     city.run(part)
     assert part.began[:4] == [0, 20, 59, 60]
@@ -102,7 +102,7 @@ def test_a_step_less_than_a_period_late_is_not_counted(city):
 
 
 def test_vital_signs_go_out_once_a_second(city):
-    statuses = city.hear(PartStatus)
+    statuses = city.subscribe(PartStatus)
     city.run(Stepping(city, 151, costs_ms=[0, 5.5]))
     told = messages(statuses)
     assert [s.t_ns // NS_PER_S for s in told] == [2, 3, 4]
@@ -117,7 +117,7 @@ def test_a_parts_own_status_goes_out_with_its_vital_signs_filled_in(city):
                 return []
             return [PartStatus(station=self.name, t_ns=now_ns, detail="6 cars")]
 
-    statuses = city.hear(PartStatus)
+    statuses = city.subscribe(PartStatus)
     city.run(Telling(city, 40, costs_ms=[2]))
     (status,) = messages(statuses)
     assert (status.detail, status.step_ms) == ("6 cars", 2.0)
@@ -125,7 +125,7 @@ def test_a_parts_own_status_goes_out_with_its_vital_signs_filled_in(city):
 
 def test_what_a_part_hears_is_in_its_inbox(city):
     class Hearing(Stepping):
-        hears = (Hears(CityEvent, {"source": "talker"}),)
+        subscriptions = (Subscription(CityEvent, {"source": "talker"}),)
 
         def step(self, now_ns, inbox):
             self.heard = [item.message.name for item in inbox]
@@ -142,7 +142,7 @@ def test_what_a_part_hears_is_in_its_inbox(city):
 
 
 def test_last_words_are_said_before_the_part_leaves(city):
-    words, presence = city.hear(CityEvent), city.hear(Presence)
+    words, presence = city.subscribe(CityEvent), city.hear(Presence)
     city.run(Stepping(city, 1))
     assert [m.name for m in messages(words)] == ["bye"]
     assert [m.alive for m in messages(presence)] == [True, False]
@@ -154,7 +154,7 @@ def test_a_part_that_fails_is_told_to_the_city_and_raised(city, caplog):
             msg = "the wheel came off"
             raise ValueError(msg)
 
-    words, presence = city.hear(CityEvent), city.hear(Presence)
+    words, presence = city.subscribe(CityEvent), city.hear(Presence)
     with pytest.raises(ValueError, match="wheel"):
         city.run(Failing(city, 1))
     (told,) = messages(words)

@@ -7,9 +7,9 @@ import pytest
 from scm.clock import NS_PER_MS
 from scm.errors import RunError
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears, Serves
+from scm.runtime.part import BasePart, Service, Subscription
 from scm.v2x.exchange import Answer, Call
-from scm.v2x.message import Refused
+from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.presence import Presence
@@ -20,16 +20,16 @@ def event(source, name, t_ns=0):
     return CityEvent(severity="info", source=source, t_ns=t_ns, name=name, text=name)
 
 
-class Talker:
+class Talker(BasePart):
     """Says one event each step, and notes everything it hears with the time."""
 
     role = "part"
-    serves = ()
+    services = ()
 
-    def __init__(self, name, period_ms=20, hears=()):
+    def __init__(self, name, period_ms=20, subscriptions=()):
         self.name = name
         self.period_ns = period_ms * NS_PER_MS
-        self.hears = hears
+        self.subscriptions = subscriptions
         self.heard = []
         self.steps = []
 
@@ -45,7 +45,7 @@ class Talker:
 class Planner(Talker):
     """Answers every second request for a plan, two steps after it came."""
 
-    serves = (Serves(PlanRequest),)
+    services = (Service(PlanRequest),)
 
     def __init__(self, name="planner"):
         super().__init__(name)
@@ -66,7 +66,7 @@ class Planner(Talker):
         return []
 
 
-ALL = (Hears(CityEvent),)
+ALL = (Subscription(CityEvent),)
 
 
 def plan_request(request_id="", plan="calm"):
@@ -87,7 +87,7 @@ def test_steps_come_in_order_of_time_then_of_adding():
 
 
 def test_a_message_reaches_later_steps_of_the_same_instant_and_no_earlier_one():
-    first, second = Talker("first", hears=ALL), Talker("second", hears=ALL)
+    first, second = Talker("first", subscriptions=ALL), Talker("second", subscriptions=ALL)
     with Lockstep([first, second]) as city:
         city.run_for(0.0)
         assert [m.source for _, m in second.heard] == ["first"]
@@ -100,7 +100,7 @@ def test_a_message_reaches_later_steps_of_the_same_instant_and_no_earlier_one():
 
 def test_two_runs_in_a_row_equal_one_of_the_whole_length():
     def heard(spans):
-        listener = Talker("listener", 30, hears=ALL)
+        listener = Talker("listener", 30, subscriptions=ALL)
         with Lockstep([Talker("a", 10), listener, Talker("b", 15)]) as city:
             for span_s in spans:
                 city.run_for(span_s)
@@ -209,7 +209,10 @@ def test_a_part_added_while_running_steps_from_now_on():
 def test_a_removed_part_says_its_last_words_and_its_presence_ends():
     leaving = Talker("leaving")
     with Lockstep([leaving]) as city:
-        words, presence = city.hear(Hears(CityEvent)), city.hear(Hears(Presence))
+        words, presence = (
+            city.subscribe(Subscription(CityEvent)),
+            city.subscribe(Subscription(Presence)),
+        )
         city.run_for(0.04)
         city.remove(leaving)
         city.run_for(0.1)
@@ -239,7 +242,7 @@ def test_the_error_of_a_part_says_whose_it_is_and_when():
 
 
 def test_what_the_script_publishes_is_heard():
-    listener = Talker("listener", hears=(Hears(Trip, {"vehicle": "n1"}),))
+    listener = Talker("listener", subscriptions=(Subscription(Trip, {"vehicle": "n1"}),))
     with Lockstep([listener]) as city:
         for vehicle in ("n1", "n2"):
             city.publish(
@@ -259,13 +262,11 @@ def test_what_the_script_publishes_is_heard():
 
 def test_a_part_that_asks_for_raw_samples_finds_them_in_its_inbox():
     class Recorder(Talker):
-        hears_raw = True
-
         def step(self, now_ns, inbox):
             self.heard += [(sample.key, sample.t_ns) for sample in inbox]
             return []
 
-    recorder = Recorder("record")
+    recorder = Recorder("record", subscriptions=(Subscription(Message, raw=True),))
     with Lockstep([Talker("a"), recorder]) as city:
         city.run_for(0.04)
     assert recorder.heard[:3] == [
@@ -299,7 +300,7 @@ class Picky(Talker):
         super().__init__(name)
         self.is_wanted = None
 
-    def learn_wishes(self, is_wanted):
+    def attach(self, is_wanted):
         self.is_wanted = is_wanted
 
 
@@ -314,11 +315,11 @@ def test_a_part_that_changes_what_it_hears_is_followed():
     with Lockstep([picky]) as city:
         city.publish(trip(1.0))
         city.run_for(0.04)
-        picky.hears = (Hears(Trip),)
+        picky.subscriptions = (Subscription(Trip),)
         city.run_for(0.02)
         city.publish(trip(2.0))
         city.run_for(0.02)
-        picky.hears = ()
+        picky.subscriptions = ()
         city.run_for(0.02)
         city.publish(trip(3.0))
         city.run_for(0.04)
@@ -331,6 +332,6 @@ def test_a_part_may_ask_whether_anybody_would_hear_it():
     picky = Picky("picky")
     with Lockstep([picky]) as city:
         assert not picky.is_wanted(Trip, {})
-        city.add(Talker("hearer", hears=(Hears(Trip, {"vehicle": "n1"}),)))
+        city.add(Talker("hearer", subscriptions=(Subscription(Trip, {"vehicle": "n1"}),)))
         assert picky.is_wanted(Trip, {"vehicle": "n1"})
         assert not picky.is_wanted(Trip, {"vehicle": "n2"})

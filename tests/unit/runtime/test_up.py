@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from scm.__main__ import parse
-from scm.commands.up import wanted_of
 from scm.disturbances import OPTIONAL_PARTS, Disturbance
+from scm.commands.up import options_of
 from scm.errors import MapError, RunError, ScmError
-from scm.runtime.up import OPTIONAL, Wanted, _parts, _say_disturbance, _settled, run_city
+from scm.runtime.up import OPTIONAL, CityOptions, _parts, _plan_of, _report_disturbance, run_city
 from scm.v2x.router import Router, free_endpoint
 
 
@@ -20,7 +20,7 @@ def start(tmp_path):
     def start(map_name="driving_school", **facts):
         facts = {"port": 0, "listen": "tcp/127.0.0.1:0", **facts}
         try:
-            wanted = Wanted(map_name=map_name, record_dir=tmp_path / "runs", **facts)
+            wanted = CityOptions(map_name=map_name, record_dir=tmp_path / "runs", **facts)
             run_city(wanted, said.append)
         finally:
             assert said == []
@@ -56,11 +56,11 @@ def test_a_wrong_radio_is_refused_by_its_key(start):
 
 
 def test_the_radio_goes_to_the_world_and_to_no_other_part(tmp_path):
-    wanted = Wanted(
+    wanted = CityOptions(
         map_name="driving_school", port=0, listen="tcp/127.0.0.1:0", record_dir=tmp_path,
         radio=("loss=0.3", "delay_ms=50"),
     )  # fmt: skip
-    told = {job.name: job.command() for job in _parts(_settled(wanted))}
+    told = {job.name: job.command() for job in _parts(_plan_of(wanted))}
     assert told["world"][-6:-2] == ["--radio", "loss=0.3", "--radio", "delay_ms=50"]
     assert [name for name, command in told.items() if "--radio" in command] == ["world"]
 
@@ -73,29 +73,29 @@ def test_a_scanned_map_is_introduced_by_the_room_that_was_read(tmp_path):
         "occupied_thresh: 0.65\nfree_thresh: 0.25\n",
         encoding="utf-8",
     )
-    wanted = Wanted(
+    wanted = CityOptions(
         map_name=str(scan), hosted=1, port=0, listen="tcp/127.0.0.1:0", record_dir=tmp_path
     )
-    assert "the room is the one that holds the origin, 1 m²" in _settled(wanted).scan
+    assert "the room is the one that holds the origin, 1 m²" in _plan_of(wanted).scan
 
 
 def test_the_recorder_is_told_of_which_cars_it_keeps_pictures(tmp_path):
     words = ["up", "--port", "0", "--listen", "tcp/127.0.0.1:0", "--record-dir", str(tmp_path)]
     words += ["--cameras-hz", "2", "--cameras-of", "n1", "--cameras-of", "n3"]
-    wanted = wanted_of(parse(words))
-    (record,) = (job for job in _parts(_settled(wanted)) if job.name == "record")
+    wanted = options_of(parse(words))
+    (record,) = (job for job in _parts(_plan_of(wanted)) if job.name == "record")
     given = parse(record.command()[3:])
     assert (given.cameras_hz, given.cameras_of) == (2.0, ["n1", "n3"])
-    assert (Wanted(map_name="x").cameras_hz, Wanted(map_name="x").cameras_of) == (0.0, ())
+    assert (CityOptions(map_name="x").cameras_hz, CityOptions(map_name="x").cameras_of) == (0.0, ())
 
 
 def test_parts_may_be_left_out_and_the_server_knows_which_should_be_there(tmp_path):
     words = ["up", "--port", "0", "--listen", "tcp/127.0.0.1:0", "--record-dir", str(tmp_path)]
-    jobs = _parts(_settled(wanted_of(parse([*words, "--without", "eye,record"]))))
+    jobs = _parts(_plan_of(options_of(parse([*words, "--without", "eye,record"]))))
     there = ["traffic", "monitor", "world", "camera", "observer", "misbehaviour"]
     assert [job.name for job in jobs] == [*there, "api"]
     assert parse(jobs[-1].command()[3:]).expects == there
-    whole = {job.name for job in _parts(_settled(wanted_of(parse(words))))}
+    whole = {job.name for job in _parts(_plan_of(options_of(parse(words))))}
     assert whole >= {"eye", "record"}
     assert set(OPTIONAL) >= set(OPTIONAL_PARTS)
 
@@ -135,6 +135,6 @@ def test_what_to_do_for_a_slow_computer_is_said_once():
         kind="late", source="world", start_ns=0, text="it is slow", advice="Do that."
     )
     for _ in range(2):
-        _say_disturbance(late, said.append, advised)
+        _report_disturbance(late, said.append, advised)
     assert [line.split()[0] for line in said] == ["warning", "do", "warning"]
     assert said[1].endswith("Do that.")

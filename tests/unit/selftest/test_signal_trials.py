@@ -8,7 +8,7 @@ from scm.clock import NS_PER_MS, NS_PER_S, nanoseconds
 from scm.errors import RunError
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import BasePart, Subscription
 from scm.selftest.signals import SignalTrials
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
@@ -20,13 +20,13 @@ LOOK_S = 0.01
 WARM_S = 12.0
 
 
-class Freezing:
+class Freezing(BasePart):
     """A controller whose process can be stopped and continued."""
 
     def __init__(self):
         self._real = TrafficPart(CITY, "brisk")
         self.name, self.role, self.period_ns = "traffic", "part", self._real.period_ns
-        self.hears, self.serves = self._real.hears, self._real.serves
+        self.subscriptions, self.services = self._real.subscriptions, self._real.services
         self._is_frozen, self._waits = False, []
 
     def send(self, number):
@@ -48,7 +48,7 @@ class LockstepObserver:
 
     def __init__(self, city, late_s=0.0):
         self.clock, self._city, self._late_ns = city.clock, city, nanoseconds(late_s)
-        self._boxes = {kind: city.hear(Hears(kind)) for kind in (Spat, MonitorStatus)}
+        self._boxes = {kind: city.subscribe(Subscription(kind)) for kind in (Spat, MonitorStatus)}
         self._all = {kind: [] for kind in self._boxes}
 
     def received(self, kind, since_ns=0):

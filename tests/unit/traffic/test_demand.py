@@ -9,7 +9,7 @@ import pytest
 
 from scm.maps.grid_city import grid_city
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.demand import DemandPart, Ways
 from scm.traffic.demand_table import DemandError, Flow, departures, load_demand, seconds_of_day
 from scm.v2x.messages.world_snapshot import WorldSnapshot
@@ -214,7 +214,7 @@ def test_a_way_passes_the_edges_that_it_names():
 def run(flows, span_s):
     part = DemandPart(CITY, flows)
     with Lockstep([WorldPart(CITY), part]) as city:
-        seen = city.hear(Hears(WorldSnapshot))
+        seen = city.subscribe(Subscription(WorldSnapshot))
         city.run_for(span_s)
         cars = [len(item.message.vehicles) for item in seen.drain()]
     return part.status, cars

@@ -6,7 +6,7 @@ import pytest
 
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.message import Refused
@@ -27,7 +27,10 @@ def driven(policy, plan):
     parts = [WorldPart(MAP, 1), TrafficPart(MAP, plan, policy=policy), MonitorPart(MAP)]
     ways, waits, worst = {}, {}, 0.0
     with Lockstep(parts) as city:
-        trips, verdicts = city.hear(Hears(Trip)), city.hear(Hears(MonitorStatus))
+        trips, verdicts = (
+            city.subscribe(Subscription(Trip)),
+            city.subscribe(Subscription(MonitorStatus)),
+        )
         for place in PLATOON:
             assert not isinstance(city.call(SpawnRequest(vehicle=place, spawn=place)), Refused)
             assert not isinstance(city.call(RouteRequest(vehicle=place)), Refused)

@@ -10,7 +10,7 @@ import pytest
 from scm.clock import NS_PER_S, nanoseconds, seconds
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.attacker import Attacker
 from scm.traffic.misbehaviour_part import MisbehaviourPart, limits_by_car
 from scm.traffic.part import TrafficPart
@@ -56,7 +56,7 @@ def run(attacks, span_s=25.0, *more, **options):
     """Return reports, the last scores, events and CAMs of a city in which some lie."""
     world = Attacker(WorldPart(MAP, 1, hosted=CARS), attacks, MAP, **options)
     with Lockstep([world, TrafficPart(MAP), MisbehaviourPart(MAP), *more], start_ns=START_NS) as c:
-        boxes = [c.hear(Hears(kind)) for kind in KINDS]
+        boxes = [c.subscribe(Subscription(kind)) for kind in KINDS]
         c.run_for(span_s)
         reports, scores, events, cams = (
             [item.message for item in box.drain()] for box in boxes
@@ -70,7 +70,7 @@ def run_starved(attacks):
     world = Attacker(hosted, attacks, MAP)
     parts = [Starved(one) for one in (world, TrafficPart(MAP), agent, MisbehaviourPart(MAP))]
     with Lockstep(parts, start_ns=START_NS) as city:
-        reports = city.hear(Hears(MisbehaviourReport))
+        reports = city.subscribe(Subscription(MisbehaviourReport))
         city.run_for(25.0)
         suspects = {item.message.suspect for item in reports.drain()}
     return suspects, seconds(hosted.world.pace.lost_ns), parts[-1].detector.memories.values()
@@ -212,7 +212,7 @@ def test_an_attack_that_nobody_finds_ends_without_a_report():
     lines = []
     world = Attacker(WorldPart(MAP, 1, hosted=CARS), {"n2": "zero_speed"}, MAP, say=lines.append)
     with Lockstep([world, TrafficPart(MAP)], start_ns=START_NS) as city:
-        city.hear(Hears(CamTx))  # somebody listens, and judges nothing
+        city.subscribe(Subscription(CamTx))  # somebody listens, and judges nothing
         city.run_for(10.0)
     assert lines[-1].endswith("never reported")
 

@@ -5,7 +5,7 @@ import pytest
 
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import BasePart, Subscription
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.message import Refused
@@ -18,13 +18,13 @@ from scm.v2x.messages.spat import Spat
 MAP = load_map("driving_school")
 
 
-class Tampered:
+class Tampered(BasePart):
     """A traffic part whose wires can be cut or crossed between controller and lamps."""
 
     def __init__(self):
         self._real = TrafficPart(MAP, "brisk")
         self.name, self.role, self.period_ns = "traffic", "part", self._real.period_ns
-        self.hears, self.serves = self._real.hears, self._real.serves
+        self.subscriptions, self.services = self._real.subscriptions, self._real.services
         self.wires = lambda spat: spat
 
     def step(self, now_ns, inbox):
@@ -51,7 +51,7 @@ def reset(city, **fields):
 
 def test_a_fault_outlives_the_monitor_and_ends_by_reset_alone():
     with Lockstep([TrafficPart(MAP), MonitorPart(MAP, {"crossing": "stale"})]) as city:
-        statuses = city.hear(Hears(MonitorStatus))
+        statuses = city.subscribe(Subscription(MonitorStatus))
         city.run_for(3.0)
         assert {item.message.fault for item in statuses.drain()} == {"stale"}
         assert reset(city).fault is None
@@ -73,7 +73,7 @@ def messages(box):
 
 
 def test_it_finds_no_fault_in_ten_minutes_of_both_plans_and_a_flash(city):
-    box = city.hear(Hears(MonitorStatus))
+    box = city.subscribe(Subscription(MonitorStatus))
     for plan in ("calm", "brisk", "flash", "calm"):
         city.run_for(150.0)
         city.call(PlanRequest(junction="crossing", plan=plan, by="test"))
@@ -86,7 +86,9 @@ def test_it_finds_no_fault_in_ten_minutes_of_both_plans_and_a_flash(city):
 
 def test_crossed_wires_are_latched_flashed_and_told_within_400_ms(city, traffic):
     city.run_for(12.0)
-    spats, events, statuses = (city.hear(Hears(k)) for k in (Spat, CityEvent, MonitorStatus))
+    spats, events, statuses = (
+        city.subscribe(Subscription(k)) for k in (Spat, CityEvent, MonitorStatus)
+    )
     traffic.wires = lambda spat: all_green(spat) if spat.mode != "flash" else spat
     city.run_for(0.4)
     assert messages(spats)[-1].mode == "flash"
@@ -98,7 +100,7 @@ def test_crossed_wires_are_latched_flashed_and_told_within_400_ms(city, traffic)
 
 def test_a_frozen_controller_is_stale_within_a_second(city, traffic):
     city.run_for(12.0)
-    box = city.hear(Hears(MonitorStatus))
+    box = city.subscribe(Subscription(MonitorStatus))
     traffic.wires = lambda _spat: None
     city.run_for(0.7)
     assert messages(box)[-1].fault == "stale"
@@ -109,7 +111,7 @@ def test_a_fault_stays_when_the_signals_are_well_again_until_a_person_resets_it(
     traffic.wires = lambda _spat: None
     city.run_for(1.0)
     traffic.wires = lambda spat: spat
-    box, spats, events = (city.hear(Hears(k)) for k in (MonitorStatus, Spat, CityEvent))
+    box, spats, events = (city.subscribe(Subscription(k)) for k in (MonitorStatus, Spat, CityEvent))
     city.run_for(30.0)
     assert {status.fault for status in messages(box)} == {"stale"}
     assert messages(spats)[-1].mode == "flash"
@@ -132,14 +134,14 @@ def test_a_controller_that_is_still_silent_after_a_reset_is_stale_within_a_secon
     traffic.wires = lambda _spat: None
     city.run_for(1.0)
     assert reset(city).fault is None
-    box = city.hear(Hears(MonitorStatus))
+    box = city.subscribe(Subscription(MonitorStatus))
     city.run_for(0.7)
     assert messages(box)[-1].fault == "stale"
 
 
 def test_a_reset_of_no_fault_says_so_and_forgets_nothing_of_what_was_seen(city):
     city.run_for(12.0)
-    events = city.hear(Hears(CityEvent))
+    events = city.subscribe(Subscription(CityEvent))
     began_ns = reset(city).since_ns
     assert began_ns < city.now_ns
     city.run_for(0.2)
@@ -160,7 +162,7 @@ def test_a_reset_of_an_unknown_junction_is_refused_with_the_nearest_name(city):
 
 
 def test_signals_of_another_map_are_ignored(city, traffic):
-    box = city.hear(Hears(MonitorStatus))
+    box = city.subscribe(Subscription(MonitorStatus))
     city.publish(Spat(junction="elsewhere", t_ns=0, seq=0, mode="plan", plan="p", groups=()))
     city.run_for(1.0)
     assert {status.fault for status in messages(box)} == {None}
@@ -168,7 +170,7 @@ def test_signals_of_another_map_are_ignored(city, traffic):
 
 def test_a_monitor_alone_says_stale_after_five_seconds_and_believes_the_first_signals():
     with Lockstep([MonitorPart(MAP)]) as city:
-        box = city.hear(Hears(MonitorStatus))
+        box = city.subscribe(Subscription(MonitorStatus))
         city.run_for(5.0)
         assert {status.fault for status in messages(box)} == {None}
         city.run_for(0.2)

@@ -10,7 +10,7 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import BasePart, Subscription
 from scm.traffic.observer_part import ObserverPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.messages.city_event import CityEvent
@@ -33,11 +33,11 @@ NS = 10**9
 SPAN_S = 60.0
 
 
-class NoisyEye:
+class NoisyEye(BasePart):
     """Stands for cameras: tracks from the truth of the world, with noise that they tell."""
 
     name, role, period_ns = "eye", "part", 100_000_000
-    hears, serves = (Hears(WorldSnapshot),), ()
+    subscriptions, services = (Subscription(WorldSnapshot),), ()
 
     def __init__(self):
         self._random = np.random.default_rng(1)
@@ -89,7 +89,7 @@ def driven(city_map, cars, span_s, *, eye):
     cameras = [NoisyEye()] if eye else []
     names, before = world.crowd.streets.names, None
     with Lockstep([part, *traffic, *cameras, observer]) as city:
-        told = city.hear(Hears(Violation))
+        told = city.subscribe(Subscription(Violation))
         for _ in range(round(span_s / 0.05)):
             city.run_for(0.05)
             lane, front = world.crowd.lane[:cars].copy(), world.crowd.s[:cars] + FRONT_M
@@ -144,11 +144,11 @@ ROADS = Roads(GRID)
 LANE, WAY, AFTER = "j0_0_n", "j0_1_nn", "j0_1_n"
 
 
-class Ghost:
+class Ghost(BasePart):
     """A car that drives as it is told, and says so itself."""
 
     name, role, period_ns = "ghost", "v", 50_000_000
-    hears, serves = (), ()
+    subscriptions, services = (), ()
 
     def __init__(self, place_at):
         self._place_at, self._seq = place_at, 0
@@ -169,11 +169,11 @@ class Ghost:
         return []
 
 
-class Lamps:
+class Lamps(BasePart):
     """A junction whose approach from the south turns at given times [s]."""
 
     name, role, period_ns = "traffic", "part", 100_000_000
-    hears, serves = (), ()
+    subscriptions, services = (), ()
 
     def __init__(self, *turns):
         self._turns = turns
@@ -202,7 +202,10 @@ def along(way_m, speed, city=ROADS, lanes=(LANE, WAY, AFTER)):
 def found(place_at, span_s=20.0, city_map=GRID, lamps=((0.0, "red"),)):
     parts = [Lamps(*lamps), Ghost(place_at), ObserverPart(city_map)]
     with Lockstep(parts) as city:
-        told, events = city.hear(Hears(Violation)), city.hear(Hears(CityEvent))
+        told, events = (
+            city.subscribe(Subscription(Violation)),
+            city.subscribe(Subscription(CityEvent)),
+        )
         city.run_for(span_s)
         violations = [item.message for item in told.drain()]
         assert len(events.drain()) == len(violations)
@@ -324,8 +327,8 @@ def test_driving_backwards_is_told_and_a_short_way_back_is_not():
 def test_a_collision_in_the_world_is_told_once_for_the_pair():
     world = WorldPart(GRID, 1)
     with Lockstep([world, ObserverPart(GRID)]) as city:
-        told = city.hear(Hears(Violation))
-        contacts = city.hear(Hears(Contact))
+        told = city.subscribe(Subscription(Violation))
+        contacts = city.subscribe(Subscription(Contact))
         places = [f"{LANE}_0", f"{LANE}_2"]
         for name, place in zip(("r1", "r2"), places, strict=True):
             request = JoinRequest(vehicle=name, session="s", spawn=place)
@@ -357,7 +360,10 @@ def test_a_collision_of_cars_that_the_world_drives_is_told_once_for_the_pair():
         car = part.world.host(name, "nigel", pose, 0)
         car.fleet.place(car.row, pose, speed)
     with Lockstep([part, ObserverPart(GRID)]) as city:
-        told, contacts = city.hear(Hears(Violation)), city.hear(Hears(Contact))
+        told, contacts = (
+            city.subscribe(Subscription(Violation)),
+            city.subscribe(Subscription(Contact)),
+        )
         city.run_for(1.5)
         violations = [item.message for item in told.drain()]
         blows = [item.message for item in contacts.drain()]

@@ -7,7 +7,7 @@ import pytest
 
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.etsi.convert import colours_of
@@ -35,7 +35,7 @@ class Told:
     """Everything a city tells of its signals."""
 
     def __init__(self, city):
-        self._boxes = [city.hear(Hears(kind)) for kind in (Spat, SpatemTx, CityEvent)]
+        self._boxes = [city.subscribe(Subscription(kind)) for kind in (Spat, SpatemTx, CityEvent)]
 
     def read(self):
         return tuple(messages(box) for box in self._boxes)

@@ -8,7 +8,7 @@ import pytest
 from scm.errors import PlanError
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.store.records import PlanRecord
 from scm.traffic.controller import Controller
 from scm.traffic.kernel import GroupTimes, Program
@@ -142,7 +142,7 @@ def messages(box):
 
 
 def test_a_plan_of_the_bus_is_run_told_and_comes_back_after_a_restart(city):
-    spats, events = city.hear(Hears(Spat)), city.hear(Hears(CityEvent))
+    spats, events = city.subscribe(Subscription(Spat)), city.subscribe(Subscription(CityEvent))
     city.run_for(6.0)
     assert ask(city, "rush", RUSH) == PlanReply(junction="crossing", plan="brisk", pending="rush")
     city.run_for(40.0)
@@ -152,13 +152,13 @@ def test_a_plan_of_the_bus_is_run_told_and_comes_back_after_a_restart(city):
     assert any("runs plan rush, before brisk" in text for text in said)
     kept = PlanRecord(plan="rush", by="ada", stages=records_of(RUSH))
     with Lockstep([TrafficPart(MAP, "brisk", kept={"crossing": kept})]) as again:
-        spats = again.hear(Hears(Spat))
+        spats = again.subscribe(Subscription(Spat))
         again.run_for(8.0)
         assert messages(spats)[-1].plan == "rush"
 
 
 def test_the_status_tells_the_plan_that_runs_whatever_comes_after_it(city):
-    told = city.hear(Hears(SignalStatus))
+    told = city.subscribe(Subscription(SignalStatus))
     longer = (msgspec.structs.replace(RUSH[0], green_s=9.0), *RUSH[1:])
     city.run_for(6.0)
     assert messages(told)[-1].stages == ()
@@ -179,7 +179,7 @@ def test_a_plan_with_an_offset_begins_its_cycles_in_step_with_the_clock_also_aft
     kept = PlanRecord(plan="rush", by="ada", stages=records_of(RUSH), offset_s=offset_s)
     with Lockstep([TrafficPart(MAP, "brisk", kept={"crossing": kept})]) as again:
         for running in (city, again):
-            told = running.hear(Hears(SignalStatus))
+            told = running.subscribe(Subscription(SignalStatus))
             running.run_for(100.0)
             greens = [turn for one in messages(told)[-20:] for turn in one.turns]
             starts_s = {t.start_ns / 1e9 for t in greens if t.groups == ("south_east",)}
@@ -204,7 +204,10 @@ def test_a_name_that_means_something_else_is_not_taken(city, plan, stages):
 
 
 def test_what_a_junction_is_and_what_is_wished_of_it_is_told(city):
-    sites, told = city.hear(Hears(SignalSite)), city.hear(Hears(SignalStatus))
+    sites, told = (
+        city.subscribe(Subscription(SignalSite)),
+        city.subscribe(Subscription(SignalStatus)),
+    )
     city.run_for(21.0)
     site = messages(sites)[-1]
     assert [phase.group for phase in site.phases] == ["south_east", "south_west"]
@@ -224,7 +227,7 @@ def test_what_a_junction_is_and_what_is_wished_of_it_is_told(city):
 
 
 def test_greens_to_come_are_told_as_they_come(city):
-    told, spats = city.hear(Hears(SignalStatus)), city.hear(Hears(Spat))
+    told, spats = city.subscribe(Subscription(SignalStatus)), city.subscribe(Subscription(Spat))
     city.run_for(12.0)
     turn = next(t for t in messages(told)[-1].turns if t.start_ns > city.now_ns)
     city.run_for((turn.start_ns - city.now_ns) / 1e9 + 0.25)
@@ -233,7 +236,7 @@ def test_greens_to_come_are_told_as_they_come(city):
 
 
 def test_a_file_is_proven_for_the_junction_that_it_describes(city):
-    sites = city.hear(Hears(SignalSite))
+    sites = city.subscribe(Subscription(SignalSite))
     city.run_for(1.0)
     site = messages(sites)[0]
     facts = {"junction": "crossing", "phases": site.phases, "conflicts": site.conflicts}

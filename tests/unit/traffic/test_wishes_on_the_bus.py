@@ -7,7 +7,7 @@ from scm.clock import NS_PER_S
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.part import TrafficPart
 from scm.v2x.etsi.convert import cam_of, station_id
 from scm.v2x.etsi.priority_requests import Wish, answers_of, srem_of
@@ -54,7 +54,7 @@ def city():
 
 
 def test_a_wish_is_answered_with_what_is_in_force_and_told(city):
-    events = city.hear(Hears(CityEvent))
+    events = city.subscribe(Subscription(CityEvent))
     city.run_for(6.0)
     reply = wish(city, "hold", "south_east", expires_s=30.0)
     assert isinstance(reply, SignalReply)
@@ -68,7 +68,7 @@ def test_a_wish_is_answered_with_what_is_in_force_and_told(city):
 
 
 def test_the_log_says_which_wishes_were_taken_back(city):
-    events = city.hear(Hears(CityEvent))
+    events = city.subscribe(Subscription(CityEvent))
     wish(city, "clear", "south_east", clears="hold", expires_s=60.0)
     wish(city, "clear", expires_s=60.0)
     city.run_for(0.2)
@@ -95,7 +95,7 @@ def test_no_wish_outlasts_fifteen_minutes(city, expires_s):
 
 
 def test_a_car_heard_at_the_roadside_gets_its_green(city):
-    spats = city.hear(Hears(Spat))
+    spats = city.subscribe(Subscription(Spat))
     for _ in range(60):
         hear_cam(city, "crossing_south_west", 0.12)
         city.run_for(0.5)
@@ -105,8 +105,8 @@ def test_a_car_heard_at_the_roadside_gets_its_green(city):
 
 def test_under_fixed_time_nobody_listens_to_cars_and_under_a_policy_somebody_does():
     fixed, actuated = TrafficPart(MAP), TrafficPart(MAP, policy="actuated")
-    assert all(hears.kind is not CamRx for hears in fixed.hears)
-    assert Hears(CamRx, {"receiver": "rsu-crossing"}) in actuated.hears
+    assert all(one.kind is not CamRx for one in fixed.subscriptions)
+    assert Subscription(CamRx, {"receiver": "rsu-crossing"}) in actuated.subscriptions
 
 
 def ask(city, verb="request", vehicle="n1", station="n1"):
@@ -119,7 +119,7 @@ def ask(city, verb="request", vehicle="n1", station="n1"):
 
 def test_an_ambulance_that_asks_is_answered_until_granted():
     with Lockstep([TrafficPart(MAP, policy="priority")]) as city:
-        ssems, spats = city.hear(Hears(SsemTx)), city.hear(Hears(Spat))
+        ssems, spats = city.subscribe(Subscription(SsemTx)), city.subscribe(Subscription(Spat))
         city.run_for(6.0)
         for _ in range(20):
             ask(city)
@@ -138,7 +138,7 @@ def test_an_ambulance_that_asks_is_answered_until_granted():
 
 def test_nobody_asks_in_anothers_name():
     with Lockstep([TrafficPart(MAP, policy="priority")]) as city:
-        ssems = city.hear(Hears(SsemTx))
+        ssems = city.subscribe(Subscription(SsemTx))
         city.run_for(6.0)
         ask(city, vehicle="ambulance", station="n1")
         city.run_for(3.0)
@@ -147,7 +147,7 @@ def test_nobody_asks_in_anothers_name():
 
 def test_under_fixed_time_a_request_is_rejected():
     with Lockstep([TrafficPart(MAP)]) as city:
-        ssems = city.hear(Hears(SsemTx))
+        ssems = city.subscribe(Subscription(SsemTx))
         ask(city)
         city.run_for(2.0)
         said = {answers_of(m.body, station_id("n1"))[1, 3] for m in messages(ssems)}

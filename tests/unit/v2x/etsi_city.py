@@ -17,7 +17,7 @@ from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.recorder.mcap_file import RunFile
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.part import TrafficPart
 from scm.v2x.etsi.convert import roadside_station, station_id
 from scm.v2x.etsi.events import DenmSender, accident, city_stop
@@ -67,8 +67,8 @@ def city_says() -> dict[str, tuple[Said, ...]]:
     """Return what is said in twelve seconds of the driving school, by message_type."""
     city_map = load_map("driving_school")
     with Lockstep([WorldPart(city_map, 0), TrafficPart(city_map)], start_ns=START_NS) as city:
-        cams, spatems = city.hear(Hears(CamTx)), city.hear(Hears(SpatemTx))
-        states = city.hear(Hears(VehicleState))
+        cams, spatems = city.subscribe(Subscription(CamTx)), city.subscribe(Subscription(SpatemTx))
+        states = city.subscribe(Subscription(VehicleState))
         for name in ("n1", "n2"):
             city.call(SpawnRequest(vehicle=name))
             city.call(RouteRequest(request_id=name, vehicle=name))

@@ -9,7 +9,7 @@ from scm.clock import NS_PER_MS
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.monitor_part import MonitorPart
 from scm.traffic.part import TrafficPart
 from scm.v2x.message import Refused
@@ -48,7 +48,7 @@ class Watch:
     def __init__(self, city, *more):
         self.city = city
         kinds = (WorldSnapshot, VehicleState, Trip, Contact, Spat, *more)
-        self.boxes = {kind: city.hear(Hears(kind)) for kind in kinds}
+        self.boxes = {kind: city.subscribe(Subscription(kind)) for kind in kinds}
 
     def all(self, kind):
         return [item.message for item in self.boxes[kind].drain()]
@@ -152,7 +152,7 @@ def test_sensors_are_simulated_only_for_subscribers_and_read_as_if_always_wanted
             for _ in range(round(silent_s / 0.02)):
                 city.run_for(0.02)
                 assert agent.sent == []
-            box = city.hear(Hears(VehicleSensors))
+            box = city.subscribe(Subscription(VehicleSensors))
             city.run_for(2.0 - silent_s)
             return [item.message for item in box.drain()]
 

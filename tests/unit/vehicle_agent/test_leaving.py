@@ -5,15 +5,16 @@ import threading
 import pytest
 
 from scm.clock import NS_PER_MS
+from scm.runtime.part import BasePart
 from scm.v2x.exchange import Call, Incoming
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
 from vehicle_agent.leaving import Leaving
 
 
-class Guest:
+class Guest(BasePart):
     """A part that counts its steps and has last words."""
 
-    name, role, period_ns, hears, serves = "n7", "v", 20 * NS_PER_MS, (), ()
+    name, role, period_ns, subscriptions, services = "n7", "v", 20 * NS_PER_MS, (), ()
 
     def __init__(self):
         self.steps = 0

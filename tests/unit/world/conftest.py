@@ -29,7 +29,7 @@ class City:
     def __init__(self, *, sensed=False, **given):
         self.part = WorldPart(MAP, **given)
         if not sensed:
-            self.part.learn_wishes(lambda kind, _where: kind not in SENSED)
+            self.part.attach(lambda kind, _where: kind not in SENSED)
         self.world = self.part.world
         self.now = 0
         self.said = []

@@ -9,6 +9,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from scm.clock import NS_PER_MS
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import BasePart
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.v2x.ask import Asking
@@ -25,10 +26,10 @@ OWNERS = {"ann": 0.1, "bob": 0.2, "eve": 0.3}
 CAR = "n1"
 
 
-class Owner:
+class Owner(BasePart):
     """Asks for the lease, and commands the car under every epoch it was ever given."""
 
-    role, period_ns, hears, serves = "client", 20 * NS_PER_MS, (), ()
+    role, period_ns, subscriptions, services = "client", 20 * NS_PER_MS, (), ()
 
     def __init__(self, name):
         self.name = name

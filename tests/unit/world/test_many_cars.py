@@ -33,7 +33,7 @@ def run(ticks, hosted, threads=1, is_wanted=None, seed=3):
     part = WorldPart(GRID, seed, hosted)
     part.world.use_threads(threads)
     if is_wanted is not None:
-        part.learn_wishes(is_wanted)
+        part.attach(is_wanted)
     said = [part.step(i * TICK_NS, []) for i in range(ticks)]
     return part.world, said
 

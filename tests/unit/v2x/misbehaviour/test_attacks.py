@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from scm.clock import NS_PER_S
 from scm.errors import RunError
 from scm.runtime.lockstep import Lockstep
-from scm.runtime.part import Hears
+from scm.runtime.part import Subscription
 from scm.traffic.part import TrafficPart
 from scm.v2x.etsi.convert import read_cam
 from scm.v2x.messages.cam_tx import CamTx
@@ -32,7 +32,10 @@ def city_says():
     """Return the CAMs and the truth of half a minute of the driving school."""
     parts = [WorldPart(MAP, 3), TrafficPart(MAP)]
     with Lockstep(parts, start_ns=START_NS) as city:
-        cams, truths = city.hear(Hears(CamTx)), city.hear(Hears(WorldSnapshot))
+        cams, truths = (
+            city.subscribe(Subscription(CamTx)),
+            city.subscribe(Subscription(WorldSnapshot)),
+        )
         for name in CARS:
             city.call(SpawnRequest(vehicle=name))
             city.call(RouteRequest(request_id=name, vehicle=name))

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from scm.clock import NS_PER_S, StepClock, WallClock
-from scm.runtime.crew import Crew, Job
+from scm.runtime.supervisor import Job, Supervisor
 from scm.v2x.messages.presence import Presence
 
 CLOCK = WallClock()
@@ -15,15 +15,15 @@ def crew_of(role, code, said):
     def command():
         return [sys.executable, "-c", f"import time; time.sleep(0.2); raise SystemExit({code})"]
 
-    return Crew([Job("x", role, "does it", command)], CLOCK, said.append)
+    return Supervisor([Job("x", role, "does it", command)], CLOCK, said.append)
 
 
-def until_it_died(crew, said, *, up):
-    crew.look()
+def until_it_died(supervisor, said, *, up):
+    supervisor.poll()
     if up:
-        crew.heard(Presence(role="part", station="x", session="1", alive=True))
-    crew.members["x"].process.wait(timeout=60.0)
-    crew.look()
+        supervisor.receive(Presence(role="part", station="x", session="1", alive=True))
+    supervisor.members["x"].process.wait(timeout=60.0)
+    supervisor.poll()
     return said[-1]
 
 
@@ -44,31 +44,31 @@ def test_what_crashed_is_started_again_and_what_left_is_not():
 def test_who_dies_again_and_again_comes_back_after_pauses_that_grow_to_half_a_minute():
     said, clock = [], StepClock(0)
     command = [sys.executable, "-c", "import signal; signal.raise_signal(signal.SIGKILL)"]
-    crew = Crew([Job("record", "part", "records", lambda: command)], clock, said.append)
+    supervisor = Supervisor([Job("record", "part", "records", lambda: command)], clock, said.append)
     pauses = []
     for _ in range(10):
-        crew.look()
-        crew.members["record"].process.wait(timeout=60.0)
-        crew.look()
-        clock.set_ns(crew.members["record"].due_ns)
+        supervisor.poll()
+        supervisor.members["record"].process.wait(timeout=60.0)
+        supervisor.poll()
+        clock.set_ns(supervisor.members["record"].due_ns)
         pauses.append(float(said[-1].split("again in ")[1].removesuffix(" s")))
     assert pauses == [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0, 30.0]
     assert "died by SIGKILL, 10 times in a row" in said[-1]
-    assert crew.settled, "the others need not wait for it"
-    crew.look()
-    crew.members["record"].process.wait(timeout=60.0)
+    assert supervisor.is_ready, "the others need not wait for it"
+    supervisor.poll()
+    supervisor.members["record"].process.wait(timeout=60.0)
     clock.set_ns(clock.now_ns() + 61 * NS_PER_S)
-    crew.look()
+    supervisor.poll()
     assert said[-1].endswith("died by SIGKILL: starts again in 0.25 s"), "it had run for a minute"
 
 
 def test_a_link_that_was_lost_for_a_moment_is_no_news():
     said = []
-    crew = crew_of("part", 0, said)
-    crew.look()
+    supervisor = crew_of("part", 0, said)
+    supervisor.poll()
     for alive in (True, False, True):
-        crew.heard(Presence(role="part", station="x", session="1", alive=alive))
-    crew.members["x"].process.wait(timeout=60.0)
+        supervisor.receive(Presence(role="part", station="x", session="1", alive=alive))
+    supervisor.members["x"].process.wait(timeout=60.0)
     assert len(said) == 1
     assert "does it" in said[0]
 
@@ -77,18 +77,18 @@ def test_whose_start_takes_long_is_named_in_one_line_now_and_then():
     sleeps = [sys.executable, "-c", "import time; time.sleep(60)"]
     said, clock = [], StepClock()
     jobs = [Job(name, "part", "does it", lambda: sleeps) for name in ("world", "eye")]
-    crew = Crew(jobs, clock, said.append)
+    supervisor = Supervisor(jobs, clock, said.append)
     try:
         for at_s in (0, 3, 5, 15):
             clock.set_ns(at_s * NS_PER_S)
-            crew.look()
+            supervisor.poll()
         assert len(said) == 1
         assert "5 s: still starting: world, eye; a first start compiles the physics" in said[0]
-        crew.heard(Presence(role="part", station="world", session="1", alive=True))
+        supervisor.receive(Presence(role="part", station="world", session="1", alive=True))
         clock.set_ns(20 * NS_PER_S)
-        crew.look()
+        supervisor.poll()
         assert said[-1].strip() == "20 s: still starting: eye"
     finally:
-        for member in crew.members.values():
+        for member in supervisor.members.values():
             member.process.kill()
             member.process.wait(timeout=60.0)

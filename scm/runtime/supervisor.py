@@ -1,10 +1,9 @@
-"""Processes that should be there: started, watched by their presence on the bus, restarted.
+"""Supervise the processes of a city: start them, watch their presence, restart what dies.
 
-A member is up when its presence appears. What dies is started again, after a pause that doubles
-with each death in a row, up to half a minute, for as long as the city runs: what kills a recorder
-ten times, a full disk, may be repaired. What ends by itself without complaint (exit code 0) or says
-at its first start that its input is bad (exit code 2) is left alone. Nothing here prints: what a
-person should know goes through `say`.
+A member is up when its presence appears. A member that dies is restarted, after a pause that
+doubles with each death in a row, up to half a minute, for as long as the city runs: the cause (a
+full disk) may be repaired. A member that exits with code 0, or at its first start with code 2 (bad
+input), is not restarted. Nothing here prints: messages for a person go through `print_line`.
 """
 
 import os
@@ -20,15 +19,15 @@ from scm.v2x.messages.presence import Presence
 
 FIRST_PAUSE_NS = 250 * NS_PER_MS
 LONGEST_PAUSE_NS = 30 * NS_PER_S
-STEADY_NS = 60 * NS_PER_S  # who ran so long did not die in a row
-MANY_DEATHS = 5  # in a row: the city is called settled without that member
+STEADY_NS = 60 * NS_PER_S  # a member that ran this long starts a new row of deaths
+MANY_DEATHS = 5  # in a row: the city counts as ready without that member
 STOP_NS = 1500 * NS_PER_MS
 LAST_STOP_NS = 1000 * NS_PER_MS
 SLOW_NS, SLOW_AGAIN_NS = 4 * NS_PER_S, 15 * NS_PER_S
 SILENT_NS = 500 * NS_PER_MS
 BAD_INPUT = 2
 
-Say = Callable[[str], None]
+PrintLine = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ class Member:
     deaths: int = 0
     silent_ns: int | None = None
     was_up: bool = False
-    told_gone: bool = False
+    reported_gone: bool = False
 
     @property
     def is_up(self) -> bool:
@@ -76,21 +75,21 @@ class Member:
         return self.process is None and self.due_ns is None
 
 
-class Crew:
+class Supervisor:
     """All processes of a city. Use it from one thread that lives as long as the process."""
 
-    def __init__(self, jobs: Sequence[Job], clock: Clock, say: Say) -> None:
+    def __init__(self, jobs: Sequence[Job], clock: Clock, print_line: PrintLine) -> None:
         self.members = {job.name: Member(job) for job in jobs}
         self._clock = clock
-        self._say = say
-        self._slow_said_ns = -SLOW_AGAIN_NS
+        self._print = print_line
+        self._slow_reported_ns = -SLOW_AGAIN_NS
 
     @property
-    def settled(self) -> bool:
-        """Whether nobody is waited for any more: all are up, done, or die again and again."""
+    def is_ready(self) -> bool:
+        """Whether every member is up, done, or dies again and again."""
         return all(m.is_up or m.is_done or m.deaths > MANY_DEATHS for m in self.members.values())
 
-    def heard(self, presence: Presence) -> None:
+    def receive(self, presence: Presence) -> None:
         """Note that a station came or went."""
         member = self.members.get(presence.station)
         if member is None or member.job.role != presence.role:
@@ -101,21 +100,21 @@ class Crew:
         else:
             member.sessions.discard(presence.session)
         if member.is_up and not before:
-            self._tell_up(member)
+            self._report_up(member)
         elif before and not member.is_up:
             member.silent_ns = self._clock.now_ns()
 
-    def _tell_up(self, member: Member) -> None:
+    def _report_up(self, member: Member) -> None:
         job, pid = member.job, member.process.pid if member.process else 0
         member.silent_ns = None
         if not member.was_up:
-            self._say(f"  {job.name:<12} {job.what:<52} pid {pid}")
-        elif member.told_gone:  # a link that was lost for a moment is no news
-            self._say(f"  {job.name:<12} is back, pid {pid}")
-        member.was_up, member.told_gone = True, False
+            self._print(f"  {job.name:<12} {job.what:<52} pid {pid}")
+        elif member.reported_gone:  # a link that was lost for a moment is no news
+            self._print(f"  {job.name:<12} is back, pid {pid}")
+        member.was_up, member.reported_gone = True, False
 
-    def look(self) -> None:
-        """Start what is due, and see who died."""
+    def poll(self) -> None:
+        """Start the members that are due, and check which died."""
         now_ns = self._clock.now_ns()
         for member in self.members.values():
             if member.process is not None:
@@ -123,10 +122,10 @@ class Crew:
                 if code is not None:
                     self._ended(member, code, now_ns)
                 else:
-                    self._tell_trouble(member, now_ns)
+                    self._report_silent(member, now_ns)
             elif member.due_ns is not None and now_ns >= member.due_ns and self._may_start(member):
                 self._start(member, now_ns)
-        self._tell_slow(now_ns)
+        self._report_slow(now_ns)
 
     def _may_start(self, member: Member) -> bool:
         before = self.members.get(member.job.after)
@@ -142,47 +141,47 @@ class Crew:
         member.started_ns = now_ns
         member.due_ns = None
 
-    def _tell_trouble(self, member: Member, now_ns: int) -> None:
+    def _report_silent(self, member: Member, now_ns: int) -> None:
         name = member.job.name
         if member.silent_ns is not None and now_ns > member.silent_ns + SILENT_NS:
-            member.silent_ns, member.told_gone = None, True
-            self._say(f"  {name:<12} is silent: it runs, but gives no sign of life on the bus")
+            member.silent_ns, member.reported_gone = None, True
+            self._print(f"  {name:<12} is silent: it runs, but gives no sign of life on the bus")
 
-    def _tell_slow(self, now_ns: int) -> None:
-        """Name, now and then, whose first start takes long."""
+    def _report_slow(self, now_ns: int) -> None:
+        """Report, now and then, the members whose first start takes long."""
         slow = [
             m for m in self.members.values()
             if m.process is not None and not m.was_up and now_ns > m.started_ns + SLOW_NS
         ]  # fmt: skip
-        if not slow or now_ns < self._slow_said_ns + SLOW_AGAIN_NS:
+        if not slow or now_ns < self._slow_reported_ns + SLOW_AGAIN_NS:
             return
-        self._slow_said_ns = now_ns
+        self._slow_reported_ns = now_ns
         names = ", ".join(m.job.name for m in slow)
         waited_s = seconds(now_ns - min(m.started_ns for m in slow))
         first = "; a first start compiles the physics, for a minute or more"
         why = first if any(m.job.name == "world" for m in slow) else ""
-        self._say(f"  {waited_s:3.0f} s: still starting: {names}{why}")
+        self._print(f"  {waited_s:3.0f} s: still starting: {names}{why}")
 
     def _ended(self, member: Member, code: int, now_ns: int) -> None:
         name = member.job.name
         member.process = None
-        member.silent_ns, member.told_gone = None, True
+        member.silent_ns, member.reported_gone = None, True
         member.sessions.clear()
         if code == 0:
-            self._say(f"  {name:<12} left")
+            self._print(f"  {name:<12} left")
             return
         how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
         member.deaths = 1 if now_ns - member.started_ns > STEADY_NS else member.deaths + 1
         if code == BAD_INPUT and not (member.was_up and member.job.role == "part"):
-            self._say(f"  {name:<12} died {how}: its input is bad; it is not started again")
+            self._print(f"  {name:<12} died {how}: its input is bad; it is not started again")
             return
         pause_ns = min(FIRST_PAUSE_NS * 2 ** min(member.deaths - 1, 10), LONGEST_PAUSE_NS)
         member.due_ns = now_ns + pause_ns
         often = f", {member.deaths} times in a row" if member.deaths > 1 else ""
-        self._say(f"  {name:<12} died {how}{often}: starts again in {seconds(pause_ns):g} s")
+        self._print(f"  {name:<12} died {how}{often}: starts again in {seconds(pause_ns):g} s")
 
     def stop(self) -> None:
-        """Ask everybody to stop, the last ones last, and end what is left after 1.5 s."""
+        """Stop all members, those marked `last` last, and kill what is left after 1.5 s."""
         began_ns = self._clock.now_ns()
         for member in self.members.values():
             member.due_ns = None
@@ -195,7 +194,7 @@ class Crew:
             self._wait_for(stopping, until_ns)
         for member in self.members.values():
             if member.process is not None and member.process.poll() is None:
-                self._say(f"  {member.job.name:<12} did not stop: killed")
+                self._print(f"  {member.job.name:<12} did not stop: killed")
             if member.process is not None:
                 _send(member.process, signal.SIGKILL)
                 member.process.wait()
