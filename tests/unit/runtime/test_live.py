@@ -142,7 +142,7 @@ def test_what_a_part_hears_is_in_its_inbox(city):
 
 
 def test_last_words_are_said_before_the_part_leaves(city):
-    words, presence = city.subscribe(CityEvent), city.hear(Presence)
+    words, presence = city.subscribe(CityEvent), city.subscribe(Presence)
     city.run(Stepping(city, 1))
     assert [m.name for m in messages(words)] == ["bye"]
     assert [m.alive for m in messages(presence)] == [True, False]
@@ -154,7 +154,7 @@ def test_a_part_that_fails_is_told_to_the_city_and_raised(city, caplog):
             msg = "the wheel came off"
             raise ValueError(msg)
 
-    words, presence = city.subscribe(CityEvent), city.hear(Presence)
+    words, presence = city.subscribe(CityEvent), city.subscribe(Presence)
     with pytest.raises(ValueError, match="wheel"):
         city.run(Failing(city, 1))
     (told,) = messages(words)
