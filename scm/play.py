@@ -97,7 +97,9 @@ class _Ear:
         self._link, self._vehicle, self._heard = link, vehicle, Heard()
         of_car = {"vehicle": vehicle}
         self._reports = link.subscribe(Subscription(VehicleState, of_car))
-        self._others = [link.subscribe(Subscription(kind, of_car)) for kind in (VehicleSensors, EyePose)]
+        self._others = [
+            link.subscribe(Subscription(kind, of_car)) for kind in (VehicleSensors, EyePose)
+        ]
         self._others.append(link.subscribe(Subscription(CityEvent)))
 
     def sent(self, command: DriveCommand) -> None:

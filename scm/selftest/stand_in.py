@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from scm.clock import WallClock
 from scm.records.city_map import CityMap
 from scm.runtime.live import run
-from scm.selftest.signal_fault import OutputFault
 from scm.runtime.part import BasePart, Subscription
+from scm.selftest.signal_fault import OutputFault
 from scm.traffic.part import TrafficPart
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.credentials import Credentials

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from scm.__main__ import parse
-from scm.disturbances import OPTIONAL_PARTS, Disturbance
 from scm.commands.up import options_of
+from scm.disturbances import OPTIONAL_PARTS, Disturbance
 from scm.errors import MapError, RunError, ScmError
 from scm.runtime.up import OPTIONAL, CityOptions, _parts, _plan_of, _report_disturbance, run_city
 from scm.v2x.router import Router, free_endpoint
