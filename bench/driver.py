@@ -15,8 +15,8 @@ from scm.arrays import Floats
 from scm.maps.grid_city import grid_city
 from scm.maps.route import Roads
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.driver_batch import Crowd
-from scm.vehicles.drivers.streets import streets_of
+from scm.vehicles.drivers.driver_batch import DriverBatch
+from scm.vehicles.drivers.lane_graph import lane_graph_of
 
 NIGEL = CarLimits(
     wheelbase=0.14154, steer_limit=0.5235988, steer_rate=0.42, front=0.23, rear=0.07, width=0.175,
@@ -34,7 +34,7 @@ class Streaming:
     def __init__(self, cars: int, side: int) -> None:
         city_map = grid_city(side, side, block_m=8.0 if side > 4 else 4.0)
         roads = Roads(city_map)
-        self.crowd = Crowd(streets_of(roads), cars)
+        self.drivers = DriverBatch(lane_graph_of(roads), cars)
         self.now_ns = 0
         self.driven = np.ones(cars, np.bool_)
         self.x, self.y, self.yaw, self.speed, self.angle = np.zeros((5, cars))
@@ -43,8 +43,8 @@ class Streaming:
         for slot, at in enumerate(rng.choice(len(places), cars, replace=False)):
             lane, s = places[at]
             self.x[slot], self.y[slot], self.yaw[slot] = roads.lane(lane).at(s)
-            self.crowd.enter(slot, NIGEL, seed=slot)
-            self.crowd.circulate(slot, lane, s)
+            self.drivers.enter(slot, NIGEL, seed=slot)
+            self.drivers.circulate(slot, lane, s)
         self._slots = np.arange(cars)
 
     def hear(self) -> None:
@@ -53,18 +53,18 @@ class Streaming:
         front_x = self.x[slots] + NIGEL.front * np.cos(self.yaw[slots])
         front_y = self.y[slots] + NIGEL.front * np.sin(self.yaw[slots])
         told = self.yaw[slots], self.speed[slots], np.zeros(len(slots))
-        self.crowd.hear(slots, self.now_ns, front_x, front_y, *told)
+        self.drivers.receive_cams(slots, self.now_ns, front_x, front_y, *told)
 
     def decide(self) -> None:
-        self.crowd.decide(self.now_ns, self.x, self.y, self.yaw, self.speed, self.driven)
+        self.drivers.decide(self.now_ns, self.x, self.y, self.yaw, self.speed, self.driven)
 
     def move(self) -> None:
         self.now_ns += TICK_NS
         step = TICK_NS * 1e-9
-        wished = self.crowd.steering * NIGEL.steer_limit
+        wished = self.drivers.steering * NIGEL.steer_limit
         most = NIGEL.steer_rate * step
         self.angle += np.clip(wished - self.angle, -most, most)
-        self.speed += (0.267 * np.maximum(0.0, self.crowd.throttle) - self.speed) * 0.28
+        self.speed += (0.267 * np.maximum(0.0, self.drivers.throttle) - self.speed) * 0.28
         self.x += self.speed * np.cos(self.yaw) * step
         self.y += self.speed * np.sin(self.yaw) * step
         self.yaw += self.speed * np.tan(self.angle) / NIGEL.wheelbase * step

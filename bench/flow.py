@@ -31,8 +31,8 @@ from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.eye_track import EyeTrack, Row6
 from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.violation import Violation
-from scm.vehicles.drivers.driver_batch import Crowd
-from scm.vehicles.drivers.memory import SIGNAL
+from scm.vehicles.drivers.driver_batch import DriverBatch
+from scm.vehicles.drivers.driver_state import SIGNAL
 from scm.world.contacts import Contacts, Touches
 from scm.world.part import WorldPart
 from scm.world.world import World
@@ -150,19 +150,19 @@ class Standing:
         self.now_s = np.zeros(cars)
         self.longest_s = np.zeros(cars)
 
-    def look(self, crowd: Crowd, speed: Floats, passed_s: float) -> None:
+    def look(self, drivers: DriverBatch, speed: Floats, passed_s: float) -> None:
         """Take note of the present instant, some time after the last one."""
-        unexplained = (np.abs(speed) < STANDS_MPS) & ~behind_red(crowd)
+        unexplained = (np.abs(speed) < STANDS_MPS) & ~behind_red(drivers)
         self.now_s = np.where(unexplained, self.now_s + passed_s, 0.0)
         np.maximum(self.longest_s, self.now_s, out=self.longest_s)
 
 
-def behind_red(crowd: Crowd) -> Bools:
+def behind_red(drivers: DriverBatch) -> Bools:
     """Return which cars wait at a red light, or on a lane where one ahead of them does."""
-    waits = crowd.waiting == SIGNAL
-    farthest = np.full(len(crowd.streets.names) + 1, -np.inf)
-    np.maximum.at(farthest, crowd.lane[waits], crowd.s[waits])
-    found: Bools = crowd.s <= farthest[crowd.lane]
+    waits = drivers.waiting == SIGNAL
+    farthest = np.full(len(drivers.lane_graph.names) + 1, -np.inf)
+    np.maximum.at(farthest, drivers.lane[waits], drivers.s[waits])
+    found: Bools = drivers.s <= farthest[drivers.lane]
     return found
 
 
@@ -172,17 +172,17 @@ class Count:
     def __init__(self, world: World, span_s: float) -> None:
         self._world, self._span_s = world, span_s
         self._touched = counted(world)
-        self.standing = Standing(world.crowd.capacity)
-        self._passed = [world.crowd.passed.copy()]
+        self.standing = Standing(world.drivers.capacity)
+        self._passed = [world.drivers.passed.copy()]
         self._began = time.perf_counter()
         self.took_s = 0.0
 
     def look(self, at_s: float, *, tells: bool) -> None:
         """Take note of an instant; `at_s` after the count began."""
-        self.standing.look(self._world.crowd, self._world.slots.speed, LOOK_S)
+        self.standing.look(self._world.drivers, self._world.slots.speed, LOOK_S)
         self.took_s = time.perf_counter() - self._began
         while at_s >= len(self._passed) * self._span_s / 4.0 and len(self._passed) <= 4:
-            self._passed.append(self._world.crowd.passed.copy())
+            self._passed.append(self._world.drivers.passed.copy())
         if tells and at_s % 60.0 < LOOK_S:
             print(
                 f"{at_s:.0f} s of the city's time in {self.took_s:.0f} s; now longest stand "
@@ -194,8 +194,8 @@ class Count:
 
     def row(self, span_s: float) -> dict[str, float]:
         """Return what there is to tell of a run that lasted so long."""
-        crowd, hosted = self._world.crowd, self._world.slots.hosted
-        passed = crowd.passed - self._passed[0]
+        drivers, hosted = self._world.drivers, self._world.slots.hosted
+        passed = drivers.passed - self._passed[0]
         marks = [float(mark.sum()) / 2.0 for mark in self._passed]
         share = 4.0 * 3600.0 / self._span_s
         quarters = {f"quarter{i}": (b - a) * share for i, (a, b) in enumerate(pairwise(marks))}

@@ -82,17 +82,17 @@ def drive(city_map: CityMap, cars: int, span_s: float, policy: str, seed: int) -
     """Run one city; return what its cars did after the first seconds."""
     part = WorldPart(city_map, seed, room=cars)
     part.attach(lambda _kind, _where: False)
-    world, crowd = part.world, part.world.crowd
+    world, drivers = part.world, part.world.drivers
     touched = counted(world)
     fill(world, cars)
     with Lockstep([part, TrafficPart(city_map, policy=policy), MonitorPart(city_map)]) as city:
         city.run_for(SETTLE_S)
-        watch, passed = Watch(world.slots.hosted.copy(), world.slots.speed), crowd.passed.sum()
+        watch, passed = Watch(world.slots.hosted.copy(), world.slots.speed), drivers.passed.sum()
         for _ in range(round(span_s / LOOK_S)):
             city.run_for(LOOK_S)
             watch.look(world.slots.speed)
     watch.tally.contacts = len(touched.began)
-    watch.tally.lines = float(crowd.passed.sum() - passed) / 2.0 / span_s
+    watch.tally.lines = float(drivers.passed.sum() - passed) / 2.0 / span_s
     return watch.tally
 
 

@@ -51,7 +51,7 @@ def driven(name: str, cars: int, policy: str, span_s: float) -> Row:
     fill(world, cars)
     with Lockstep([part, traffic, MonitorPart(city_map)]) as city:
         city.run_for(WARM_S)
-        before, way_m = world.crowd.passed.copy(), 0.0
+        before, way_m = world.drivers.passed.copy(), 0.0
         stood_s, longest_s = np.zeros(cars), 0.0
         for _ in range(round(span_s / LOOK_S)):
             city.run_for(LOOK_S)
@@ -59,7 +59,7 @@ def driven(name: str, cars: int, policy: str, span_s: float) -> Row:
             stands = np.abs(world.slots.speed[:cars]) < 0.01
             stood_s = np.where(stands, stood_s + LOOK_S, 0.0)
             longest_s = max(longest_s, float(stood_s.max()))
-    passed = float((world.crowd.passed - before)[:cars].sum()) / 2.0
+    passed = float((world.drivers.passed - before)[:cars].sum()) / 2.0
     return Row(
         way_m / cars / span_s,
         (cars * span_s - way_m / LIMIT_MPS) / max(passed, 1.0),

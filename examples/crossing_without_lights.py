@@ -77,7 +77,7 @@ def run(
             for one, other in itertools.permutations(poses, 2):
                 least = min(least, apart(*one, corners_of(*other)))
             for n in range(4):
-                if part.world.crowd.passed[n] >= 2:
+                if part.world.drivers.passed[n] >= 2:
                     through[n] = min(through[n], 0.1 * step)
             if max(through) < math.inf:
                 break

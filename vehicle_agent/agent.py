@@ -217,7 +217,7 @@ class AgentPart:
             raise
         stay.guard.stop(self._stopped)
         for status in self._faults.values():
-            stay.signals.hear_monitor(status)
+            stay.signals.receive_monitor_status(status)
         self._stay = stay
 
     def _on_definition(self, item: Incoming) -> list[Outgoing]:
@@ -237,21 +237,21 @@ class AgentPart:
 
     def _on_spatem(self, item: Incoming) -> list[Outgoing]:
         if isinstance(item.message, SpatemRx) and self._stay is not None:
-            self._stay.signals.hear_spatem(item.message.body, item.t_ns)
+            self._stay.signals.receive_spatem(item.message.body, item.t_ns)
             self._stay.air.hear("spatem", item.t_ns)
         return []
 
     def _on_cam(self, item: Incoming) -> list[Outgoing]:
         message = item.message
         if isinstance(message, CamRx) and self._stay is not None and message.station != self.name:
-            self._stay.cars.hear(message.body, item.t_ns)
+            self._stay.cars.receive(message.body, item.t_ns)
             self._stay.air.hear("cam", item.t_ns)
         return []
 
     def _on_denm(self, item: Incoming) -> list[Outgoing]:
         message = item.message
         if isinstance(message, DenmRx) and self._stay is not None and message.station != self.name:
-            self._stay.trips.driver.crowd.hear_denm(message.body, item.t_ns)
+            self._stay.trips.driver.batch.receive_denm(message.body, item.t_ns)
             self._stay.air.hear("denm", item.t_ns)
         return []
 
@@ -267,7 +267,7 @@ class AgentPart:
         if isinstance(item.message, MonitorStatus):
             self._faults[item.message.junction] = item.message
             if self._stay is not None:
-                self._stay.signals.hear_monitor(item.message)
+                self._stay.signals.receive_monitor_status(item.message)
         return []
 
     def _on_stop(self, item: Incoming) -> list[Outgoing]:

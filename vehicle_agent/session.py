@@ -24,13 +24,12 @@ from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.driver import RouteView
-from scm.vehicles.drivers.alone import OWN
+from scm.vehicles.drivers.cam_tracker import CamTracker
 from scm.vehicles.drivers.channel import is_ideal
-from scm.vehicles.drivers.heard import HeardCars
-from scm.vehicles.drivers.trips import Trips
+from scm.vehicles.drivers.signal_table import SignalTable
+from scm.vehicles.drivers.single_car import OWN, TripDriver
 from scm.vehicles.guard import Guard, Guarded
 from scm.vehicles.lights import OFF, TURNS, Headlights, Indicators, Switches, lamps
-from scm.vehicles.signal_view import SignalView
 from vehicle_agent.actuation import LastWord
 from vehicle_agent.body import Body
 from vehicle_agent.guard import RealGuard
@@ -68,11 +67,11 @@ class Stay:
             MapError: when it stands where no lane leads anywhere.
         """
         self._vehicle, self._car, self._body = vehicle, car, body
-        self.signals = SignalView(city_map)
-        self.cars = HeardCars()
+        self.signals = SignalTable(city_map)
+        self.cars = CamTracker()
         self.guard = Guard(epoch)
         self._roads = Roads(city_map)
-        self.trips = Trips(vehicle, self._roads, body.limits, body.motion().pose, now_ns)
+        self.trips = TripDriver(vehicle, self._roads, body.limits, body.motion().pose, now_ns)
         self.last_word = LastWord(body, real)
         self.astray = ""
         self._tried_ns = now_ns
@@ -133,7 +132,7 @@ class Stay:
             return
         self._tried_ns, pose = now_ns, self._body.motion().pose
         try:
-            self.trips = Trips(self._vehicle, self._roads, self._body.limits, pose, now_ns)
+            self.trips = TripDriver(self._vehicle, self._roads, self._body.limits, pose, now_ns)
             self.astray = ""
         except MapError as error:
             self.astray = str(error)
@@ -152,10 +151,10 @@ class Stay:
             speed=motion.speed,
             signals=self.signals,
             others=self.cars.others(now_ns, motion.pose),
-            hears_well=self._loses_nothing or self.cars.hears_well(now_ns),
+            reception_is_good=self._loses_nothing or self.cars.reception_is_good(now_ns),
         )
         throttle, steering = self.trips.decide(view)
-        self._turn = TURNS[int(self.trips.driver.crowd.turn[OWN])]
+        self._turn = TURNS[int(self.trips.driver.batch.turn[OWN])]
         return DriveCommand(
             vehicle=self._vehicle,
             t_ns=now_ns,

@@ -73,13 +73,13 @@ class Roads:
         lanes: By name, in the order of the file; each is laid when it is first asked for.
         meetings: Where movements of known shapes meet, for `maps.conflicts`.
         signs: Those that cars obey, by lane.
-        streets: The same lanes for compiled drivers, once somebody has made them.
+        lane_graph: The same lanes for compiled drivers, once built.
     """
 
     def __init__(self, city_map: CityMap) -> None:
         self.city_map = city_map
         self.lanes: Mapping[str, LanePath] = _Lanes(city_map.lanes)
-        self.streets: Any = None
+        self.lane_graph: Any = None
         self.meetings: dict[tuple[object, ...], Any] = {}
         self._definitions = {lane.name: lane for lane in city_map.lanes}
         self._length = {

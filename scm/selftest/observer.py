@@ -19,7 +19,7 @@ from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import WorldSnapshot
-from scm.vehicles.signal_view import SignalView
+from scm.vehicles.drivers.signal_table import SignalTable
 
 KINDS: tuple[type[Message], ...] = (
     *(Spat, MonitorStatus, SpatemTx, WorldSnapshot, CityEvent, Presence, VehicleState),
@@ -52,7 +52,7 @@ class Observer:
         self.bus = ZenohBus(city, name, endpoint, credentials=credentials)
         self._boxes = {kind: Mailbox(DEPTH) for kind in KINDS}
         self._received: dict[type[Message], list[Incoming]] = {kind: [] for kind in KINDS}
-        self._view = SignalView(city_map)
+        self._view = SignalTable(city_map)
         self._groups = [(j.name, group.name) for j in city_map.junctions for group in j.groups]
         self._went_ns: dict[str, int] = {}
         self._never = threading.Event()
@@ -78,9 +78,9 @@ class Observer:
 
     def _show(self, item: Incoming) -> None:
         if isinstance(item.message, MonitorStatus):
-            self._view.hear_monitor(item.message)
+            self._view.receive_monitor_status(item.message)
         elif isinstance(item.message, SpatemTx):
-            self._view.hear_spatem(item.message.body, item.t_ns)
+            self._view.receive_spatem(item.message.body, item.t_ns)
 
     def went_ns(self, junction: str) -> int:
         """Return when a car could last have passed a signal of a junction; 0 if never."""

@@ -1,7 +1,7 @@
-"""The contract of a driver: what it is shown, what it knows of its car, what it answers.
+"""The contract of a driver: its view, its car's limits, and its commands.
 
-Drivers are pure: no bus, no clock, no physics. A simulated and a real car, hosted by the world or
-driven by an agent, one or ten thousand of them, follow the same compiled law: `drivers/law.py`.
+Drivers are pure: no bus, no clock, no physics. Simulated and real cars, hosted by the world or
+driven by an agent, use the same compiled controller: `drivers/controller.py`.
 """
 
 from dataclasses import dataclass
@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Protocol
 
 from scm.geometry import Pose2
 
-if TYPE_CHECKING:  # what reads signals is compiled; who only describes a car needs no compiler
-    from scm.vehicles.signal_view import SignalView
+if TYPE_CHECKING:  # the signal table needs the compiler; describing a car does not
+    from scm.vehicles.drivers.signal_table import SignalTable
 
 
 @dataclass(frozen=True, slots=True)
 class Other:
-    """Another car as it is believed to be now, map frame.
+    """Another car at its estimated place now, map frame.
 
     Attributes:
-        x: Middle of its outline [m]; likewise `y`.
+        x: Centre of its outline [m]; likewise `y`.
         speed: Along its own heading [m/s].
     """
 
@@ -32,39 +32,39 @@ class Other:
 
 @dataclass(frozen=True, slots=True)
 class RouteView:
-    """What a driver is shown at one instant.
+    """What a driver sees at one instant.
 
     Attributes:
         pose: Of its own rear axle, map frame.
         speed: Its own, along the body's x [m/s].
-        others: Every other car it knows of, itself left out.
-        stop: Whether it must come to rest in its lane, wherever it is.
-        hears_well: Whether it may take silence for absence where there are no lights.
+        others: Every other car that it knows of.
+        stop: Whether it must come to rest in its lane.
+        reception_is_good: Whether it can assume that it receives all cars around.
     """
 
     now_ns: int
     pose: Pose2
     speed: float
-    signals: "SignalView"
+    signals: "SignalTable"
     others: tuple[Other, ...] = ()
     stop: bool = False
-    hears_well: bool = True
+    reception_is_good: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class CarLimits:
-    """What a driver must know of its car.
+    """The limits of a car that its driver needs.
 
     Attributes:
         steer_limit: Road-wheel angle at full command [rad].
-        steer_rate: How fast the road wheels turn [rad/s].
+        steer_rate: Of the road wheels [rad/s].
         front: From the rear axle to the front bumper [m].
         rear: From the rear axle to the rear bumper [m], positive.
         speeds: Steady speed on the level at throttles 1/n, 2/n ... 1 [m/s], strictly increasing;
-            empty: not known, the driver finds the throttle by feedback.
+            empty: unknown, the driver finds the throttle by feedback.
         accel: Comfortable acceleration [m/s^2]; likewise `decel`, positive.
         lateral_accel: Comfortable limit in curves [m/s^2].
-        brake_throttle: Lowest throttle to slow down with; 0 where zero throttle already brakes.
+        brake_throttle: Lowest throttle for slowing down; 0 if zero throttle brakes.
     """
 
     wheelbase: float
@@ -86,7 +86,7 @@ class CarLimits:
 
 
 class Driver(Protocol):
-    """Decides throttle and steering, both -1 to 1, from what it is shown."""
+    """Decides throttle and steering, both -1 to 1, from its view."""
 
     def decide(self, view: RouteView) -> tuple[float, float]:
         """Return (throttle, steering): + forward, + left."""

@@ -131,7 +131,9 @@ def _call_cams(world: World, due: Ints, now_ns: int) -> None:
     x, y, yaw = slots.x[due], slots.y[due], slots.yaw[due]
     bumper_x, bumper_y = x + front * np.cos(yaw), y + front * np.sin(yaw)
     world.busy.note("cam", x, y)
-    world.crowd.hear(due, now_ns, bumper_x, bumper_y, yaw, slots.speed[due], slots.yaw_rate[due])
+    world.drivers.receive_cams(
+        due, now_ns, bumper_x, bumper_y, yaw, slots.speed[due], slots.yaw_rate[due]
+    )
     _tell_others(world, due, x, y, now_ns)
 
 
@@ -150,9 +152,9 @@ def _call_denm(world: World, frame: DenmTx, now_ns: int) -> None:
 def _tell_drivers(world: World, frame: Frame, now_ns: int) -> None:
     """Let the drivers of hosted cars keep what they read."""
     if isinstance(frame, SpatemTx):
-        world.crowd.hear_spatem(frame.body, now_ns)
+        world.drivers.receive_spatem(frame.body, now_ns)
     elif isinstance(frame, DenmTx):
-        world.crowd.hear_denm(frame.body, now_ns)
+        world.drivers.receive_denm(frame.body, now_ns)
         tell(world, frame, now_ns)
     elif isinstance(frame, CamTx) and (car := world.remote.get(frame.station)) is not None:
         _tell_of_car(world, car.slot, frame.body, now_ns)
@@ -167,10 +169,10 @@ def _tell_of_car(world: World, slot: int, body: CamBody, now_ns: int) -> None:
     if told.place is None or told.yaw_rad is None:
         return
     length_m, width_m = told.length_m or ASSUMED_LENGTH_M, told.width_m or ASSUMED_WIDTH_M
-    world.crowd.show(slot, length_m, width_m)
+    world.drivers.show(slot, length_m, width_m)
     numbers = (*told.place, told.yaw_rad, told.speed_mps or 0.0, told.yaw_rate_radps or 0.0)
     columns = [np.array([number]) for number in numbers]
-    world.crowd.hear(np.array([slot]), now_ns, *columns)
+    world.drivers.receive_cams(np.array([slot]), now_ns, *columns)
 
 
 def _tell_others(world: World, due: Ints, x: Floats, y: Floats, now_ns: int) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from scm.arrays import Bools, Floats
 from scm.records.city_map import Point, RadioChannel
 from scm.v2x.congestion import WINDOW_NS, ReactiveControl, air_time, load_loss
-from scm.vehicles.drivers.channel import busy_for
+from scm.vehicles.drivers.channel import add_busy_time
 
 OnAir = tuple[Floats, Floats, Floats]
 
@@ -62,7 +62,7 @@ class Busy:
         frames = (at_x, at_y, air_s)
         self._frames = []
         before, self._offered = self._offered, np.zeros(len(x))
-        busy_for(self._range_m, *frames, x, y, hosted, self._offered)
+        add_busy_time(self._range_m, *frames, x, y, hosted, self._offered)
         self._offered /= span_s
         mean = 0.5 * (before + self._offered)
         self.ratio = np.minimum(mean, 1.0)
@@ -90,7 +90,7 @@ class Busy:
         busy = np.zeros(len(places))
         all_of_them = np.ones(len(places), np.bool_)
         x, y = np.ascontiguousarray(places[:, 0]), np.ascontiguousarray(places[:, 1])
-        busy_for(self._range_m, *frames, x, y, all_of_them, busy)
+        add_busy_time(self._range_m, *frames, x, y, all_of_them, busy)
         known = self._others
         self._others = {
             name: (known.get(name, (0.0, 0.0))[1], float(now / span_s))

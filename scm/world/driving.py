@@ -45,7 +45,7 @@ def take_over(world: World, car: HostedCar, lease: rules.Lease, now_ns: int) -> 
         car.guard.set_epoch(lease.epoch, now_ns)
     car.lease = lease
     world.keep(car)
-    world.errands.end(car.slot, now_ns)
+    world.trips.end(car.slot, now_ns)
     world.slots.driven[car.slot] = False
     world.slots.hazard[car.slot] = False
 
@@ -56,7 +56,7 @@ def send(world: World, car: HostedCar, request: RouteRequest, now_ns: int) -> Ro
     Raises:
         ScmError: when the lanes do not allow the route, or the car stands on none.
     """
-    reply = world.errands.begin(car.slot, car.name, request, car.pose, now_ns)
+    reply = world.trips.begin(car.slot, car.name, request, car.pose, now_ns)
     slots = world.slots
     slots.driven[car.slot] = not car.has_diverged
     slots.hazard[car.slot] = slots.arrived[car.slot] = False
@@ -93,17 +93,17 @@ def _obey(world: World, car: HostedCar, now_ns: int, *, stop: bool) -> None:
 
 def _drive(world: World, now_ns: int, *, stop: bool) -> None:
     """Let the drivers decide, and note who has arrived."""
-    slots, crowd = world.slots, world.crowd
+    slots, drivers = world.slots, world.drivers
     driven = slots.driven
     if not driven.any():
         return
-    crowd.decide(now_ns, slots.x, slots.y, slots.yaw, slots.speed, driven, stop=stop)
-    np.copyto(slots.throttle, crowd.throttle, where=driven)
-    np.copyto(slots.steering, crowd.steering, where=driven)
+    drivers.decide(now_ns, slots.x, slots.y, slots.yaw, slots.speed, driven, stop=stop)
+    np.copyto(slots.throttle, drivers.throttle, where=driven)
+    np.copyto(slots.steering, drivers.steering, where=driven)
     if world.stuck.against:
         slots.throttle[driven & world.stuck.rests(now_ns - world.pace.lost_ns)] = 0.0
-    world.errands.look(now_ns)
-    np.copyto(slots.arrived, crowd.arrived & driven)
+    world.trips.check_arrivals(now_ns)
+    np.copyto(slots.arrived, drivers.arrived & driven)
     slots.mode[driven] = STOP if stop else DRIVE
     if not stop:
         slots.mode[slots.arrived] = IDLE

@@ -61,7 +61,7 @@ def _frame(world: World, frame: Frame, now_ns: int) -> None:
 
 def _verdict(world: World, status: MonitorStatus, now_ns: int) -> None:
     del now_ns
-    world.crowd.hear_monitor(status)
+    world.drivers.receive_monitor_status(status)
 
 
 def _presence(world: World, presence: Presence, now_ns: int) -> None:

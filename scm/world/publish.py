@@ -56,8 +56,8 @@ def publish(world: World, now_ns: int) -> None:
             world.outbox.append(contact)
     if world.every["snapshot"].is_due(now_ns) and world.wishes.any(WorldSnapshot):
         world.outbox.append(snapshot(world, now_ns))
-    world.errands.every_ns = max(TRIP_NS, len(world.hosted) * NS_PER_S // TRIPS_A_SECOND)
-    world.outbox += world.errands.reports(now_ns)
+    world.trips.every_ns = max(TRIP_NS, len(world.hosted) * NS_PER_S // TRIPS_A_SECOND)
+    world.outbox += world.trips.reports(now_ns)
     if world.every["second"].is_due(now_ns):
         world.outbox += _each_second(world, now_ns)
 
@@ -104,7 +104,7 @@ def _cars(world: World, of: Ints) -> list[tuple[HostedCar, Told]]:
     """Return the cars of some slots, and what their lamps are told by driver and guard."""
     slots, hosted, names = world.slots, world.hosted, world.slots.names
     hazards = slots.hazard[of].tolist()
-    turns = (world.crowd.turn * slots.driven)[of].tolist()
+    turns = (world.drivers.turn * slots.driven)[of].tolist()
     told = zip(of.tolist(), hazards, turns, strict=True)
     return [(hosted[names[slot]], LAMPS[hazard, turn]) for slot, hazard, turn in told]
 

@@ -90,7 +90,7 @@ def _stranded(world: World) -> Bools:
     stranded = slots.hazard | slots.diverged
     inside = np.zeros_like(stands)
     of = np.flatnonzero(stands & slots.driven & ~slots.arrived)
-    inside[of] = world.crowd.is_in_junction(of)
+    inside[of] = world.drivers.is_in_junction(of)
     return stands & (stranded | inside)
 
 

@@ -24,11 +24,11 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
 from scm.vehicles.drivers.channel import RANGE
-from scm.vehicles.drivers.driver_batch import Crowd
+from scm.vehicles.drivers.driver_batch import DriverBatch
 from scm.vehicles.drivers.early import compile_together
-from scm.vehicles.drivers.errands import Errands
+from scm.vehicles.drivers.lane_graph import lane_graph_of
 from scm.vehicles.drivers.limits import limits_of
-from scm.vehicles.drivers.streets import streets_of
+from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.external_vehicles import Placed
 from scm.vehicles.ground import Ground
 from scm.vehicles.rays.grid import WallGrid
@@ -132,9 +132,9 @@ class World:
         self.impacts = Impacts()
         self.blows = Blows()
         radio = replace(city_map.radio, loss=loss) if loss else city_map.radio
-        self.crowd = Crowd(streets_of(self.roads), capacity, seed=seed, radio=radio)
-        self.errands = Errands(self.crowd, spread=True)
-        channel = self.crowd.channel
+        self.drivers = DriverBatch(lane_graph_of(self.roads), capacity, seed=seed, radio=radio)
+        self.trips = Trips(self.drivers, spread=True)
+        channel = self.drivers.channel
         self.radio = Radio(channel, generator(seed, NAME, "radio"))
         self.radio_before = RadioCounts()
         self.busy = Busy(radio, float(channel.numbers[RANGE]), channel.load)
@@ -190,7 +190,7 @@ class World:
         one is better.
         """
         self.garage.use_threads(count)
-        self.crowd.threads = count
+        self.drivers.threads = count
 
     def receivers(self) -> Receivers:
         """Return all stations that frames are brought to, but for the hosted cars."""
@@ -255,7 +255,7 @@ class World:
         slot = self._take(name, car_name, pose, hosted=True)
         fleet, row = self.garage.park(car_name, pose, slot)
         self.ground.settle(fleet, row)
-        self.crowd.enter(slot, limits_of(model), number(self.seed, name, "driver"))
+        self.drivers.enter(slot, limits_of(model), number(self.seed, name, "driver"))
         for kind, bank in self.banks.items():
             bank.fit(slot, name, model, fleet, row, now_ns, self._offset(kind))
         self.hosted[name] = HostedCar(
@@ -348,11 +348,11 @@ class World:
             self.garage.car(name)  # read once, and not in each process
         compile_together(
             [
-                self.crowd.warm_law,
+                self.drivers.warm_up_controller,
                 lambda: self._warm_scanner(scanner),
                 *(partial(self._warm_car, name) for name in names),
                 self.contacts.warm,
-                self.crowd.warm_rest,
+                self.drivers.warm_up_rest,
             ]
         )
 
@@ -419,8 +419,8 @@ class World:
             Keep("latches", "epochs", EpochRecord(highest=self.highest_epoch)),
         ]
         self.contacts.remove(slot)
-        self.errands.forget(slot)
-        self.crowd.leave(slot)
+        self.trips.forget(slot)
+        self.drivers.leave(slot)
         self.cams.forget(slot)
         self.stuck.forget(slot)
         for bank in self.banks.values():

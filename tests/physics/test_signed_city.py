@@ -49,7 +49,7 @@ def test_no_two_cars_touch(city_after_two_minutes):
 
 def test_every_car_gets_over_junctions(city_after_two_minutes):
     world, _, longest = city_after_two_minutes
-    junctions = world.crowd.passed[:CARS] / 2.0  # two lanes a junction
+    junctions = world.drivers.passed[:CARS] / 2.0  # two lanes a junction
     # on a free road it is some 17 s from one to the next: 7 in two minutes; 4 and 6.2 were measured
     assert junctions.min() >= 3.0
     assert junctions.mean() >= 5.5

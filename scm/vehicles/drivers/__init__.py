@@ -1,14 +1,14 @@
-"""Drivers: who steers a car when nobody else does. One law, compiled, for one car or ten thousand.
+"""Drivers: the control of cars that nobody leases. One compiled controller for any number of cars.
 
-law          all that a driver decides, in order          crowd    any number of drivers on one map
-way          where a car is along its lanes               errands  route requests in, progress out
-ahead        which cars stand or drive on the way         alone    one car with a crowd of its own
-stop_lines   stop or go: what the signals say             trips    the errands of one car alone
-giving_way   stop or go where there are no signals        rules    what signs say, where ways meet
-exits        whether there is room behind a junction      route    one car along a path
-pace         how fast, and which throttle for it          heard    cars around one, by their CAMs
-steering     a way and a pose to a steering command
-Tables of arrays: streets and rules the map, memory the drivers, stations the CAMs, signal_table the
-signals. chance decides whose radio frames get lost; limits reads what a driver must know from a car
-file.
+controller       all that a driver decides, in order      driver_batch  many drivers on one map
+lane_tracking    where a car is along its lanes           trips         route requests, trip reports
+cars_ahead       which cars are on the way ahead          single_car    the driver of one car alone
+stop_lines       stop or go by signals                    rules         signs, and where paths cross
+giving_way       stop or go without signals               cam_tracker   cars around one, from CAMs
+junction_exits   whether there is room behind a junction  hazards       hazard warnings from DENMs
+speed_control    allowed speed and throttle               green_light   speed advice at signals
+steering         a path and a pose to a steering command  reception     whether reception is good
+Tables of arrays: lane_graph the map, driver_state the drivers, received_cams the stations,
+signal_table the signals. channel decides which radio frames arrive; limits reads a car's limits
+from its car file; early warms up the compiled code in parallel.
 """

@@ -1,7 +1,7 @@
-"""Any number of drivers over one map: who is where, who was sent where, and what all decide now.
+"""Any number of drivers on one map: where each car is, where it was sent, and its commands.
 
-A car is a slot, a number below the capacity. Some slots are driven here, others are only seen: a
-car with a driver of its own is shown to the crowd by what it tells on the air.
+A car is a vehicle index below the capacity. Some are driven here; others, which have drivers of
+their own, are known only from their CAMs.
 """
 
 from collections.abc import Sequence
@@ -18,60 +18,65 @@ from scm.v2x.etsi.cam_spatem import SpatemBody
 from scm.v2x.etsi.denm import DenmBody
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers import memory as m
-from scm.vehicles.drivers.ahead import Scratch, scratch
-from scm.vehicles.drivers.channel import channel_of, frames_kept
+from scm.vehicles.drivers import driver_state as col
+from scm.vehicles.drivers.cars_ahead import Scratch, new_scratch
+from scm.vehicles.drivers.channel import channel_of, history_length
+from scm.vehicles.drivers.controller import decide
 from scm.vehicles.drivers.green_light import HORIZON
-from scm.vehicles.drivers.lane_tracking import look_from
-from scm.vehicles.drivers.law import decide
-from scm.vehicles.drivers.order import note_standing
+from scm.vehicles.drivers.hazards import HazardTable
+from scm.vehicles.drivers.lane_graph import LaneGraph
+from scm.vehicles.drivers.lane_tracking import fill_window
+from scm.vehicles.drivers.received_cams import no_cams, store_cams, update_cells
+from scm.vehicles.drivers.return_to_lane import MAX_RETURN_M, NO_WALL, distance_to_wall, walls_near
 from scm.vehicles.drivers.signal_table import SignalTable
-from scm.vehicles.drivers.stations import find_cells, hear_cams, nobody
-from scm.vehicles.drivers.streets import Streets
-from scm.vehicles.drivers.warned import Warnings
-from scm.vehicles.drivers.way_back import FARTHEST_M, FREE, free_way, walls_near
+from scm.vehicles.drivers.waiting_order import note_standing
 
-PACKED_FROM = 4096
-WORTH_THREADS = 256
+MIN_ROUTE_ENTRIES = 4096  # size of the route table before it grows, so that it seldom does
+MIN_CARS_FOR_THREADS = 256  # fewer cars are decided faster by one thread
 
 
-class Crowd:
-    """The drivers of many cars; see the module.
+class DriverBatch:
+    """The drivers of many cars.
 
     Args:
         streets: The lanes of the map.
-        capacity: How many slots there are.
-        seed: Of the luck of radio frames.
-        radio: What the air does to frames; None: nothing.
+        capacity: Number of vehicle indices.
+        seed: Decides which radio frames are lost.
+        radio: The radio channel; None: an ideal one.
 
     Attributes:
-        throttle: (capacity,) last decided, -1 to 1; likewise `steering`, + = left.
-        channel: What the air does to frames on their way to the drivers.
-        signals: What is told of the signals.
-        threads: How many work on large crowds; what is decided does not depend on it.
-        horizon: From how far before a line speed is chosen for its next green [m]; 0: never.
+        throttle: (capacity,) last commands, -1 to 1; likewise `steering`, + = left.
+        channel: The radio channel from all senders to these drivers.
+        signals: The received signal states.
+        threads: Number of threads for large batches; results do not depend on it.
+        horizon: Distance before a line at which speed is chosen for its next green [m]; 0: never.
     """
 
     def __init__(
-        self, streets: Streets, capacity: int, *, seed: int = 0, radio: RadioChannel | None = None
+        self,
+        lane_graph: LaneGraph,
+        capacity: int,
+        *,
+        seed: int = 0,
+        radio: RadioChannel | None = None,
     ) -> None:
-        city_map = streets.roads.city_map
-        self.streets = streets
+        city_map = lane_graph.roads.city_map
+        self.lane_graph = lane_graph
         self.capacity = capacity
         self._seed = seed
-        self._memory = m.empty_memory(capacity)
+        self._state = col.empty_state(capacity)
         radio = radio or RadioChannel()
         self._walls = wall_segments(city_map)
         self.channel = channel_of(
             radio, radio.range_m or city_map.radio_range_m, capacity, self._walls
         )
-        kept = frames_kept(radio)
-        self._heard = nobody(city_map, capacity, kept, self.channel)
-        self.signals = SignalTable(city_map, kept, self.channel)
-        self._warnings = Warnings(self.channel)
+        history = history_length(radio)
+        self._received = no_cams(city_map, capacity, history, self.channel)
+        self.signals = SignalTable(city_map, history, self.channel)
+        self._hazards = HazardTable(self.channel)
         self.threads = 1
         self.horizon = HORIZON if city_map.speed_advice else 0.0
-        self._rooms = [scratch()]
+        self._scratch = [new_scratch()]
         self._pool: ThreadPoolExecutor | None = None
         self._poses = self.channel.poses
         self._commands = np.zeros((2, capacity))
@@ -82,105 +87,107 @@ class Crowd:
         self.throttle: Floats = self._commands[0]
         self.steering: Floats = self._commands[1]
 
-    def warm(self) -> None:
-        """Compile or load now what driving needs; call it before the first car enters."""
-        self.warm_law()
-        self.warm_rest()
+    def warm_up(self) -> None:
+        """Compile or load all that driving needs; call it before the first car enters."""
+        self.warm_up_controller()
+        self.warm_up_rest()
 
-    def warm_law(self) -> None:
-        """Compile or load what decides: the larger part."""
+    def warm_up_controller(self) -> None:
+        """Compile or load the controller, which is the larger part."""
         self._decide(np.zeros(0, np.int64), 0, self.signals, stop=False)
 
-    def warm_rest(self) -> None:
-        """Compile or load what hears and sets out."""
-        nobody: Ints = np.zeros(0, np.int64)
+    def warm_up_rest(self) -> None:
+        """Compile or load reception and route setup."""
+        no_cars: Ints = np.zeros(0, np.int64)
         none: Floats = np.zeros(0)
-        self.hear(nobody, 0, none, none, none, none, none)
-        if self.capacity and self.streets.names:
-            look_from(self.streets.ways, self._memory, 0, 0)
-            self._memory.sight[0] = -1
-            kinds = np.zeros((1, m.SPEEDS + m.MOST_SPEEDS))
-            alone = m.empty_memory(1)._replace(kinds=kinds, routes=np.zeros(1, np.int64))
-            alone.sight[0, m.HERE] = 0
-            free_way(self.streets.ways, alone, self._rooms[0], np.zeros((0, 4)), 0.0, 0.0, 0.0)
+        self.receive_cams(no_cars, 0, none, none, none, none, none)
+        if self.capacity and self.lane_graph.names:
+            fill_window(self.lane_graph.arrays, self._state, 0, 0)
+            self._state.lane_window[0] = -1
+            kinds = np.zeros((1, col.SPEEDS + col.MAX_SPEEDS))
+            alone = col.empty_state(1)._replace(kinds=kinds, routes=np.zeros(1, np.int64))
+            alone.lane_window[0, col.HERE] = 0
+            distance_to_wall(
+                self.lane_graph.arrays, alone, self._scratch[0], np.zeros((0, 4)), 0.0, 0.0, 0.0
+            )
 
     @property
     def lane(self) -> Ints:
-        """Lane of each car, as a place in `streets.names`; -1 before it was sent."""
-        return self._memory.sight[:, m.HERE]
+        """Lane of each car, as an index into `lane_graph.names`; -1 before it was sent."""
+        return self._state.lane_window[:, col.HERE]
 
     @property
     def s(self) -> Floats:
-        """Where each rear axle is along its lane [m]."""
-        return self._memory.floats[:, m.S]
+        """Distance of each rear axle along its lane [m]."""
+        return self._state.floats[:, col.S]
 
     @property
     def cross_track(self) -> Floats:
-        """How far each rear axle is beside its lane's middle [m], + = left."""
-        return self._memory.floats[:, m.BESIDE]
+        """Lateral offset of each rear axle from its lane's centre line [m], + = left."""
+        return self._state.floats[:, col.BESIDE]
 
     @property
     def done_m(self) -> Floats:
-        """How far each car has driven along its way since it was sent [m]."""
-        return self._memory.floats[:, m.DONE]
+        """Distance that each car has driven since it was sent [m]."""
+        return self._state.floats[:, col.DONE]
 
     @property
     def arrived(self) -> Bools:
-        """Whether each car's route is done; never that of a car that goes round."""
-        return self._memory.ints[:, m.ARRIVED] > 0
+        """Whether each car's route is done; never true of a car that circulates."""
+        return self._state.ints[:, col.ARRIVED] > 0
 
     @property
     def waiting(self) -> Ints:
-        """What holds each car at rest, as a place in `memory.WAITING_FOR`."""
-        return self._memory.ints[:, m.WAITING]
+        """What each car at rest waits for, as an index into `driver_state.WAITING_FOR`."""
+        return self._state.ints[:, col.WAITING]
 
     @property
     def turn(self) -> Ints:
-        """Where each car's way turns next: 1 left, -1 right, 0 neither."""
-        return self._memory.ints[:, m.TURN]
+        """Direction of each car's next turn: 1 left, -1 right, 0 neither."""
+        return self._state.ints[:, col.TURN]
 
     @property
     def passed(self) -> Ints:
-        """How many lanes of its way each car has passed since it was sent."""
-        return self._memory.ints[:, m.INDEX]
+        """Number of lanes that each car has passed since it was sent."""
+        return self._state.ints[:, col.INDEX]
 
-    def enter(self, slot: int, limits: CarLimits, seed: int = 0) -> None:
-        """Put a driver into a car; it stands until it is sent.
+    def enter(self, index: int, limits: CarLimits, seed: int = 0) -> None:
+        """Give a car a driver; it stands until it is sent.
 
         Args:
-            slot: The car's.
-            limits: What the driver must know of it.
+            index: The vehicle index.
+            limits: The car's limits.
             seed: Decides where it turns while it circulates.
         """
-        self.leave(slot)
+        self.leave(index)
         if limits not in self._kinds:
-            row = m.kind_row(limits, self.streets.sharpest_change(limits.wheelbase))
-            kinds = np.vstack([self._memory.kinds, row])
-            self._memory = self._memory._replace(kinds=kinds)
+            row = col.kind_row(limits, self.lane_graph.sharpest_change(limits.wheelbase))
+            kinds = np.vstack([self._state.kinds, row])
+            self._state = self._state._replace(kinds=kinds)
             self._kinds[limits] = len(kinds) - 1
-        ints = self._memory.ints[slot]
-        ints[m.KIND], ints[m.SEED], ints[m.LAST_NS] = self._kinds[limits], seed, m.NEVER_NS
-        self._memory.floats[slot] = 0.0
-        self._entered[slot] = True
-        self.show(slot, limits.length, limits.width)
+        ints = self._state.ints[index]
+        ints[col.KIND], ints[col.SEED], ints[col.LAST_NS] = self._kinds[limits], seed, col.NEVER_NS
+        self._state.floats[index] = 0.0
+        self._entered[index] = True
+        self.show(index, limits.length, limits.width)
 
-    def show(self, slot: int, length: float, width: float) -> None:
-        """Let others see a car as an outline of this size [m], once it speaks."""
-        self._heard.size[slot] = length, width
+    def show(self, index: int, length: float, width: float) -> None:
+        """Show a car to the others as an outline of this size [m], once it sends CAMs."""
+        self._received.size[index] = length, width
 
-    def leave(self, slot: int) -> None:
-        """Take a car away, its driver and its outline."""
-        self._entered[slot] = self._sent[slot] = False
-        self._heard.size[slot] = 0.0
-        self._heard.number[:, slot] = -1
-        self._memory.stood[slot] = m.NEVER_NS
-        self._memory.sight[slot] = -1
-        self._memory.ints[slot, m.COUNT] = 0
-        self._commands[:, slot] = 0.0
+    def leave(self, index: int) -> None:
+        """Remove a car with its driver and its outline."""
+        self._entered[index] = self._sent[index] = False
+        self._received.size[index] = 0.0
+        self._received.number[:, index] = -1
+        self._state.stood[index] = col.NEVER_NS
+        self._state.lane_window[index] = -1
+        self._state.ints[index, col.COUNT] = 0
+        self._commands[:, index] = 0.0
 
     def send(
         self,
-        slot: int,
+        index: int,
         lanes: Sequence[str],
         s: float,
         after: str = "stop",
@@ -190,109 +197,113 @@ class Crowd:
         """Send a car along lanes, without a jerk if it drives already.
 
         Args:
-            slot: The car's.
+            index: The vehicle index.
             lanes: In driving order.
-            s: Where on its lane the rear axle is, roughly [m].
-            after: What comes after the last lane: `stop` at its end, `loop` to the first one, or
-                `circulate`, any lane that follows.
-            speed: Wished on free road [m/s]; None: what lanes and curves allow.
+            s: Approximate place of the rear axle on its lane [m].
+            after: After the last lane: `stop` at its end, `loop` to the first one, or
+                `circulate` on any lane that follows.
+            speed: On free road [m/s]; None: what lanes and curves allow.
             first: Which of the lanes the car is on.
 
         Raises:
             MapError: when there is no such lane.
         """
         numbers = [self._number(name) for name in lanes]
-        ints, floats = self._memory.ints[slot], self._memory.floats[slot]
-        at = self._lay(numbers, slot)
-        ints[m.ROUTE], ints[m.COUNT], ints[m.INDEX] = at, len(numbers), first
-        ints[m.AFTER] = m.AFTERS.index(after)
-        ints[m.GOAL] = m.NO_GOAL if after == "loop" else len(numbers) - 1
-        ints[m.GOING_LINE], ints[m.RULE_LINE], ints[m.ARRIVED] = -1, -1, 0
-        floats[m.S], floats[m.DONE] = s, 0.0
-        floats[m.TOLD] = np.inf if speed is None else speed
-        look_from(self.streets.ways, self._memory, slot, numbers[first])
-        self._sent[slot] = True
+        ints, floats = self._state.ints[index], self._state.floats[index]
+        at = self._store_route(numbers, index)
+        ints[col.ROUTE], ints[col.COUNT], ints[col.INDEX] = at, len(numbers), first
+        ints[col.AFTER] = col.AFTERS.index(after)
+        ints[col.GOAL] = col.NO_GOAL if after == "loop" else len(numbers) - 1
+        ints[col.GOING_LINE], ints[col.RULE_LINE], ints[col.ARRIVED] = -1, -1, 0
+        floats[col.S], floats[col.DONE] = s, 0.0
+        floats[col.REQUESTED_SPEED] = np.inf if speed is None else speed
+        fill_window(self.lane_graph.arrays, self._state, index, numbers[first])
+        self._sent[index] = True
 
     def wall_ahead(
         self,
-        slot: int,
+        index: int,
         lanes: Sequence[str],
         s: float,
         pose: Pose2,
         after: str = "stop",
         speed: float | None = None,
     ) -> float | None:
-        """Return how far a car would get before it hits a wall beside its lane [m]; None: it won't.
+        """Return how far a car would get before it hits a wall beside its lane [m], or None.
 
-        Nothing changes; the arguments are those of `send`, and the pose of the car's rear axle.
+        Changes nothing. The arguments are those of `send`, and the pose of the car's rear axle.
 
         Raises:
             MapError: when there is no such lane.
         """
         numbers = [self._number(name) for name in lanes]
-        memory, route = m.empty_memory(1), np.array(numbers, np.int64)
-        memory = memory._replace(kinds=self._memory.kinds, routes=route)
-        memory.ints[0], memory.floats[0] = self._memory.ints[slot], self._memory.floats[slot]
-        ints, floats = memory.ints[0], memory.floats[0]
-        ints[m.ROUTE], ints[m.COUNT], ints[m.INDEX] = 0, len(numbers), 0
-        ints[m.AFTER] = m.AFTERS.index(after)
-        floats[m.S], floats[m.TOLD] = s, np.inf if speed is None else speed
-        look_from(self.streets.ways, memory, 0, numbers[0])
+        state, route = col.empty_state(1), np.array(numbers, np.int64)
+        state = state._replace(kinds=self._state.kinds, routes=route)
+        state.ints[0], state.floats[0] = self._state.ints[index], self._state.floats[index]
+        ints, floats = state.ints[0], state.floats[0]
+        ints[col.ROUTE], ints[col.COUNT], ints[col.INDEX] = 0, len(numbers), 0
+        ints[col.AFTER] = col.AFTERS.index(after)
+        floats[col.S], floats[col.REQUESTED_SPEED] = s, np.inf if speed is None else speed
+        fill_window(self.lane_graph.arrays, state, 0, numbers[0])
         x, y, yaw = pose
-        kind = memory.kinds[ints[m.KIND]]
-        walls = walls_near(self._walls, x, y, FARTHEST_M + kind[m.FRONT] + kind[m.REAR])
-        gone = free_way(self.streets.ways, memory, self._rooms[0], walls, x, y, yaw)
-        return None if gone == FREE else gone
+        kind = state.kinds[ints[col.KIND]]
+        walls = walls_near(self._walls, x, y, MAX_RETURN_M + kind[col.FRONT] + kind[col.REAR])
+        distance = distance_to_wall(
+            self.lane_graph.arrays, state, self._scratch[0], walls, x, y, yaw
+        )
+        return None if distance == NO_WALL else distance
 
     def circulate(
-        self, slot: int, lane: str, s: float, speed: float | None = None
+        self, index: int, lane: str, s: float, speed: float | None = None
     ) -> tuple[str, ...]:
-        """Send a car round without end, at each junction where its own seed takes it.
+        """Let a car circulate without end; its seed chooses the branch at each junction.
 
         Returns:
-            The lanes it takes first; where there is no choice, those of its whole round.
+            The first lanes of its route; all lanes of the loop where there is no choice.
 
         Raises:
             MapError: when there is no such lane, or it leads nowhere.
         """
         number = self._number(lane)
-        if not self.streets.goes_round[number]:
-            self.streets.roads.loop(lane)  # says what is wrong
-        self.send(slot, (lane,), s, "circulate", speed)
-        return self.go_on(slot)
+        if not self.lane_graph.goes_round[number]:
+            self.lane_graph.roads.loop(lane)  # raises with the reason
+        self.send(index, (lane,), s, "circulate", speed)
+        return self.go_on(index)
 
-    def go_on(self, slot: int) -> tuple[str, ...]:
-        """Let a car circulate from where it is; return as `circulate` does."""
-        self._memory.ints[slot, m.GOAL] = m.NO_GOAL
-        self._memory.ints[slot, m.ARRIVED] = 0
-        self._memory.floats[slot, m.DONE] = 0.0
-        if self._memory.ints[slot, m.AFTER] != m.CIRCULATE:
-            msg = f"slot {slot} was not sent to circulate"
+    def go_on(self, index: int) -> tuple[str, ...]:
+        """Let a car circulate from where it is and return its lanes, as `circulate` does."""
+        self._state.ints[index, col.GOAL] = col.NO_GOAL
+        self._state.ints[index, col.ARRIVED] = 0
+        self._state.floats[index, col.DONE] = 0.0
+        if self._state.ints[index, col.AFTER] != col.CIRCULATE:
+            msg = f"vehicle index {index} was not sent to circulate"
             raise ValueError(msg)
-        lane = self.streets.names[self.lane[slot]]
-        return self.streets.round_from(lane) or self.in_sight(slot)
+        lane = self.lane_graph.names[self.lane[index]]
+        return self.lane_graph.round_from(lane) or self.planned_lanes(index)
 
-    def halt(self, slot: int) -> None:
-        """Take a car off its way; it is not driven before it is sent again."""
-        self._sent[slot] = False
+    def halt(self, index: int) -> None:
+        """End a car's route; it is not driven until it is sent again."""
+        self._sent[index] = False
 
-    def in_sight(self, slot: int) -> tuple[str, ...]:
-        """Return the lanes of a car's way from the one it is on, as far as it has decided."""
-        return tuple(self.streets.names[n] for n in self._memory.sight[slot, m.HERE :] if n >= 0)
+    def planned_lanes(self, index: int) -> tuple[str, ...]:
+        """Return a car's lanes from the current one on, as far as they are chosen."""
+        return tuple(
+            self.lane_graph.names[n] for n in self._state.lane_window[index, col.HERE :] if n >= 0
+        )
 
-    def is_in_junction(self, slots: Ints) -> Bools:
-        """Return which of some cars (k,) have their middle where nobody may stop."""
-        s, lanes = self.s[slots], self.lane[slots]
-        kinds = self._memory.kinds[self._memory.ints[slots, m.KIND]]
-        middle = s + 0.5 * (kinds[:, m.FRONT] - kinds[:, m.REAR])
-        within = self.streets.forbidden[lanes]
+    def is_in_junction(self, indices: Ints) -> Bools:
+        """Return which of some cars (k,) have their centre where stopping is forbidden."""
+        s, lanes = self.s[indices], self.lane[indices]
+        kinds = self._state.kinds[self._state.ints[indices, col.KIND]]
+        middle = s + 0.5 * (kinds[:, col.FRONT] - kinds[:, col.REAR])
+        within = self.lane_graph.forbidden[lanes]
         at = middle[:, None]
         inside: Bools = ((within[:, :, 0] <= at) & (at <= within[:, :, 1])).any(axis=1)
         return inside & (lanes >= 0)
 
-    def hear(
+    def receive_cams(
         self,
-        slots: Ints,
+        indices: Ints,
         now_ns: int,
         x: Floats,
         y: Floats,
@@ -300,23 +311,23 @@ class Crowd:
         speed: Floats,
         yaw_rate: Floats,
     ) -> None:
-        """Take what cars tell on the air now, shape (k,): of the middle of their front bumpers."""
+        """Store CAMs sent now, shape (k,): columns of the middle of each front bumper."""
         cams = np.column_stack((x, y, yaw, speed, yaw_rate))
-        stations = np.asarray(slots, np.int64)
-        note_standing(self._memory.stood, self._memory.stood_at, stations, now_ns, cams)
-        hear_cams(self._heard, stations, now_ns, cams)
+        stations = np.asarray(indices, np.int64)
+        note_standing(self._state.stood, self._state.stood_at, stations, now_ns, cams)
+        store_cams(self._received, stations, now_ns, cams)
 
-    def hear_spatem(self, body: SpatemBody, now_ns: int) -> None:
-        """Take a SPATEM that is on the air now."""
-        self.signals.hear_spatem(body, now_ns)
+    def receive_spatem(self, body: SpatemBody, now_ns: int) -> None:
+        """Store a SPATEM that is sent now."""
+        self.signals.receive_spatem(body, now_ns)
 
-    def hear_denm(self, body: DenmBody, now_ns: int) -> None:
-        """Take a warning that is on the air now."""
-        self._warnings.hear(body, now_ns)
+    def receive_denm(self, body: DenmBody, now_ns: int) -> None:
+        """Store a warning that is sent now."""
+        self._hazards.receive(body, now_ns)
 
-    def hear_monitor(self, status: MonitorStatus) -> None:
-        """Take the monitor's verdict on a junction."""
-        self.signals.hear_monitor(status)
+    def receive_monitor_status(self, status: MonitorStatus) -> None:
+        """Store a junction's fault state."""
+        self.signals.receive_monitor_status(status)
 
     def decide(
         self,
@@ -329,15 +340,15 @@ class Crowd:
         *,
         stop: bool = False,
     ) -> None:
-        """Let the drivers of the cars that are `driven` decide; the others keep their commands.
+        """Compute new commands for the cars that are `driven`; the others keep theirs.
 
         Args:
             now_ns: The present time [ns].
-            x: Of each rear axle, map frame, by slot; likewise `y` and `yaw`.
+            x: Of each rear axle, map frame, by vehicle index; likewise `y` and `yaw`.
             y: See `x`.
             yaw: See `x`.
             speed: Along each body [m/s].
-            driven: Whose driver drives, by slot; cars that were never sent are left out.
+            driven: Which cars to drive, by vehicle index; cars that were never sent are skipped.
             stop: Whether all must come to rest in their lanes, wherever they are.
         """
         poses = self._poses
@@ -345,38 +356,38 @@ class Crowd:
         cars = np.flatnonzero(driven & self._sent)
         self._decide(cars, now_ns, self.signals, stop=stop)
 
-    def decide_alone(
+    def decide_one(
         self,
-        slot: int,
+        index: int,
         now_ns: int,
         pose: tuple[float, float, float, float],
         signals: SignalTable,
         *,
         stop: bool,
     ) -> tuple[float, float]:
-        """Return (throttle, steering) of one car by signals that it alone has heard.
+        """Return (throttle, steering) of one car, by the signals that this car received.
 
         Args:
-            slot: The car's.
+            index: The vehicle index.
             now_ns: The present time [ns].
             pose: x, y, yaw of its rear axle and speed along its body.
-            signals: What it knows of them.
+            signals: As this car received them.
             stop: Whether it must come to rest.
         """
-        self._poses[slot] = pose
-        self._decide(np.array([slot], np.int64), now_ns, signals, stop=stop)
-        return float(self.throttle[slot]), float(self.steering[slot])
+        self._poses[index] = pose
+        self._decide(np.array([index], np.int64), now_ns, signals, stop=stop)
+        return float(self.throttle[index]), float(self.steering[index])
 
     def _decide(self, cars: Ints, now_ns: int, signals: SignalTable, *, stop: bool) -> None:
-        find_cells(self._heard, now_ns)
+        update_cells(self._received, now_ns)
 
-        def part(cars: Ints, room: Scratch) -> None:
+        def part(cars: Ints, scratch: Scratch) -> None:
             decide(
-                self.streets.ways,
-                self._memory,
-                self._heard,
-                signals.told,
-                room,
+                self.lane_graph.arrays,
+                self._state,
+                self._received,
+                signals.received,
+                scratch,
                 cars,
                 self._poses,
                 self._commands,
@@ -384,49 +395,51 @@ class Crowd:
                 bool(stop),
                 self._seed,
                 self.horizon,
-                self._warnings.warned,
+                self._hazards.hazards,
             )
 
-        if self.threads == 1 or len(cars) < WORTH_THREADS:
-            part(cars, self._rooms[0])
+        if self.threads == 1 or len(cars) < MIN_CARS_FOR_THREADS:
+            part(cars, self._scratch[0])
             return
-        if self._pool is None or len(self._rooms) != self.threads:
+        if self._pool is None or len(self._scratch) != self.threads:
             self._pool = ThreadPoolExecutor(self.threads)
-            self._rooms = [scratch() for _ in range(self.threads)]
-        for _ in self._pool.map(part, np.array_split(cars, self.threads), self._rooms):
+            self._scratch = [new_scratch() for _ in range(self.threads)]
+        for _ in self._pool.map(part, np.array_split(cars, self.threads), self._scratch):
             pass
 
     def _number(self, lane: str) -> int:
-        number = self.streets.numbers.get(lane)
+        number = self.lane_graph.numbers.get(lane)
         if number is None:
-            self.streets.roads.successors(lane)  # says what is wrong
+            self.lane_graph.roads.successors(lane)  # raises with the reason
             msg = f"no lane {lane!r}"
             raise MapError(msg)
         return number
 
-    def _lay(self, numbers: list[int], slot: int) -> int:
-        """Put a route among all routes; return where it begins."""
-        self._memory.ints[slot, m.COUNT] = 0
-        if self._routes_used + len(numbers) > len(self._memory.routes):
-            self._pack(len(numbers))
+    def _store_route(self, numbers: list[int], index: int) -> int:
+        """Append a route to the route table and return where it begins."""
+        self._state.ints[index, col.COUNT] = 0
+        if self._routes_used + len(numbers) > len(self._state.routes):
+            self._compact_routes(len(numbers))
         at = self._routes_used
-        self._memory.routes[at : at + len(numbers)] = numbers
+        self._state.routes[at : at + len(numbers)] = numbers
         self._routes_used += len(numbers)
         return at
 
-    def _pack(self, more: int) -> None:
-        """Drop the routes that nobody drives any more, and make room for more lanes."""
-        ints, before = self._memory.ints, self._memory.routes
-        slots = np.flatnonzero(ints[:, m.COUNT])
-        kept = [before[ints[k, m.ROUTE] : ints[k, m.ROUTE] + ints[k, m.COUNT]] for k in slots]
-        used = sum(len(route) for route in kept)
+    def _compact_routes(self, more: int) -> None:
+        """Drop unused routes and make room for more lanes."""
+        ints, before = self._state.ints, self._state.routes
+        indices = np.flatnonzero(ints[:, col.COUNT])
+        in_use = [
+            before[ints[k, col.ROUTE] : ints[k, col.ROUTE] + ints[k, col.COUNT]] for k in indices
+        ]
+        used = sum(len(route) for route in in_use)
         routes = np.zeros(
-            max(64 if self.capacity < 64 else PACKED_FROM, 2 * (used + more)), np.int64
+            max(64 if self.capacity < 64 else MIN_ROUTE_ENTRIES, 2 * (used + more)), np.int64
         )
         self._routes_used = 0
-        for slot, route in zip(slots, kept, strict=True):
+        for index, route in zip(indices, in_use, strict=True):
             at = self._routes_used
             routes[at : at + len(route)] = route
-            ints[slot, m.ROUTE] = at
+            ints[index, col.ROUTE] = at
             self._routes_used += len(route)
-        self._memory = self._memory._replace(routes=routes)
+        self._state = self._state._replace(routes=routes)

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
 
 from scm.log import event
-from scm.vehicles.drivers.law import decide
+from scm.vehicles.drivers.controller import decide
 from scm.vehicles.jit import is_kept, load_compiler
 
 Job = Callable[[], object]

@@ -1,6 +1,6 @@
-"""Speed advice for a car that has no map but the air: junctions by MAPEM, their lights by SPATEM.
+"""Speed advice (GLOSA) for a car without a map: junctions from MAPEM, signals from SPATEM.
 
-For drivers of your own, in an agent or a script; the city's driver follows `green_light.py`.
+For drivers of your own, in an agent or a script. The city's driver uses `green_light.py`.
 """
 
 import math
@@ -12,27 +12,26 @@ from scm.v2x.etsi.codes import number_of, scaled
 from scm.v2x.etsi.convert import Told, colours_of, place_of
 from scm.v2x.etsi.mapem import IntersectionGeometry, MapemBody, MapLane
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.green_light import FLOOR, HORIZON, advised_speed
+from scm.vehicles.drivers.green_light import HORIZON, MIN_SPEED_SHARE, advised_speed
 from scm.vehicles.drivers.stop_lines import SHORT_OF_LINE
 from scm.vehicles.jit import plain
 
-FRESH_S = 1.0
-_AWRY_RAD = math.radians(30.0)
+MAX_AGE_S = 1.0
+_MAX_HEADING_ERROR_RAD = math.radians(30.0)
 _CM, _SPEED_STEP = SCALE * 100.0, 0.02 / SCALE
 _speed = plain(advised_speed)
 
 
 class Advice(NamedTuple):
-    """How to come to the next lights.
+    """Advice for the approach to the next signals.
 
     Attributes:
-        junction: Its number, as in MAPEM; `lane` the number of the lane that leads to it, None:
-            MAPEM does not tell it.
+        junction: Its number in MAPEM; `lane` is the number of the approach lane, None: unknown.
         distance_m: From the front bumper to the stop line.
-        speed_mps: To drive now, at most the lane's limit; None: MAPEM tells no limit.
-        earliest_s, latest_s, likely_s: When the lights change; None: not told.
-        confidence: The share of such likely ends that come true; None: not told.
-        is_green: What they are now.
+        speed_mps: To drive now, at most the lane's limit; None: MAPEM has no limit.
+        earliest_s, latest_s, likely_s: Time until the signals change; None: unknown.
+        confidence: Probability that the likely time is right; None: unknown.
+        is_green: Whether they are green now.
     """
 
     junction: int
@@ -47,25 +46,25 @@ class Advice(NamedTuple):
 
 
 class GreenAdvisor:
-    """What one car makes of MAPEMs and SPATEMs.
+    """Advises one car by the MAPEMs and SPATEMs that it received.
 
     Args:
         limits: Of the car.
-        floor: Least speed that is advised, a share of the limit.
+        floor: Lowest advised speed as a share of the limit.
     """
 
-    def __init__(self, limits: CarLimits, floor: float = FLOOR) -> None:
+    def __init__(self, limits: CarLimits, floor: float = MIN_SPEED_SHARE) -> None:
         self._limits, self._floor = limits, floor
         self._maps: dict[int, IntersectionGeometry] = {}
         self._lights: dict[int, tuple[int, int, dict[int, Told]]] = {}
 
-    def hear_mapem(self, body: MapemBody) -> None:
-        """Take the lanes of junctions."""
+    def receive_mapem(self, body: MapemBody) -> None:
+        """Store the lanes of junctions."""
         for geometry in body.intersections or ():
             self._maps[geometry.id.id] = geometry
 
-    def hear_spatem(self, body: SpatemBody, arrived_ns: int) -> None:
-        """Take a SPATEM that arrived at `arrived_ns`, on the receiver's clock."""
+    def receive_spatem(self, body: SpatemBody, arrived_ns: int) -> None:
+        """Store a SPATEM that arrived at `arrived_ns`, on the receiver's clock."""
         self._lights[body.intersection] = (
             arrived_ns,
             body.revision,
@@ -73,7 +72,7 @@ class GreenAdvisor:
         )
 
     def advise(self, pose: Pose2, now_ns: int) -> Advice | None:
-        """Return how to go on from a pose of the rear axle; None: no lights told of ahead."""
+        """Return the advice at a pose of the rear axle, or None without known signals ahead."""
         yaw, front = pose.yaw, self._limits.front
         x, y = pose.x + front * math.cos(yaw), pose.y + front * math.sin(yaw)
         found = [
@@ -86,43 +85,43 @@ class GreenAdvisor:
         if not found:
             return None
         distance, number, lane = min(found, key=lambda one: one[0])
-        told = self._told(number, lane, now_ns)
-        return None if told is None else self._advice(distance, number, lane, told)
+        signal = self._signal_for(number, lane, now_ns)
+        return None if signal is None else self._advice(distance, number, lane, signal)
 
-    def _told(self, number: int, lane: MapLane, now_ns: int) -> Told | None:
-        """Return what is told now of the group that is the first to release a lane."""
+    def _signal_for(self, number: int, lane: MapLane, now_ns: int) -> Told | None:
+        """Return the present state of the group that releases a lane first."""
         arrived_ns, revision, groups = self._lights.get(number, (0, -1, {}))
         age_s = 1e-9 * (now_ns - arrived_ns)
-        if revision != self._maps[number].revision or not -FRESH_S <= age_s <= FRESH_S:
+        if revision != self._maps[number].revision or not -MAX_AGE_S <= age_s <= MAX_AGE_S:
             return None
         numbers = {number_of(way, "signal_group") for way in lane.connects_to or ()}
-        told = [groups[n] for n in numbers if n is not None and n in groups]
-        if not told:
+        signal = [groups[n] for n in numbers if n is not None and n in groups]
+        if not signal:
             return None
-        first = min(told, key=lambda one: (one.colour != "green", one.min_end_s or 0.0))
+        first = min(signal, key=lambda one: (one.colour != "green", one.min_end_s or 0.0))
         return first._replace(
             min_end_s=_later(first.min_end_s, age_s),
             max_end_s=_later(first.max_end_s, age_s),
             likely_end_s=_later(first.likely_end_s, age_s),
         )
 
-    def _advice(self, distance: float, number: int, lane: MapLane, told: Told) -> Advice:
+    def _advice(self, distance: float, number: int, lane: MapLane, signal: Told) -> Advice:
         allowed = _limit_mps(self._maps[number])
-        wait = (told.min_end_s or 0.0) if told.colour == "red" else 0.0
-        room = distance - SHORT_OF_LINE
+        wait = (signal.min_end_s or 0.0) if signal.colour == "red" else 0.0
+        distance_left = distance - SHORT_OF_LINE
         speed = None
         if allowed is not None:
-            speed = _speed(room, wait, self._limits.decel, allowed, self._floor * allowed)
-        ends = told.min_end_s, told.max_end_s, told.likely_end_s, told.likely_confidence
-        is_green = told.colour == "green"
+            speed = _speed(distance_left, wait, self._limits.decel, allowed, self._floor * allowed)
+        ends = signal.min_end_s, signal.max_end_s, signal.likely_end_s, signal.likely_confidence
+        is_green = signal.colour == "green"
         return Advice(number, number_of(lane, "lane_id"), distance, speed, *ends, is_green)
 
 
 def _limit_mps(geometry: IntersectionGeometry) -> float | None:
-    """Return the speed limit of all vehicles at a junction [m/s]; None: it is not told."""
+    """Return the speed limit of all vehicles at a junction [m/s], or None."""
     limits = geometry.speed_limits or ()
-    told = next((one for one in limits if one.type == "vehicleMaxSpeed"), None)
-    return None if told is None else scaled(told, "speed", _SPEED_STEP)
+    signal = next((one for one in limits if one.type == "vehicleMaxSpeed"), None)
+    return None if signal is None else scaled(signal, "speed", _SPEED_STEP)
 
 
 def _later(end_s: float | None, age_s: float) -> float | None:
@@ -132,7 +131,7 @@ def _later(end_s: float | None, age_s: float) -> float | None:
 def _distance(
     geometry: IntersectionGeometry, lane: MapLane, x: float, y: float, yaw: float
 ) -> float | None:
-    """Return how far a place on a lane that leads in is from the stop line [m]; None: beside it."""
+    """Return the distance from a place on an approach lane to the stop line [m], or None."""
     attributes = lane.lane_attributes
     if "ingressPath" not in attributes.directional_use or attributes.lane_type.vehicle is None:
         return None
@@ -147,8 +146,12 @@ def _distance(
         if place and length > 0.0:
             along = ((x - near_x) * dx + (y - near_y) * dy) / length
             beside = ((y - near_y) * dx - (x - near_x) * dy) / length
-            awry = abs(wrap_angle(yaw - math.atan2(-dy, -dx)))
-            if 0.0 <= along <= length and abs(beside) <= half and awry <= _AWRY_RAD:
+            heading_error = abs(wrap_angle(yaw - math.atan2(-dy, -dx)))
+            if (
+                0.0 <= along <= length
+                and abs(beside) <= half
+                and heading_error <= _MAX_HEADING_ERROR_RAD
+            ):
                 return begin + along
             begin += length
         near_x, near_y = near_x + dx, near_y + dy

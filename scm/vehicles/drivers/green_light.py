@@ -1,37 +1,37 @@
-"""Speed advice for green lights (GLOSA): come to a red line no sooner than its green can begin.
+"""Speed advice for green lights (GLOSA): reach a red line no sooner than its green can begin.
 
     v (t + 1/k) + v^2 / (2 a) = d       v: the speed that needs t until it would have to brake for
                                         a stop after d, with deceleration a, its end at rate k
 
-A red that SPATEM promises until t cannot end sooner, so who slows down for it loses next to
-nothing, and no advice is above what the car would drive without. Each car that stands or comes
-before the own one adds the time that it needs to leave. Who would have to go slower than the floor
-goes at the floor, and stops. A promise holds whatever its age: the earliest end never moves back.
-The car still obeys its signal: advice only takes speed away, and gently. Nobody is slowed down
-before its tail is out of the last junction.
+A red that SPATEM guarantees until t cannot end sooner, so a car that slows down for it loses almost
+nothing. Advice is never above the speed without it. Each car ahead adds the time that it needs to
+leave. A car that would have to go slower than the lowest advised speed drives at that speed and
+stops. A guaranteed time holds at any age: the earliest end never moves back. The car still obeys
+its signal: advice only reduces speed, and gently, and never before the car's rear has left the last
+junction.
 """
 
 import math
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.drivers.ahead import REAR_AT
-from scm.vehicles.drivers.memory import BEHIND, DECEL, FRONT, HERE, PACE, REAR, S
-from scm.vehicles.drivers.pace import END_RATE
-from scm.vehicles.drivers.signal_table import RED, Told, frame_for
+from scm.vehicles.drivers.cars_ahead import REAR_AT
+from scm.vehicles.drivers.driver_state import BEHIND, DECEL, FRONT, HERE, REAR, SPEED_SETPOINT, S
+from scm.vehicles.drivers.lane_graph import GROUP, JUNCTION, LaneArrays
+from scm.vehicles.drivers.signal_table import RED, ReceivedSignals, frame_for
+from scm.vehicles.drivers.speed_control import END_RATE
 from scm.vehicles.drivers.stop_lines import SHORT_OF_LINE
-from scm.vehicles.drivers.streets import GROUP, JUNCTION, Ways
 from scm.vehicles.jit import law
 
-HORIZON = 4.0
-FLOOR = 0.3
-HEADWAY = 1.5
-EASE = 0.25
-LONGEST_PROMISE_NS = 60_000_000_000
+HORIZON = 4.0  # distance to a line from which speed is advised [m]
+MIN_SPEED_SHARE = 0.3  # lowest advised speed, of the limit
+TIME_PER_CAR = 1.5  # that each car ahead needs to leave [s]
+MAX_SLOWDOWN = 0.25  # [m/s^2]
+MAX_GUARANTEE_NS = 60_000_000_000  # age after which a frame is ignored
 
 
 @law
 def arriving_speed(distance: float, wait: float, decel: float) -> float:
-    """Return how fast to go so as to begin to brake for a stop only after a time [m/s].
+    """Return the speed at which braking for a stop begins only after a time [m/s].
 
     Args:
         distance: To where the front would stop [m].
@@ -44,58 +44,60 @@ def arriving_speed(distance: float, wait: float, decel: float) -> float:
 
 @law
 def advised_speed(
-    distance: float, wait: float, decel: float, allowed: float, floor: float
+    distance: float, wait: float, decel: float, allowed: float, min_speed: float
 ) -> float:
-    """Return the speed to come to a line with [m/s]: `allowed` where slowing down is of no use.
+    """Return the speed for the approach to a line [m/s]; `allowed` where slowing down is useless.
 
     Args:
         distance: To where the front would stop [m].
-        wait: Until it may pass [s]; 0 or less: it may now, or nobody knows.
+        wait: Until it may pass [s]; 0 or less: now, or unknown.
         decel: Comfortable [m/s^2].
-        allowed: What it would drive without advice [m/s].
-        floor: The least speed worth advising [m/s].
+        allowed: The speed without advice [m/s].
+        min_speed: The lowest advised speed [m/s].
     """
     if wait <= 0.0:
         return allowed
     speed = arriving_speed(distance, wait, decel)
-    return min(allowed, max(floor, speed))
+    return min(allowed, max(min_speed, speed))
 
 
 @law
-def red_for(told: Told, group: int, junction: int, place: int, now_ns: int) -> float:
-    """Return for how long a group stays red at least by a frame [s]; 0 or less: not known."""
-    if place < 0 or told.fault[junction] or told.flashing[place, junction]:
+def red_for(signals: ReceivedSignals, group: int, junction: int, place: int, now_ns: int) -> float:
+    """Return the minimum time that a group stays red by a frame [s]; 0 or less: unknown."""
+    if place < 0 or signals.fault[junction] or signals.flashing[place, junction]:
         return 0.0
-    age_ns = now_ns - told.arrived_ns[place, junction]
-    left = told.min_end[place, group] - 1e-9 * age_ns
-    if told.colour[place, group] != RED or age_ns > LONGEST_PROMISE_NS or math.isnan(left):
+    age_ns = now_ns - signals.arrived_ns[place, junction]
+    left = signals.min_end[place, group] - 1e-9 * age_ns
+    if signals.colour[place, group] != RED or age_ns > MAX_GUARANTEE_NS or math.isnan(left):
         return 0.0
     return float(left)
 
 
 @law
-def is_clear(ways: Ways, sight: Ints, s: float, rear: float, at: int, line: int) -> bool:
-    """Return whether no junction lies between a car's tail and a line on lane `at` in sight."""
+def is_clear(
+    lanes: LaneArrays, lane_window: Ints, s: float, rear: float, at: int, line: int
+) -> bool:
+    """Return whether no junction is between a car's rear and a line on lane `at` of the window."""
     begin, first = -s, HERE
-    if s < rear and sight[BEHIND] >= 0:
-        begin, first = -s - ways.length[sight[BEHIND]], BEHIND
+    if s < rear and lane_window[BEHIND] >= 0:
+        begin, first = -s - lanes.length[lane_window[BEHIND]], BEHIND
     for there in range(first, at + 1):
-        lane = sight[there]
-        end = ways.line_at[line] if there == at else math.inf
-        for stretch in range(ways.stretch_first[lane], ways.stretch_first[lane + 1]):
-            if ways.stretches[stretch, 0] < end and begin + ways.stretches[stretch, 1] > -rear:
+        lane = lane_window[there]
+        end = lanes.line_at[line] if there == at else math.inf
+        for stretch in range(lanes.stretch_first[lane], lanes.stretch_first[lane + 1]):
+            if lanes.stretches[stretch, 0] < end and begin + lanes.stretches[stretch, 1] > -rear:
                 return False
-        begin += ways.length[lane]
+        begin += lanes.length[lane]
     return True
 
 
 @law
-def advice(
-    ways: Ways,
-    told: Told,
+def advised_approach(
+    lanes: LaneArrays,
+    signals: ReceivedSignals,
     kind: Floats,
     floats: Floats,
-    sight: Ints,
+    lane_window: Ints,
     ahead: Floats,
     found: int,
     car: int,
@@ -107,21 +109,21 @@ def advice(
     now_ns: int,
     seed: int,
 ) -> float:
-    """Return the speed to approach a line with, `distance` ahead of the rear axle [m/s].
+    """Return the speed for the approach to a line `distance` ahead of the rear axle [m/s].
 
-    `ahead` are the cars ahead, `found` of them, `passed` is the time since the last decision [s].
+    `ahead` holds `found` cars ahead; `passed` is the time since the last decision [s].
     """
-    if not is_clear(ways, sight, floats[S], kind[REAR], at, line):
+    if not is_clear(lanes, lane_window, floats[S], kind[REAR], at, line):
         return allowed
-    junction = ways.line_links[line, JUNCTION]
-    place = frame_for(told, junction, car, now_ns, seed)
-    wait = red_for(told, ways.line_links[line, GROUP], junction, place, now_ns)
+    junction = lanes.line_links[line, JUNCTION]
+    place = frame_for(signals, junction, car, now_ns, seed)
+    wait = red_for(signals, lanes.line_links[line, GROUP], junction, place, now_ns)
     if wait <= 0.0:
         return allowed
     for other in range(found):
-        wait += HEADWAY if ahead[other, REAR_AT] < distance else 0.0
-    room = distance - kind[FRONT] - SHORT_OF_LINE
-    floor = FLOOR * ways.rules.limit[line]
-    wished = advised_speed(room, wait, kind[DECEL], allowed, floor)
-    eased = floats[PACE] - EASE * max(0.0, passed)
-    return float(min(allowed, max(wished, eased)))
+        wait += TIME_PER_CAR if ahead[other, REAR_AT] < distance else 0.0
+    distance_left = distance - kind[FRONT] - SHORT_OF_LINE
+    min_speed = MIN_SPEED_SHARE * lanes.rules.limit[line]
+    target = advised_speed(distance_left, wait, kind[DECEL], allowed, min_speed)
+    slowed = floats[SPEED_SETPOINT] - MAX_SLOWDOWN * max(0.0, passed)
+    return float(min(allowed, max(target, slowed)))

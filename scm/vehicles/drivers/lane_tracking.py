@@ -1,4 +1,4 @@
-"""Where a car is along its way, and what lies ahead: compiled, over straights and arcs.
+"""Where a car is along its route, and which lane segments are around it: compiled.
 
 On an arc of curvature k that begins at the origin towards +x, the point (u, v) has its foot at
 s = atan2(k u, 1 - k v) / k and lies (2 v - k (u^2 + v^2)) / (1 + sqrt((k u)^2 + (1 - k v)^2)) to
@@ -8,8 +8,8 @@ the left of it; for k = 0 that is (u, v) itself.
 import math
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.drivers.chance import mixed
-from scm.vehicles.drivers.memory import (
+from scm.vehicles.drivers.channel import pcg_hash
+from scm.vehicles.drivers.driver_state import (
     AFTER,
     BEHIND,
     BESIDE,
@@ -17,84 +17,86 @@ from scm.vehicles.drivers.memory import (
     COUNT,
     DONE,
     HERE,
-    IN_SIGHT,
     INDEX,
     LOOP,
     ROUTE,
     SEED,
-    Memory,
+    WINDOW_SIZE,
+    DriverState,
     S,
 )
-from scm.vehicles.drivers.streets import AT, COS, CURVATURE, LENGTH, SIN, Ways, X, Y
+from scm.vehicles.drivers.lane_graph import AT, COS, CURVATURE, LENGTH, SIN, LaneArrays, X, Y
 from scm.vehicles.jit import array_kernel, law
 
 TURN = 2.0 * math.pi
-MOST_STEPS = 16
+MAX_STEPS = 16  # segments that one call moves on; a car passes fewer between decisions
 
 
 @law
-def lane_at(ways: Ways, memory: Memory, car: int, index: int, before: int) -> int:
-    """Return lane number `index` of a car's way, given the one before it; -1 beyond the end."""
-    ints = memory.ints[car]
+def lane_at(lanes: LaneArrays, state: DriverState, car: int, index: int, before: int) -> int:
+    """Return lane number `index` of a car's route, given the one before it; -1 beyond the end."""
+    ints = state.ints[car]
     if 0 <= index < ints[COUNT]:
-        return int(memory.routes[ints[ROUTE] + index])
+        return int(state.routes[ints[ROUTE] + index])
     if ints[AFTER] == LOOP:
-        return int(memory.routes[ints[ROUTE] + index % ints[COUNT]])
+        return int(state.routes[ints[ROUTE] + index % ints[COUNT]])
     if ints[AFTER] != CIRCULATE or before < 0:
         return -1
-    first = ways.next_first[before]
-    choices = ways.next_first[before + 1] - first
+    first = lanes.next_first[before]
+    choices = lanes.next_first[before + 1] - first
     if choices == 0:
         return -1
-    return int(ways.following[first + mixed(ints[SEED], index) % choices])
+    return int(lanes.following[first + pcg_hash(ints[SEED], index) % choices])
 
 
 @array_kernel
-def look_from(ways: Ways, memory: Memory, car: int, lane: int) -> None:
-    """Fill a car's sight from the lane it is on; its INDEX says which of its way that is."""
-    sight = memory.sight[car]
-    loops = memory.ints[car, AFTER] == LOOP
-    sight[BEHIND] = lane_at(ways, memory, car, memory.ints[car, INDEX] - 1, -1) if loops else -1
-    sight[HERE] = lane
-    for ahead in range(HERE + 1, IN_SIGHT):
-        index = memory.ints[car, INDEX] + ahead - HERE
-        sight[ahead] = lane_at(ways, memory, car, index, sight[ahead - 1])
+def fill_window(lanes: LaneArrays, state: DriverState, car: int, lane: int) -> None:
+    """Fill a car's lane window from its current lane; INDEX is that lane's place on the route."""
+    lane_window = state.lane_window[car]
+    loops = state.ints[car, AFTER] == LOOP
+    lane_window[BEHIND] = (
+        lane_at(lanes, state, car, state.ints[car, INDEX] - 1, -1) if loops else -1
+    )
+    lane_window[HERE] = lane
+    for ahead in range(HERE + 1, WINDOW_SIZE):
+        index = state.ints[car, INDEX] + ahead - HERE
+        lane_window[ahead] = lane_at(lanes, state, car, index, lane_window[ahead - 1])
 
 
 @law
-def choose_again(ways: Ways, memory: Memory, car: int) -> None:
-    """Let a car that circulates turn elsewhere behind the lane it is on; a route stays as it is."""
-    ints, sight = memory.ints[car], memory.sight[car]
-    ints[SEED] = mixed(ints[SEED], ints[INDEX])
-    for ahead in range(HERE + 1, IN_SIGHT):
+def choose_other_branch(lanes: LaneArrays, state: DriverState, car: int) -> None:
+    """Choose other branches after the current lane for a circulating car; fixed routes stay."""
+    ints, lane_window = state.ints[car], state.lane_window[car]
+    ints[SEED] = pcg_hash(ints[SEED], ints[INDEX])
+    for ahead in range(HERE + 1, WINDOW_SIZE):
         index = ints[INDEX] + ahead - HERE
-        sight[ahead] = lane_at(ways, memory, car, index, sight[ahead - 1])
+        lane_window[ahead] = lane_at(lanes, state, car, index, lane_window[ahead - 1])
 
 
 @law
-def go_on(ways: Ways, memory: Memory, car: int) -> None:
-    """Move a car's sight on by one lane."""
-    sight = memory.sight[car]
-    for ahead in range(IN_SIGHT - 1):
-        sight[ahead] = sight[ahead + 1]
-    memory.ints[car, INDEX] += 1
-    index = memory.ints[car, INDEX] + IN_SIGHT - 1 - HERE
-    sight[IN_SIGHT - 1] = lane_at(ways, memory, car, index, sight[IN_SIGHT - 2])
+def advance_window(lanes: LaneArrays, state: DriverState, car: int) -> None:
+    """Advance a car's lane window by one lane."""
+    lane_window = state.lane_window[car]
+    for ahead in range(WINDOW_SIZE - 1):
+        lane_window[ahead] = lane_window[ahead + 1]
+    state.ints[car, INDEX] += 1
+    index = state.ints[car, INDEX] + WINDOW_SIZE - 1 - HERE
+    lane_window[WINDOW_SIZE - 1] = lane_at(lanes, state, car, index, lane_window[WINDOW_SIZE - 2])
 
 
 @law
-def go_back(memory: Memory, car: int) -> None:
-    """Move a car's sight back by the one lane that it remembers."""
-    sight = memory.sight[car]
-    for ahead in range(IN_SIGHT - 1, 0, -1):
-        sight[ahead] = sight[ahead - 1]
-    sight[BEHIND] = -1
-    memory.ints[car, INDEX] -= 1
+def step_back_window(state: DriverState, car: int) -> None:
+    """Move a car's lane window back by one lane."""
+    lane_window = state.lane_window[car]
+    for ahead in range(WINDOW_SIZE - 1, 0, -1):
+        lane_window[ahead] = lane_window[ahead - 1]
+    lane_window[BEHIND] = -1
+    state.ints[car, INDEX] -= 1
 
 
 @law
 def segment_at(first: Ints, segments: Floats, lane: int, s: float) -> int:
-    """Return the segment that holds a distance along a lane."""
+    """Return the segment at a distance along a lane."""
     segment = first[lane]
     last = first[lane + 1] - 1
     while segment < last and s >= segments[segment + 1, AT]:
@@ -103,11 +105,11 @@ def segment_at(first: Ints, segments: Floats, lane: int, s: float) -> int:
 
 
 @law
-def foot(row: Floats, x: float, y: float, near: float) -> tuple[float, float, float, float]:
-    """Return a point's place by a segment: along it, left of it, and the direction at its foot.
+def project(row: Floats, x: float, y: float, near: float) -> tuple[float, float, float, float]:
+    """Project a point on a segment: distance along it, offset to the left, direction there.
 
-    The direction is (cos, sin) of what the segment has turned since its start. On a long arc the
-    foot is looked for within half a turn of `near` [m].
+    The direction is (cos, sin) relative to the segment's start. On a long arc the projection is
+    the one within half a turn of `near` [m].
     """
     dx, dy = x - row[X], y - row[Y]
     u, v = dx * row[COS] + dy * row[SIN], dy * row[COS] - dx * row[SIN]
@@ -118,75 +120,79 @@ def foot(row: Floats, x: float, y: float, near: float) -> tuple[float, float, fl
     radius = math.sqrt(p * p + q * q)
     turned = math.atan2(p, q)
     turned += TURN * math.floor((k * near - turned) / TURN + 0.5)
-    return turned / k, (2.0 * v - k * (u * u + v * v)) / (1.0 + radius), q / radius, p / radius
+    return (
+        turned / k,
+        (2.0 * v - k * (u * u + v * v)) / (1.0 + radius),
+        q / radius,
+        p / radius,
+    )
 
 
 @law
-def locate(ways: Ways, memory: Memory, car: int, x: float, y: float) -> None:
-    """Find a car's foot on its way, walking from where it was; count what it has driven."""
-    sight, floats = memory.sight[car], memory.floats[car]
-    segment = segment_at(ways.segment_first, ways.segments, sight[HERE], floats[S])
-    near = floats[S] - ways.segments[segment, AT]
-    gone, walked = -floats[S], 0
+def update_position(lanes: LaneArrays, state: DriverState, car: int, x: float, y: float) -> None:
+    """Update a car's place on its route from its last one, and the distance driven."""
+    lane_window, floats = state.lane_window[car], state.floats[car]
+    segment = segment_at(lanes.segment_first, lanes.segments, lane_window[HERE], floats[S])
+    near = floats[S] - lanes.segments[segment, AT]
+    moved, walked = -floats[S], 0
     along = beside = 0.0
-    for _ in range(MOST_STEPS):
-        lane = sight[HERE]
-        row = ways.segments[segment]
-        along, beside, _c, _s = foot(row, x, y, near)
+    for _ in range(MAX_STEPS):
+        lane = lane_window[HERE]
+        row = lanes.segments[segment]
+        along, beside, _c, _s = project(row, x, y, near)
         step = 1 if along > row[LENGTH] else (-1 if along < 0.0 else 0)
-        if step in (0, -walked):  # in a bend a point may lie between two normals
+        if step in (0, -walked):  # in a bend a point can lie between two normals
             break
-        if step > 0 and segment + 1 < ways.segment_first[lane + 1]:
+        if step > 0 and segment + 1 < lanes.segment_first[lane + 1]:
             segment += 1
-        elif step > 0 and sight[HERE + 1] >= 0:
-            gone += ways.length[lane]
-            go_on(ways, memory, car)
-            segment = ways.segment_first[sight[HERE]]
-        elif step < 0 and segment > ways.segment_first[lane]:
+        elif step > 0 and lane_window[HERE + 1] >= 0:
+            moved += lanes.length[lane]
+            advance_window(lanes, state, car)
+            segment = lanes.segment_first[lane_window[HERE]]
+        elif step < 0 and segment > lanes.segment_first[lane]:
             segment -= 1
-        elif step < 0 and sight[BEHIND] >= 0:
-            go_back(memory, car)
-            gone -= ways.length[sight[HERE]]
-            segment = ways.segment_first[sight[HERE] + 1] - 1
+        elif step < 0 and lane_window[BEHIND] >= 0:
+            step_back_window(state, car)
+            moved -= lanes.length[lane_window[HERE]]
+            segment = lanes.segment_first[lane_window[HERE] + 1] - 1
         else:
             break
         walked = step
-        near = 0.0 if step > 0 else ways.segments[segment, LENGTH]
-    row = ways.segments[segment]
+        near = 0.0 if step > 0 else lanes.segments[segment, LENGTH]
+    row = lanes.segments[segment]
     s = row[AT] + min(max(along, 0.0), row[LENGTH])
     floats[S], floats[BESIDE] = s, beside
-    floats[DONE] += gone + s
+    floats[DONE] += moved + s
 
 
 @law
-def survey(
+def list_segments(
     first: Ints,
     segments: Floats,
-    sight: Ints,
+    lane_window: Ints,
     s: float,
     back: float,
     reach: float,
     ids: Ints,
     begins: Floats,
 ) -> tuple[int, int, bool]:
-    """List the segments of a way around a place on it.
+    """List the segments of a route around a car.
 
     Args:
-        first: Of each lane, its first segment.
+        first: First segment of each lane.
         segments: Of all lanes.
-        sight: The car's lanes in sight.
-        s: Its place on the lane it is on [m].
-        back: How far to look back [m].
-        reach: How far to look ahead [m].
-        ids: Takes the segments, in driving order.
-        begins: Takes where each begins, counted from the place [m]; one more for the last one's
-            end.
+        lane_window: Of the car.
+        s: Its place on its lane [m].
+        back: Distance to look back [m].
+        reach: Distance to look ahead [m].
+        ids: Output: the segments, in driving order.
+        begins: Output: where each begins, relative to the car [m], and the end of the last one.
 
     Returns:
-        How many there are, which of them holds the place, and whether the way ends in sight.
+        Number of segments, index of the car's own, and whether the route ends within reach.
     """
-    at, segment, begin, here = look_back(first, segments, sight, s, back)
-    lane = sight[at]
+    at, segment, begin, here = first_segment_behind(first, segments, lane_window, s, back)
+    lane = lane_window[at]
     count = 0
     while True:
         ids[count], begins[count] = segment, begin
@@ -198,33 +204,33 @@ def survey(
         segment += 1
         if segment == first[lane + 1]:
             at += 1
-            if at == IN_SIGHT or sight[at] < 0:
-                ends = at < IN_SIGHT
+            if at == WINDOW_SIZE or lane_window[at] < 0:
+                ends = at < WINDOW_SIZE
                 break
-            lane = sight[at]
+            lane = lane_window[at]
             segment = first[lane]
     begins[count] = begin
     return count, min(here, count - 1), ends
 
 
 @law
-def look_back(
-    first: Ints, segments: Floats, sight: Ints, s: float, back: float
+def first_segment_behind(
+    first: Ints, segments: Floats, lane_window: Ints, s: float, back: float
 ) -> tuple[int, int, float, int]:
-    """Return the first segment that a survey needs.
+    """Return the segment at a distance behind the car.
 
     Returns:
-        Which lane in sight it is on, its number, where it begins from the car's place on [m], and
-        how many segments later that place is.
+        Its lane in the window, its number, its start relative to the car [m], and how many
+        segments later the car is.
     """
-    at, lane, here = HERE, sight[HERE], 0
+    at, lane, here = HERE, lane_window[HERE], 0
     segment = segment_at(first, segments, lane, s)
     begin = segments[segment, AT] - s
     while begin > -back:
         if segment > first[lane]:
             segment -= 1
-        elif at == HERE and sight[BEHIND] >= 0:
-            at, lane = BEHIND, sight[BEHIND]
+        elif at == HERE and lane_window[BEHIND] >= 0:
+            at, lane = BEHIND, lane_window[BEHIND]
             segment = first[lane + 1] - 1
         else:
             break
@@ -234,12 +240,12 @@ def look_back(
 
 
 @law
-def turned(
+def heading_change(
     segments: Floats, ids: Ints, begins: Floats, count: int, here: int, offset: float
 ) -> float:
-    """Return by how much the way turns from the car's place to an offset along it [rad], + = left.
+    """Return the change of heading from the car to an offset along its route [rad], + = left.
 
-    Beyond what was surveyed the way is taken as straight.
+    Beyond the listed segments the route is assumed straight.
     """
     total = 0.0
     at = here

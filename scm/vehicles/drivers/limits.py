@@ -1,4 +1,4 @@
-"""What a driver must know of its car, read from the car file."""
+"""The limits of a car that its driver needs, read from the car file."""
 
 import math
 
@@ -9,8 +9,8 @@ from scm.vehicles.driver import CarLimits
 def limits_of(car: Car) -> CarLimits:
     """Return the limits of a car.
 
-    Where the servo is a lag and not a rate, or the map from command to angle is curved, the
-    numbers are those of the linear servo that is closest around the middle.
+    If the servo is a lag and not a rate, or the map from command to angle is curved, the numbers
+    are those of the linear servo that is closest around the centre.
     """
     rear, front = car.vector("body.footprint_x_m")
     right, left = car.vector("body.footprint_y_m")
@@ -44,7 +44,7 @@ def _steer_rate(car: Car, limit: float) -> float:
 
 
 def turning_radius_m(car: Car) -> float:
-    """Return the radius of the tightest circle that the middle of the rear axle drives [m]."""
+    """Return the radius of the tightest circle of the rear axle's centre [m]."""
     lock = _steer_limit(car)
     if any(term.name == "steer_map_tanh" for term in car.terms):
         lock = min(

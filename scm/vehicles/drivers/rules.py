@@ -1,6 +1,6 @@
-"""Who goes first at each line of a map, as flat arrays: what signs say, and where ways meet.
+"""Right of way at each line of a map, as flat arrays: signs, and where paths cross.
 
-Places along a way over a junction count from its line: u < 0 before it, u > 0 behind it.
+A "way" is a path over a junction. Places along it count from its line: u < 0 before, u > 0 behind.
 """
 
 import math
@@ -18,36 +18,36 @@ from scm.maps.route import Roads
 from scm.maps.signs import Turn, precedence_at, turn_of
 from scm.records.city_map import Conflict
 
-# What a line asks for: to obey its signal, to stop, to give way, or right before left.
+# Kind of a line: with a signal, a stop sign, a give-way sign, or none (right before left).
 LIT, STOP_SIGN, GIVE_WAY, PLAIN = range(4)
 
-LOOK_BACK_S = 8.0
-LEAST_BACK_M = 1.5
-MOST_BACK_M = 6.0
-BEYOND_M = 0.2
-DEEPEST = 3
-SHORT = 0.04
-ACROSS_RAD = math.radians(45.0)
+LOOK_BACK_S = 8.0  # driving time before a line within which other cars matter
+MIN_BACK_M = 1.5
+MAX_BACK_M = 6.0
+BEYOND_M = 0.2  # behind a junction that still belongs to a way
+MAX_LANES = 3  # between a line and the lane that crosses the junction
+TOLERANCE_M = 0.04  # a conflict may begin this far before its line
+ACROSS_RAD = math.radians(45.0)  # lines at a larger angle come from the side
 _SIGNED = {"stop": STOP_SIGN, "give_way": GIVE_WAY, None: PLAIN}
 
 
 class Rules(NamedTuple):
-    """The arrays: n lines in the order of `Ways`, w ways over their junctions, p pairs of ways.
+    """The arrays: n lines in the order of `LaneArrays`, w ways over junctions, p pairs of ways.
 
     Attributes:
-        kind: (n,) what a line asks for, see above.
+        kind: (n,) kind of each line, see above.
         order: (n,) its place among the lines of its junction.
         all_stop: (n,) whether all lines of its junction have a stop sign.
         limit: (n,) speed limit at the line [m/s].
-        window: (n, 4) left, low, right, high of all that matters at its junction [m].
-        peer_first: (n + 1,) where a line's peers begin: the other lines of its junction.
-        feed_first: (n + 1,) likewise the segments that lead to it, `feed_begin` where each begins.
-        way_first: (n + 1,) likewise its ways.
-        way_lane: (w,) the lane of the junction that a way takes, `way_depth` lanes after the line.
-        path_first: (w + 1,) likewise the segments of a way, `path_begin` where each begins.
-        pair_first: (w + 1,) likewise the ways that meet a way: `pair_way`.
+        window: (n, 4) left, low, right, high of the area that matters at its junction [m].
+        peer_first: (n + 1,) start of each line's `peers`: the other lines of its junction.
+        feed_first: (n + 1,) start of each line's approach segments; `feed_begin` is their place.
+        way_first: (n + 1,) start of each line's ways.
+        way_lane: (w,) the way's lane in the junction, `way_depth` lanes after the line.
+        path_first: (w + 1,) start of each way's segments; `path_begin` is their place.
+        pair_first: (w + 1,) start of each way's conflicting ways: `pair_way`.
         pair_yields: (p,) whether the way gives way to the other one.
-        zones: (p, 4) from and to of where they meet, on the way and on the other one.
+        zones: (p, 4) from and to of the conflict zone, on the way and on the other one.
     """
 
     kind: Ints
@@ -76,9 +76,9 @@ class Line(NamedTuple):
     """A line at which cars wait.
 
     Attributes:
-        junction: Counted through the junctions with lights, then the crossings without.
-        group: Counted through all groups; -1: no lights.
-        ways: Of its group, or its approach.
+        junction: Number over the junctions with signals, then the crossings without.
+        group: Number over all signal groups; -1: no signals.
+        ways: Of its group or its approach.
     """
 
     lane: str
@@ -121,12 +121,12 @@ def lines_of(roads: Roads) -> list[list[Line]]:
 
 
 class RuleBook:
-    """Works out the rules of one map.
+    """Builds the rules of one map.
 
     Args:
         roads: Its lanes.
-        lines: As `lines_of` found them.
-        segment_first: Of each lane, its first segment among all.
+        lines: From `lines_of`.
+        segment_first: First segment of each lane.
     """
 
     def __init__(self, roads: Roads, lines: list[list[Line]], segment_first: Ints) -> None:
@@ -139,7 +139,7 @@ class RuleBook:
         for name in names:
             for after in roads.successors(name):
                 self._before.setdefault(after, []).append(name)
-        self._back = min(MOST_BACK_M, max(LEAST_BACK_M, LOOK_BACK_S * self._fastest()))
+        self._back = min(MAX_BACK_M, max(MIN_BACK_M, LOOK_BACK_S * self._fastest()))
         self._members: dict[int, list[int]] = {}
         for number, line in enumerate(self._lines):
             self._members.setdefault(line.junction, []).append(number)
@@ -195,16 +195,16 @@ class RuleBook:
         return next(limit for at, limit in reversed(limits) if at <= line.at_m)
 
     def _ways_from(self, number: int, line: Line) -> list[_Way]:
-        """Return the ways that can be reached from a line without passing through many lanes."""
+        """Return the ways from a line, over at most MAX_LANES lanes."""
         wanted: dict[str, list[Conflict]] = {}
         for move in line.ways:
             wanted.setdefault(move.lane, []).append(move)
         found: list[_Way] = []
         chains: list[tuple[tuple[str, ...], float]] = [((line.lane,), -line.at_m)]
-        for _ in range(DEEPEST + 1):
+        for _ in range(MAX_LANES + 1):
             longer: list[tuple[tuple[str, ...], float]] = []
             for chain, begin in chains:
-                lane, least = chain[-1], line.at_m - SHORT if len(chain) == 1 else 0.0
+                lane, least = chain[-1], line.at_m - TOLERANCE_M if len(chain) == 1 else 0.0
                 for move in wanted.get(lane, ()):
                     if move.from_m >= least:
                         turn = turn_of(self._roads.definition(lane))
@@ -215,7 +215,7 @@ class RuleBook:
         return found
 
     def _path(self, way: _Way) -> list[tuple[int, float]]:
-        """Return the segments from a line over its junction, and a little beyond it."""
+        """Return the segments from a line to BEYOND_M behind its junction."""
         roads, rows = self._roads, []
         end = way.begin + way.move.to_m + BEYOND_M
         begin = way.begin - sum(roads.length_of(name) for name in way.lanes[:-1])
@@ -232,7 +232,7 @@ class RuleBook:
         return rows
 
     def _feed(self, line: Line) -> list[tuple[int, float]]:
-        """Return the segments that lead to a line, from all sides."""
+        """Return all segments that lead to a line."""
         rows, open_ = [], [(line.lane, -line.at_m)]
         while open_:
             lane, begin = open_.pop()
@@ -245,7 +245,7 @@ class RuleBook:
         return rows
 
     def _segments(self, lane: str) -> list[tuple[int, float, float]]:
-        """Return number, place on the lane and length of a lane's segments."""
+        """Return number, place on the lane, and length of a lane's segments."""
         first = int(self._segment_first[self._numbers[lane]])
         lengths = [length for length, _ in cut_segments(self._roads, lane)]
         starts = accumulate(lengths, initial=0.0)
@@ -255,7 +255,7 @@ class RuleBook:
     def _pairs(
         self, way: _Way, peers: list[list[int]], of_line: list[list[int]], order: dict[int, int]
     ) -> list[tuple[int, bool, tuple[float, ...]]]:
-        """Return what meets a way: the other way, whether it gives way to it, and where."""
+        """Return a way's conflicts: the other way, whether it has right of way, and the zone."""
         rows: list[tuple[int, bool, tuple[float, ...]]] = []
         for peer in peers[way.line]:
             for number in of_line[peer]:
@@ -273,9 +273,9 @@ class RuleBook:
         return rows
 
     def _yields(self, way: _Way, other: _Way, order: dict[int, int]) -> bool:
-        """Return whether a way gives way: by signs, else right before left, left after oncoming.
+        """Return whether a way gives way: by signs, else right before left, left turns last.
 
-        Where cars drive on the left it is the other way round.
+        Mirrored where cars drive on the left.
         """
         mine, theirs = self._lines[way.line], self._lines[other.line]
         is_major, other_is_major = mine.kind in (LIT, PLAIN), theirs.kind in (LIT, PLAIN)
@@ -292,7 +292,7 @@ class RuleBook:
         return order[way.line] > order[other.line]
 
     def _pose(self, line: Line) -> Pose2:
-        """Return where a line is, and its lane's heading there."""
+        """Return a line's place and its lane's heading there."""
         pose, left = Pose2(*self._roads.definition(line.lane).start), line.at_m
         for segment in self._roads.definition(line.lane).segments:
             length, curvature = extent(segment)
@@ -303,7 +303,7 @@ class RuleBook:
         return pose
 
     def _windows(self) -> list[tuple[float, ...]]:
-        """Return what must be looked at around each line: as far as cars come from."""
+        """Return the area around each line in which other cars matter."""
         boxes = {}
         for junction, row in self._members.items():
             xs, ys = zip(
@@ -315,7 +315,7 @@ class RuleBook:
 
 
 def cut_segments(roads: Roads, lane: str) -> list[tuple[float, float]]:
-    """Return length and curvature of a lane's segments, cut where a speed limit begins."""
+    """Return length and curvature of a lane's segments, split where a speed limit begins."""
     cuts = [at for at, _ in roads.limits_on(lane)]
     rows, begin = [], 0.0
     for segment in roads.definition(lane).segments:

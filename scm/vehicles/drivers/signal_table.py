@@ -1,9 +1,10 @@
-"""What was last told of the signals, junction by junction, for every receiver of the air.
+"""The last received SPATEMs and monitor states of each junction.
 
-One table serves one car, or a whole crowd: where frames get lost, it keeps the last few of them,
-and each reader takes the newest one that reached it.
+One table serves one car or a whole batch of drivers. On a lossy channel it stores the last few
+frames, and each driver uses the newest one that reached it.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,30 +18,30 @@ from scm.v2x.etsi.convert import REVISIONS, colours_of
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Colour
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived, ideal
-from scm.vehicles.jit import law
+from scm.vehicles.jit import law, plain
 
-FRESH_NS = NS_PER_S
-RESOLUTION_S = 0.1
+MAX_AGE_NS = NS_PER_S  # SPATEMs come at 10 Hz
+RESOLUTION_S = 0.1  # of a SPATEM's times
 
 COLOURS: tuple[Colour | None, ...] = (None, "green", "yellow", "red", "flashing_red", "dark")
 UNKNOWN, GREEN, YELLOW, RED, FLASHING, _DARK = range(6)
 _CODES = {colour: code for code, colour in enumerate(COLOURS)}
-_SALT = 77
+_SPATEM_SALT = 77  # sender ids of roadside units, apart from those of cars and hazards
 
 
-class Told(NamedTuple):
-    """The arrays: j junctions, g groups counted through all of them, m frames kept of each.
+class ReceivedSignals(NamedTuple):
+    """The arrays: j junctions, g signal groups over all junctions, m stored frames per junction.
 
     Attributes:
-        newest: (j,) which of the frames kept is the newest.
-        number: (m, j) of each frame, -1: there is none.
-        arrived_ns: (m, j).
-        flashing: (m, j) whether the frame says that the junction is out of order.
-        colour: (m, g) by their place in `COLOURS`.
-        min_end: (m, g) for how long the colour lasts at least [s] after arrival, NaN: unknown.
-        fault: (j,) whether the monitor has found a fault.
-        place: (j, 2) where the roadside units stand [m].
-        channel: What the air does to SPATEMs on their way.
+        newest: (j,) row of the newest frame.
+        number: (m, j) sequence number of each frame; -1: none.
+        arrived_ns: (m, j) reception times.
+        flashing: (m, j) whether the frame reports a junction out of order.
+        colour: (m, g) index into `COLOURS`.
+        min_end: (m, g) minimum remaining time of the colour at reception [s]; NaN: unknown.
+        fault: (j,) whether the monitor has latched a fault.
+        place: (j, 2) position of the roadside unit [m].
+        channel: The radio channel of SPATEMs.
     """
 
     newest: Ints
@@ -55,104 +56,134 @@ class Told(NamedTuple):
 
 
 class SignalTable:
-    """The signals of one map.
+    """The signals of one map, as received.
 
     Attributes:
-        told: The arrays.
-        ignored: Frames of another map, or another revision of it.
+        received: The arrays.
+        ignored: Number of frames of another map, or of another revision of it.
     """
 
-    def __init__(self, city_map: CityMap, kept: int = 1, channel: Channel | None = None) -> None:
+    def __init__(self, city_map: CityMap, history: int = 1, channel: Channel | None = None) -> None:
         self._revision = city_map.revision % REVISIONS
-        self._kept = kept
-        self._junctions = {junction.number: n for n, junction in enumerate(city_map.junctions)}
-        self._names = {junction.name: n for n, junction in enumerate(city_map.junctions)}
-        numbers: list[dict[int, int]] = []
-        count = 0
-        for junction in city_map.junctions:
-            numbers.append({group.number: count + k for k, group in enumerate(junction.groups)})
-            count += len(junction.groups)
-        self._groups = numbers
-        junctions = len(numbers)
-        self.told = Told(
-            newest=np.zeros(junctions, np.int64),
-            number=np.full((kept, junctions), -1, np.int64),
-            arrived_ns=np.zeros((kept, junctions), np.int64),
-            flashing=np.zeros((kept, junctions), np.bool_),
-            colour=np.zeros((kept, count), np.int64),
-            min_end=np.full((kept, count), np.nan),
-            fault=np.zeros(junctions, np.bool_),
-            place=np.array([roadside_place(city_map, j.name) for j in city_map.junctions]).reshape(
-                -1, 2
-            ),
+        self._history = history
+        junctions = city_map.junctions
+        self._junctions = {junction.number: n for n, junction in enumerate(junctions)}
+        self._names = {junction.name: n for n, junction in enumerate(junctions)}
+        groups = [(junction, group) for junction in junctions for group in junction.groups]
+        self._group_names = {(j.name, group.name): n for n, (j, group) in enumerate(groups)}
+        self._groups: list[dict[int, int]] = [{} for _ in junctions]
+        for n, (junction, group) in enumerate(groups):
+            self._groups[self._names[junction.name]][group.number] = n
+        shape = history, len(junctions)
+        self.received = ReceivedSignals(
+            newest=np.zeros(len(junctions), np.int64),
+            number=np.full(shape, -1, np.int64),
+            arrived_ns=np.zeros(shape, np.int64),
+            flashing=np.zeros(shape, np.bool_),
+            colour=np.zeros((history, len(groups)), np.int64),
+            min_end=np.full((history, len(groups)), np.nan),
+            fault=np.zeros(len(junctions), np.bool_),
+            place=np.array([roadside_place(city_map, j.name) for j in junctions]).reshape(-1, 2),
             channel=channel or ideal(),
         )
         self._frames = 0
         self.ignored = 0
 
-    def hear_spatem(self, body: SpatemBody, arrived_ns: int) -> None:
-        """Take a SPATEM that arrived at `arrived_ns`; one of another map is ignored and counted."""
+    def receive_spatem(self, body: SpatemBody, arrived_ns: int) -> None:
+        """Store a SPATEM that arrived at `arrived_ns`; count and ignore one of another map."""
         junction = self._junctions.get(body.intersection)
         if junction is None or body.revision != self._revision:
             self.ignored += 1
             return
-        told, groups = self.told, self._groups[junction]
-        place = (int(told.newest[junction]) + 1) % self._kept
-        told.newest[junction] = place
-        told.number[place, junction] = self._frames
+        received, groups = self.received, self._groups[junction]
+        place = (int(received.newest[junction]) + 1) % self._history
+        received.newest[junction] = place
+        received.number[place, junction] = self._frames
         self._frames += 1
-        told.arrived_ns[place, junction] = arrived_ns
-        told.flashing[place, junction] = "failureFlash" in body.status
+        received.arrived_ns[place, junction] = arrived_ns
+        received.flashing[place, junction] = "failureFlash" in body.status
         for group in groups.values():
-            told.colour[place, group] = UNKNOWN
+            received.colour[place, group] = UNKNOWN
         for number, state in colours_of(body).items():
             group_at = groups.get(number)
             if group_at is not None:
-                told.colour[place, group_at] = _CODES[state.colour]
-                told.min_end[place, group_at] = (
+                received.colour[place, group_at] = _CODES[state.colour]
+                received.min_end[place, group_at] = (
                     np.nan if state.min_end_s is None else state.min_end_s
                 )
 
-    def hear_monitor(self, status: MonitorStatus) -> None:
-        """Take the monitor's verdict on a junction; a fault stands until the monitor lifts it."""
+    def receive_monitor_status(self, status: MonitorStatus) -> None:
+        """Store a junction's fault state; a fault stays until the monitor clears it."""
         junction = self._names.get(status.junction)
         if junction is not None:
-            self.told.fault[junction] = status.fault is not None
+            self.received.fault[junction] = status.fault is not None
+
+    def colour(self, junction: str, group: str, now_ns: int) -> Colour | None:
+        """Return the colour to act on, or None without usable data; see `usable_colour`."""
+        number = self._group_names.get((junction, group))
+        if number is None:
+            return None
+        at, received = self._names[junction], self.received
+        place = int(received.newest[at]) if received.number[received.newest[at], at] >= 0 else -1
+        colour: Colour | None = COLOURS[_usable_colour(received, number, at, place, now_ns)]
+        return colour
+
+    def may_go(self, junction: str, group: str, now_ns: int) -> bool:
+        """Return whether a car may pass the group's stop line now."""
+        return self.colour(junction, group, now_ns) == "green"
+
+    def time_to_change(self, junction: str, group: str, now_ns: int) -> float | None:
+        """Return the minimum time until the colour changes [s], or None when unknown."""
+        if self.colour(junction, group, now_ns) in (None, "flashing_red"):
+            return None
+        at, received = self._names[junction], self.received
+        place = received.newest[at]
+        min_end = float(received.min_end[place, self._group_names[junction, group]])
+        if math.isnan(min_end):
+            return None
+        return max(0.0, min_end - 1e-9 * int(now_ns - received.arrived_ns[place, at]))
 
 
 @law
-def frame_for(told: Told, junction: int, receiver: int, now_ns: int, seed: int) -> int:
-    """Return the place of the newest frame of a junction that reached a receiver, or -1."""
-    kept = len(told.number)
-    for older in range(kept):
-        place = (told.newest[junction] - older) % kept
-        number = told.number[place, junction]
+def frame_for(
+    received: ReceivedSignals, junction: int, receiver: int, now_ns: int, seed: int
+) -> int:
+    """Return the row of the newest frame of a junction that reached a receiver, or -1."""
+    history = len(received.number)
+    for older in range(history):
+        place = (received.newest[junction] - older) % history
+        number = received.number[place, junction]
         if number < 0:
             return -1
-        if told.channel.numbers[IDEAL] > 0.0:
+        if received.channel.numbers[IDEAL] > 0.0:
             return int(place)
-        age_ns = now_ns - told.arrived_ns[place, junction]
-        x, y = told.place[junction, 0], told.place[junction, 1]
-        sender = -_SALT - junction
-        if has_arrived(told.channel, seed, sender, receiver, number, x, y, age_ns):
+        age_ns = now_ns - received.arrived_ns[place, junction]
+        x, y = received.place[junction, 0], received.place[junction, 1]
+        sender = -_SPATEM_SALT - junction
+        if has_arrived(received.channel, seed, sender, receiver, number, x, y, age_ns):
             return int(place)
     return -1
 
 
 @law
-def believed(told: Told, group: int, junction: int, place: int, now_ns: int) -> int:
-    """Return the colour to act on, by its place in `COLOURS`; 0 when nothing is to be believed.
+def usable_colour(
+    received: ReceivedSignals, group: int, junction: int, place: int, now_ns: int
+) -> int:
+    """Return the colour to act on as an index into `COLOURS`; UNKNOWN without usable data.
 
-    A green whose promised earliest end has passed counts as yellow until the next frame says that
-    it goes on: a car that can stop then does.
+    A green counts as yellow once its guaranteed time has passed, until the next frame confirms it:
+    a car that can stop then stops.
     """
     if place < 0:
         return UNKNOWN
-    age_ns = now_ns - told.arrived_ns[place, junction]
-    if abs(age_ns) > FRESH_NS:
+    age_ns = now_ns - received.arrived_ns[place, junction]
+    if abs(age_ns) > MAX_AGE_NS:
         return UNKNOWN
-    if told.flashing[place, junction] or told.fault[junction]:
+    if received.flashing[place, junction] or received.fault[junction]:
         return FLASHING
-    colour = told.colour[place, group]
-    lapsed = 1e-9 * age_ns > told.min_end[place, group] + RESOLUTION_S
+    colour = received.colour[place, group]
+    lapsed = 1e-9 * age_ns > received.min_end[place, group] + RESOLUTION_S
     return YELLOW if colour == GREEN and lapsed else int(colour)
+
+
+_usable_colour = plain(usable_colour)

@@ -4,11 +4,11 @@
 
 e is the lateral error of the rear axle, psi the yaw error; for a car that rolls without slip the
 error then follows e'' + 2 z w e' + w^2 e = 0 over the distance driven, at every speed.
-The path's curvature jumps where a straight meets an arc, but a servo takes its time. So kappa_path
-and the yaw psi refers to are means over the stretch that the car covers while the servo makes the
-map's largest swing, centred on the axle: a way that the car can really follow, a few mm beside the
-true one. And e and psi are those the car will have when the servo has swung back from where it is
-now: without that look ahead a slow servo turns a large error into a weave.
+The path's curvature jumps where a straight meets an arc, but a servo needs time. So kappa_path and
+the reference of psi are means over the distance that the car covers during the servo's largest
+swing on this map, centred on the axle: a path that the car can follow, a few mm beside the true
+one. And e and psi are predicted for the time when the servo has swung back: without that, a slow
+servo turns a large error into an oscillation.
 
 Holds: small slip angles, |e| below a car's width.   Source: Frenet kinematics of a bicycle; ours.
 """
@@ -16,8 +16,7 @@ Holds: small slip angles, |e| below a car's width.   Source: Frenet kinematics o
 import math
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.drivers.lane_tracking import turned
-from scm.vehicles.drivers.memory import (
+from scm.vehicles.drivers.driver_state import (
     ANGLE,
     BESIDE,
     STEER,
@@ -26,13 +25,14 @@ from scm.vehicles.drivers.memory import (
     SWING,
     WHEELBASE,
 )
-from scm.vehicles.drivers.streets import CURVATURE, YAW
+from scm.vehicles.drivers.lane_graph import CURVATURE, YAW
+from scm.vehicles.drivers.lane_tracking import heading_change
 from scm.vehicles.jit import law
 
-STIFFNESS = 8.0
-DAMPING = 0.8
-LATERAL_LIMIT = 0.05
-LEAST_HALF = 0.02
+STIFFNESS = 8.0  # w [1/m]
+DAMPING = 0.8  # z
+LATERAL_LIMIT = 0.05  # larger lateral errors count as this [m]
+MIN_PREVIEW = 0.02  # half the distance of the means [m]
 
 
 @law
@@ -52,11 +52,11 @@ def steer(
 
     Args:
         segments: Of all lanes.
-        ids: The surveyed segments; `begins` where each begins, from the rear axle on [m].
+        ids: The listed segments; `begins` is where each begins, from the rear axle [m].
         begins: See `ids`.
         kind: The row of the kind of car.
-        floats: Its memory.
-        count: Of surveyed segments.
+        floats: Its state.
+        count: Number of listed segments.
         here: Which of them the rear axle is on.
         yaw: Of the car [rad].
         speed: Forward [m/s].
@@ -64,11 +64,11 @@ def steer(
     """
     step = kind[STEER_RATE] * max(0.0, passed)
     floats[ANGLE] += max(-step, min(step, floats[STEER] - floats[ANGLE]))
-    half = max(LEAST_HALF, 0.5 * speed * kind[SWING])
-    before = turned(segments, ids, begins, count, here, -half)
-    after = turned(segments, ids, begins, count, here, half)
-    quarters = turned(segments, ids, begins, count, here, -0.5 * half)
-    quarters += turned(segments, ids, begins, count, here, 0.5 * half)
+    half = max(MIN_PREVIEW, 0.5 * speed * kind[SWING])
+    before = heading_change(segments, ids, begins, count, here, -half)
+    after = heading_change(segments, ids, begins, count, here, half)
+    quarters = heading_change(segments, ids, begins, count, here, -0.5 * half)
+    quarters += heading_change(segments, ids, begins, count, here, 0.5 * half)
     segment = ids[here]
     way_yaw = segments[segment, YAW] - segments[segment, CURVATURE] * begins[here]
     mean_yaw = way_yaw + (before + 4.0 * quarters + after) / 12.0
@@ -84,7 +84,7 @@ def steer(
 def feedback(
     kind: Floats, floats: Floats, yaw: float, path_curvature: float, speed: float
 ) -> float:
-    """Return the curvature [1/m] against the errors the car has once the servo swung back."""
+    """Return the curvature [1/m] against the errors predicted for the servo's swing back."""
     off = floats[ANGLE] - math.atan(kind[WHEELBASE] * path_curvature)
     way = speed * abs(off) / kind[STEER_RATE]
     off_curvature = off / kind[WHEELBASE]

@@ -1,30 +1,37 @@
-"""Stop or go at the next line: what the signal says.
+"""Stop or go at the next line, by its signal.
 
-A yellow light, or a green one whose promised end has passed, stops a car that can stop with
-comfortable deceleration before the line, and lets the others clear the junction. Whoever went on
-for that reason goes on. Red and silence stop everybody. Flashing red is a stop sign for all; where
-the monitor tells of a fault and the lights do not flash, everybody stands.
+Yellow, or green after its guaranteed time, stops a car that can stop comfortably before the line;
+the others clear the junction, and a car that decided to go keeps going. Red and missing frames stop
+all cars. Flashing red is a stop sign for all; if the monitor reports a fault and the signals do not
+flash, all cars stand.
 """
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.drivers.memory import (
+from scm.vehicles.drivers.driver_state import (
     FREE,
     GOING_INDEX,
     GOING_LINE,
     HERE,
-    IN_SIGHT,
     SIGN,
     SIGNAL,
     VEHICLE,
+    WINDOW_SIZE,
 )
-from scm.vehicles.drivers.signal_table import FLASHING, GREEN, YELLOW, Told, believed, frame_for
-from scm.vehicles.drivers.streets import GROUP, JUNCTION
+from scm.vehicles.drivers.lane_graph import GROUP, JUNCTION
+from scm.vehicles.drivers.signal_table import (
+    FLASHING,
+    GREEN,
+    YELLOW,
+    ReceivedSignals,
+    frame_for,
+    usable_colour,
+)
 from scm.vehicles.jit import law
 
-SHORT_OF_LINE = 0.04
-NEAREST = 0.02
-REACTION = 0.1
-LOOK_AHEAD = 0.5
+SHORT_OF_LINE = 0.04  # where the front bumper stops before the line [m]
+STOP_MARGIN = 0.02  # of distance for a stop that counts as comfortable [m]
+REACTION = 0.1  # [s]
+LOOK_AHEAD = 0.5  # beyond the stopping distance [m]
 
 
 @law
@@ -32,7 +39,7 @@ def next_line(
     length: Floats,
     line_first: Ints,
     line_at: Floats,
-    sight: Ints,
+    lane_window: Ints,
     s: float,
     front: float,
     reach: float,
@@ -40,12 +47,12 @@ def next_line(
     """Return the next stop line at or after the front bumper.
 
     Returns:
-        Its number, its lane in sight, how far it is from the rear axle [m]; this is -1 when there
-        is none within the reach.
+        Its number, its lane in the window, and its distance from the rear axle [m], which is -1 if
+        there is none within reach.
     """
     begin = -s
-    for at in range(HERE, IN_SIGHT):
-        lane = sight[at]
+    for at in range(HERE, WINDOW_SIZE):
+        lane = lane_window[at]
         if lane < 0 or begin > reach:
             break
         for line in range(line_first[lane], line_first[lane + 1]):
@@ -57,8 +64,8 @@ def next_line(
 
 
 @law
-def signal_says(
-    told: Told,
+def obey_signal(
+    signals: ReceivedSignals,
     links: Ints,
     ints: Ints,
     line: int,
@@ -68,29 +75,29 @@ def signal_says(
     now_ns: int,
     seed: int,
 ) -> int:
-    """Return what holds a car at a line: SIGNAL, or nothing: FREE.
+    """Return what a car waits for at a line: SIGNAL, or FREE.
 
-    VEHICLE: the others, unless there is room behind it. SIGN: the junction has no signals now.
+    VEHICLE: the cars behind the line, unless there is room. SIGN: the junction has no signals now.
 
     Args:
-        told: The signals.
-        links: Of stop lines: group and junction.
-        ints: The car's memory.
+        signals: The received signal states.
+        links: Group and junction of stop lines.
+        ints: The car's integer state.
         line: The stop line.
-        index: Which lane of the car's way the line is on.
-        can_stop: Whether the car would come to rest before it without haste.
-        car: The car's number.
+        index: The line's lane on the car's route.
+        can_stop: Whether the car can stop comfortably before it.
+        car: The vehicle index.
         now_ns: The present time [ns].
-        seed: Of the luck.
+        seed: Decides which frames are lost.
     """
     is_going = ints[GOING_LINE] == line and ints[GOING_INDEX] == index
-    place = frame_for(told, links[line, JUNCTION], car, now_ns, seed)
-    colour = believed(told, links[line, GROUP], links[line, JUNCTION], place, now_ns)
+    place = frame_for(signals, links[line, JUNCTION], car, now_ns, seed)
+    colour = usable_colour(signals, links[line, GROUP], links[line, JUNCTION], place, now_ns)
     if colour == GREEN and can_stop and not is_going:
         return VEHICLE
     if colour == GREEN or (colour == YELLOW and (is_going or not can_stop)):
         ints[GOING_LINE], ints[GOING_INDEX] = line, index
         return FREE
-    is_flashing = told.flashing[place, links[line, JUNCTION]]
-    shows_flash = is_flashing or told.colour[place, links[line, GROUP]] == FLASHING
+    is_flashing = signals.flashing[place, links[line, JUNCTION]]
+    shows_flash = is_flashing or signals.colour[place, links[line, GROUP]] == FLASHING
     return SIGN if colour == FLASHING and shows_flash else SIGNAL

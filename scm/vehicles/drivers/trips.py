@@ -1,50 +1,212 @@
-"""The trips of one car that drives itself: it circulates until it is sent somewhere."""
+"""Trips of a batch of drivers: route requests in, progress reports out.
 
-import zlib
+A car circulates until it is sent somewhere. A request becomes a route, and each car's progress is
+reported in `Trip` messages: twice a second, and at once on arrival.
+"""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Literal
+
+import numpy as np
+
+from scm.clock import NS_PER_S
+from scm.errors import MapError
 from scm.geometry import Pose2
-from scm.maps.route import Roads
+from scm.maps.route import OnLane
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.trip import Trip
-from scm.vehicles.driver import CarLimits, RouteView
-from scm.vehicles.drivers.alone import OWN, Alone
-from scm.vehicles.drivers.errands import Errands
+from scm.vehicles.drivers.driver_batch import DriverBatch
+from scm.vehicles.drivers.driver_state import WAITING_FOR
+
+REPORT_NS = NS_PER_S // 2
+GOLDEN_RATIO = 0.618034  # spreads the reports of consecutive indices evenly
+REMEDY = "drive it there by hand, or take it off the map and spawn it again"
+_NOW_NS = -(2**62)
+
+
+@dataclass(slots=True)
+class _ActiveTrip:
+    vehicle: str
+    trip_id: str
+    route: tuple[str, ...]
+    length_m: float | None
+    started_ns: int
+    count: int
+    passes: tuple[tuple[str, float], ...] = ()
+    """The requested lanes, laps written out, and the distance at which each of them ends."""
+    speed_mps: float | None = None
+    then: Literal["stop", "circulate"] = "stop"
 
 
 class Trips:
-    """Where one car was sent, and the driver that takes it there.
+    """The trips of a batch of drivers.
 
-    Attributes:
-        driver: Of the present trip.
+    Args:
+        drivers: The batch.
+        every_ns: Interval of each car's reports.
+        spread: Whether the cars' reports are spread over that interval.
     """
 
     def __init__(
-        self, vehicle: str, roads: Roads, limits: CarLimits, pose: Pose2, now_ns: int
+        self, drivers: DriverBatch, every_ns: int = REPORT_NS, *, spread: bool = False
     ) -> None:
-        """Begin to circulate from where the car stands.
+        self.every_ns = every_ns
+        self._drivers = drivers
+        self._spread = spread
+        self._trips: dict[int, _ActiveTrip] = {}
+        self._due_ns = np.zeros(drivers.capacity, np.int64)
+        self._under_way = np.zeros(drivers.capacity, np.bool_)
+        self._unsent: list[Trip] = []
+
+    def circulate(self, index: int, vehicle: str, pose: Pose2, now_ns: int) -> tuple[str, ...]:
+        """Let a car circulate without end from where it stands; return its first lanes.
 
         Raises:
-            MapError: when it stands beside all lanes, or on one that leads nowhere.
+            MapError: when it stands beside all lanes or on a lane that leads nowhere, or would hit
+                a wall on its way to the lane.
         """
-        self._vehicle = vehicle
-        self.driver = Alone(roads, limits, zlib.crc32(vehicle.encode()))
-        self._errands = Errands(self.driver.crowd)
-        self._errands.circulate(OWN, vehicle, pose, now_ns)
+        place = self._nearest_lane(vehicle, pose)
+        self._check_way(index, vehicle, (place.lane,), place, pose, "circulate")
+        route = self._drivers.circulate(index, place.lane, place.s)
+        self._note(index, vehicle, route, None, now_ns, "")
+        return route
 
-    def begin(self, request: RouteRequest, pose: Pose2, now_ns: int) -> RouteReply:
-        """Send the car on a trip from where it is; a trip under way ends without arrival.
+    def begin(
+        self, index: int, vehicle: str, request: RouteRequest, pose: Pose2, now_ns: int
+    ) -> RouteReply:
+        """Send a car on a trip from where it is; a trip under way ends without arrival.
 
         Raises:
-            MapError: when the lanes do not exist or cannot be reached.
+            MapError: when the lanes do not exist or cannot be reached, or the car would hit a wall
+                on its way to its lane.
         """
-        return self._errands.begin(OWN, self._vehicle, request, pose, now_ns)
+        place, roads = self._nearest_lane(vehicle, pose), self._drivers.lane_graph.roads
+        length_m: float | None = None
+        passes: tuple[tuple[str, float], ...] = ()
+        if request.via:
+            route = roads.route(place.lane, request.via, request.laps)
+            self._check_way(index, vehicle, route, place, pose, request.then, request.speed_mps)
+            self._drivers.send(index, route, place.s, request.then, request.speed_mps)
+            ends_m = [m - place.s for m in accumulate(map(roads.length_of, route))]
+            length_m, passes = ends_m[-1], _passes(request, route, ends_m)
+        else:
+            lane, speed_mps = (place.lane,), request.speed_mps
+            self._check_way(index, vehicle, lane, place, pose, "circulate", speed_mps)
+            route = self._drivers.circulate(index, place.lane, place.s, speed_mps)
+        trip = self._note(index, vehicle, route, length_m, now_ns, request.request_id)
+        trip.passes, trip.speed_mps, trip.then = passes, request.speed_mps, request.then
+        return RouteReply(vehicle=vehicle, trip_id=trip.trip_id, route=route, length_m=length_m)
 
-    def decide(self, view: RouteView) -> tuple[float, float]:
-        """Return (throttle, steering); on arrival go on circulating where that was asked for."""
-        commands = self.driver.decide(view)
-        self._errands.look(view.now_ns)
-        return commands
+    def end(self, index: int, now_ns: int) -> None:
+        """End a car's trip with a last report: somebody else drives it now."""
+        if self._under_way[index]:
+            self._unsent.append(self._report(index, now_ns))
+        self._halt(index)
+
+    def _halt(self, index: int) -> None:
+        self._drivers.halt(index)
+        self._under_way[index] = False
+
+    def forget(self, index: int) -> None:
+        """Remove a car; its vehicle index is free for another one."""
+        self._halt(index)
+        self._trips.pop(index, None)
+
+    def check_arrivals(self, now_ns: int) -> None:
+        """Handle new arrivals; call it after each decision of the batch."""
+        for index in np.flatnonzero(self._under_way & self._drivers.arrived).tolist():
+            trip = self._trips[index]
+            self._unsent.append(self._report(index, now_ns, arrived_ns=now_ns))
+            self._under_way[index] = False
+            if trip.then == "circulate":
+                route = self._drivers.go_on(index)
+                after = self._note(index, trip.vehicle, route, None, now_ns, "")
+                after.speed_mps = trip.speed_mps
 
     def reports(self, now_ns: int) -> list[Trip]:
-        """Return what is to be told of the trip now: twice a second, and when it ended."""
-        return self._errands.reports(now_ns)
+        """Return the reports that are due."""
+        unsent, self._unsent = self._unsent, []
+        due = np.flatnonzero(self._under_way & (self._due_ns <= now_ns))
+        self._due_ns[due] = now_ns + self.every_ns
+        for index in due.tolist():
+            if self._spread:
+                self._due_ns[index] += self._lag_ns(index, now_ns)
+            unsent.append(self._report(index, now_ns))
+        return unsent
+
+    def _lag_ns(self, index: int, now_ns: int) -> int:
+        """Return the negative delay that spreads a car's reports over the interval."""
+        turn_ns = int(index * GOLDEN_RATIO % 1.0 * self.every_ns)
+        return -((now_ns - turn_ns) % self.every_ns)
+
+    def _report(self, index: int, now_ns: int, arrived_ns: int | None = None) -> Trip:
+        trip, drivers = self._trips[index], self._drivers
+        done_m = float(drivers.done_m[index])
+        return Trip(
+            vehicle=trip.vehicle,
+            trip_id=trip.trip_id,
+            t_ns=now_ns,
+            route=trip.route,
+            done_m=done_m,
+            length_m=trip.length_m,
+            started_ns=trip.started_ns,
+            arrived_ns=arrived_ns,
+            waiting_for=WAITING_FOR[drivers.waiting[index]],
+            via=tuple(lane for lane, end_m in trip.passes if end_m > done_m),
+            speed_mps=trip.speed_mps,
+            then=trip.then,
+        )
+
+    def _note(
+        self,
+        index: int,
+        vehicle: str,
+        route: Sequence[str],
+        length_m: float | None,
+        now_ns: int,
+        trip_id: str,
+    ) -> _ActiveTrip:
+        before = self._trips.get(index)
+        count = 1 + (before.count if before is not None and before.vehicle == vehicle else 0)
+        trip_id = trip_id or f"{vehicle}-{count}"
+        trip = _ActiveTrip(vehicle, trip_id, tuple(route), length_m, now_ns, count)
+        self._trips[index] = trip
+        self._due_ns[index] = _NOW_NS
+        self._under_way[index] = True
+        return trip
+
+    def _nearest_lane(self, vehicle: str, pose: Pose2) -> OnLane:
+        place = self._drivers.lane_graph.roads.nearest(pose)
+        if place is None:
+            msg = f"{vehicle}: no lane in its direction at ({pose.x:.2f}, {pose.y:.2f}) m; {REMEDY}"
+            raise MapError(msg)
+        return place
+
+    def _check_way(
+        self,
+        index: int,
+        vehicle: str,
+        route: Sequence[str],
+        place: OnLane,
+        pose: Pose2,
+        after: str,
+        speed: float | None = None,
+    ) -> None:
+        """Raise MapError if the car would hit a wall before it is on its lane."""
+        distance = self._drivers.wall_ahead(index, route, place.s, pose, after, speed)
+        if distance is not None:
+            msg = f"{vehicle}: it would hit a wall {distance:.2f} m ahead, on its way to lane "
+            raise MapError(f"{msg}{place.lane}; {REMEDY}")
+
+
+def _passes(
+    request: RouteRequest, route: Sequence[str], ends_m: Sequence[float]
+) -> tuple[tuple[str, float], ...]:
+    """Return the requested lanes and the distance along the route at which each of them ends."""
+    at, passes = -1, []
+    for lane in request.via * request.laps:
+        at = route.index(lane, at + 1)
+        passes.append((lane, ends_m[at]))
+    return tuple(passes)

@@ -10,8 +10,8 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.route import Path, Roads
 from scm.records.city_map import Sign
+from scm.vehicles.drivers.lane_graph import LIMIT, LaneGraph
 from scm.vehicles.drivers.rules import PLAIN, STOP_SIGN
-from scm.vehicles.drivers.streets import LIMIT, Streets
 
 STREET = "j0_1_e"
 LINE_M = 4.0 - 2 * 0.54 - 0.14
@@ -112,9 +112,9 @@ def test_turn_signs_take_lanes_out_of_routes_and_circulation(signed, kind, left)
     roads = Roads(with_signs(signed, {"kind": kind}))
     names = {f"j1_1_{way}" for way in left}
     assert set(roads.successors(STREET)) == names
-    streets = Streets(roads)
-    first, last = streets.ways.next_first[streets.numbers[STREET] :][:2]
-    assert {streets.names[n] for n in streets.ways.following[first:last]} == names
+    lane_graph = LaneGraph(roads)
+    first, last = lane_graph.arrays.next_first[lane_graph.numbers[STREET] :][:2]
+    assert {lane_graph.names[n] for n in lane_graph.arrays.following[first:last]} == names
     forbidden = ({"j1_1_ee", "j1_1_en", "j1_1_es"} - names).pop()
     assert forbidden not in roads.route(STREET, ("j1_1_n",))
     with pytest.raises(MapError, match="does not follow"):
@@ -125,8 +125,8 @@ def test_a_speed_limit_holds_from_its_sign_to_the_end_of_the_lane(signed):
     roads = Roads(with_signs(signed, {"kind": "speed_limit", "value_mps": 0.1}))
     path = Path(roads, (STREET, "j1_1_ee"))
     assert [path.speed_limit_mps(s) for s in (0.9, 1.1, 2.9, 3.0)] == [0.25, 0.1, 0.1, 0.25]
-    streets = Streets(roads)
-    ways, lane = streets.ways, streets.numbers[STREET]
+    lane_graph = LaneGraph(roads)
+    ways, lane = lane_graph.arrays, lane_graph.numbers[STREET]
     rows = ways.segments[ways.segment_first[lane] : ways.segment_first[lane + 1]]
     assert rows[:, LIMIT].tolist() == [0.25, 0.1]
     assert rows[:, 1].tolist() == pytest.approx([1.0, 1.92])
@@ -142,9 +142,11 @@ def test_a_sign_without_a_lane_holds_for_the_cars_it_looks_at(signed):
 
 def test_a_line_asks_for_what_its_sign_says(signed):
     kinds = {}
-    streets = Streets(Roads(signed))
-    rules, ways = streets.ways.rules, streets.ways
-    for lane, first, last in zip(streets.names, ways.line_first, ways.line_first[1:], strict=False):
+    lane_graph = LaneGraph(Roads(signed))
+    rules, ways = lane_graph.arrays.rules, lane_graph.arrays
+    for lane, first, last in zip(
+        lane_graph.names, ways.line_first, ways.line_first[1:], strict=False
+    ):
         if last > first:
             kinds[lane] = rules.kind[first], bool(rules.all_stop[first])
     assert kinds["j0_0_e"][0] == PLAIN  # a through road: who comes from the side gives way

@@ -92,7 +92,7 @@ def test_cars_go_round_in_their_lanes(imported):
     part = WorldPart(city_map, room=CARS)
     part.attach(lambda _kind, _where: False)
     world = part.world
-    streets, spawns = world.crowd.streets, city_map.spawns
+    streets, spawns = world.drivers.lane_graph, city_map.spawns
     places = [s for s in spawns if streets.goes_round[streets.numbers[s.lane]]]
     count = min(CARS, len(places))
     for i in range(count):
@@ -104,7 +104,7 @@ def test_cars_go_round_in_their_lanes(imported):
     with Lockstep(parts) as city:
         for _ in range(round(SPAN_S / 0.2)):
             city.run_for(0.2)
-            worst = np.maximum(worst, np.abs(world.crowd.cross_track[:count]))
+            worst = np.maximum(worst, np.abs(world.drivers.cross_track[:count]))
             way += 0.2 * np.abs(world.slots.speed[:count])
     assert worst.max() < BESIDE_CAR_M
     assert way.min() > 0.3

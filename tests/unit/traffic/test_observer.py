@@ -87,12 +87,12 @@ def driven(city_map, cars, span_s, *, eye):
         send(world, car, RouteRequest(vehicle=car.name), 0)
     traffic = [TrafficPart(city_map)] if city_map.junctions else []
     cameras = [NoisyEye()] if eye else []
-    names, before = world.crowd.streets.names, None
+    names, before = world.drivers.lane_graph.names, None
     with Lockstep([part, *traffic, *cameras, observer]) as city:
         told = city.subscribe(Subscription(Violation))
         for _ in range(round(span_s / 0.05)):
             city.run_for(0.05)
-            lane, front = world.crowd.lane[:cars].copy(), world.crowd.s[:cars] + FRONT_M
+            lane, front = world.drivers.lane[:cars].copy(), world.drivers.s[:cars] + FRONT_M
             if before is not None:
                 for i in np.flatnonzero(lane == before[0]):
                     at_m = lines.get(names[lane[i]], math.inf)

@@ -41,8 +41,8 @@ from scm.v2x.uper.parts import Chosen, Each, Fields, Names, Only
 from scm.vehicles.car import load_car
 from scm.vehicles.drivers.channel import ideal
 from scm.vehicles.drivers.green_advisor import GreenAdvisor
+from scm.vehicles.drivers.hazards import HazardTable
 from scm.vehicles.drivers.limits import limits_of
-from scm.vehicles.drivers.warned import Warnings
 from tests.unit.v2x.etsi_city import a_track
 from tests.unit.v2x.test_etsi_convert import NOW, a_state
 
@@ -202,9 +202,9 @@ def read(kind, body):
         place = Positions().of(body)[2:4]
         return numbers_in([read_cam(body), claim or (), seen, place if any(place) else ()])
     if kind == "denm":
-        warnings = Warnings(ideal())
-        warnings.hear(body, NOW)
-        return numbers_in(warnings.warned.at[warnings.warned.ends_ns > 0].tolist())
+        warnings = HazardTable(ideal())
+        warnings.receive(body, NOW)
+        return numbers_in(warnings.hazards.at[warnings.hazards.ends_ns > 0].tolist())
     if kind == "mapem":
         return numbers_in(advice(body, bodies()["spatem"]))
     if kind == "spatem":
@@ -218,8 +218,8 @@ def read(kind, body):
 
 def advice(mapem_body, spatem_body):
     advisor = GreenAdvisor(limits_of(load_car("nigel")))
-    advisor.hear_mapem(mapem_body)
-    advisor.hear_spatem(spatem_body, NOW)
+    advisor.receive_mapem(mapem_body)
+    advisor.receive_spatem(spatem_body, NOW)
     line = ROADS.stop_lines_of(JUNCTION.name, JUNCTION.groups[0].name)[0]
     pose = ROADS.lane(line.lane).at(line.at_m - 0.6)
     return advisor.advise(Pose2(pose.x, pose.y, pose.yaw), NOW)

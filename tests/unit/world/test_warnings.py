@@ -95,8 +95,8 @@ def test_a_car_that_stands_within_a_junction_warns(make_city):
     lane = world.roads.lane(inside.lane)
     car = world.host("n5", "nigel", lane.at(0.5 * (inside.from_m + inside.to_m) - 0.08), city.now)
     city.ask(RouteRequest(vehicle="n5"))
-    world.crowd.halt(car.slot)
-    world.crowd.throttle[car.slot] = 0.0
+    world.drivers.halt(car.slot)
+    world.drivers.throttle[car.slot] = 0.0
     city.run_for(3.0)
     assert {f.station for f in city.heard(DenmTx)} == {"n5"}
     assert set(causes(city)) == {STATIONARY_VEHICLE}

@@ -541,4 +541,4 @@ def test_a_car_given_back_beside_its_lane_drives_there_where_no_wall_is(city):
     city.ask(RouteRequest(vehicle="n1"))
     city.run_for(8.0)
     assert "contact" not in city.events()
-    assert abs(city.world.crowd.cross_track[car.slot]) < 0.02
+    assert abs(city.world.drivers.cross_track[car.slot]) < 0.02

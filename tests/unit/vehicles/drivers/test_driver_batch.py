@@ -17,10 +17,10 @@ from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.channel import channel_of, has_arrived
-from scm.vehicles.drivers.driver_batch import Crowd
-from scm.vehicles.drivers.memory import WAITING_FOR
-from scm.vehicles.drivers.stations import known_to
-from scm.vehicles.drivers.streets import Streets
+from scm.vehicles.drivers.driver_batch import DriverBatch
+from scm.vehicles.drivers.driver_state import WAITING_FOR
+from scm.vehicles.drivers.lane_graph import LaneGraph
+from scm.vehicles.drivers.received_cams import estimate_for
 from scm.vehicles.jit import plain
 
 NIGEL = CarLimits(
@@ -47,7 +47,7 @@ class City:
     def __init__(self, roads, places, seeds=None, **options):
         n = len(places)
         self.roads = roads
-        self.crowd = Crowd(Streets(roads), n, **options)
+        self.drivers = DriverBatch(LaneGraph(roads), n, **options)
         self.traffic = TrafficPart(roads.city_map)
         self.x, self.y, self.yaw, self.speed, self.angle = np.zeros((5, n))
         self.driven = np.ones(n, np.bool_)
@@ -55,14 +55,14 @@ class City:
         self.colours = {}
         for slot, (lane, s) in enumerate(places):
             self.x[slot], self.y[slot], self.yaw[slot] = roads.lane(lane).at(s)
-            self.crowd.enter(slot, NIGEL, seeds[slot] if seeds else slot)
-            self.crowd.circulate(slot, lane, s)
+            self.drivers.enter(slot, NIGEL, seeds[slot] if seeds else slot)
+            self.drivers.circulate(slot, lane, s)
 
     def tell(self):
         if self.now_ns % (100 * NS_PER_MS) == 0:
             for message in self.traffic.step(self.now_ns, []):
                 if isinstance(message, SpatemTx):
-                    self.crowd.hear_spatem(message.body, self.now_ns)
+                    self.drivers.receive_spatem(message.body, self.now_ns)
                 elif isinstance(message, Spat):
                     for group in message.groups:
                         self.colours[message.junction, group.group] = group.colour
@@ -70,18 +70,18 @@ class City:
         rate = self.speed * np.tan(self.angle) / NIGEL.wheelbase
         slots = np.arange(len(self.x))
         told = self.x + ahead[0], self.y + ahead[1], self.yaw, self.speed, rate
-        self.crowd.hear(slots, self.now_ns, *told)
+        self.drivers.receive_cams(slots, self.now_ns, *told)
 
     def decide(self):
-        self.crowd.decide(self.now_ns, self.x, self.y, self.yaw, self.speed, self.driven)
+        self.drivers.decide(self.now_ns, self.x, self.y, self.yaw, self.speed, self.driven)
 
     def tick(self):
         self.tell()
         self.decide()
         most = NIGEL.steer_rate * 0.01
-        wanted = np.interp(self.crowd.throttle, np.linspace(0, 1, 11), (0.0, *NIGEL.speeds))
+        wanted = np.interp(self.drivers.throttle, np.linspace(0, 1, 11), (0.0, *NIGEL.speeds))
         for _ in range(2):
-            turn = self.crowd.steering * NIGEL.steer_limit - self.angle
+            turn = self.drivers.steering * NIGEL.steer_limit - self.angle
             self.angle += np.clip(turn, -most, most)
             self.speed += (wanted - self.speed) * 0.15
             self.x += self.speed * np.cos(self.yaw) * 0.01
@@ -120,16 +120,16 @@ def test_dense_traffic_flows_without_touching_running_red_or_blocking_a_junction
     city = City(grid, on_streets(grid, 60))
     lines = {line.lane: line for line in grid.city_map.stop_lines}
     inside = {m.lane for j in grid.city_map.junctions for g in j.groups for m in g.movements}
-    names, crowd = city.crowd.streets.names, city.crowd
+    names, drivers = city.drivers.lane_graph.names, city.drivers
     passed, began, driven = 0, {}, np.zeros(60)
     for tick in range(6000):
-        before = [(names[crowd.lane[k]], crowd.s[k] + NIGEL.front) for k in range(60)]
+        before = [(names[drivers.lane[k]], drivers.s[k] + NIGEL.front) for k in range(60)]
         city.tick()
         driven += city.speed * 0.02
         for slot, (lane, front) in enumerate(before):
             line = lines.get(lane)
-            now = names[crowd.lane[slot]]
-            if line and now == lane and front <= line.at_m < crowd.s[slot] + NIGEL.front:
+            now = names[drivers.lane[slot]]
+            if line and now == lane and front <= line.at_m < drivers.s[slot] + NIGEL.front:
                 passed += 1
                 assert city.colours[line.junction, line.group] in ("green", "yellow")
             began[slot] = tick if now not in inside else began.get(slot, tick)
@@ -137,7 +137,7 @@ def test_dense_traffic_flows_without_touching_running_red_or_blocking_a_junction
         if tick % 25 == 0:
             assert touching(city) == []
         if tick > 250:
-            assert np.abs(crowd.cross_track).max() < 0.007
+            assert np.abs(drivers.cross_track).max() < 0.007
     assert passed > 60
     assert driven.min() > 0.8  # all junctions share the longest cycle of them, for a green wave
 
@@ -150,61 +150,61 @@ def test_every_car_of_a_crowd_decides_as_it_would_alone(eight):
         together.tick()
         for slot, one in enumerate(alone):
             one.tick()
-            assert one.crowd.throttle[0] == together.crowd.throttle[slot]
-            assert one.crowd.steering[0] == together.crowd.steering[slot]
+            assert one.drivers.throttle[0] == together.drivers.throttle[slot]
+            assert one.drivers.steering[0] == together.drivers.steering[slot]
 
 
 def test_how_many_threads_work_changes_nothing(grid, monkeypatch):
-    monkeypatch.setattr("scm.vehicles.drivers.driver_batch.WORTH_THREADS", 2)
+    monkeypatch.setattr("scm.vehicles.drivers.driver_batch.MIN_CARS_FOR_THREADS", 2)
     one, two = (City(grid, on_streets(grid, 40)) for _ in range(2))
-    two.crowd.threads = 2
+    two.drivers.threads = 2
     for _ in range(200):
         one.tick()
         two.tick()
-    assert np.array_equal(one.crowd.throttle, two.crowd.throttle)
+    assert np.array_equal(one.drivers.throttle, two.drivers.throttle)
     assert np.array_equal(one.x, two.x)
 
 
 def test_where_a_car_turns_depends_on_its_own_seed_alone(grid):
     lane = grid.city_map.spawns[0].lane
-    crowd = Crowd(Streets(grid), 3)
+    drivers = DriverBatch(LaneGraph(grid), 3)
     for slot, seed in enumerate((7, 8, 7)):
-        crowd.enter(slot, NIGEL, seed)
-        crowd.circulate(slot, lane, 0.2)
-    assert crowd.in_sight(0) == crowd.in_sight(2)
-    assert crowd.in_sight(0) != crowd.in_sight(1)
+        drivers.enter(slot, NIGEL, seed)
+        drivers.circulate(slot, lane, 0.2)
+    assert drivers.planned_lanes(0) == drivers.planned_lanes(2)
+    assert drivers.planned_lanes(0) != drivers.planned_lanes(1)
 
 
 def test_all_ways_behind_a_junction_are_taken(grid):
     spawn = next(
         s for s in grid.city_map.spawns if len(grid.successors(grid.successors(s.lane)[0]))
     )
-    crowd = Crowd(Streets(grid), 1)
+    drivers = DriverBatch(LaneGraph(grid), 1)
     taken = set()
     for seed in range(40):
-        crowd.enter(0, NIGEL, seed)
-        crowd.circulate(0, spawn.lane, 0.2)
-        taken.add(crowd.in_sight(0)[1])
+        drivers.enter(0, NIGEL, seed)
+        drivers.circulate(0, spawn.lane, 0.2)
+        taken.add(drivers.planned_lanes(0)[1])
     assert taken == set(grid.successors(spawn.lane))
 
 
 def test_a_car_that_nobody_drives_keeps_its_commands(eight):
     city = City(eight, [("east_loop", 0.3)])
     city.tick()
-    before = float(city.crowd.throttle[0])
+    before = float(city.drivers.throttle[0])
     city.driven[:] = False
     city.decide()
-    assert city.crowd.throttle[0] == before > 0.0
+    assert city.drivers.throttle[0] == before > 0.0
 
 
 def test_a_halted_car_is_not_driven_before_it_is_sent_again(eight):
     city = City(eight, [("east_loop", 0.3)])
-    city.crowd.halt(0)
+    city.drivers.halt(0)
     city.tick()
-    assert city.crowd.throttle[0] == 0.0
-    city.crowd.circulate(0, "east_loop", 0.3)
+    assert city.drivers.throttle[0] == 0.0
+    city.drivers.circulate(0, "east_loop", 0.3)
     city.tick()
-    assert city.crowd.throttle[0] > 0.0
+    assert city.drivers.throttle[0] > 0.0
 
 
 def test_a_car_behind_another_stops_and_says_why(eight):
@@ -212,18 +212,18 @@ def test_a_car_behind_another_stops_and_says_why(eight):
     city.driven[1] = False
     for _ in range(400):
         city.tick()
-    gap = 1.2 - NIGEL.rear - (city.crowd.s[0] + NIGEL.front)
+    gap = 1.2 - NIGEL.rear - (city.drivers.s[0] + NIGEL.front)
     assert 0.05 < gap < 0.15
-    assert WAITING_FOR[city.crowd.waiting[0]] == "vehicle"
+    assert WAITING_FOR[city.drivers.waiting[0]] == "vehicle"
 
 
 def test_a_car_that_left_is_seen_by_nobody(eight):
     city = City(eight, [("east_loop", 0.3), ("east_loop", 1.0)])
     city.driven[1] = False
-    city.crowd.leave(1)
+    city.drivers.leave(1)
     for _ in range(300):
         city.tick()
-    assert city.crowd.done_m[0] > 1.0
+    assert city.drivers.done_m[0] > 1.0
 
 
 @pytest.mark.parametrize(("queue", "enters"), [(7, False), (3, True)])
@@ -234,7 +234,7 @@ def test_nobody_enters_a_junction_whose_exit_is_full_even_if_all_roll_there(grid
     assert grid.stop_lines_on(street)
     places = [(line.lane, line.at_m - 0.8), *((street, 0.5 + 0.37 * k) for k in range(queue))]
     city = City(grid, places)
-    city.crowd.send(0, (line.lane, way, street), line.at_m - 0.8)
+    city.drivers.send(0, (line.lane, way, street), line.at_m - 0.8)
     city.driven[1:] = False
     x, y, was_green = city.x[1:].copy(), city.y[1:].copy(), 0
     for _ in range(3500):
@@ -242,7 +242,7 @@ def test_nobody_enters_a_junction_whose_exit_is_full_even_if_all_roll_there(grid
         city.tick()
         was_green += city.colours[line.junction, line.group] == "green"
     assert was_green > 100
-    assert bool(city.crowd.passed[0] > 0) is enters
+    assert bool(city.drivers.passed[0] > 0) is enters
 
 
 def test_with_all_frames_lost_nobody_is_seen(eight):
@@ -250,7 +250,7 @@ def test_with_all_frames_lost_nobody_is_seen(eight):
     city.driven[1] = False
     for _ in range(300):
         city.tick()
-    assert city.crowd.s[0] + NIGEL.front > 1.2
+    assert city.drivers.s[0] + NIGEL.front > 1.2
 
 
 def test_with_some_frames_lost_cars_still_keep_apart(eight):
@@ -273,25 +273,25 @@ def test_luck_takes_its_share_of_frames_evenly():
 
 
 def test_luck_depends_on_sender_receiver_and_frame():
-    def luck(seed=1, sender=2, receiver=3):
+    def draw(seed=1, sender=2, receiver=3):
         return [reached(0.5, seed, sender, receiver, n) for n in range(64)]
 
-    assert luck() == luck()
-    assert luck() != luck(seed=9)
-    assert luck() != luck(sender=9)
-    assert luck() != luck(receiver=9)
+    assert draw() == draw()
+    assert draw() != draw(seed=9)
+    assert draw() != draw(sender=9)
+    assert draw() != draw(receiver=9)
 
 
 def test_routes_sent_again_and_again_take_no_more_room(eight):
-    crowd = Crowd(Streets(eight), 2)
+    drivers = DriverBatch(LaneGraph(eight), 2)
     for slot in range(2):
-        crowd.enter(slot, NIGEL)
-    crowd.send(1, ("east_loop", "crossing_south_west"), 0.5)
+        drivers.enter(slot, NIGEL)
+    drivers.send(1, ("east_loop", "crossing_south_west"), 0.5)
     for _ in range(2000):
-        crowd.send(0, ("west_loop", "crossing_south_east", "east_loop"), 0.1)
-    assert crowd.in_sight(1) == ("east_loop", "crossing_south_west")
-    assert crowd.in_sight(0) == ("west_loop", "crossing_south_east", "east_loop")
-    assert len(crowd._memory.routes) < 200
+        drivers.send(0, ("west_loop", "crossing_south_east", "east_loop"), 0.1)
+    assert drivers.planned_lanes(1) == ("east_loop", "crossing_south_west")
+    assert drivers.planned_lanes(0) == ("west_loop", "crossing_south_east", "east_loop")
+    assert len(drivers._state.routes) < 200
 
 
 def test_a_silent_car_is_forgotten(eight):
@@ -300,7 +300,7 @@ def test_a_silent_car_is_forgotten(eight):
     city.tell()
     city.now_ns += 4 * NS_PER_S
     city.decide()
-    assert city.crowd.throttle[0] > 0.0
+    assert city.drivers.throttle[0] > 0.0
 
 
 def test_where_frames_get_lost_a_silent_car_is_believed_to_stand_where_it_stood(grid):
@@ -309,13 +309,13 @@ def test_where_frames_get_lost_a_silent_car_is_believed_to_stand_where_it_stood(
         (RadioChannel(loss=0.3), 3.5, True),
         (RadioChannel(loss=0.3), 17.0, False),
     ):
-        crowd = Crowd(Streets(grid), 2, radio=air)
-        crowd.enter(0, NIGEL, 0)
-        crowd.show(1, 0.3, 0.175)
+        drivers = DriverBatch(LaneGraph(grid), 2, radio=air)
+        drivers.enter(0, NIGEL, 0)
+        drivers.show(1, 0.3, 0.175)
         for frame in range(16):
             told = np.array([[1.0], [1.0], [0.0], [0.0], [0.0]])
-            crowd.hear(np.array([1]), now_ns + frame * NS_PER_MS, *told)
-        told_ns = now_ns + round(after_s * NS_PER_S)
-        known, x, *_ = plain(known_to)(crowd._heard, 1, 0, told_ns, 0)
+            drivers.receive_cams(np.array([1]), now_ns + frame * NS_PER_MS, *told)
+        sent_ns = now_ns + round(after_s * NS_PER_S)
+        known, x, *_ = plain(estimate_for)(drivers._received, 1, 0, sent_ns, 0)
         assert known == is_known
         assert x == (pytest.approx(0.85) if is_known else 0.0)

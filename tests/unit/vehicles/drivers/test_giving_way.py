@@ -11,10 +11,10 @@ from scm.maps.grid_city import grid_city
 from scm.maps.route import Roads
 from scm.records.city_map import RadioChannel, Sign
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.channel import DEAF
-from scm.vehicles.drivers.driver_batch import Crowd
-from scm.vehicles.drivers.memory import WAITING_FOR
-from scm.vehicles.drivers.streets import Streets
+from scm.vehicles.drivers.channel import POOR_RECEPTION
+from scm.vehicles.drivers.driver_batch import DriverBatch
+from scm.vehicles.drivers.driver_state import WAITING_FOR
+from scm.vehicles.drivers.lane_graph import LaneGraph
 
 NIGEL = CarLimits(
     wheelbase=0.14154, steer_limit=0.5235988, steer_rate=0.42, front=0.23, rear=0.07, width=0.175,
@@ -51,7 +51,7 @@ class Drive:
 
     def __init__(self, roads, cars, **options):
         n = len(cars)
-        self.crowd = Crowd(Streets(roads), n, **options)
+        self.drivers = DriverBatch(LaneGraph(roads), n, **options)
         self.x, self.y, self.yaw, self.speed, self.angle = np.zeros((5, n))
         self.driven, self.heard = np.ones(n, np.bool_), np.ones(n, np.bool_)
         self.now_ns = 0
@@ -60,9 +60,9 @@ class Drive:
         for slot, (arm, to, before) in enumerate(cars):
             s = LINE_M - before - NIGEL.front
             self.x[slot], self.y[slot], self.yaw[slot] = roads.lane(ARMS[arm]).at(s)
-            self.crowd.enter(slot, NIGEL, slot)
-            self.crowd.send(slot, way(arm, to), s)
-        self.names = self.crowd.streets.names
+            self.drivers.enter(slot, NIGEL, slot)
+            self.drivers.send(slot, way(arm, to), s)
+        self.names = self.drivers.lane_graph.names
 
     def tick(self):
         if self.now_ns % (100 * NS_PER_MS) == 0:
@@ -70,14 +70,14 @@ class Drive:
             x = self.x + NIGEL.front * np.cos(self.yaw)
             y = self.y + NIGEL.front * np.sin(self.yaw)
             told = (x[slots], y[slots], self.yaw[slots], self.speed[slots], np.zeros(len(slots)))
-            self.crowd.hear(slots, self.now_ns, *told)
-        crowd = self.crowd
-        crowd.decide(self.now_ns, self.x, self.y, self.yaw, self.speed, self.driven)
+            self.drivers.receive_cams(slots, self.now_ns, *told)
+        drivers = self.drivers
+        drivers.decide(self.now_ns, self.x, self.y, self.yaw, self.speed, self.driven)
         step = 1e-9 * TICK_NS
-        wished = np.where(self.driven, crowd.steering, 0.0) * NIGEL.steer_limit
+        wished = np.where(self.driven, drivers.steering, 0.0) * NIGEL.steer_limit
         most = NIGEL.steer_rate * step
         self.angle += np.clip(wished - self.angle, -most, most)
-        throttle = np.where(self.driven, np.maximum(0.0, crowd.throttle), 0.0)
+        throttle = np.where(self.driven, np.maximum(0.0, drivers.throttle), 0.0)
         self.speed += (0.267 * throttle - self.speed) * 0.28
         self.x += self.speed * np.cos(self.yaw) * step
         self.y += self.speed * np.sin(self.yaw) * step
@@ -87,7 +87,7 @@ class Drive:
 
     def _note(self, step):
         for slot in range(len(self.x)):
-            lane, s = self.names[self.crowd.lane[slot]], self.crowd.s[slot]
+            lane, s = self.names[self.drivers.lane[slot]], self.drivers.s[slot]
             is_before = lane in ARMS.values() and s + NIGEL.front < LINE_M
             if is_before and self.speed[slot] < 0.01:
                 self.stood_s[slot] += step
@@ -121,7 +121,7 @@ class Drive:
         return False
 
     def reason(self, slot):
-        return WAITING_FOR[self.crowd.waiting[slot]]
+        return WAITING_FOR[self.drivers.waiting[slot]]
 
 
 def test_a_car_rests_half_a_second_at_a_stop_sign_and_then_goes():
@@ -213,10 +213,10 @@ def test_nobody_touches_where_a_third_of_all_frames_is_lost(seed):
 def test_who_knows_that_it_hears_too_little_stays_before_its_line():
     for arm, to, goes in (("n", "n", False), ("e", "e", True)):
         drive = Drive(crossing("n give_way", "s give_way"), [(arm, to, 0.6)])
-        drive.crowd.channel.numbers[DEAF] = 1.0
+        drive.drivers.channel.numbers[POOR_RECEPTION] = 1.0
         drive.run(10.0)
         assert (drive.crossed_s[0] is not None) == goes
-        drive.crowd.channel.numbers[DEAF] = 0.0
+        drive.drivers.channel.numbers[POOR_RECEPTION] = 0.0
         drive.run(5.0)
         assert drive.crossed_s[0] is not None
 
@@ -263,8 +263,8 @@ def mirrored(lane):
 def test_where_cars_drive_on_the_left_they_yield_in_the_mirror_image():
     city = msgspec.structs.replace(grid_city(3, 3, block_m=6.0, signs=True), signs=())
     lanes = tuple(map(mirrored, city.lanes))
-    right = Streets(Roads(city)).ways.rules
-    left = Streets(Roads(msgspec.structs.replace(city, lanes=lanes, drives_on="left"))).ways.rules
+    right = LaneGraph(Roads(city)).arrays.rules
+    left = LaneGraph(Roads(msgspec.structs.replace(city, lanes=lanes, drives_on="left"))).ways.rules
     assert right.pair_way.tolist() == left.pair_way.tolist()
     assert right.pair_yields.tolist() == left.pair_yields.tolist()
     assert any(right.pair_yields)

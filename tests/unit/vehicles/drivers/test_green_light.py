@@ -16,11 +16,11 @@ from scm.v2x.etsi.convert import spatem_of
 from scm.v2x.etsi.topology import mapem_of, topology_of
 from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.driver_batch import Crowd
+from scm.vehicles.drivers.driver_batch import DriverBatch
 from scm.vehicles.drivers.green_advisor import GreenAdvisor
 from scm.vehicles.drivers.green_light import advised_speed, arriving_speed, red_for
-from scm.vehicles.drivers.pace import stopping_speed
-from scm.vehicles.drivers.streets import Streets
+from scm.vehicles.drivers.lane_graph import LaneGraph
+from scm.vehicles.drivers.speed_control import stopping_speed
 
 NIGEL = CarLimits(
     wheelbase=0.14154, steer_limit=0.5235988, steer_rate=0.42, front=0.23, rear=0.07, width=0.175,
@@ -39,13 +39,13 @@ class Approach:
         city_map = replace(city_map, speed_advice=is_advised, radio=radio or RadioChannel())
         self.roads = Roads(city_map)
         self.junction = city_map.junctions[0]
-        self.crowd = Crowd(Streets(self.roads), 1)
+        self.drivers = DriverBatch(LaneGraph(self.roads), 1)
         (self.line,) = (one for one in city_map.stop_lines if one.group == LINE_LANE)
         self.lanes, s = self._back(self.line.lane, self.line.at_m - NIGEL.front - far_m)
         self.x, self.y, self.yaw = self.roads.lane(self.lanes[0]).at(s)
-        self.speed, self.now_ns, self.told_ns = 0.2, 0, None
-        self.crowd.enter(0, NIGEL)
-        self.crowd.circulate(0, self.lanes[0], s)
+        self.speed, self.now_ns, self.sent_ns = 0.2, 0, None
+        self.drivers.enter(0, NIGEL)
+        self.drivers.circulate(0, self.lanes[0], s)
         self.speeds, self.crossed_at = [], None
 
     def _back(self, lane, s):
@@ -65,41 +65,41 @@ class Approach:
             junction=self.junction.name, t_ns=self.now_ns, seq=0, mode="plan", plan="calm",
             revision=self.roads.city_map.revision, groups=groups,
         )  # fmt: skip
-        self.crowd.hear_spatem(spatem_of(spat, self.junction), self.now_ns)
+        self.drivers.receive_spatem(spatem_of(spat, self.junction), self.now_ns)
 
     def left(self):
         """Return how far the front is from the line [m], negative behind it."""
         if self.crossed_at is not None:
-            return self.crossed_done - float(self.crowd.done_m[0])
-        lane = self.crowd.streets.names[self.crowd.lane[0]]
+            return self.crossed_done - float(self.drivers.done_m[0])
+        lane = self.drivers.lane_graph.names[self.drivers.lane[0]]
         if lane not in self.lanes:
             return -math.inf
         ahead = self.lanes[self.lanes.index(lane) : -1]
         between = sum(self.roads.length_of(name) for name in ahead)
-        return between + self.line.at_m - self.crowd.s[0] - NIGEL.front
+        return between + self.line.at_m - self.drivers.s[0] - NIGEL.front
 
     def drive(self, seconds, green_at_s, promised_s=None):
         """Drive on; the light is red until then, and SPATEM promises it until `promised_s`."""
         promised_ns = round(1e9 * (green_at_s if promised_s is None else promised_s))
         for _ in range(round(seconds / 0.02)):
             is_green = self.now_ns >= green_at_s * 1e9
-            if self.now_ns % (500 * NS_PER_MS) == 0 or (is_green and self.told_ns is None):
-                self.told_ns = self.now_ns if is_green else None
+            if self.now_ns % (500 * NS_PER_MS) == 0 or (is_green and self.sent_ns is None):
+                self.sent_ns = self.now_ns if is_green else None
                 end_ns = self.now_ns + 10**10 if is_green else max(promised_ns, self.now_ns)
                 self.tell("green" if is_green else "red", end_ns)
             self.tick()
             self.speeds.append(self.speed)
             if self.crossed_at is None and self.left() < 0.0:
-                self.crossed_done = float(self.crowd.done_m[0])
+                self.crossed_done = float(self.drivers.done_m[0])
                 self.crossed_at = 1e-9 * self.now_ns
         return self
 
     def tick(self):
         row = (np.array([value]) for value in (self.x, self.y, self.yaw, self.speed))
-        self.crowd.decide(self.now_ns, *row, np.ones(1, np.bool_))
-        wanted = np.interp(self.crowd.throttle[0], np.linspace(0, 1, 11), (0.0, *NIGEL.speeds))
+        self.drivers.decide(self.now_ns, *row, np.ones(1, np.bool_))
+        wanted = np.interp(self.drivers.throttle[0], np.linspace(0, 1, 11), (0.0, *NIGEL.speeds))
         self.speed += float(wanted - self.speed) * 0.28
-        angle = float(self.crowd.steering[0]) * NIGEL.steer_limit
+        angle = float(self.drivers.steering[0]) * NIGEL.steer_limit
         self.x += self.speed * math.cos(self.yaw) * 0.02
         self.y += self.speed * math.sin(self.yaw) * 0.02
         self.yaw += self.speed * math.tan(angle) / NIGEL.wheelbase * 0.02
@@ -162,7 +162,7 @@ def test_a_promise_counts_even_when_most_frames_get_lost():
 def test_a_flashing_or_accused_junction_promises_nothing():
     car = Approach(2.0)
     car.tell("red", 8 * 10**9)
-    told, group = car.crowd.signals.told, car.crowd.streets.ways.line_links[0, 0]
+    told, group = car.drivers.signals.received, car.drivers.lane_graph.arrays.line_links[0, 0]
     place = told.newest[0]
     assert red_for(told, group, 0, place, 0) == pytest.approx(8.0, abs=0.11)
     assert red_for(told, group, 0, place, 9 * 10**9) < 0.0
@@ -189,9 +189,9 @@ def test_a_car_without_a_map_is_advised_by_what_the_air_tells():
             for g in junction.groups
         ),
     )  # fmt: skip
-    advisor.hear_spatem(spatem_of(spat, junction), now_ns)
+    advisor.receive_spatem(spatem_of(spat, junction), now_ns)
     assert advisor.advise(pose, now_ns) is None
-    advisor.hear_mapem(mapem_of(roads, junction))
+    advisor.receive_mapem(mapem_of(roads, junction))
     told = advisor.advise(pose, now_ns)
     assert told.lane == topology_of(roads, junction).lane_in(line.group)
     assert told.distance_m == pytest.approx(1.6, abs=0.005)

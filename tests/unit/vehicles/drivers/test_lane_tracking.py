@@ -9,9 +9,9 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.route import Path, Roads
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.driver_batch import Crowd
-from scm.vehicles.drivers.lane_tracking import segment_at, survey, turned
-from scm.vehicles.drivers.streets import CURVATURE, LENGTH, YAW, Streets
+from scm.vehicles.drivers.driver_batch import DriverBatch
+from scm.vehicles.drivers.lane_graph import CURVATURE, LENGTH, YAW, LaneGraph
+from scm.vehicles.drivers.lane_tracking import heading_change, list_segments, segment_at
 
 NIGEL = CarLimits(0.14154, 0.5236, 0.42, 0.23, 0.07, 0.175, speeds=(0.13, 0.27))
 LAP = ("east_loop", "crossing_south_west", "west_loop", "crossing_south_east")
@@ -29,81 +29,85 @@ def lap(roads):
 
 @pytest.mark.parametrize("beside", [0.0, 0.08, -0.2])
 def test_a_car_that_is_led_along_its_way_is_found_where_it_is(roads, lap, beside):
-    crowd = Crowd(Streets(roads), 1)
-    crowd.enter(0, NIGEL)
-    crowd.send(0, LAP, 0.4, "loop")
+    drivers = DriverBatch(LaneGraph(roads), 1)
+    drivers.enter(0, NIGEL)
+    drivers.send(0, LAP, 0.4, "loop")
     driven = np.ones(1, np.bool_)
     for tick, s in enumerate(np.arange(0.4, 0.4 + 1.5 * lap.length_m, 0.05)):
         x, y, yaw = lap.at(s)
         x, y = x - beside * math.sin(yaw), y + beside * math.cos(yaw)
-        crowd.decide(tick * 10**7, *np.array([[x], [y], [yaw], [0.2]]), driven)
-        assert crowd.done_m[0] == pytest.approx(s - 0.4, abs=1e-4)
-        assert crowd.cross_track[0] == pytest.approx(beside, abs=1e-4)
-        assert crowd.streets.names[crowd.lane[0]] == lap.lane_at(s)
+        drivers.decide(tick * 10**7, *np.array([[x], [y], [yaw], [0.2]]), driven)
+        assert drivers.done_m[0] == pytest.approx(s - 0.4, abs=1e-4)
+        assert drivers.cross_track[0] == pytest.approx(beside, abs=1e-4)
+        assert drivers.lane_graph.names[drivers.lane[0]] == lap.lane_at(s)
 
 
 def test_a_car_pushed_back_over_the_start_of_its_lane_is_found_again(roads, lap):
-    crowd = Crowd(Streets(roads), 1)
-    crowd.enter(0, NIGEL)
-    crowd.send(0, LAP, 2.0, "stop")
+    drivers = DriverBatch(LaneGraph(roads), 1)
+    drivers.enter(0, NIGEL)
+    drivers.send(0, LAP, 2.0, "stop")
     start = roads.lane("east_loop").length_m
     for tick, s in enumerate((2.0, start + 0.1, start - 0.1, start + 0.2)):
         x, y, yaw = lap.at(s)
-        crowd.decide(tick * 10**7, *np.array([[x], [y], [yaw], [0.2]]), np.ones(1, np.bool_))
-        assert crowd.streets.names[crowd.lane[0]] == lap.lane_at(s)
-        assert crowd.done_m[0] == pytest.approx(s - 2.0, abs=1e-4)
+        drivers.decide(tick * 10**7, *np.array([[x], [y], [yaw], [0.2]]), np.ones(1, np.bool_))
+        assert drivers.lane_graph.names[drivers.lane[0]] == lap.lane_at(s)
+        assert drivers.done_m[0] == pytest.approx(s - 2.0, abs=1e-4)
 
 
 @pytest.mark.parametrize("offset", [-0.3, -0.05, 0.0, 0.07, 0.4, 1.3])
 def test_the_turn_along_the_way_is_that_of_the_map(roads, lap, offset):
-    ways = Streets(roads).ways
-    numbers = [Streets(roads).numbers[name] for name in LAP]
-    sight = np.array([numbers[3], *numbers, -1, -1, -1], np.int64)
+    ways = LaneGraph(roads).arrays
+    numbers = [LaneGraph(roads).numbers[name] for name in LAP]
+    lane_window = np.array([numbers[3], *numbers, -1, -1, -1], np.int64)
     ids, begins = np.zeros(32, np.int64), np.zeros(33)
     for s in (0.0, 0.5, 2.0):
-        count, here, _ = survey(ways.segment_first, ways.segments, sight, s, 0.4, 2.0, ids, begins)
-        seen = turned(ways.segments, ids, begins, count, here, offset)
+        count, here, _ = list_segments(
+            ways.segment_first, ways.segments, lane_window, s, 0.4, 2.0, ids, begins
+        )
+        seen = heading_change(ways.segments, ids, begins, count, here, offset)
         pieces = np.linspace(s, s + offset, 400)
         expected = np.sum([lap.curvature(p) for p in pieces[:-1]]) * offset / 399
         assert seen == pytest.approx(expected, abs=0.02)
 
 
 def test_a_way_that_ends_in_sight_says_so(roads):
-    streets = Streets(roads)
-    ways, lane = streets.ways, streets.numbers["east_loop"]
+    lane_graph = LaneGraph(roads)
+    ways, lane = lane_graph.arrays, lane_graph.numbers["east_loop"]
     ids, begins = np.zeros(32, np.int64), np.zeros(33)
-    sight = np.array([-1, lane, -1, -1, -1, -1, -1, -1], np.int64)
-    far = survey(ways.segment_first, ways.segments, sight, 1.0, 0.1, 2.0, ids, begins)
+    lane_window = np.array([-1, lane, -1, -1, -1, -1, -1, -1], np.int64)
+    far = list_segments(ways.segment_first, ways.segments, lane_window, 1.0, 0.1, 2.0, ids, begins)
     assert far[2]
     assert begins[far[0]] == pytest.approx(roads.length_of("east_loop") - 1.0)
-    assert not survey(ways.segment_first, ways.segments, sight, 1.0, 0.1, 0.5, ids, begins)[2]
+    assert not list_segments(
+        ways.segment_first, ways.segments, lane_window, 1.0, 0.1, 0.5, ids, begins
+    )[2]
 
 
 def test_segments_lie_on_the_lanes_of_the_map(roads):
-    streets = Streets(roads)
-    for number, name in enumerate(streets.names):
+    lane_graph = LaneGraph(roads)
+    for number, name in enumerate(lane_graph.names):
         lane = roads.lane(name)
         for s in np.linspace(0.01, lane.length_m - 0.01, 7):
-            row = streets.ways.segments[
-                segment_at(streets.ways.segment_first, streets.ways.segments, number, s)
+            row = lane_graph.arrays.segments[
+                segment_at(lane_graph.arrays.segment_first, lane_graph.arrays.segments, number, s)
             ]
             here = row[YAW] + row[CURVATURE] * (s - row[0])
             assert math.cos(here - lane.at(s).yaw) == pytest.approx(1.0, abs=1e-6)
-        assert streets.ways.length[number] == pytest.approx(lane.length_m)
+        assert lane_graph.arrays.length[number] == pytest.approx(lane.length_m)
 
 
 def test_a_segment_lies_in_its_rectangle():
     roads = Roads(grid_city(2, 2))
-    streets = Streets(roads)
-    for number, name in enumerate(streets.names):
-        first = streets.ways.segment_first[number]
-        west, south, east, north = streets.ways.segments[first, 9:13]
+    lane_graph = LaneGraph(roads)
+    for number, name in enumerate(lane_graph.names):
+        first = lane_graph.arrays.segment_first[number]
+        west, south, east, north = lane_graph.arrays.segments[first, 9:13]
         points = roads.lane(name).points
         assert west - 1e-3 <= points[:, 0].min()
         assert points[:, 0].max() <= east + 1e-3
         assert south - 1e-3 <= points[:, 1].min()
         assert points[:, 1].max() <= north + 1e-3
-        assert streets.ways.segments[first, LENGTH] > 0.0
+        assert lane_graph.arrays.segments[first, LENGTH] > 0.0
 
 
 def test_a_lane_that_leads_nowhere_is_known_for_it(roads):
@@ -115,7 +119,7 @@ def test_a_lane_that_leads_nowhere_is_known_for_it(roads):
         for lane in school.lanes
     ]
     fields = {key: getattr(school, key) for key in school.__struct_fields__}
-    streets = Streets(Roads(type(school)(**fields | {"lanes": tuple(cut)})))
-    assert streets.goes_round == [False] * 4
-    assert streets.round_from("west_loop") is None
-    assert Streets(roads).round_from("east_loop") == LAP
+    lane_graph = LaneGraph(Roads(type(school)(**fields | {"lanes": tuple(cut)})))
+    assert lane_graph.goes_round == [False] * 4
+    assert lane_graph.round_from("west_loop") is None
+    assert LaneGraph(roads).round_from("east_loop") == LAP

@@ -8,7 +8,7 @@ from scm.maps.load import load_map
 from scm.v2x.etsi.convert import spatem_of
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import SignalGroup, Spat
-from scm.vehicles.signal_view import SignalView
+from scm.vehicles.drivers.signal_table import SignalTable
 
 AT = ("crossing", "south_east")
 NOW_NS = 100 * NS_PER_S
@@ -21,7 +21,7 @@ def city_map():
 
 @pytest.fixture
 def view(city_map):
-    return SignalView(city_map)
+    return SignalTable(city_map)
 
 
 @pytest.fixture
@@ -61,83 +61,83 @@ def test_nothing_heard_is_nothing_believed(view):
 
 
 def test_a_fresh_green_lets_go(view, body):
-    view.hear_spatem(body(), NOW_NS)
+    view.receive_spatem(body(), NOW_NS)
     assert view.may_go(*AT, NOW_NS)
 
 
 @pytest.mark.parametrize("colour", ["red", "yellow", "flashing_red", "dark"])
 def test_only_green_lets_go(view, body, colour):
-    view.hear_spatem(body(colour), NOW_NS)
+    view.receive_spatem(body(colour), NOW_NS)
     assert view.colour(*AT, NOW_NS) == colour
     assert not view.may_go(*AT, NOW_NS)
 
 
 @pytest.mark.parametrize(("age_ms", "believed"), [(0, True), (1000, True), (1001, False)])
 def test_a_green_is_believed_for_one_second_from_its_arrival(view, body, age_ms, believed):
-    view.hear_spatem(body(), NOW_NS)
+    view.receive_spatem(body(), NOW_NS)
     assert view.may_go(*AT, NOW_NS + age_ms * NS_PER_MS) is believed
 
 
 def test_a_message_from_the_future_is_not_believed(view, body):
-    view.hear_spatem(body(), NOW_NS + 2 * NS_PER_S)
+    view.receive_spatem(body(), NOW_NS + 2 * NS_PER_S)
     assert view.colour(*AT, NOW_NS) is None
 
 
 def test_a_message_that_arrives_while_a_step_runs_is_believed(view, body):
-    view.hear_spatem(body(), NOW_NS + NS_PER_MS)
+    view.receive_spatem(body(), NOW_NS + NS_PER_MS)
     assert view.may_go(*AT, NOW_NS)
 
 
 def test_failure_flash_overrides_every_colour(view, body):
-    view.hear_spatem(body(mode="flash"), NOW_NS)
+    view.receive_spatem(body(mode="flash"), NOW_NS)
     assert view.colour(*AT, NOW_NS) == "flashing_red"
     assert view.time_to_change(*AT, NOW_NS) is None
 
 
 def test_a_known_monitor_fault_overrides_green_until_it_is_lifted(view, body):
-    view.hear_spatem(body(), NOW_NS)
-    view.hear_monitor(fault("conflict"))
+    view.receive_spatem(body(), NOW_NS)
+    view.receive_monitor_status(fault("conflict"))
     assert not view.may_go(*AT, NOW_NS)
-    view.hear_monitor(fault(None))
+    view.receive_monitor_status(fault(None))
     assert view.may_go(*AT, NOW_NS)
 
 
 def test_a_fault_of_another_junction_changes_nothing(view, body):
-    view.hear_spatem(body(), NOW_NS)
-    view.hear_monitor(fault("conflict", junction="elsewhere"))
+    view.receive_spatem(body(), NOW_NS)
+    view.receive_monitor_status(fault("conflict", junction="elsewhere"))
     assert view.may_go(*AT, NOW_NS)
 
 
 def test_signals_of_another_revision_of_the_map_are_ignored_and_counted(view, body):
-    view.hear_spatem(body(revision=2), NOW_NS)
+    view.receive_spatem(body(revision=2), NOW_NS)
     assert not view.may_go(*AT, NOW_NS)
     assert view.ignored == 1
 
 
 def test_an_unknown_group_is_never_green(view, body):
-    view.hear_spatem(body(), NOW_NS)
+    view.receive_spatem(body(), NOW_NS)
     assert not view.may_go("crossing", "north", NOW_NS)
 
 
 def test_a_group_that_a_message_leaves_out_is_never_green(view, body):
     full = body()
     junction = replace(full.intersections[0], states=full.states[1:])
-    view.hear_spatem(replace(full, intersections=(junction,)), NOW_NS)
+    view.receive_spatem(replace(full, intersections=(junction,)), NOW_NS)
     assert view.colour(*AT, NOW_NS) is None
 
 
 def test_a_green_past_its_promised_end_counts_as_yellow(view, body):
-    view.hear_spatem(body(min_end_s=0.5), NOW_NS)
+    view.receive_spatem(body(min_end_s=0.5), NOW_NS)
     assert view.colour(*AT, NOW_NS + 500 * NS_PER_MS) == "green"
     assert view.colour(*AT, NOW_NS + 601 * NS_PER_MS) == "yellow"
 
 
 def test_time_to_change_counts_down_from_the_arrival(view, body):
-    view.hear_spatem(body(min_end_s=0.5), NOW_NS)
+    view.receive_spatem(body(min_end_s=0.5), NOW_NS)
     assert view.time_to_change(*AT, NOW_NS + 200 * NS_PER_MS) == pytest.approx(0.3)
     assert view.time_to_change(*AT, NOW_NS + 900 * NS_PER_MS) == 0.0
 
 
 def test_a_change_that_is_not_promised_is_not_known(view, body):
-    view.hear_spatem(body("dark"), NOW_NS)
+    view.receive_spatem(body("dark"), NOW_NS)
     assert view.time_to_change(*AT, NOW_NS) is None

@@ -13,8 +13,8 @@ from scm.maps.route import Path, Roads
 from scm.v2x.etsi.convert import spatem_of
 from scm.v2x.messages.spat import SignalGroup, Spat
 from scm.vehicles.driver import CarLimits, Other, RouteView
-from scm.vehicles.drivers.route import RouteDriver
-from scm.vehicles.signal_view import SignalView
+from scm.vehicles.drivers.signal_table import SignalTable
+from scm.vehicles.drivers.single_car import RouteDriver
 
 NIGEL = CarLimits(
     wheelbase=0.14154,
@@ -76,7 +76,7 @@ class Scene:
     path: Path
     car: Bicycle
     driver: RouteDriver
-    signals: SignalView
+    signals: SignalTable
     now_ns: int = 0
     colour: str = "green"
     others: tuple = ()
@@ -111,7 +111,7 @@ class Scene:
         spat = Spat(
             junction=junction.name, t_ns=self.now_ns, seq=1, mode="plan", plan="p", groups=groups
         )
-        self.signals.hear_spatem(spatem_of(spat, junction), self.now_ns)
+        self.signals.receive_spatem(spatem_of(spat, junction), self.now_ns)
 
     @property
     def bumper_before_line(self):
@@ -127,7 +127,7 @@ def scene(city_map, eight):
         at = path.at(s)
         pose = at @ Pose2(0.0, lateral, yaw)
         driver = RouteDriver(path, NIGEL, **options)
-        return Scene(city_map, path, Bicycle(pose), driver, SignalView(city_map))
+        return Scene(city_map, path, Bicycle(pose), driver, SignalTable(city_map))
 
     return make
 

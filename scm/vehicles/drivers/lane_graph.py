@@ -1,7 +1,7 @@
-"""The lanes of a map as flat arrays: what compiled drivers walk along.
+"""The lane graph of a map as flat arrays for compiled drivers.
 
-A lane is a chain of straights and arcs, kept as what they are and not as points: place, heading and
-the foot of a perpendicular are exact and cost the same on every map.
+A lane is a chain of straights and arcs, stored as such and not as points: place, heading and
+projections are exact and cost the same on every map.
 """
 
 import math
@@ -18,24 +18,24 @@ from scm.maps.route import Roads
 from scm.records.city_map import Lane
 from scm.vehicles.drivers.rules import RuleBook, Rules, cut_segments, lines_of
 
-# Columns of a segment: where on its lane, its length, its start pose, 1/radius (+ = left), the
-# lane's speed limit; and the rectangle that holds it.
+# Columns of a segment: place on its lane, length, start pose, curvature (+ = left), speed limit,
+# and bounding box.
 AT, LENGTH, X, Y, COS, SIN, YAW, CURVATURE, LIMIT, WEST, SOUTH, EAST, NORTH = range(13)
-# Columns of a stop line: where on its lane. Columns of its links: group and junction by number.
+# Columns of a stop line's links: signal group and junction by number.
 GROUP, JUNCTION = range(2)
-MICRO = 1e-6
+TOLERANCE_M = 1e-6
 
 
-class Ways(NamedTuple):
-    """The arrays; what belongs to lane i stands in rows first[i] up to first[i + 1].
+class LaneArrays(NamedTuple):
+    """The arrays; rows first[i] to first[i + 1] belong to lane i.
 
     Attributes:
         length: Of each lane [m].
         segments: (n, 13), see the columns above.
-        following: Lanes that begin where one ends, by number.
-        line_at: Where on its lane each stop line is [m]; `line_links` its group and junction.
-        stretches: (n, 2) from and to of where nobody may stop [m]; `stretch_junction` whose.
-        rules: Who goes first at each line.
+        following: Successors of each lane, by number.
+        line_at: Place of each stop line on its lane [m]; `line_links` its group and junction.
+        stretches: (n, 2) from and to of where stopping is forbidden [m]; `stretch_junction` whose.
+        rules: Right of way at each line.
     """
 
     length: Floats
@@ -52,15 +52,15 @@ class Ways(NamedTuple):
     rules: Rules
 
 
-class Streets:
-    """A map's lanes for compiled drivers.
+class LaneGraph:
+    """The lane graph of one map.
 
     Attributes:
-        roads: Where they come from.
-        names: Of the lanes, by number; `numbers` the other way round.
-        goes_round: Of each lane, whether a car can drive on from it for ever.
-        forbidden: (lanes, k, 2) from and to of where nobody may stop on each lane [m], NaN: none.
-        ways: The arrays; of the lanes that follow one, those without end if there are any.
+        roads: The map's roads.
+        names: Of the lanes, by number; `numbers` is the inverse.
+        goes_round: Whether a car can drive on for ever from each lane.
+        forbidden: (lanes, k, 2) from and to of where stopping is forbidden [m]; NaN: none.
+        arrays: For compiled code; dead-end successors are left out where there are others.
     """
 
     def __init__(self, roads: Roads) -> None:
@@ -82,7 +82,7 @@ class Streets:
         for number, row in enumerate(stretches):
             for at, (_, move) in enumerate(row):
                 self.forbidden[number, at] = move.from_m, move.to_m
-        self.ways = Ways(
+        self.arrays = LaneArrays(
             length=np.array([sum(row[LENGTH] for row in rows) for rows in segments], np.float64),
             segment_first=segment_first,
             segments=_table([row for rows in segments for row in rows], 13),
@@ -102,11 +102,11 @@ class Streets:
         )
 
     def round_from(self, lane: str) -> tuple[str, ...] | None:
-        """Return the one round that a car can go from a lane; None where it has a choice."""
-        ways, start = self.ways, self.numbers[lane]
+        """Return the only loop from a lane, or None where a car has a choice."""
+        arrays, start = self.arrays, self.numbers[lane]
         at, found = start, [start]
-        while ways.next_first[at + 1] - ways.next_first[at] == 1:
-            at = int(ways.following[ways.next_first[at]])
+        while arrays.next_first[at + 1] - arrays.next_first[at] == 1:
+            at = int(arrays.following[arrays.next_first[at]])
             if at == start:
                 return tuple(self.names[n] for n in found)
             if len(found) == len(self.names):
@@ -115,36 +115,36 @@ class Streets:
         return None
 
     def sharpest_change(self, wheelbase: float) -> float:
-        """Return by how much the road wheels' angle jumps at the worst joint of the map [rad]."""
-        ways = self.ways
-        angle = np.arctan(wheelbase * ways.segments[:, CURVATURE])
+        """Return the largest jump of the steering angle between segments of the map [rad]."""
+        arrays = self.arrays
+        angle = np.arctan(wheelbase * arrays.segments[:, CURVATURE])
         within = np.abs(np.diff(angle))
-        within[ways.segment_first[1:-1] - 1] = 0.0
+        within[arrays.segment_first[1:-1] - 1] = 0.0
         largest = float(within.max(initial=0.0))
-        lasts, firsts = angle[ways.segment_first[1:] - 1], angle[ways.segment_first[:-1]]
-        before = np.repeat(np.arange(len(self.names)), np.diff(ways.next_first))
-        between = np.abs(firsts[ways.following] - lasts[before])
+        lasts, firsts = angle[arrays.segment_first[1:] - 1], angle[arrays.segment_first[:-1]]
+        before = np.repeat(np.arange(len(self.names)), np.diff(arrays.next_first))
+        between = np.abs(firsts[arrays.following] - lasts[before])
         return max(largest, float(between.max(initial=0.0)))
 
 
-def streets_of(roads: Roads) -> Streets:
-    """Return the streets of these roads, made once."""
-    found: Streets | None = getattr(roads, "streets", None)
+def lane_graph_of(roads: Roads) -> LaneGraph:
+    """Return the lane graph of these roads, built once."""
+    found: LaneGraph | None = getattr(roads, "lane_graph", None)
     if found is None:
-        found = Streets(roads)
-        roads.streets = found
+        found = LaneGraph(roads)
+        roads.lane_graph = found
     return found
 
 
 def _endless(following: list[list[int]]) -> list[bool]:
-    """Return for each lane whether a car can drive on from it for ever."""
+    """Return for each lane whether a car can drive on for ever."""
     before: list[list[int]] = [[] for _ in following]
     for lane, row in enumerate(following):
         for after in row:
             before[after].append(lane)
     choices = [len(row) for row in following]
     ended = [lane for lane, count in enumerate(choices) if count == 0]
-    for lane in ended:  # grows while it is walked through
+    for lane in ended:  # grows during the loop
         for earlier in before[lane]:
             choices[earlier] -= 1
             if choices[earlier] == 0:
@@ -158,16 +158,16 @@ def _segments(roads: Roads, lane: Lane) -> list[tuple[float, ...]]:
     limits = roads.limits_on(lane.name)
     for length, curvature in cut_segments(roads, lane.name):
         x, y, yaw = pose
-        held = _rectangle(pose, length, curvature)
+        box = _rectangle(pose, length, curvature)
         cos, sin = math.cos(yaw), math.sin(yaw)
-        limit = next(limit for begin, limit in reversed(limits) if begin <= at + MICRO)
-        rows.append((at, length, x, y, cos, sin, yaw, curvature, limit, *held))
+        limit = next(limit for begin, limit in reversed(limits) if begin <= at + TOLERANCE_M)
+        rows.append((at, length, x, y, cos, sin, yaw, curvature, limit, *box))
         pose, at = advance(pose, length, curvature), at + length
     return rows
 
 
 def _rectangle(start: Pose2, length: float, curvature: float) -> tuple[float, ...]:
-    """Return west, south, east, north of a segment, to a millimetre or so for arcs."""
+    """Return west, south, east, north of a segment; accurate to about a millimetre for arcs."""
     pieces = 1 + int(32.0 * abs(curvature) * length)
     places = [advance(start, length * k / pieces, curvature) for k in range(pieces + 1)]
     xs, ys = [place.x for place in places], [place.y for place in places]

@@ -1,8 +1,8 @@
-"""Which cars are on the way ahead: outlines against the corridor that the own car will sweep.
+"""Which cars are on the route ahead: outlines against the corridor that the own car will sweep.
 
-Along a segment of the way a car's outline is the box that holds it, with sides along and across the
-way at its middle. In a bend it is taken as wider by what the way curves over its length, and the
-corridor as wider on the outside by what the own front swings out.
+On each segment a car's outline is its bounding box, with sides along and across the route. In a
+bend it is widened by the curvature over its length, and the corridor is widened on the outside by
+the swing of the own front.
 """
 
 import math
@@ -11,21 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.drivers.lane_tracking import foot
-from scm.vehicles.drivers.memory import FRONT, WIDTH
-from scm.vehicles.drivers.stations import (
-    AT_X,
-    AT_Y,
-    CELLS_X,
-    CELLS_Y,
-    LARGEST,
-    LOW_X,
-    LOW_Y,
-    Heard,
-    cell_number,
-    known_to,
-)
-from scm.vehicles.drivers.streets import (
+from scm.vehicles.drivers.driver_state import FRONT, WIDTH
+from scm.vehicles.drivers.lane_graph import (
     COS,
     CURVATURE,
     EAST,
@@ -37,27 +24,40 @@ from scm.vehicles.drivers.streets import (
     X,
     Y,
 )
+from scm.vehicles.drivers.lane_tracking import project
+from scm.vehicles.drivers.received_cams import (
+    AT_X,
+    AT_Y,
+    CELLS_X,
+    CELLS_Y,
+    LARGEST,
+    LOW_X,
+    LOW_Y,
+    ReceivedCams,
+    cell_number,
+    estimate_for,
+)
 from scm.vehicles.jit import law
 
-REACH = 2.0
-MARGIN = 0.01
-STANDSTILL_GAP = 0.08
-MOST_AHEAD = 32
-MOST_SEGMENTS = 32
+REACH = 2.0  # beyond the front bumper [m]
+MARGIN = 0.01  # on both sides of the corridor [m]
+STANDSTILL_GAP = 0.08  # to the car ahead at rest [m]
+MAX_CARS_AHEAD = 32
+MAX_SEGMENTS = 32
 
-# Columns of a car ahead: where its rear is along the way, its speed along it, its length.
+# Columns of a car ahead: place of its rear along the route, speed along it, length.
 REAR_AT, SPEED_OF, LENGTH_OF = range(3)
-# Columns of a window over the floor.
+# Columns of a rectangle on the floor.
 LEFT, LOW, RIGHT, HIGH = range(4)
 
 
 class Scratch(NamedTuple):
-    """Room to work in, one a thread.
+    """Working arrays of one thread.
 
     Attributes:
-        ids: (32,) segments of the way; `begins` (33,) where each begins, from the rear axle on.
+        ids: (32,) segments of the route; `begins` (33,) where each begins, from the rear axle.
         ahead: (32, 3) cars ahead, nearest first.
-        window: (4,) over the floor.
+        window: (4,) rectangle on the floor.
     """
 
     ids: Ints
@@ -66,21 +66,21 @@ class Scratch(NamedTuple):
     window: Floats
 
 
-def scratch() -> Scratch:
-    """Return room for one thread."""
+def new_scratch() -> Scratch:
+    """Return the working arrays for one thread."""
     return Scratch(
-        ids=np.zeros(MOST_SEGMENTS, np.int64),
-        begins=np.zeros(MOST_SEGMENTS + 1),
-        ahead=np.zeros((MOST_AHEAD, 3)),
+        ids=np.zeros(MAX_SEGMENTS, np.int64),
+        begins=np.zeros(MAX_SEGMENTS + 1),
+        ahead=np.zeros((MAX_CARS_AHEAD, 3)),
         window=np.zeros(4),
     )
 
 
 @law
-def cars_ahead(
+def find_cars_ahead(
     segments: Floats,
-    heard: Heard,
-    room: Scratch,
+    received: ReceivedCams,
+    scratch: Scratch,
     kind: Floats,
     car: int,
     count: int,
@@ -88,13 +88,13 @@ def cars_ahead(
     now_ns: int,
     seed: int,
 ) -> int:
-    """Find the cars on the surveyed way, nearest first; return how many.
+    """Write the cars on the listed segments to `scratch`, nearest first; return how many.
 
-    They are looked for from the own front bumper on, as far as `reach` [m]. `room` holds the
-    surveyed segments, `count` of them, and takes the cars.
+    `scratch` holds `count` listed segments. The search goes from the own front bumper to `reach`
+    [m] beyond it.
     """
-    span(segments, room.ids, room.begins, room.window, count, kind[FRONT], reach)
-    floor, window = heard.floor, room.window
+    span(segments, scratch.ids, scratch.begins, scratch.window, count, kind[FRONT], reach)
+    floor, window = received.floor, scratch.window
     margin = 0.5 * kind[WIDTH] + MARGIN + floor[LARGEST]
     window[LEFT], window[RIGHT] = window[LEFT] - margin, window[RIGHT] + margin
     window[LOW], window[HIGH] = window[LOW] - margin, window[HIGH] + margin
@@ -105,20 +105,20 @@ def cars_ahead(
     high = cell_number(floor, window[HIGH], LOW_Y, CELLS_Y)
     found = 0
     for row in range(low, high + 1):
-        first = heard.cell_first[row * across + left]
-        last = heard.cell_first[row * across + right + 1]
+        first = received.cell_first[row * across + left]
+        last = received.cell_first[row * across + right + 1]
         for at in range(first, last):
-            other = heard.in_cell[at]
-            if other == car or is_outside(window, heard.at[other]):
+            other = received.in_cell[at]
+            if other == car or is_outside(window, received.at[other]):
                 continue
-            known, x, y, cos, sin, speed = known_to(heard, other, car, now_ns, seed)
+            known, x, y, cos, sin, speed = estimate_for(received, other, car, now_ns, seed)
             if not known:
                 continue
-            half_length, half_width = 0.5 * heard.size[other, 0], 0.5 * heard.size[other, 1]
+            half_length, half_width = 0.5 * received.size[other, 0], 0.5 * received.size[other, 1]
             hit, rear, same_way = first_overlap(
                 segments,
-                room.ids,
-                room.begins,
+                scratch.ids,
+                scratch.begins,
                 kind,
                 count,
                 reach,
@@ -131,14 +131,14 @@ def cars_ahead(
             )
             if hit:
                 found = insert(
-                    room.ahead, found, rear, max(0.0, speed * same_way), 2.0 * half_length
+                    scratch.ahead, found, rear, max(0.0, speed * same_way), 2.0 * half_length
                 )
     return found
 
 
 @law
 def is_outside(window: Floats, at: Floats) -> bool:
-    """Return whether a car's middle lies outside a window, and cannot reach into the way."""
+    """Return whether a car's centre lies outside a rectangle, so that it cannot be on the route."""
     x, y = at[AT_X], at[AT_Y]
     return bool(x < window[LEFT] or x > window[RIGHT] or y < window[LOW] or y > window[HIGH])
 
@@ -153,7 +153,7 @@ def span(
     front: float,
     reach: float,
 ) -> None:
-    """Lay a window over the way from the front bumper to the end of the reach."""
+    """Set the rectangle that holds the route from the front bumper to the end of the reach."""
     window[LEFT] = window[LOW] = math.inf
     window[RIGHT] = window[HIGH] = -math.inf
     for at in range(count):
@@ -186,9 +186,9 @@ def first_overlap(
     half_length: float,
     half_width: float,
 ) -> tuple[bool, float, float]:
-    """Return whether an outline reaches into the corridor, where first, and how much it goes along.
+    """Return whether an outline reaches into the corridor, where first, and its alignment.
 
-    The last is the cosine of the angle between its heading and the way.
+    The alignment is the cosine of the angle between its heading and the route.
     """
     front = kind[FRONT]
     half = 0.5 * kind[WIDTH] + MARGIN
@@ -198,7 +198,7 @@ def first_overlap(
         swing = 0.5 * row[CURVATURE] * front * front
         if end < begin or is_beside(row, x, y, half + abs(swing) + half_length + half_width):
             continue
-        along, beside, turn_cos, turn_sin = foot(row, x, y, 0.5 * row[LENGTH])
+        along, beside, turn_cos, turn_sin = project(row, x, y, 0.5 * row[LENGTH])
         way_cos = row[COS] * turn_cos - row[SIN] * turn_sin
         way_sin = row[SIN] * turn_cos + row[COS] * turn_sin
         same, across = way_cos * cos + way_sin * sin, abs(way_cos * sin - way_sin * cos)
@@ -220,7 +220,7 @@ def first_overlap(
 
 @law
 def is_beside(row: Floats, x: float, y: float, wide: float) -> bool:
-    """Return whether a point lies farther beside the line of a segment than `wide` [m]."""
+    """Return whether a point is more than `wide` [m] beside the line of a segment."""
     dx, dy = x - row[X], y - row[Y]
     v = dy * row[COS] - dx * row[SIN]
     k = row[CURVATURE]
@@ -244,9 +244,9 @@ def rear_end(
     half_length: float,
     half_width: float,
 ) -> float:
-    """Return where along a segment an outline begins [m], seen from the bumper that is nearer."""
+    """Return where along a segment an outline begins [m], by its nearer bumper."""
     back = -half_length if same >= 0.0 else half_length
-    along, _, turn_cos, turn_sin = foot(row, x + back * cos, y + back * sin, 0.5 * row[LENGTH])
+    along, _, turn_cos, turn_sin = project(row, x + back * cos, y + back * sin, 0.5 * row[LENGTH])
     way_cos = row[COS] * turn_cos - row[SIN] * turn_sin
     way_sin = row[SIN] * turn_cos + row[COS] * turn_sin
     across: float = abs(way_cos * sin - way_sin * cos)
@@ -255,7 +255,7 @@ def rear_end(
 
 @law
 def insert(ahead: Floats, found: int, rear: float, speed: float, length: float) -> int:
-    """Put a car in its place, the farthest out if there are too many; return how many there are."""
+    """Insert a car in order and drop the farthest if there are too many; return the count."""
     at = found
     if found == len(ahead):
         at -= 1

@@ -9,10 +9,9 @@ from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.v2x.messages.route_request import RouteRequest
 from scm.vehicles.driver import CarLimits, RouteView
-from scm.vehicles.drivers.alone import OWN
-from scm.vehicles.drivers.errands import Errands
+from scm.vehicles.drivers.signal_table import SignalTable
+from scm.vehicles.drivers.single_car import OWN, TripDriver
 from scm.vehicles.drivers.trips import Trips
-from scm.vehicles.signal_view import SignalView
 
 LIMITS = CarLimits(0.14154, 0.5236, 0.42, 0.23, 0.07, 0.175, speeds=(0.13, 0.27))
 
@@ -34,12 +33,12 @@ def start(roads):
 
 @pytest.fixture
 def trips(roads, start):
-    return Trips("n7", roads, LIMITS, start, 0)
+    return TripDriver("n7", roads, LIMITS, start, 0)
 
 
 @pytest.fixture
 def view(city_map):
-    signals = SignalView(city_map)
+    signals = SignalTable(city_map)
 
     def make(pose, now_ms=20):
         return RouteView(now_ms * NS_PER_MS, pose, 0.0, signals)
@@ -92,7 +91,7 @@ def test_an_impossible_trip_is_refused_and_changes_nothing(trips, start):
 
 def test_a_car_beside_all_lanes_cannot_begin(roads):
     with pytest.raises(MapError, match="n7"):
-        Trips("n7", roads, LIMITS, Pose2(50.0, 50.0, 0.0), 0)
+        TripDriver("n7", roads, LIMITS, Pose2(50.0, 50.0, 0.0), 0)
 
 
 def test_a_trip_tells_what_is_left_of_it_so_that_it_can_go_on(trips, roads, view, start):
@@ -106,43 +105,43 @@ def test_a_trip_tells_what_is_left_of_it_so_that_it_can_go_on(trips, roads, view
     passed_m, left = -0.5, []
     for t_s, lane in enumerate(route, 1):
         passed_m += roads.lane(lane).length_m
-        trips.driver.crowd.done_m[OWN] = passed_m + 0.01
+        trips.driver.batch.done_m[OWN] = passed_m + 0.01
         (trip,) = trips.reports(t_s * 1000 * NS_PER_MS)
         left.append(trip.via)
     after_west = [via for lane, via in zip(route, left, strict=True) if lane == "west_loop"]
     assert list(map(len, after_west)) == [3, 1]
     assert left[-1] == ()
-    trips.driver.crowd.done_m[OWN] = 0.0
+    trips.driver.batch.done_m[OWN] = 0.0
     trips.begin(RouteRequest(vehicle="n7", speed_mps=0.2), start, 0)
     assert [(t.via, t.speed_mps) for t in trips.reports(0)] == [((), 0.2)]
 
 
 def test_a_lane_whose_end_is_reached_is_passed(trips, start):
     reply = trips.begin(RouteRequest(vehicle="n7", via=("west_loop",)), start, 0)
-    trips.driver.crowd.done_m[OWN] = reply.length_m
+    trips.driver.batch.done_m[OWN] = reply.length_m
     assert [trip.via for trip in trips.reports(0)] == [()]
 
 
 def test_spread_reports_keep_to_their_own_turn(trips, start):
-    errands = Errands(trips.driver.crowd, spread=True)
-    errands.circulate(OWN, "n7", start, 0)
-    times = [t for t in range(130, 2000, 10) if errands.reports(t * NS_PER_MS)]
+    trips = Trips(trips.driver.batch, spread=True)
+    trips.circulate(OWN, "n7", start, 0)
+    times = [t for t in range(130, 2000, 10) if trips.reports(t * NS_PER_MS)]
     assert times == [130, 500, 1000, 1500]
 
 
 def test_another_car_in_its_place_counts_its_trips_anew(trips, start):
-    errands = Errands(trips.driver.crowd)
+    trips = Trips(trips.driver.batch)
     for vehicle in ("n7", "n7", "n8"):
-        errands.circulate(OWN, vehicle, start, 0)
-    assert [trip.trip_id for trip in errands.reports(0)] == ["n8-1"]
+        trips.circulate(OWN, vehicle, start, 0)
+    assert [trip.trip_id for trip in trips.reports(0)] == ["n8-1"]
 
 
 def test_the_last_word_on_a_trip_is_said_once(trips, start):
-    errands = Errands(trips.driver.crowd)
-    errands.circulate(OWN, "n7", start, 0)
-    errands.end(OWN, 0)
-    errands.end(OWN, 0)
-    assert len(errands.reports(0)) == 1
+    trips = Trips(trips.driver.batch)
+    trips.circulate(OWN, "n7", start, 0)
+    trips.end(OWN, 0)
+    trips.end(OWN, 0)
+    assert len(trips.reports(0)) == 1
 
 
 @pytest.mark.parametrize("then", ["stop", "circulate"])

@@ -4,49 +4,49 @@ import numpy as np
 import pytest
 
 from scm.clock import NS_PER_S
-from scm.vehicles.drivers.memory import NEVER_NS
-from scm.vehicles.drivers.order import (
-    EVERY_NS,
-    LONG_NS,
-    SHIFT_NS,
+from scm.vehicles.drivers.driver_state import NEVER_NS
+from scm.vehicles.drivers.waiting_order import (
+    LONG_WAIT_NS,
+    TURN_EVERY_NS,
     TURN_NS,
+    TURN_SHIFT_NS,
     has_turn,
     is_earlier,
     note_standing,
 )
 
 
-class Told:
-    """What one station tells, CAM by CAM."""
+class Station:
+    """One station and its CAMs."""
 
     def __init__(self):
         self.stood, self.at = np.full(1, NEVER_NS, np.int64), np.zeros((1, 2))
 
-    def tell(self, t_s, x, speed):
+    def send(self, t_s, x, speed):
         cams = np.array([[x, 0.0, 0.0, speed, 0.0]])
         note_standing(self.stood, self.at, np.array([0]), round(t_s * NS_PER_S), cams)
         return int(self.stood[0])
 
 
 def test_a_car_stands_since_it_first_told_so():
-    told = Told()
-    assert told.tell(1.0, 4.0, 0.2) == NEVER_NS
-    assert told.tell(2.0, 4.3, 0.01) == 2 * NS_PER_S
-    assert told.tell(3.0, 4.3, 0.0) == 2 * NS_PER_S
+    station = Station()
+    assert station.send(1.0, 4.0, 0.2) == NEVER_NS
+    assert station.send(2.0, 4.3, 0.01) == 2 * NS_PER_S
+    assert station.send(3.0, 4.3, 0.0) == 2 * NS_PER_S
 
 
 def test_who_starts_and_stops_again_keeps_its_place():
-    told = Told()
-    told.tell(2.0, 4.3, 0.0)
-    assert told.tell(3.0, 4.33, 0.06) == 2 * NS_PER_S
-    assert told.tell(4.0, 4.35, 0.0) == 2 * NS_PER_S
+    station = Station()
+    station.send(2.0, 4.3, 0.0)
+    assert station.send(3.0, 4.33, 0.06) == 2 * NS_PER_S
+    assert station.send(4.0, 4.35, 0.0) == 2 * NS_PER_S
 
 
 def test_who_moves_up_in_a_queue_stands_anew():
-    told = Told()
-    told.tell(2.0, 4.3, 0.0)
-    assert told.tell(3.0, 4.5, 0.1) == NEVER_NS
-    assert told.tell(4.0, 4.7, 0.0) == 4 * NS_PER_S
+    station = Station()
+    station.send(2.0, 4.3, 0.0)
+    assert station.send(3.0, 4.5, 0.1) == NEVER_NS
+    assert station.send(4.0, 4.7, 0.0) == 4 * NS_PER_S
 
 
 @pytest.mark.parametrize("order", [0, 3])
@@ -54,8 +54,12 @@ def test_a_turn_comes_after_long_ends_and_comes_again(order):
     def at(age_ns):
         return has_turn(5, order, 5 + age_ns)
 
-    again = LONG_NS + EVERY_NS + order * SHIFT_NS
-    assert [at(LONG_NS - 1), at(LONG_NS), at(LONG_NS + TURN_NS)] == [False, True, False]
+    again = LONG_WAIT_NS + TURN_EVERY_NS + order * TURN_SHIFT_NS
+    assert [at(LONG_WAIT_NS - 1), at(LONG_WAIT_NS), at(LONG_WAIT_NS + TURN_NS)] == [
+        False,
+        True,
+        False,
+    ]
     assert [at(again - 1), at(again), at(again + TURN_NS)] == [False, True, False]
     assert not has_turn(NEVER_NS, order, 5)
 

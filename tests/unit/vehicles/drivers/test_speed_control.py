@@ -6,9 +6,9 @@ import pytest
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.vehicles.driver import CarLimits
-from scm.vehicles.drivers.memory import kind_row
-from scm.vehicles.drivers.pace import free_speed, stopping_speed, throttle
-from scm.vehicles.drivers.streets import Streets
+from scm.vehicles.drivers.driver_state import kind_row
+from scm.vehicles.drivers.lane_graph import LaneGraph
+from scm.vehicles.drivers.speed_control import free_speed, stopping_speed, throttle
 
 TABLE = CarLimits(0.14, 0.52, 0.42, 0.23, 0.07, 0.175, speeds=(0.1, 0.2, 0.3, 0.4))
 BARE = CarLimits(0.14, 0.52, 0.42, 0.23, 0.07, 0.175)
@@ -83,7 +83,7 @@ def test_at_the_end_the_stopping_speed_is_zero():
 @pytest.fixture
 def eight():
     """Return segments of the eight: a straight, the east loop, and what comes after it."""
-    ways = Streets(Roads(load_map("driving_school"))).ways
+    ways = LaneGraph(Roads(load_map("driving_school"))).arrays
     ids = np.array([1, 2, 3, 4], np.int64)
     return ways, ids, np.cumsum([0.0, *ways.segments[ids, 1]])
 

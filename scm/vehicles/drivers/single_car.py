@@ -1,0 +1,208 @@
+"""The driver of one car that drives itself: a batch of one, with the same compiled controller.
+
+It knows only what each `RouteView` shows it.
+"""
+
+import math
+import zlib
+
+import numpy as np
+
+from scm.geometry import Pose2
+from scm.maps.route import Path, Roads
+from scm.v2x.messages.route_request import RouteReply, RouteRequest
+from scm.v2x.messages.trip import Trip
+from scm.vehicles.driver import CarLimits, Other, RouteView
+from scm.vehicles.drivers.channel import POOR_RECEPTION
+from scm.vehicles.drivers.controller import ARRIVED_WITHIN
+from scm.vehicles.drivers.driver_batch import DriverBatch
+from scm.vehicles.drivers.driver_state import WAITING_FOR
+from scm.vehicles.drivers.lane_graph import lane_graph_of
+from scm.vehicles.drivers.trips import Trips
+
+OWN = 0
+MAX_OTHERS = 63  # more cannot stand within the driver's reach
+
+
+class SingleDriver:
+    """The driver of one car.
+
+    Attributes:
+        batch: Where it is sent, as vehicle index `OWN`; the other indices show the others.
+    """
+
+    def __init__(self, roads: Roads, limits: CarLimits, seed: int = 0) -> None:
+        self.batch = DriverBatch(lane_graph_of(roads), 1 + MAX_OTHERS)
+        self.batch.enter(OWN, limits, seed)
+        self._shown = 0
+
+    @property
+    def done_m(self) -> float:
+        """Distance driven since it was sent [m]."""
+        return float(self.batch.done_m[OWN])
+
+    @property
+    def cross_track(self) -> float:
+        """Lateral offset of the rear axle from the route [m], + = left."""
+        return float(self.batch.cross_track[OWN])
+
+    @property
+    def waiting_for(self) -> str | None:
+        """What the car is waiting for at rest: `signal`, `vehicle`, `stop`, `sign`, or None."""
+        return WAITING_FOR[self.batch.waiting[OWN]]
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the route is done."""
+        return bool(self.batch.arrived[OWN])
+
+    def decide(self, view: RouteView) -> tuple[float, float]:
+        """Return (throttle, steering), both -1 to 1: + forward, + left."""
+        self._show(_nearest(view), view.now_ns)
+        self.batch.channel.numbers[POOR_RECEPTION] = 0.0 if view.reception_is_good else 1.0
+        pose = (*view.pose, view.speed)
+        return self.batch.decide_one(OWN, view.now_ns, pose, view.signals, stop=view.stop)
+
+    def _show(self, others: tuple[Other, ...], now_ns: int) -> None:
+        """Show the others to the batch as if each had just sent a CAM."""
+        batch = self.batch
+        for index in range(1 + len(others), 1 + self._shown):
+            batch.show(index, 0.0, 0.0)
+        self._shown = len(others)
+        if others:
+            for index, other in enumerate(others, start=1):
+                batch.show(index, other.length, other.width)
+            cams = np.array([_cam(other) for other in others])
+            batch.receive_cams(np.arange(1, 1 + len(others)), now_ns, *cams.T)
+
+
+class TripDriver:
+    """Drives one car on trips; it circulates until it is sent somewhere.
+
+    Attributes:
+        driver: The driver of the present trip.
+    """
+
+    def __init__(
+        self, vehicle: str, roads: Roads, limits: CarLimits, pose: Pose2, now_ns: int
+    ) -> None:
+        """Start to circulate from where the car stands.
+
+        Raises:
+            MapError: when it stands beside all lanes, or on a lane that leads nowhere.
+        """
+        self._vehicle = vehicle
+        self.driver = SingleDriver(roads, limits, zlib.crc32(vehicle.encode()))
+        self._trips = Trips(self.driver.batch)
+        self._trips.circulate(OWN, vehicle, pose, now_ns)
+
+    def begin(self, request: RouteRequest, pose: Pose2, now_ns: int) -> RouteReply:
+        """Send the car on a trip from where it is; a trip under way ends without arrival.
+
+        Raises:
+            MapError: when the lanes do not exist or cannot be reached.
+        """
+        return self._trips.begin(OWN, self._vehicle, request, pose, now_ns)
+
+    def decide(self, view: RouteView) -> tuple[float, float]:
+        """Return (throttle, steering); after arrival circulate if the request asked for it."""
+        commands = self.driver.decide(view)
+        self._trips.check_arrivals(view.now_ns)
+        return commands
+
+    def reports(self, now_ns: int) -> list[Trip]:
+        """Return the trip messages that are due: twice a second, and when a trip ends."""
+        return self._trips.reports(now_ns)
+
+
+class RouteDriver:
+    """Drives one car along a path that a script lays itself.
+
+    Attributes:
+        path: The path.
+        s: Where the rear axle is along it, laps included [m]; None before the first decision.
+        cross_track: Lateral offset of the rear axle [m], + = left.
+        waiting_for: What the car is waiting for at rest: `signal`, `vehicle`, `stop`, `sign`.
+        trip_m: Length of the trip; None: without end.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        limits: CarLimits,
+        *,
+        speed: float | None = None,
+        trip_m: float | None = None,
+        near: float | None = None,
+    ) -> None:
+        self.limits = limits
+        self.cross_track = 0.0
+        self.waiting_for: str | None = None
+        self._driver = SingleDriver(path.roads, limits)
+        self.follow(path, speed=speed, trip_m=trip_m, near=near)
+
+    def follow(
+        self,
+        path: Path,
+        *,
+        speed: float | None = None,
+        trip_m: float | None = None,
+        near: float | None = None,
+    ) -> None:
+        """Follow another path from now on, without a jerk.
+
+        Args:
+            path: An open path ends the drive with the rear axle at its end, a closed one never.
+            speed: On free road [m/s]; None: what lanes and curves allow.
+            trip_m: Length of the trip from where the car begins; None: to the end of the path.
+            near: Approximate place of the car along the path [m]; None: the closest point.
+        """
+        self.path = path
+        self.trip_m = trip_m
+        self.s: float | None = None
+        self._started = 0.0
+        self._near = near
+        self._speed = speed
+
+    @property
+    def done_m(self) -> float:
+        """Distance driven along the path since the first decision [m]."""
+        return 0.0 if self.s is None else self.s - self._started
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the trip is done."""
+        return self.trip_m is not None and self.done_m >= self.trip_m - ARRIVED_WITHIN
+
+    def decide(self, view: RouteView) -> tuple[float, float]:
+        """Return (throttle, steering), both -1 to 1: + forward, + left."""
+        if self.s is None:
+            self._begin(view)
+        commands = self._driver.decide(view)
+        self.s = self._started + self._driver.done_m
+        self.cross_track = self._driver.cross_track
+        self.waiting_for = self._driver.waiting_for
+        return commands
+
+    def _begin(self, view: RouteView) -> None:
+        path = self.path
+        self._started, _ = path.project(view.pose.x, view.pose.y, self._near)
+        if self.trip_m is None and not path.closed:
+            self.trip_m = path.length_m - self._started
+        first, s = path.index_at(self._started)
+        after = "loop" if path.closed else "stop"
+        self._driver.batch.send(OWN, path.lanes, s, after, self._speed, first)
+
+
+def _nearest(view: RouteView) -> tuple[Other, ...]:
+    if len(view.others) <= MAX_OTHERS:
+        return view.others
+    x, y, _ = view.pose
+    return tuple(sorted(view.others, key=lambda o: math.hypot(o.x - x, o.y - y))[:MAX_OTHERS])
+
+
+def _cam(other: Other) -> tuple[float, float, float, float, float]:
+    """Return the CAM columns of a car: front bumper x and y, heading, speed, yaw rate."""
+    ahead = 0.5 * other.length
+    x, y = other.x + ahead * math.cos(other.yaw), other.y + ahead * math.sin(other.yaw)
+    return x, y, other.yaw, other.speed, 0.0
