@@ -90,8 +90,8 @@ class World:
         hosted: Cars simulated here, by name, in the order they came; likewise `remote`.
         sessions: Of agents that are on the bus: the station of each.
         leased: Those of the hosted that somebody else drives.
-        crowd: The drivers of the hosted cars, and what they hear over the radio.
-        errands: Where these were sent.
+        drivers: The drivers of the hosted cars, and the radio frames that they receive.
+        trips: Where these were sent.
         front: By slot, from the rear axle to the front bumper [m].
         placed: Where the remote cars are, for their LIDARs: only the world can see for them.
         banks: The devices of all cars, by kind of sensor.

@@ -264,7 +264,9 @@ def test_where_cars_drive_on_the_left_they_yield_in_the_mirror_image():
     city = msgspec.structs.replace(grid_city(3, 3, block_m=6.0, signs=True), signs=())
     lanes = tuple(map(mirrored, city.lanes))
     right = LaneGraph(Roads(city)).arrays.rules
-    left = LaneGraph(Roads(msgspec.structs.replace(city, lanes=lanes, drives_on="left"))).ways.rules
+    left = LaneGraph(
+        Roads(msgspec.structs.replace(city, lanes=lanes, drives_on="left"))
+    ).arrays.rules
     assert right.pair_way.tolist() == left.pair_way.tolist()
     assert right.pair_yields.tolist() == left.pair_yields.tolist()
     assert any(right.pair_yields)
