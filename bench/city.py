@@ -19,8 +19,8 @@ from scm.maps.load import load_map
 from scm.records.city_map import CityMap
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.route_request import RouteRequest
 from scm.world import step

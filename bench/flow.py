@@ -23,10 +23,10 @@ from scm.arrays import Bools, Floats, Ints
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import BasePart, Subscription
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.observer_part import ObserverPart
-from scm.traffic.part import TrafficPart
-from scm.traffic.policy import FIXED
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.observation.part import ObserverPart
+from scm.traffic.signals.part import TrafficPart
+from scm.traffic.signals.policy import FIXED
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.eye_track import EyeTrack, Row6
 from scm.v2x.messages.traffic_counts import TrafficCounts

@@ -18,9 +18,9 @@ from scm.arrays import Bools, Floats
 from scm.maps.load import load_map
 from scm.records.city_map import CityMap, RadioChannel
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.part import TrafficPart
-from scm.traffic.policy import FIXED
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.signals.part import TrafficPart
+from scm.traffic.signals.policy import FIXED
 from scm.world.part import WorldPart
 
 MAPS = ("grid:4x4:4",)

@@ -12,11 +12,11 @@ from bench.flow import Cameras
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
-from scm.traffic.demand import DemandPart
-from scm.traffic.demand_table import Flow
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.observer_part import ObserverPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.demand.part import DemandPart
+from scm.traffic.demand.table import Flow
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.observation.part import ObserverPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.messages.violation import Violation
 from scm.world.part import WorldPart
 

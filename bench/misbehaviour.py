@@ -23,7 +23,12 @@ import msgspec
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
-from scm.traffic.part import TrafficPart
+from scm.traffic.misbehaviour.attack import Frame, Scene, Sent, attack_names, load_attack
+from scm.traffic.misbehaviour.check import Sender
+from scm.traffic.misbehaviour.detector import UNKNOWN, Detector
+from scm.traffic.misbehaviour.forge import driven, moved
+from scm.traffic.misbehaviour.ground import Ground
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.etsi.convert import read_cam
 from scm.v2x.message import Refused
@@ -32,11 +37,6 @@ from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.world_snapshot import WorldSnapshot
-from scm.v2x.misbehaviour.attack import Frame, Scene, Sent, attack_names, load_attack
-from scm.v2x.misbehaviour.check import Sender
-from scm.v2x.misbehaviour.detector import UNKNOWN, Detector
-from scm.v2x.misbehaviour.forge import driven, moved
-from scm.v2x.misbehaviour.ground import Ground
 from scm.world.part import WorldPart
 
 START_NS = 1_795_000_000_000_000_000

@@ -14,8 +14,8 @@ import numpy as np
 from bench.city import fill
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.signals.part import TrafficPart
 from scm.world.part import WorldPart
 
 CASES = {

@@ -17,11 +17,11 @@ from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
-from scm.traffic.controller import Controller, Heard
-from scm.traffic.detectors import Seen, Watcher, reach_of
-from scm.traffic.part import tables_of
-from scm.traffic.program import STEP_NS, program_of
-from scm.traffic.timing import NIGEL
+from scm.traffic.signals.controller import Controller, Heard
+from scm.traffic.signals.detectors import Seen, Watcher, reach_of
+from scm.traffic.signals.part import tables_of
+from scm.traffic.signals.program import STEP_NS, program_of
+from scm.traffic.signals.timing import NIGEL
 
 DT_S = STEP_NS / NS_PER_S
 DECEL, ACCEL, TIME_GAP_S, STAND_GAP_M, LENGTH_M, SIGHT_M = 0.5, 0.5, 0.8, 0.12, 0.30, 2.0

@@ -9,14 +9,14 @@ import time
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
-from scm.traffic import kernel, rings
-from scm.traffic.controller import Controller
-from scm.traffic.flood import flood
-from scm.traffic.kernel import Program
-from scm.traffic.policy import policy_names
-from scm.traffic.program import STEP_NS, program_of
-from scm.traffic.proof import in_steps, prove
-from scm.traffic.proof_rings import prove_service, small_times
+from scm.traffic.signals import kernel, rings
+from scm.traffic.signals.controller import Controller
+from scm.traffic.signals.kernel import Program
+from scm.traffic.signals.policy import policy_names
+from scm.traffic.signals.program import STEP_NS, program_of
+from scm.traffic.signals.proof.kernel_proof import in_steps, prove
+from scm.traffic.signals.proof.random_requests import flood
+from scm.traffic.signals.proof.ring_proof import prove_service, small_times
 
 STEPS, JUNCTIONS = 100_000_000, 4_000
 LIVE_STEPS = 3000

@@ -31,13 +31,13 @@ from scm.maps.route import Roads
 from scm.maps.sumo import import_sumo
 from scm.records.city_map import CityMap
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.demand import DemandPart, Ways
-from scm.traffic.demand_table import Flow
-from scm.traffic.own_plan import OWN, adopted, own_table
-from scm.traffic.part import TrafficPart
-from scm.traffic.plan import load_timetable
-from scm.traffic.program import program_of
-from scm.traffic.timing import NIGEL, headway_s
+from scm.traffic.demand.part import DemandPart, Ways
+from scm.traffic.demand.table import Flow
+from scm.traffic.signals.map_plan import OWN, adopted, own_table
+from scm.traffic.signals.part import TrafficPart
+from scm.traffic.signals.plan import load_timetable
+from scm.traffic.signals.program import program_of
+from scm.traffic.signals.timing import NIGEL, headway_s
 from scm.world.part import WorldPart
 
 STOOD_S = 180.0

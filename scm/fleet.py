@@ -31,8 +31,8 @@ from scm.log import event
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Part, Subscription
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.ask import ask
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus

@@ -120,7 +120,11 @@ def _run(arguments: argparse.Namespace) -> int:
     keys = KeyRing(open_store(arguments.keys)) if arguments.keys else None
     check_bind(arguments.host, keys)
     stop, failures = stop_on_signal(), list[Exception]()
-    view, city_map, shipped = CityView(), load_map(arguments.map), names("scm.traffic.plans")
+    view, city_map, shipped = (
+        CityView(),
+        load_map(arguments.map),
+        names("scm.traffic.signals.plans"),
+    )
     credentials = credentials_of(arguments, view.name)
     with ZenohBus(arguments.city, view.name, arguments.connect, credentials=credentials) as bus:
         wire = BusWire(bus)

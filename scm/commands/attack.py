@@ -4,7 +4,7 @@ import argparse
 import gc
 
 from scm.command import Command, credentials_argument
-from scm.v2x.misbehaviour.attack import attack_names
+from scm.traffic.misbehaviour.attack import attack_names
 from scm.v2x.router import DEFAULT_ENDPOINT
 
 
@@ -35,7 +35,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.command import credentials_of
     from scm.maps.load import load_map
     from scm.runtime.live import run, stop_on_signal
-    from scm.traffic.attacker import Attacker
+    from scm.traffic.misbehaviour.attacker import Attacker
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
     from vehicle_agent.agent import AgentPart

@@ -26,8 +26,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
-    from scm.traffic.demand import DemandPart
-    from scm.traffic.demand_table import load_demand, seconds_of_day
+    from scm.traffic.demand.part import DemandPart
+    from scm.traffic.demand.table import load_demand, seconds_of_day
 
     begin_s = None if arguments.time is None else seconds_of_day(arguments.time, "--time")
     flows = load_demand(arguments.table, lambda line: print(line, file=sys.stderr, flush=True))

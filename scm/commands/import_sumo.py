@@ -44,7 +44,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.sumo import import_sumo
-    from scm.traffic.own_plan import adopted
+    from scm.traffic.signals.map_plan import adopted
 
     if arguments.scale is not None and not 0.0 < arguments.scale < math.inf:
         raise MapError(f"--scale: got {arguments.scale}, expected a number above 0")
@@ -70,7 +70,7 @@ def _written(city_map: "CityMap", out: Path) -> "CityMap":
     """
     from scm.maps.load import map_of
     from scm.maps.sumo_toml import map_toml
-    from scm.traffic.part import TrafficPart
+    from scm.traffic.signals.part import TrafficPart
 
     text = map_toml(city_map)
     city = map_of(text, out)
@@ -86,7 +86,7 @@ def _report(
     out: Path, city: "CityMap", made: "Imported", why_not: Mapping[str, str]
 ) -> Iterator[str]:
     """Yield what became of a network, line by line."""
-    from scm.traffic.own_plan import OWN
+    from scm.traffic.signals.map_plan import OWN
 
     width, depth = (high - low for low, high in (city.floor.x_m, city.floor.y_m))
     yield f"{out}: 1:{made.scale:g} on {width:.1f} x {depth:.1f} m"

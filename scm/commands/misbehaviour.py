@@ -7,7 +7,7 @@ from scm.command import Command, part_arguments, run_part
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
-    from scm.traffic.misbehaviour_part import MisbehaviourPart
+    from scm.traffic.misbehaviour.part import MisbehaviourPart
 
     return run_part(MisbehaviourPart(load_map(arguments.map)), arguments)
 

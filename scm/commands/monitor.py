@@ -14,7 +14,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import waited_ns
     from scm.maps.load import load_map
     from scm.store.records import FaultRecord, records
-    from scm.traffic.monitor_part import MonitorPart
+    from scm.traffic.monitor.part import MonitorPart
 
     with state_of(arguments) as state:
         stored = {} if state is None else records(state, "latches", "monitor", FaultRecord)

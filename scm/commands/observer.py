@@ -7,7 +7,7 @@ from scm.command import Command, part_arguments, run_part
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
-    from scm.traffic.observer_part import ObserverPart
+    from scm.traffic.observation.part import ObserverPart
 
     return run_part(ObserverPart(load_map(arguments.map)), arguments)
 

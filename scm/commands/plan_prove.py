@@ -17,7 +17,7 @@ def _run(arguments: argparse.Namespace) -> int:
     import msgspec
 
     from scm.errors import PlanError
-    from scm.traffic.plan_asked import prove_file
+    from scm.traffic.signals.custom_plans import prove_file
     from scm.v2x.plan_file import PlanFile
 
     try:

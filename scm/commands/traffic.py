@@ -25,10 +25,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.store.records import PlanRecord, records
-    from scm.traffic.cars import facts_of, slowest_of
-    from scm.traffic.part import TrafficPart
-    from scm.traffic.policies.learned import load_learned
-    from scm.traffic.timing import NIGEL
+    from scm.traffic.car_facts import facts_of, slowest_of
+    from scm.traffic.signals.part import TrafficPart
+    from scm.traffic.signals.policies.learned import load_learned
+    from scm.traffic.signals.timing import NIGEL
 
     with state_of(arguments) as state:
         part = TrafficPart(

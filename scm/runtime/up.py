@@ -17,8 +17,8 @@ from scm.maps.radio import with_radio
 from scm.runtime.live import stop_on_signal
 from scm.runtime.supervisor import Job, PrintLine, Supervisor
 from scm.store.open import open_store
-from scm.traffic.demand import DemandPart
-from scm.traffic.demand_table import load_demand
+from scm.traffic.demand.part import DemandPart
+from scm.traffic.demand.table import load_demand
 from scm.v2x.access import SCRIPT, Guard, guard_of, is_loopback, own_stations
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus

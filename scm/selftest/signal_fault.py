@@ -12,7 +12,7 @@ from signal import Signals
 import msgspec
 
 from scm.clock import NS_PER_MS
-from scm.traffic.conflict_table import Card
+from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Colour, SignalGroup, Spat
 
 OutputFault = Callable[[Spat], Spat | None]

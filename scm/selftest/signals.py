@@ -21,7 +21,7 @@ from scm.selftest.observer import Observer
 from scm.selftest.signal_fault import OutputFault, SignalFault
 from scm.selftest.stand_in import StandIn
 from scm.selftest.table import in_ms, in_s
-from scm.traffic.conflict_table import card_of
+from scm.traffic.monitor.conflict_table import card_of
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Spat

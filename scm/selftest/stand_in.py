@@ -12,7 +12,7 @@ from scm.records.city_map import CityMap
 from scm.runtime.live import run
 from scm.runtime.part import BasePart, Subscription
 from scm.selftest.signal_fault import OutputFault
-from scm.traffic.part import TrafficPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.credentials import Credentials
 from scm.v2x.etsi.convert import roadside_station, spatem_of

@@ -1,8 +1,7 @@
-"""Traffic signals: what a junction shows, and a second channel that doubts it.
+"""Traffic: signals, their monitor, demand, observation and misbehaviour; one room each.
 
-`kernel.py` decides colours, `proof*.py` and `flood.py` prove it; `policies/` wish through
-`rings.py` or the timetables of `plans/`; `controller.py` runs them and keeps promises,
-`detectors.py` sees cars, `part.py` talks. `conflict_table.py`, `monitor.py`, `monitor_part.py` are
-the second channel and share no code with the first. May import v2x, maps. To add a policy or
-plan: one file.
+`signals/` decides and publishes what junctions show, `monitor/` checks it independently, `demand/`
+brings cars, `observation/` counts traffic and finds violations, `misbehaviour/` checks what cars
+claim on the air. `car_facts.py` reads what they must know of cars. May import v2x, maps and
+vehicles; knows no bus.
 """

@@ -18,12 +18,12 @@ from scm.errors import MessageError
 from scm.maps.load import load_map
 from scm.registry import load, names
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.demand import DemandPart
-from scm.traffic.demand_table import Flow
-from scm.traffic.misbehaviour_part import MisbehaviourPart
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.observer_part import ObserverPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.demand.part import DemandPart
+from scm.traffic.demand.table import Flow
+from scm.traffic.misbehaviour.part import MisbehaviourPart
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.observation.part import ObserverPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.exchange import Call
 from scm.v2x.key import key_of
 from scm.v2x.message import Request, decode, encode

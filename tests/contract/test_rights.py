@@ -12,12 +12,12 @@ from scm.maps.load import load_map
 from scm.recorder.part import RecorderPart
 from scm.registry import names
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.demand import DemandPart
-from scm.traffic.demand_table import load_demand
-from scm.traffic.misbehaviour_part import MisbehaviourPart
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.observer_part import ObserverPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.demand.part import DemandPart
+from scm.traffic.demand.table import load_demand
+from scm.traffic.misbehaviour.part import MisbehaviourPart
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.observation.part import ObserverPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.exchange import Call
 from scm.v2x.key import key_of, prefix, selector
 from scm.v2x.message import Message, Request

@@ -7,21 +7,21 @@ from pathlib import Path
 
 import pytest
 
-import scm.traffic
+import scm.traffic.monitor
 from scm.maps.load import load_map, map_names
 from scm.maps.route import Roads
 from scm.registry import load
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
-from scm.traffic import kernel
-from scm.traffic.conflict_table import card_of
-from scm.traffic.controller import Controller
-from scm.traffic.monitor import Monitor
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.part import TrafficPart
-from scm.traffic.plan import PACKAGE, Plan, load_timetable, plan_names
-from scm.traffic.program import STEP_NS, program_of
-from scm.traffic.proof import in_steps, prove
+from scm.traffic.monitor.checks import Monitor
+from scm.traffic.monitor.conflict_table import card_of
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.signals import kernel
+from scm.traffic.signals.controller import Controller
+from scm.traffic.signals.part import TrafficPart
+from scm.traffic.signals.plan import PACKAGE, Plan, load_timetable, plan_names
+from scm.traffic.signals.program import STEP_NS, program_of
+from scm.traffic.signals.proof.kernel_proof import in_steps, prove
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanRequest
 from scm.v2x.messages.spat import Spat
@@ -131,11 +131,9 @@ def test_a_controller_with_a_wrong_program_is_caught_in_its_first_cycle(city_map
 
 
 def test_the_second_channel_imports_nothing_of_the_first():
-    folder = Path(scm.traffic.__file__).parent
-    second = {"conflict_table", "monitor", "monitor_part"}
-    for name in second:
-        tree = ast.parse((folder / f"{name}.py").read_text(encoding="utf-8"))
+    for place in Path(scm.traffic.monitor.__file__).parent.glob("*.py"):
+        tree = ast.parse(place.read_text(encoding="utf-8"))
         imported = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-        own = {module.split(".")[-1] for module in imported if module.startswith("scm.traffic")}
-        assert own <= second
+        own = [module for module in imported if module.startswith("scm.traffic")]
+        assert all(module.startswith("scm.traffic.monitor.") for module in own)
         assert "scm.maps.conflicts" not in imported

@@ -14,7 +14,7 @@ import pytest
 from scm.maps.load import load_map
 from scm.recorder.part import RecorderPart
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.part import TrafficPart
+from scm.traffic.signals.part import TrafficPart
 from scm.world.part import WorldPart
 from tests.e2e.city_process import CityProcess, city, wait_for
 

@@ -8,8 +8,8 @@ from scm.errors import VoidError
 from scm.fleet import City, LockstepLink
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus

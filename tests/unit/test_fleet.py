@@ -11,7 +11,7 @@ from scm.fleet import City, LiveLink, LockstepLink, open_city
 from scm.maps.load import load_map
 from scm.runtime.live import run
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.part import TrafficPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.mailbox import Mailbox
 from scm.v2x.messages.remove_request import RemoveRequest

@@ -53,7 +53,7 @@ class Observation(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         kind: Class of observations of ETSI TS 103 759.
-        check: Name of the check, a file of `scm/v2x/misbehaviour/checks`.
+        check: Name of the check, a file of `scm/traffic/misbehaviour/checks`.
         plausibility: Of the worst claim: how often an honest car would seem so bad.
         claims: How many were at least doubtful.
     """

@@ -4,7 +4,7 @@ import msgspec
 
 from scm.clock import NS_PER_S
 from scm.selftest.signal_fault import OutputFault, SignalFault
-from scm.traffic.conflict_table import Card
+from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 JUMP_NS = -2 * NS_PER_S

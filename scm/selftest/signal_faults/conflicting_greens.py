@@ -7,7 +7,7 @@ from scm.selftest.signal_fault import (
     long_green,
     recolour,
 )
-from scm.traffic.conflict_table import Card
+from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Colour, Spat
 
 

@@ -3,7 +3,7 @@
 import msgspec
 
 from scm.selftest.signal_fault import OutputFault, SignalFault
-from scm.traffic.conflict_table import Card
+from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 

@@ -1,7 +1,7 @@
 """All lamps of a group are out."""
 
 from scm.selftest.signal_fault import OutputFault, SignalFault, recolour
-from scm.traffic.conflict_table import Card
+from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 

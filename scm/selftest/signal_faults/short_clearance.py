@@ -2,7 +2,7 @@
 
 from scm.clock import NS_PER_MS
 from scm.selftest.signal_fault import OutputFault, SignalFault, conflicting_groups, recolour
-from scm.traffic.conflict_table import Card
+from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 

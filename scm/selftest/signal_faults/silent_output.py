@@ -1,7 +1,7 @@
 """The controller runs, but none of its output arrives."""
 
 from scm.selftest.signal_fault import OutputFault, SignalFault
-from scm.traffic.conflict_table import Card
+from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 

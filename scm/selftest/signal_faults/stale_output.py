@@ -1,7 +1,7 @@
 """The same old sample is sent again and again."""
 
 from scm.selftest.signal_fault import OutputFault, SignalFault
-from scm.traffic.conflict_table import Card
+from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Spat
 
 

@@ -21,8 +21,8 @@ from scm.api.view import CityView
 from scm.maps.load import load_map
 from scm.registry import names
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.message import Message, Request
 from scm.world.part import WorldPart
 
@@ -44,7 +44,9 @@ class Town:
         self.city.run_for(BEFORE_S)
         hosted = tuple((f"n{number}", "nigel") for number in range(1, cars + 1))
         self.city.add(WorldPart(city_map, hosted=hosted))
-        plans = {junction.name: names("scm.traffic.plans") for junction in city_map.junctions}
+        plans = {
+            junction.name: names("scm.traffic.signals.plans") for junction in city_map.junctions
+        }
         shelves, site = shelves_in(folder), Site(base)
         app = create_app(view, self._ask, city_map, shelves=shelves, plans=plans, site=site)
         self._threads = [

@@ -10,8 +10,8 @@ from scm.errors import RunError
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.exchange import Call, Incoming
 from scm.v2x.message import Refused
 from scm.v2x.messages.camera_frame import CameraFrame

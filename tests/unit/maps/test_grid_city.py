@@ -15,9 +15,9 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
-from scm.traffic.conflict_table import card_of
-from scm.traffic.part import TrafficPart
-from scm.traffic.program import program_of
+from scm.traffic.monitor.conflict_table import card_of
+from scm.traffic.signals.part import TrafficPart
+from scm.traffic.signals.program import program_of
 
 NIGEL_RADIUS_M = 0.245
 

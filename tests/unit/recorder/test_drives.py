@@ -20,7 +20,7 @@ from scm.recorder.mcap_file import RunFile, read_run
 from scm.recorder.part import RecorderPart
 from scm.replay.free_run import free_run
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.part import TrafficPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of
 from scm.v2x.message import Message, encode

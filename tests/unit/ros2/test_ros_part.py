@@ -12,7 +12,7 @@ from scm.ros2.frames import vector
 from scm.ros2.part import RosPart
 from scm.ros2.types import ros, to_cdr
 from scm.runtime.part import Subscription
-from scm.traffic.part import TrafficPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.exchange import Incoming
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_stop import CityStop

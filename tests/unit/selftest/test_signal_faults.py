@@ -9,8 +9,8 @@ from scm.selftest.signal_fault import SignalFault
 from scm.selftest.signals import FAULTS, Outcome
 from scm.selftest.stand_in import FaultyTraffic
 from scm.selftest.table import markdown_table, text_table
-from scm.traffic.conflict_table import card_of
-from scm.traffic.monitor import Monitor
+from scm.traffic.monitor.checks import Monitor
+from scm.traffic.monitor.conflict_table import card_of
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Spat

@@ -10,8 +10,8 @@ from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import BasePart, Subscription
 from scm.selftest.signals import SignalTrials
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Spat
 

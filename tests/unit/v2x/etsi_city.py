@@ -18,7 +18,7 @@ from scm.maps.route import Roads
 from scm.recorder.mcap_file import RunFile
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
-from scm.traffic.part import TrafficPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.etsi.convert import roadside_station, station_id
 from scm.v2x.etsi.events import DenmSender, accident, city_stop
 from scm.v2x.etsi.json_form import Body

@@ -19,7 +19,9 @@ from scm.eye.track.perception import collective_perception
 from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.traffic.sightings import Sightings
+from scm.traffic.misbehaviour.claim import claim_of
+from scm.traffic.misbehaviour.limits import Limits
+from scm.traffic.signals.sightings import Sightings
 from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.etsi.codes import codes_in
 from scm.v2x.etsi.convert import cam_of, colours_of, place_of, read_cam, spatem_of, station_id
@@ -33,8 +35,6 @@ from scm.v2x.etsi.priority_requests import Answered, Wish, answers_of, srem_of, 
 from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.spat import SignalGroup, Spat
-from scm.v2x.misbehaviour.claim import claim_of
-from scm.v2x.misbehaviour.limits import Limits
 from scm.v2x.pcap import Positions
 from scm.v2x.uper import cam, codec, denm, mapem, spatem, srem, ssem
 from scm.v2x.uper.parts import Chosen, Each, Fields, Names, Only

@@ -10,8 +10,8 @@ from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
-from scm.traffic.monitor_part import MonitorPart
-from scm.traffic.part import TrafficPart
+from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.message import Refused
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand

@@ -9,7 +9,7 @@ from scm.maps.load import load_map
 from scm.maps.radio import with_radio
 from scm.records.city_map import RadioChannel
 from scm.runtime.lockstep import Lockstep
-from scm.traffic.part import TrafficPart
+from scm.traffic.signals.part import TrafficPart
 from scm.world.part import WorldPart
 
 CARS = tuple((f"n{n}", "nigel") for n in range(1, 5))

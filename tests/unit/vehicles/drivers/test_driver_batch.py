@@ -12,7 +12,7 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.records.city_map import RadioChannel
-from scm.traffic.part import TrafficPart
+from scm.traffic.signals.part import TrafficPart
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem_tx import SpatemTx
 from scm.vehicles.driver import CarLimits

@@ -1,0 +1,171 @@
+"""A part whose cars lie on the air: what it sends is as before, but for some stations' CAMs.
+
+    Attacker(AgentPart("n3"), {"n3": "zero_speed"})     a station of its own, live or in lockstep
+    Attacker(WorldPart(...), {"n3": "zero_speed"})      a hosted car, in lockstep
+
+Around a world, what roadside units and agents hear is changed alike; the drivers of other hosted
+cars hear the truth, for they hear it inside the world.
+"""
+
+import heapq
+import itertools
+import random
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from msgspec.structs import replace
+
+from scm.clock import seconds
+from scm.records.city_map import CityMap
+from scm.runtime.part import IsWanted, Part, Service, Subscription
+from scm.traffic.misbehaviour.attack import Frame, Scene, Transform, load_attack
+from scm.traffic.misbehaviour.ground import Ground
+from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
+
+Cam = CamTx | CamRx
+MOST_CHECKS = 3
+
+
+@dataclass(slots=True)
+class _Record:
+    """What one liar has said so far, and since when it is suspected for it."""
+
+    about: str
+    cams: int = 0
+    lies: int = 0
+    first_ns: int = 0
+    since_ns: int | None = None
+
+
+class Attacker:
+    """A part, and what some of its stations say instead of the truth; see `scm.runtime.part.Part`.
+
+    Args:
+        part: Whose outbox is changed; everything else is its own.
+        attacks: By station the name of its attack.
+        city_map: What attackers know of the city.
+        seed: Of all attacks.
+        own_names: Ghosts go under names of their own, as if they had certificates; else under the
+            attacker's, as a city that guards its keys allows nothing else.
+        say: Takes lines for a person: the first lie, each suspicion, the sum at the end. None:
+            nobody is told. A city that guards its keys tells no car who is suspected.
+
+    Raises:
+        RunError: when there is no such attack.
+    """
+
+    def __init__(
+        self,
+        part: Part,
+        attacks: Mapping[str, str],
+        city_map: CityMap,
+        seed: int = 0,
+        *,
+        own_names: bool = False,
+        say: Callable[[str], None] | None = None,
+    ) -> None:
+        self._part = part
+        self.name, self.role, self.period_ns = part.name, part.role, part.period_ns
+        self._scene = Scene(Ground(city_map))
+        self._send: dict[str, Transform] = {
+            station: load_attack(name).start(random.Random(f"{seed} {station}"), self._scene)
+            for station, name in attacks.items()
+        }
+        self._own_names = own_names
+        self._say = say or _nobody
+        self._is_told = say is not None
+        self._records = {name: _Record(load_attack(a).about) for name, a in attacks.items()}
+        self._later: list[tuple[int, int, list[Cam]]] = []
+        self._count = itertools.count()
+
+    @property
+    def subscriptions(self) -> Sequence[Subscription]:
+        """What the part hears, and reports on its liars where somebody is told."""
+        reports = (Subscription(MisbehaviourReport, {"suspect": name}) for name in self._send)
+        return (*self._part.subscriptions, *reports) if self._is_told else self._part.subscriptions
+
+    @property
+    def services(self) -> Sequence[Service]:
+        """What the part serves."""
+        return self._part.services
+
+    def attach(self, is_wanted: IsWanted) -> None:
+        """Let the part check for subscribers."""
+        self._part.attach(is_wanted)
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Let the part act, and change what its liars say."""
+        for item in inbox:
+            if isinstance(item.message, CamRx):
+                self._overhear(item.message)
+            elif isinstance(item.message, MisbehaviourReport):
+                self._is_reported(item.message)
+        outbox: list[Outgoing] = []
+        heard: dict[tuple[str, int], list[Cam]] = {}
+        for said in self._part.step(now_ns, inbox):
+            if isinstance(said, CamTx | CamRx) and said.station in self._send:
+                heard.setdefault((said.station, said.t_ns), []).append(said)
+                continue
+            if isinstance(said, CamTx):
+                self._overhear(said)
+            outbox.append(said)
+        for copies in heard.values():
+            self._lie(copies)
+        while self._later and self._later[0][0] <= now_ns:
+            outbox += heapq.heappop(self._later)[2]
+        return outbox
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Let the part leave."""
+        for name, record in self._records.items():
+            found = "never reported" if record.since_ns is None else "reported"
+            sums = f"{record.cams} CAMs, {record.lies} of them lies, {found}"
+            self._say(f"{name} leaves: {sums if record.cams else 'it was never in the city'}")
+        return self._part.finish(now_ns)
+
+    def _overhear(self, cam: Cam) -> None:
+        self._scene.heard.append(Frame(cam.station, cam.t_ns, cam.body))
+
+    def _lie(self, copies: list[Cam]) -> None:
+        """Replace one frame, as sent and as each receiver heard it."""
+        first = copies[0]
+        record = self._records[first.station]
+        for sent in self._send[first.station](Frame(first.station, first.t_ns, first.body)):
+            frame = sent.frame
+            record.cams += 1
+            record.lies += sent.lies
+            if sent.lies and record.lies == 1:
+                record.first_ns = frame.t_ns
+                self._say(f"{first.station} lies from now on: {record.about}")
+            name = frame.station if self._own_names else first.station
+            told = [_as(copy, name, frame) for copy in copies]
+            heapq.heappush(self._later, (frame.t_ns, next(self._count), told))
+
+    def _is_reported(self, report: MisbehaviourReport) -> None:
+        """Say it once for each suspicion, not at every repetition."""
+        record = self._records[report.suspect]
+        if record.since_ns == report.since_ns:
+            return
+        record.since_ns = report.since_ns
+        after_s = seconds(report.t_ns - record.first_ns)
+        checks = ", ".join(
+            f"{one.check} ({one.claims} CAMs doubted)" for one in report.observations[:MOST_CHECKS]
+        )
+        self._say(
+            f"{report.suspect} is reported {after_s:.1f} s after its first lie, "
+            f"score {report.score:.1f}: {checks}"
+        )
+
+
+def _as(copy: Cam, name: str, frame: Frame) -> Cam:
+    if isinstance(copy, CamTx):
+        return CamTx(station=name, t_ns=frame.t_ns, body=frame.body)
+    car = copy.car if name == copy.station else ""  # a ghost is no car of the city
+    return replace(copy, station=name, t_ns=frame.t_ns, body=frame.body, signed="", car=car)
+
+
+def _nobody(line: str) -> None:
+    del line

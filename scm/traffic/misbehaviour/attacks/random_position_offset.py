@@ -1,0 +1,27 @@
+"""Random position offset: somewhere else, by another way each time.
+
+p' = p + d, drawn anew for each CAM, sizes as in constant_position_offset
+"""
+
+import random
+
+from scm.traffic.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
+from scm.traffic.misbehaviour.attacks.constant_position_offset import offset_m
+from scm.traffic.misbehaviour.forge import moved
+from scm.v2x.etsi.convert import read_cam
+
+
+def _start(rng: random.Random, scene: Scene) -> Transform:
+    del scene
+
+    def send(frame: Frame) -> list[Sent]:
+        place = read_cam(frame.body).place
+        if place is None:
+            return [Sent(frame, lies=False)]
+        body = moved(frame.body, place[0] + offset_m(rng), place[1] + offset_m(rng))
+        return [Sent(frame._replace(body=body), lies=True)]
+
+    return send
+
+
+ATTACK = Attack("a position that is off by another way each time", _start)

@@ -1,0 +1,39 @@
+"""Sudden stop: from some moment on it stands, and drives on.
+
+p' = p(t*), v' = 0, t* with 5 % for each CAM while it drives
+a lie while it drives, or once it is 20 m of the full city away
+"""
+
+import math
+import random
+
+from scm.traffic.misbehaviour.attack import SLOW_MPS, Attack, Frame, Scene, Sent, Transform
+from scm.traffic.misbehaviour.forge import driven, moved
+from scm.v2x.etsi.cam_spatem import SCALE
+from scm.v2x.etsi.convert import CamView, read_cam
+
+CHANCE = 0.05
+AWAY_M = 20.0 / SCALE
+
+
+def _start(rng: random.Random, scene: Scene) -> Transform:
+    del scene
+    stop: CamView | None = None
+
+    def send(frame: Frame) -> list[Sent]:
+        nonlocal stop
+        told = read_cam(frame.body)
+        is_driving = abs(told.speed_mps or 0.0) > SLOW_MPS
+        if stop is None and is_driving and told.place is not None and rng.random() < CHANCE:
+            stop = told
+        if stop is None or stop.place is None or told.place is None:
+            return [Sent(frame, lies=False)]
+        body = moved(frame.body, *stop.place)
+        body = driven(body, speed_mps=0.0, yaw_rad=stop.yaw_rad, accel_mps2=0.0)
+        away = math.dist(told.place, stop.place) >= AWAY_M
+        return [Sent(frame._replace(body=body), lies=is_driving or away)]
+
+    return send
+
+
+ATTACK = Attack("a stop that does not happen", _start)

@@ -1,0 +1,44 @@
+"""Zero speed: says it stands, wherever it is.
+
+v' = 0        a lie while it drives: above 1 m/s of the full city, and moved
+"""
+
+import math
+import random
+
+from scm.traffic.misbehaviour.attack import (
+    SLOW_MPS,
+    STEP_M,
+    Attack,
+    Frame,
+    Scene,
+    Sent,
+    Transform,
+)
+from scm.traffic.misbehaviour.forge import driven
+from scm.v2x.etsi.convert import CamView, read_cam
+
+
+def drives(told: CamView, before: CamView | None) -> bool:
+    """Return whether a car truly moves, by its speed and its way since the CAM before."""
+    was = None if before is None else before.place
+    if was is None or told.place is None or abs(told.speed_mps or 0.0) <= SLOW_MPS:
+        return False
+    return math.dist(told.place, was) > STEP_M / 5.0
+
+
+def _start(rng: random.Random, scene: Scene) -> Transform:
+    del rng, scene
+    before: CamView | None = None
+
+    def send(frame: Frame) -> list[Sent]:
+        nonlocal before
+        told, last = read_cam(frame.body), before
+        before = told
+        body = driven(frame.body, speed_mps=0.0)
+        return [Sent(frame._replace(body=body), lies=drives(told, last))]
+
+    return send
+
+
+ATTACK = Attack("a speed of zero while driving", _start)

@@ -1,0 +1,19 @@
+"""Kalman position (F2MD's PSCP): the claim lies where the filter forecasts it.
+
+p = place(innovation, sigma of forecast and claim)
+"""
+
+from scm.traffic.misbehaviour.check import Case, Check
+from scm.traffic.misbehaviour.likely import of_place
+
+TOLERANCE_M = 0.02
+
+
+def _judge(case: Case) -> float | None:
+    kalman = case.kalman
+    if not kalman.is_warm:
+        return None
+    return of_place(kalman.moved_m, TOLERANCE_M, 1.3 * kalman.position_std)
+
+
+CHECK = Check(_judge, "position")

@@ -1,0 +1,30 @@
+"""Lane heading: who is on a lane drives its way.
+
+    p = erfc of the least angle to a lane there, beyond 76 degrees
+
+A mirrored position lies on the other side of the road and heads against it. So does a real
+wrong-way driver, who tells the truth: an Eye that confirms the place settles it, and without an
+Eye this weighs little.
+"""
+
+from scm.geometry import wrap_angle
+from scm.traffic.misbehaviour.check import Case, Check
+from scm.traffic.misbehaviour.likely import at_most
+from scm.traffic.misbehaviour.limits import HEADING_RAD
+
+SIGMA_RAD = 0.1
+
+
+def _judge(case: Case) -> float | None:
+    now = case.now
+    if now.yaw_rad is None:
+        return None
+    ways = case.ground.ways_at(*now.middle)
+    if not ways:
+        return None
+    yaw = now.yaw_rad
+    off = min(abs(wrap_angle(yaw - way)) for way in ways)
+    return at_most(off, HEADING_RAD, SIGMA_RAD)
+
+
+CHECK = Check(_judge, "position", floor=1e-2, witnessed=True)

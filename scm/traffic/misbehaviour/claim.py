@@ -1,0 +1,144 @@
+"""A CAM as a claim: where a car says it is, how it moves, and how sure it says it is."""
+
+import math
+
+import msgspec
+
+from scm.traffic.misbehaviour.limits import Limits
+from scm.v2x.etsi.cam_spatem import SCALE, CamBody
+from scm.v2x.etsi.codes import is_out_of_range, scaled
+from scm.v2x.etsi.convert import (
+    ASSUMED_LENGTH_M,
+    ASSUMED_WIDTH_M,
+    generated_ns,
+    read_cam,
+)
+
+SURELY = 1.96
+"""Deviations within which 95 % lie: what confidence means in these messages."""
+LEAST_OWN = 1e-4
+ACCEL_UNIT_MPS2 = 0.1 / SCALE
+
+
+class Claim(msgspec.Struct, frozen=True, gc=False):
+    """What one CAM says, in metres of the table.
+
+    Attributes:
+        who: The station's number in the message.
+        station: Who sent it, by its key on the bus.
+        receiver: Who heard it.
+        sent_ns: When it left its antenna.
+        t_ns: When it says that it was true.
+        lost_ns: Of the time until then, what passed without the car being moved, see `CamRx`.
+        x_m, y_m: The middle of the front bumper, map frame.
+        yaw_rad, speed_mps, accel_mps2, yaw_rate_radps, length_m, width_m: None: the CAM does not
+            say, or only that it is beyond the field's range. Speed is negative in reverse.
+        is_beyond_speed: Whether it says that it is faster than the field can express.
+        accel_beyond_mps2: What it says to exceed, + = speeding up, where its acceleration is beyond
+            the field's range: +-1.14. Nigels exceed it; None: it does not say so.
+        own_m, own_mps, own_rad: Standard deviations of position, speed and yaw.
+    """
+
+    who: int
+    station: str
+    receiver: str
+    sent_ns: int
+    t_ns: int
+    lost_ns: int
+    x_m: float
+    y_m: float
+    yaw_rad: float | None
+    speed_mps: float | None
+    accel_mps2: float | None
+    yaw_rate_radps: float | None
+    length_m: float | None
+    width_m: float | None
+    is_beyond_speed: bool
+    accel_beyond_mps2: float | None
+    own_m: float
+    own_mps: float
+    own_rad: float
+    body: CamBody
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Return length and width [m]; a Nigel's where the CAM does not tell them."""
+        return self.length_m or ASSUMED_LENGTH_M, self.width_m or ASSUMED_WIDTH_M
+
+    @property
+    def accel_range(self) -> tuple[float, float] | None:
+        """Return the least and the greatest acceleration that it may mean; None: it tells none."""
+        if self.accel_mps2 is not None:
+            return self.accel_mps2, self.accel_mps2
+        beyond = self.accel_beyond_mps2
+        if beyond is None:
+            return None
+        return (beyond, math.inf) if beyond > 0.0 else (-math.inf, beyond)
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Return the middle of the car's body; of one without a yaw, its front [m]."""
+        if self.yaw_rad is None:
+            return self.x_m, self.y_m
+        half = self.size[0] / 2.0
+        return self.x_m - half * math.cos(self.yaw_rad), self.y_m - half * math.sin(self.yaw_rad)
+
+    def rear(self, front_share: float) -> tuple[float, float]:
+        """Return the rear axle's centre if so much of the car lies before it [m]."""
+        if self.yaw_rad is None:
+            return self.x_m, self.y_m
+        front = front_share * self.size[0]
+        return self.x_m - front * math.cos(self.yaw_rad), self.y_m - front * math.sin(self.yaw_rad)
+
+
+def claim_of(
+    station: str, receiver: str, sent_ns: int, body: CamBody, limits: Limits, lost_ns: int = 0
+) -> Claim | None:
+    """Return what a CAM claims; None: it does not say where its car is, so it claims nothing."""
+    told = read_cam(body)
+    if told.place is None:
+        return None
+    motion = body.motion
+    accel_mps2, beyond_mps2 = accel_of(body)
+    ellipse = body.position.position_confidence_ellipse
+    own = limits.own_m, limits.own_mps, limits.own_rad
+    most = limits.most_own_m, limits.most_own_mps, limits.most_own_rad
+    return Claim(
+        body.station_id,
+        station,
+        receiver,
+        sent_ns,
+        generated_ns(body, sent_ns),
+        lost_ns,
+        *told.place,
+        told.yaw_rad,
+        told.speed_mps,
+        accel_mps2,
+        told.yaw_rate_radps,
+        told.length_m,
+        told.width_m,
+        is_out_of_range(motion.speed, "value"),
+        beyond_mps2,
+        _deviation(ellipse, "semi_major", 0.01 / SCALE, own[0], most[0]),
+        _deviation(motion.speed, "confidence", 0.01 / SCALE, own[1], most[1]),
+        _deviation(motion.heading, "confidence", math.radians(0.1), own[2], most[2]),
+        body,
+    )
+
+
+def accel_of(body: CamBody) -> tuple[float | None, float | None]:
+    """Return the acceleration that a CAM tells, and what it says to exceed; see `Claim` [m/s^2]."""
+    told = body.motion.longitudinal_acceleration
+    if is_out_of_range(told, "value"):
+        return None, told.value * ACCEL_UNIT_MPS2
+    return scaled(told, "value", ACCEL_UNIT_MPS2), None
+
+
+def _deviation(
+    record: msgspec.Struct, field: str, unit: float, unknown: float, most: float
+) -> float:
+    """Return the standard deviation that a confidence field tells, never more than `most`."""
+    if is_out_of_range(record, field):
+        return most
+    told = scaled(record, field, unit)
+    return unknown if told is None else min(max(told / SURELY, LEAST_OWN), most)

@@ -1,0 +1,136 @@
+"""What many plausibilities add up to: a score a station, with memory and hysteresis.
+
+    points = min(MOST, -log10(least plausibility of all checks)) - FREE, at least 0
+    score <- score exp(-dt / MEMORY_S) + points
+    suspected from ON up, until it has fallen below OFF
+
+The least counts and not the sum: checks look at the same numbers, so they are wrong together.
+FREE is what an honest car's worst check of twenty says anyway. ON takes two blatant claims, or
+many doubtful ones within the memory. Where the Eye cannot see a car's tag, nobody can speak for it:
+what checks that a witness settles find raises its score to UNSEEN_MOST and no further.
+"""
+
+import math
+from collections import deque
+
+from scm.traffic.misbehaviour.check import Check, Strayed
+from scm.traffic.misbehaviour.claim import Claim
+from scm.traffic.misbehaviour.kalman import Kalman
+
+MEMORY_S = 10.0
+FREE, MOST = 0.8, 4.0
+ON, OFF = 5.0, 2.0
+UNSEEN_MOST = 3.0
+EVIDENCE = 6
+REPEAT_NS = 10_000_000_000
+
+
+class Noted:
+    """How one check stands against a station since it was last in order.
+
+    Attributes:
+        least: The worst plausibility.
+        claims: How many claims were at least doubtful.
+    """
+
+    __slots__ = ("check", "claims", "least")
+
+    def __init__(self, check: Check) -> None:
+        self.check, self.least, self.claims = check, 1.0, 0
+
+
+class Memory:
+    """What is known of one station.
+
+    Attributes:
+        station: Its name on the bus.
+        newest: Its last claim.
+        first_ns: Since when it is known.
+        late_ns: When it last told of a time in which it was not moved; None: never.
+        hard_ns: When it was last driven by hand, or the city stopped; None: never.
+        is_tag_unseen: Whether it is a car whose tag the Eye should see and never saw.
+        idle: Its claims in a row that came fast though nothing had changed.
+        score: What is held against it.
+        since_ns: Since when it is suspected; None: it is not.
+        told_ns: When that was last reported.
+        is_news: Whether that report was the first of this suspicion.
+        noted: By check what led to it.
+        evidence: The last claims that gave points, each with the one before it.
+    """
+
+    __slots__ = (
+        "evidence", "first_ns", "hard_ns", "idle", "is_news", "is_tag_unseen",
+        "kalman", "late_ns", "newest", "noted", "score",
+        "since_ns", "station", "strayed", "told_ns", "worst",
+    )  # fmt: skip
+
+    def __init__(self, station: str, first_ns: int) -> None:
+        self.station = station
+        self.first_ns = first_ns
+        self.strayed = Strayed()
+        self.newest: Claim | None = None
+        self.kalman = Kalman()
+        self.late_ns: int | None = None
+        self.hard_ns: int | None = None
+        self.is_tag_unseen = False
+        self.idle = 0
+        self.score = 0.0
+        self.worst = ""
+        self.since_ns: int | None = None
+        self.told_ns: int | None = None
+        self.is_news = False
+        self.noted: dict[str, Noted] = {}
+        self.evidence: deque[Claim] = deque(maxlen=EVIDENCE)
+
+    def add(self, claim: Claim, gap_s: float, doubts: list[tuple[Check, float]]) -> bool:
+        """Take the checks' doubts of a claim; return whether a report is due.
+
+        Args:
+            claim: The claim.
+            gap_s: Since the station's last one.
+            doubts: Checks that found it less than ordinary, and its plausibility.
+        """
+        points = soft = 0.0
+        for check, plausibility in doubts:
+            found = min(MOST, -math.log10(plausibility)) - FREE
+            if found <= 0.0:
+                continue
+            noted = self.noted.get(check.name)
+            if noted is None:
+                noted = self.noted[check.name] = Noted(check)
+            noted.claims += 1
+            noted.least = min(noted.least, plausibility)
+            if found > max(points, soft):
+                self.worst = check.name
+            if check.witnessed and self.is_tag_unseen:
+                soft = max(soft, found)
+            else:
+                points = max(points, found)
+        self.score = self.score * math.exp(-max(0.0, gap_s) / MEMORY_S) + points
+        if soft > points:
+            self.score = max(self.score, min(self.score + soft - points, UNSEEN_MOST))
+        if points or soft:
+            self._keep(claim)
+        return self._judge(claim.sent_ns)
+
+    def _keep(self, claim: Claim) -> None:
+        before = self.newest
+        if before is not None and (not self.evidence or self.evidence[-1] is not before):
+            self.evidence.append(before)
+        self.evidence.append(claim)
+
+    def _judge(self, now_ns: int) -> bool:
+        if self.since_ns is None:
+            if self.score < ON:
+                if self.score < OFF / 10.0:
+                    self.noted.clear()
+                return False
+            self.since_ns = now_ns
+        elif self.score < OFF:
+            self.since_ns = self.told_ns = None
+            self.noted.clear()
+            return False
+        if self.told_ns is not None and now_ns - self.told_ns < REPEAT_NS:
+            return False
+        self.is_news, self.told_ns = self.told_ns is None, now_ns
+        return True

@@ -1,0 +1,1 @@
+"""Observation: traffic counts and violations, from cameras, cars' reports and signals."""

@@ -1,0 +1,260 @@
+"""Counters: who passes a lane, how long a junction delays it, and how many stand before it.
+
+    passage      the front passes the line of the lane; without a line, the rear axle its middle
+    delay        from entering the lane before the line to leaving the junction, beyond the time
+                 that this way takes at the limits
+    stop         slower than 0.03 m/s, after having been faster than 0.10
+    queue        cars that stopped and have not been faster than 0.10 since
+    saturation   flow x saturation headway / share of green; the headway is that of cars that had
+                 stopped and follow one another
+
+A passage counts once: a car must have been before the place, or have come from the lane before, and
+4 s must lie between two of its passages on a lane.
+"""
+
+import itertools
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from statistics import fmean
+
+from scm.clock import NS_PER_S, seconds
+from scm.maps.route import OnLane, Roads
+from scm.traffic.observation.car_estimates import Belief
+from scm.traffic.observation.lane_tracking import Followed, Lines
+from scm.traffic.observation.service_level import level_of, share_below
+from scm.traffic.signals.sightings import NIGEL_FRONT_M
+from scm.v2x.etsi.convert import ASSUMED_LENGTH_M
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.traffic_counts import ApproachCount, LaneCount, TrafficCounts
+
+WINDOW_NS = 900 * NS_PER_S
+AGAIN_NS = 4 * NS_PER_S
+ARMED_M = 0.02
+STANDS_MPS, MOVES_MPS = 0.03, 0.10
+LEAVES_QUEUE_S = 8.0
+LEAST_HEADWAYS = 5
+SAMPLE_NS = NS_PER_S
+
+
+@dataclass(slots=True)
+class _Visit:
+    """A car on one lane, and over the junction behind it."""
+
+    lane: str
+    from_ns: int
+    from_m: float
+    armed: bool
+    front_m: float
+    t_ns: int
+    passed_ns: int | None = None
+    stops: int = 0
+    stands: bool = False
+    moved: bool = True
+
+
+@dataclass(slots=True)
+class _Log:
+    """What was counted on a lane; times [ns] with what belongs to them, oldest first."""
+
+    passages: deque[tuple[int, float, bool]] = field(default_factory=deque)
+    delays: deque[tuple[int, float, int]] = field(default_factory=deque)
+    queues: deque[tuple[int, int]] = field(default_factory=deque)
+    greens: deque[tuple[int, bool]] = field(default_factory=deque)
+
+    def forget(self, before_ns: int) -> None:
+        rows: tuple[deque[tuple[int, float, bool]] | deque[tuple[int, float, int]]
+                    | deque[tuple[int, int]] | deque[tuple[int, bool]], ...]  # fmt: skip
+        rows = (self.passages, self.delays, self.queues, self.greens)
+        for row in rows:
+            while row and row[0][0] < before_ns:
+                row.popleft()
+
+
+class Counters:
+    """Counts on all lanes of a map."""
+
+    def __init__(self, roads: Roads, lines: Mapping[str, Lines]) -> None:
+        self._roads, self._lines = roads, lines
+        self._logs: dict[str, _Log] = {}
+        self._visits: dict[str, _Visit] = {}
+        self._before: dict[str, _Visit] = {}
+        self._last: dict[tuple[str, str], int] = {}
+        self._began_ns: int | None = None
+        self._next_sample_ns = 0
+
+    def see(self, belief: Belief, followed: Followed | None) -> None:
+        """Take where a car is now."""
+        if followed is None:
+            self.forget(belief.vehicle)
+            return
+        place, vehicle = followed.place, belief.vehicle
+        visit = self._visits.get(vehicle)
+        if visit is None or visit.lane != place.lane:
+            visit = self._change(belief, place, visit)
+        self._stops(visit, belief.speed)
+        self._pass(visit, belief, place)
+
+    def forget(self, vehicle: str) -> None:
+        """Forget a car that is gone, or beside all lanes."""
+        self._visits.pop(vehicle, None)
+        self._before.pop(vehicle, None)
+
+    def sample(self, now_ns: int, spats: Mapping[str, Spat]) -> None:
+        """Note queues and greens, once a second."""
+        if self._began_ns is None:
+            self._began_ns = now_ns
+        if now_ns < self._next_sample_ns:
+            return
+        self._next_sample_ns = now_ns + SAMPLE_NS
+        for lane, line in self._lines.items():
+            log = self._log(lane)
+            log.queues.append((now_ns, len(self._queue(lane))))
+            spat = spats.get(line.junction)
+            for group in spat.groups if spat is not None else ():
+                if group.group == line.group:
+                    log.greens.append((now_ns, group.colour == "green"))
+        for log in self._logs.values():
+            log.forget(now_ns - WINDOW_NS)
+        old = now_ns - AGAIN_NS
+        self._last = {key: at for key, at in self._last.items() if at > old}
+
+    def counts(self, now_ns: int) -> TrafficCounts:
+        """Return all counts of the window that ends now."""
+        began_ns = now_ns if self._began_ns is None else self._began_ns
+        span_s = seconds(min(WINDOW_NS, now_ns - began_ns))
+        lanes = [
+            LaneCount(lane=name, **self._flow(log, span_s))  # type: ignore[arg-type]
+            for name, log in self._logs.items()
+            if log.passages
+        ]
+        approaches = [self._approach(lane, line, span_s) for lane, line in self._lines.items()]
+        return TrafficCounts(
+            t_ns=now_ns, window_s=span_s, lanes=tuple(lanes), approaches=tuple(approaches)
+        )
+
+    def _log(self, lane: str) -> _Log:
+        return self._logs.setdefault(lane, _Log())
+
+    def _change(self, belief: Belief, place: OnLane, old: _Visit | None) -> _Visit:
+        """Begin a visit; the one before goes on until the junction is behind the car."""
+        vehicle, earlier = belief.vehicle, self._before.get(belief.vehicle)
+        if earlier is not None and old is not None and place.lane == earlier.lane:
+            self._visits[vehicle] = earlier  # it was not gone: noise at the joint
+            del self._before[vehicle]
+            return earlier
+        if earlier is not None and old is not None:
+            successors = self._roads.successors(old.lane)
+            if place.lane in successors:
+                self._leave(earlier, old.lane, belief.t_ns)
+                del self._before[vehicle]
+            elif place.lane not in self._roads.successors(earlier.lane):
+                del self._before[vehicle]
+        follows = old is not None and place.lane in self._roads.successors(old.lane)
+        if old is not None and follows and old.lane in self._lines:
+            self._before[vehicle] = old
+        front = self._front(place)
+        visit = _Visit(place.lane, belief.t_ns, place.s, follows, front, belief.t_ns)
+        if old is None:  # a car that stands where it is first seen has not stopped there
+            visit.moved = abs(belief.speed) > MOVES_MPS
+        else:
+            visit.stands, visit.moved = old.stands, old.moved
+        self._visits[vehicle] = visit
+        return visit
+
+    def _front(self, place: OnLane) -> float:
+        """Return how far a car is beyond the place where it is counted [m]."""
+        line = self._lines.get(place.lane)
+        if line is None:
+            return place.s - self._roads.length_of(place.lane) / 2.0
+        return place.s + NIGEL_FRONT_M - line.at_m
+
+    def _stops(self, visit: _Visit, speed: float) -> None:
+        if abs(speed) < STANDS_MPS and visit.moved:
+            visit.stands, visit.moved = True, False
+            visit.stops += 1
+        elif abs(speed) > MOVES_MPS:
+            visit.stands, visit.moved = False, True
+
+    def _pass(self, visit: _Visit, belief: Belief, place: OnLane) -> None:
+        front = self._front(place)
+        before_m, before_ns = visit.front_m, visit.t_ns
+        visit.front_m, visit.t_ns = front, belief.t_ns
+        if front < -ARMED_M:
+            visit.armed = True
+        if front < 0.0 or not visit.armed or visit.passed_ns is not None:
+            return
+        key = (belief.vehicle, visit.lane)
+        if belief.t_ns - self._last.get(key, -AGAIN_NS) < AGAIN_NS:
+            return
+        share = -before_m / (front - before_m) if before_m < 0.0 <= front else 1.0
+        visit.passed_ns = before_ns + round(share * (belief.t_ns - before_ns))
+        self._last[key] = belief.t_ns
+        self._log(visit.lane).passages.append((visit.passed_ns, abs(belief.speed), visit.stops > 0))
+
+    def _leave(self, visit: _Visit, way: str, now_ns: int) -> None:
+        """Note the delay of a car that has left the junction."""
+        if visit.passed_ns is None:
+            return
+        roads = self._roads
+        lane, over = roads.definition(visit.lane), roads.definition(way)
+        free_s = (roads.length_of(visit.lane) - visit.from_m) / lane.speed_limit_mps
+        free_s += roads.length_of(way) / over.speed_limit_mps
+        delay_s = max(0.0, seconds(now_ns - visit.from_ns) - free_s)
+        self._log(visit.lane).delays.append((now_ns, delay_s, visit.stops))
+
+    def _queue(self, lane: str) -> list[float]:
+        """Return how far the fronts of the cars that stand on a lane are before its line [m]."""
+        return [
+            -visit.front_m
+            for visit in self._visits.values()
+            if visit.lane == lane and visit.stands and visit.passed_ns is None
+        ]
+
+    def _flow(self, log: _Log, span_s: float) -> dict[str, float | int | None]:
+        times = [at_ns for at_ns, _, _ in log.passages]
+        headway = seconds(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else None
+        return {
+            "passed": len(times),
+            "flow_hz": len(times) / span_s if span_s > 0.0 else 0.0,
+            "headway_s": headway,
+            "speed_mps": fmean(speed for _, speed, _ in log.passages) if times else None,
+        }
+
+    def _approach(self, lane: str, line: Lines, span_s: float) -> ApproachCount:
+        log = self._log(lane)
+        flow = self._flow(log, span_s)
+        queue = self._queue(lane)
+        delay = fmean(delay for _, delay, _ in log.delays) if log.delays else None
+        headway = _saturation_headway_s(log)
+        green = fmean(is_green for _, is_green in log.greens) if log.greens else None
+        saturation = None
+        if headway is not None and green:
+            saturation = (flow["flow_hz"] or 0.0) * headway / green
+        level = ""
+        if delay is not None:
+            level = level_of(delay, signal=bool(line.group), saturation=saturation)
+        return ApproachCount(
+            junction=line.junction,
+            lane=lane,
+            delay_s=delay,
+            level=level,
+            stops=fmean(stops for _, _, stops in log.delays) if log.delays else 0.0,
+            queue=len(queue),
+            queue_m=max(queue) + ASSUMED_LENGTH_M if queue else 0.0,
+            queue_most=share_below([count for _, count in log.queues], 0.95),
+            saturation_headway_s=headway,
+            saturation=saturation,
+            **flow,  # type: ignore[arg-type]
+        )
+
+
+def _saturation_headway_s(log: _Log) -> float | None:
+    """Return the mean headway of cars that leave a queue behind one another; None: too few."""
+    rows = list(log.passages)
+    gaps = [
+        seconds(after[0] - before[0])
+        for before, after in itertools.pairwise(rows)
+        if before[2] and after[2] and seconds(after[0] - before[0]) < LEAVES_QUEUE_S
+    ]
+    return fmean(gaps) if len(gaps) >= LEAST_HEADWAYS else None

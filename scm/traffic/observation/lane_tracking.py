@@ -1,0 +1,125 @@
+"""Which lane a car is on, followed from lane to lane so that noise at joints does not matter."""
+
+import math
+from typing import NamedTuple
+
+from scm.geometry import Pose2, wrap_angle
+from scm.maps.route import OnLane, Roads
+from scm.maps.signs import precedence_at
+from scm.traffic.observation.car_estimates import Belief
+
+SAME_WAY_RAD = math.radians(60.0)
+NEAR_M = 0.06
+STAYS_M = 0.02
+ROOM_M = 0.03
+END_M = 0.005
+
+
+class Lines(NamedTuple):
+    """The line at which cars wait on a lane, and what rules it.
+
+    Attributes:
+        group: Of the junction's signals; empty: it has none.
+        sign: `stop` or `give_way`; empty: neither.
+    """
+
+    at_m: float
+    junction: str
+    group: str
+    sign: str
+
+
+class Followed(NamedTuple):
+    """Where a car is now; `before` is the lane it was on until it came here, empty: none."""
+
+    place: OnLane
+    before: str
+
+
+class Follower:
+    """Follows all cars along the lanes of a map."""
+
+    def __init__(self, roads: Roads) -> None:
+        self._roads = roads
+        self._cars: dict[str, Followed] = {}
+
+    def see(self, belief: Belief) -> Followed | None:
+        """Return where a car is; None when it is beside all lanes of its direction."""
+        known = self._cars.get(belief.vehicle)
+        found = self._stays(known, belief) if known is not None else None
+        if found is None:
+            found = self._moves(known, belief)
+        if found is None:
+            self._cars.pop(belief.vehicle, None)
+            return None
+        self._cars[belief.vehicle] = found
+        return found
+
+    def forget(self, vehicle: str) -> None:
+        """Forget a car that is gone."""
+        self._cars.pop(vehicle, None)
+
+    def _stays(self, known: Followed, belief: Belief) -> Followed | None:
+        """Return the place on the same lane if it is plainly still there."""
+        lane = self._roads.lanes[known.place.lane]
+        s, lateral = lane.project(belief.x, belief.y, known.place.s)
+        # beyond an end `project` answers the end itself, give or take the last digit
+        if not END_M < s < lane.length_m - END_M or abs(lateral) > NEAR_M:
+            return None
+        if abs(wrap_angle(lane.yaw_at(s) - belief.yaw)) > SAME_WAY_RAD:
+            return None
+        return Followed(OnLane(known.place.lane, s, lateral), known.before)
+
+    def _moves(self, known: Followed | None, belief: Belief) -> Followed | None:
+        """Return the nearest place on a lane that it can have come to, else on any."""
+        best: tuple[float, OnLane] | None = None
+        if known is not None:
+            for name in self._reached(known):
+                away, place = self._measure(name, belief)
+                away -= STAYS_M if name == known.place.lane else 0.0
+                if place is not None and (best is None or away < best[0]):
+                    best = away, place
+        if best is None:
+            place = self._roads.nearest(Pose2(belief.x, belief.y, belief.yaw))
+            if place is None or abs(place.lateral) > self._room(place.lane):
+                return None
+            best = 0.0, place
+        lane = best[1].lane
+        if known is None:
+            return Followed(best[1], "")
+        before = known.before if lane == known.place.lane else known.place.lane
+        return Followed(best[1], before)
+
+    def _reached(self, known: Followed) -> list[str]:
+        roads, lane = self._roads, known.place.lane
+        names = [lane, *roads.successors(lane)]
+        if known.before and lane in roads.successors(known.before):
+            names += roads.successors(known.before)
+        for name in roads.successors(lane):
+            names += roads.successors(name)
+        return list(dict.fromkeys(names))
+
+    def _measure(self, name: str, belief: Belief) -> tuple[float, OnLane | None]:
+        lane = self._roads.lanes[name]
+        s, lateral = lane.project(belief.x, belief.y)
+        foot = lane.at(s)
+        away = math.hypot(belief.x - foot.x, belief.y - foot.y)
+        same_way = abs(wrap_angle(foot.yaw - belief.yaw)) <= SAME_WAY_RAD
+        is_there = same_way and away <= self._room(name)
+        return away, OnLane(name, s, lateral) if is_there else None
+
+    def _room(self, lane: str) -> float:
+        return self._roads.definition(lane).width_m / 2.0 + ROOM_M
+
+
+def rules_of(roads: Roads) -> dict[str, Lines]:
+    """Return the last line of each lane that has one."""
+    found: dict[str, Lines] = {}
+    for lane in roads.city_map.lanes:
+        held = roads.signs.get(lane.name, ())
+        for line in roads.stop_lines_on(lane.name):
+            found[lane.name] = Lines(line.at_m, line.junction, line.group, "")
+        for crossing, approach in roads.approaches_on(lane.name):
+            sign = precedence_at(held, approach.at_m) or ""
+            found[lane.name] = Lines(approach.at_m, crossing, "", sign)
+    return found

@@ -1,0 +1,355 @@
+"""Broken rules, found in believed poses: red light, stop line, speed, wrong way, collision.
+
+    red light   the front passed the line when its group had been red for 0.3 s, and went on 0.20 m
+    stop line   it passed the line at red by 0.05 m and stands there; or it passed a stop sign's
+                line and was never slower than 0.05 m/s on the last 0.30 m
+    speed       a tenth and 0.02 m/s over the limit, for a second
+    wrong way   0.30 m along a lane of the other direction alone, or 0.50 m backwards
+    collision   a contact that the world tells
+
+Each limit is passed only by three standard deviations of what is measured, and each violation is
+told once: for a line once a visit, for speed and direction until three good seconds, for a pair of
+cars until three seconds without contact. Noise around a limit says nothing.
+"""
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from scm.clock import NS_PER_S, seconds
+from scm.geometry import Pose2
+from scm.maps.route import Roads
+from scm.traffic.observation.car_estimates import Belief
+from scm.traffic.observation.lane_tracking import Followed, Lines
+from scm.traffic.observation.signal_history import Shown, SignalMemory
+from scm.traffic.signals.sightings import NIGEL_FRONT_M
+from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.spat import SignalGroup
+from scm.v2x.messages.violation import Kind, TrackPoint, Violation
+
+SIGMAS = 3.0
+GRACE_S = 0.3
+INTO_M, OVER_M = 0.20, 0.05
+STANDS_MPS, RESTS_MPS = 0.02, 0.05
+STANDS_NS = NS_PER_S // 2
+REST_M = 0.30
+OVER_SHARE, OVER_MPS = 1.1, 0.02
+LONG_NS = NS_PER_S
+GOOD_NS = 3 * NS_PER_S
+WRONG_M, BACK_M = 0.30, 0.50
+SLOW_MPS = 0.03
+TRACK_POINTS = 50
+
+
+class _Past(NamedTuple):
+    """A car has passed its line at red, and it is not yet clear what it will do."""
+
+    t_ns: int
+    shown: Shown
+
+
+@dataclass(slots=True)
+class _Lasting:
+    """Something that must last before it counts, and be gone for a while before it may again."""
+
+    since_ns: int | None = None
+    way_m: float = 0.0
+    told: bool = False
+    good_ns: int | None = None
+
+    def bad(self, now_ns: int, way_m: float) -> None:
+        self.good_ns = None
+        if self.since_ns is None:
+            self.since_ns, self.way_m = now_ns, 0.0
+        self.way_m += way_m
+
+    def lasts_ns(self, now_ns: int) -> int:
+        return 0 if self.since_ns is None else now_ns - self.since_ns
+
+    def good(self, now_ns: int) -> None:
+        self.since_ns = None
+        if self.good_ns is None:
+            self.good_ns = now_ns
+        if now_ns - self.good_ns >= GOOD_NS:
+            self.told = False
+
+
+@dataclass(slots=True)
+class _Car:
+    """What is remembered of one car."""
+
+    track: deque[TrackPoint] = field(default_factory=lambda: deque(maxlen=TRACK_POINTS))
+    lane: str = ""
+    front_m: float = 0.0
+    t_ns: int = 0
+    past: _Past | None = None
+    line_told: bool = False
+    stands_ns: int | None = None
+    came_m: float = 0.0
+    slowest_mps: float = math.inf
+    speed: _Lasting = field(default_factory=_Lasting)
+    way: _Lasting = field(default_factory=_Lasting)
+
+
+class Judge:
+    """Finds violations; every one that `see` and `hit` return is to be told."""
+
+    def __init__(self, roads: Roads, lines: Mapping[str, Lines]) -> None:
+        self._roads, self._lines = roads, lines
+        self._cars: dict[str, _Car] = {}
+        self._limits: dict[str, list[tuple[float, float]]] = {}
+        self._contacts: dict[frozenset[str], int] = {}
+        self._told = 0
+        self.signals = SignalMemory()
+
+    def forget(self, vehicle: str) -> None:
+        """Forget a car that is gone."""
+        self._cars.pop(vehicle, None)
+
+    def _car(self, vehicle: str) -> _Car:
+        car = self._cars.get(vehicle)
+        if car is None:
+            car = self._cars[vehicle] = _Car()
+        return car
+
+    def see(self, belief: Belief, followed: Followed | None) -> list[Violation]:
+        """Judge where a car is now."""
+        car = self._car(belief.vehicle)
+        if car.track and belief.t_ns <= car.track[-1].t_ns:
+            return []
+        span_s = seconds(belief.t_ns - car.track[-1].t_ns) if car.track else 0.0
+        car.track.append(_point(belief))
+        found = [
+            self._line(car, belief, followed),
+            self._speed(car, belief, followed),
+            self._direction(car, belief, followed, abs(belief.speed) * span_s),
+        ]
+        return [violation for violation in found if violation is not None]
+
+    def hit(self, contact: Contact) -> list[Violation]:
+        """Judge what the world says that a car bumped into."""
+        found = []
+        for other in contact.against:
+            pair = frozenset((contact.vehicle, other))
+            last_ns = self._contacts.get(pair)
+            self._contacts[pair] = contact.t_ns
+            if last_ns is None or contact.t_ns - last_ns >= GOOD_NS:
+                found.append(self._collision(contact, other))
+        return found
+
+    def _collision(self, contact: Contact, other: str) -> Violation:
+        car = self._car(contact.vehicle)
+        blow_mps = math.hypot(contact.dvx_mps, contact.dvy_mps)
+        last = car.track[-1] if car.track else None
+        self._told += 1
+        return Violation(
+            vehicle=contact.vehicle,
+            number=self._told,
+            kind="collision",
+            t_ns=contact.t_ns,
+            x_m=last.x_m if last is not None else 0.0,
+            y_m=last.y_m if last is not None else 0.0,
+            lane=car.lane,
+            text=f"{contact.vehicle} hit {other}: {blow_mps:.2f} m/s in one blow",
+            certainty=1.0,
+            sources=("contact", *_sources(car)),
+            against=(other,),
+            track=tuple(car.track),
+        )
+
+    def _line(self, car: _Car, belief: Belief, followed: Followed | None) -> Violation | None:
+        """Judge the line of the lane that it is on, or has just left over the junction."""
+        if followed is None:
+            car.lane, car.past = "", None
+            return None
+        lane, s = followed.place.lane, followed.place.s
+        line = self._lines.get(lane)
+        if line is None:
+            line, s = self._behind(car, lane, s)
+            if line is None:
+                car.lane, car.past = "", None
+                return None
+            lane = car.lane
+        front = s + NIGEL_FRONT_M - line.at_m
+        if lane != car.lane:
+            car.lane, car.front_m, car.t_ns = lane, front, belief.t_ns
+            car.past, car.line_told, car.stands_ns = None, False, None
+            car.came_m, car.slowest_mps = front, math.inf
+        if front > -REST_M - NIGEL_FRONT_M:
+            car.slowest_mps = min(car.slowest_mps, abs(belief.speed))
+        if line.group:
+            return self._at_signal(car, belief, line, front)
+        return self._at_sign(car, belief, line, front)
+
+    def _behind(self, car: _Car, lane: str, s: float) -> tuple[Lines | None, float]:
+        """Return the line that lies behind a car on the way over a junction, and its place."""
+        if not car.lane or lane not in self._roads.successors(car.lane):
+            return None, s
+        return self._lines[car.lane], s + self._roads.length_of(car.lane)
+
+    def _at_signal(self, car: _Car, belief: Belief, line: Lines, front: float) -> Violation | None:
+        before_m, before_ns = car.front_m, car.t_ns
+        car.front_m, car.t_ns = front, belief.t_ns
+        if before_m <= 0.0 < front:
+            share = -before_m / (front - before_m)
+            at_ns = before_ns + round(share * (belief.t_ns - before_ns))
+            grace_s = GRACE_S + SIGMAS * belief.std_m / max(abs(belief.speed), STANDS_MPS)
+            shown = self.signals.red_at(line.junction, line.group, at_ns, grace_s)
+            car.past = None if shown is None else _Past(at_ns, shown)
+        if front <= 0.0 or car.line_told:
+            car.past = None if front <= 0.0 else car.past
+            return None
+        return self._past_red(car, belief, line, front) if car.past is not None else None
+
+    def _past_red(self, car: _Car, belief: Belief, line: Lines, front: float) -> Violation | None:
+        """Judge a car whose front has passed its line at red."""
+        assert car.past is not None  # noqa: S101 asked before
+        sure = SIGMAS * belief.std_m
+        if front >= INTO_M + sure:
+            car.line_told = True
+            age_s = seconds(car.past.t_ns - car.past.shown.since_ns)
+            text = (
+                f"{belief.vehicle} passed the line of {line.junction} at {_where(line)} at red, "
+                f"{age_s:.1f} s after it began, and drove on"
+            )
+            return self._tell("red_light", car, belief, text, front / _doubt(belief), car.past)
+        if self.signals.is_not_red(line.junction, line.group):
+            car.past = None
+            return None
+        if abs(belief.speed) > STANDS_MPS + SIGMAS * belief.std_mps:
+            car.stands_ns = None
+            return None
+        if car.stands_ns is None:
+            car.stands_ns = belief.t_ns
+        if front < OVER_M + sure or belief.t_ns - car.stands_ns < STANDS_NS:
+            return None
+        car.line_told = True
+        text = (
+            f"{belief.vehicle} stands {front:.2f} m beyond the line of {line.junction} at "
+            f"{_where(line)}, which it passed at red"
+        )
+        return self._tell("stop_line", car, belief, text, front / _doubt(belief), car.past)
+
+    def _at_sign(self, car: _Car, belief: Belief, line: Lines, front: float) -> Violation | None:
+        car.front_m, car.t_ns = front, belief.t_ns
+        if line.sign != "stop" or car.line_told or front < INTO_M + SIGMAS * belief.std_m:
+            return None
+        car.line_told = True
+        beyond = car.slowest_mps - RESTS_MPS
+        came_from_afar = car.came_m < -REST_M
+        if not came_from_afar or beyond <= SIGMAS * belief.std_mps:
+            return None
+        text = (
+            f"{belief.vehicle} passed the stop sign of {line.junction} without a stop: never "
+            f"slower than {car.slowest_mps:.2f} m/s before the line"
+        )
+        return self._tell("stop_line", car, belief, text, beyond / max(belief.std_mps, 1e-6))
+
+    def _speed(self, car: _Car, belief: Belief, followed: Followed | None) -> Violation | None:
+        if followed is None:
+            car.speed.good(belief.t_ns)
+            return None
+        limit = self._limit(followed)
+        over = abs(belief.speed) - limit * OVER_SHARE - OVER_MPS
+        if over <= SIGMAS * belief.std_mps:
+            car.speed.good(belief.t_ns)
+            return None
+        car.speed.bad(belief.t_ns, 0.0)
+        if car.speed.told or car.speed.lasts_ns(belief.t_ns) < LONG_NS:
+            return None
+        car.speed.told = True
+        text = (
+            f"{belief.vehicle} drives {abs(belief.speed):.2f} m/s on {followed.place.lane}, "
+            f"where {limit:.2f} m/s are allowed"
+        )
+        return self._tell("speed", car, belief, text, over / max(belief.std_mps, 1e-6))
+
+    def _limit(self, followed: Followed) -> float:
+        lane = followed.place.lane
+        limits = self._limits.get(lane)
+        if limits is None:
+            limits = self._limits[lane] = self._roads.limits_on(lane)
+        return next(limit for at, limit in reversed(limits) if at <= max(followed.place.s, 0.0))
+
+    def _direction(
+        self, car: _Car, belief: Belief, followed: Followed | None, way_m: float
+    ) -> Violation | None:
+        lane, needed, how = "", BACK_M, "drives backwards on"
+        if followed is not None and belief.speed < -SLOW_MPS - SIGMAS * belief.std_mps:
+            lane = followed.place.lane
+        elif followed is None and belief.speed > SLOW_MPS + SIGMAS * belief.std_mps:
+            lane, needed, how = self._against(belief), WRONG_M, "drives against the direction of"
+        if not lane:
+            car.way.good(belief.t_ns)
+            return None
+        car.way.bad(belief.t_ns, way_m)
+        is_sure = car.way.way_m - needed >= SIGMAS * belief.std_m
+        if car.way.told or not is_sure or car.way.lasts_ns(belief.t_ns) < LONG_NS:
+            return None
+        car.way.told = True
+        text = f"{belief.vehicle} {how} {lane}, for {car.way.way_m:.2f} m so far"
+        return self._tell("wrong_way", car, belief, text, car.way.way_m / _doubt(belief))
+
+    def _against(self, belief: Belief) -> str:
+        """Return the lane of the other direction on which a car is; empty: on none."""
+        turned = Pose2(belief.x, belief.y, belief.yaw + math.pi)
+        place = self._roads.nearest(turned)
+        if place is None:
+            return ""
+        room = self._roads.definition(place.lane).width_m / 2.0 - SIGMAS * belief.std_m
+        return place.lane if abs(place.lateral) < room else ""
+
+    def _tell(
+        self,
+        kind: Kind,
+        car: _Car,
+        belief: Belief,
+        text: str,
+        sigmas: float,
+        past: _Past | None = None,
+    ) -> Violation:
+        self._told += 1
+        place = car.lane if kind in ("red_light", "stop_line") else ""
+        signal: SignalGroup | None = past.shown.group if past is not None else None
+        at_m = car.front_m + self._lines[place].at_m - NIGEL_FRONT_M if place else 0.0
+        return Violation(
+            vehicle=belief.vehicle,
+            number=self._told,
+            kind=kind,
+            t_ns=past.t_ns if past is not None else belief.t_ns,
+            x_m=belief.x,
+            y_m=belief.y,
+            lane=place,
+            at_m=at_m,
+            text=text,
+            certainty=0.5 * (1.0 + math.erf(sigmas / math.sqrt(2.0))),
+            sources=(*_sources(car), *(("spat",) if past is not None else ())),
+            junction=past.shown.junction if past is not None else "",
+            signal=signal,
+            track=tuple(car.track),
+        )
+
+
+def _point(belief: Belief) -> TrackPoint:
+    return TrackPoint(
+        t_ns=belief.t_ns,
+        x_m=belief.x,
+        y_m=belief.y,
+        yaw_rad=belief.yaw,
+        speed_mps=belief.speed,
+        source=belief.source,
+    )
+
+
+def _sources(car: _Car) -> tuple[str, ...]:
+    return tuple(sorted({point.source for point in car.track}))
+
+
+def _doubt(belief: Belief) -> float:
+    return max(belief.std_m, 1e-6)
+
+
+def _where(line: Lines) -> str:
+    return f"group {line.group!r}"

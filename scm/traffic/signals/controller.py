@@ -1,0 +1,502 @@
+"""One junction's controller: kernel, policy and wishes in force, and what is told of all of them.
+
+It starts all red. Under a timetable it runs cycles of a plan and takes another plan, or another
+policy, when a cycle ends and no red has a promised end any more; from any other policy it goes back
+to the timetable through a clearance. Between policy and kernel stands the gate: no wish begins or
+ends a colour against what Spat has promised. As long as anybody has a reason for flash it flashes
+red; then it starts again through all red.
+"""
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from scm.errors import PlanError, nearest
+from scm.traffic.signals import kernel, operator_overrides
+from scm.traffic.signals.detectors import Detector
+from scm.traffic.signals.forecast import Coming, forecasts, laid_out, within
+from scm.traffic.signals.green_wave import Wave
+from scm.traffic.signals.guaranteed_time import (
+    SLACK_NS,
+    Promise,
+    earliest_green,
+    end_after,
+    red_end,
+    still_ns,
+    wished_green,
+)
+from scm.traffic.signals.kernel import Phase, Program
+from scm.traffic.signals.operator_overrides import NEED_RINGS, Asked
+from scm.traffic.signals.plan import FLASH, Timetable, load_timetable, plan_names
+from scm.traffic.signals.policy import (
+    FIXED,
+    Answer,
+    JunctionView,
+    PriorityCall,
+    Status,
+    load_policy,
+    policy_names,
+    site_of,
+)
+from scm.traffic.signals.program import STEP_NS
+from scm.traffic.signals.timetables import Tables, Timetables
+from scm.traffic.signals.timing import NIGEL, CarFacts
+from scm.v2x.messages.signal_request import SignalRequest
+from scm.v2x.messages.spat import Colour, SignalGroup, Spat
+
+LATE_NS = 3 * STEP_NS
+FORESEE_EVERY_NS = 5 * STEP_NS
+BY_HAND = "actuated"
+
+_COLOUR: dict[Phase, Colour] = {
+    Phase.RED: "red",
+    Phase.CLEARANCE: "red",
+    Phase.GREEN: "green",
+    Phase.YELLOW: "yellow",
+    Phase.FLASH: "flashing_red",
+}
+_NEXT: dict[Colour, Colour] = {
+    "red": "green",
+    "green": "yellow",
+    "yellow": "red",
+    "flashing_red": "red",
+}
+
+
+@dataclass(slots=True)
+class _Shown:
+    """What one group shows, since when, and what was promised of it."""
+
+    colour: Colour
+    since_ns: int
+    promise: Promise
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What detectors and vehicles tell a policy at one step; see `JunctionView`."""
+
+    detectors: Mapping[str, Detector]
+    sees: bool = False
+    priority: tuple[PriorityCall, ...] = ()
+
+
+UNHEARD = Heard({})
+
+
+class Controller:
+    """The signals of one junction; step it with the time, it never asks for it.
+
+    Attributes:
+        mode: `start`, `plan`, `flash`, or what a policy says: `adaptive`, `priority`, `preempt`.
+        policy: In force, also while flashing.
+        asked: Wishes of operators and scripts in force.
+        priority: What became of each vehicle's request, by its key.
+        failure: Why a policy was given up for fixed time; empty: none was.
+        changed: Whether the last step changed a colour.
+        late_steps: How often time came in too large a piece, and the cycle was put off by it.
+    """
+
+    def __init__(
+        self,
+        junction: str,
+        program: Program,
+        plan: str,
+        revision: int = 1,
+        *,
+        policy: str = FIXED,
+        tables: Tables | None = None,
+        learned: Callable[[Any], Any] | None = None,
+        car: CarFacts = NIGEL,
+    ) -> None:
+        """Take a junction.
+
+        Args:
+            junction: Its name.
+            program: What its kernel must keep.
+            plan: Of the timetable to begin with.
+            revision: Of the map.
+            policy: To run while nobody wishes another one.
+            tables: Timetables by plan, in step with the neighbours; None: all plans, alone.
+            learned: For the policy `learned`.
+            car: As the worst of the fleet; policies reckon with how fast its queue leaves.
+
+        Raises:
+            PlanError: when there is no such plan or policy, or a plan is not safe.
+        """
+        self.junction = junction
+        self._program = program
+        self._revision = revision
+        tables = tables or {name: (load_timetable(name, program), None) for name in plan_names()}
+        self._timetables = Timetables(tables, _known(junction, plan, tables))
+        self._site = site_of(junction, program, learned, car)
+        self._policies = {name: load_policy(name) for name in policy_names()}
+        self._usual = self._known_policy(policy)
+        self.policy = FIXED
+        self._memory: Any = None
+        self.asked: tuple[Asked, ...] = ()
+        self.priority: Mapping[tuple[int, int], Status] = {}
+        self.failure = self._failed = ""
+        self.mode = "start"
+        self.changed = False
+        self.late_steps = 0
+        self._flash_reasons: set[str] = set()
+        self._state = kernel.start(program)
+        self._shown: dict[str, _Shown] = {}
+        self._wished: frozenset[str] = frozenset()
+        self._last_ns: int | None = None
+        self._shown_ns: int | None = None
+        self._is_late = False
+        self._seq = 0
+        self._foreseen_ns = 0
+        self._forecasts: Mapping[str, int | None] = {}
+        self._coming: tuple[Coming, ...] = ()
+        self._restart_ns = max(times.clearance for times in program.times) + STEP_NS
+
+    @property
+    def plan(self) -> str:
+        """The plan in force, also while flashing or under another policy."""
+        return self._timetables.plan
+
+    @property
+    def guest(self) -> tuple[Timetable, Wave | None] | None:
+        """The plan in force, where somebody made it; None: it is one of the junction's own."""
+        return self._timetables.guest
+
+    @property
+    def running(self) -> str:
+        """What is in force, in one word: the plan of a timetable, or the policy."""
+        return self.plan if self._policies[self.policy].is_timed else self.policy
+
+    @property
+    def pending(self) -> str:
+        """What was asked for and is to come at the next safe moment; empty: nothing."""
+        wanted = self._wanted()
+        if wanted == self.policy:
+            return self._timetables.pending if wanted == FIXED else ""
+        return (self._timetables.pending or self.plan) if wanted == FIXED else wanted
+
+    @property
+    def is_flashing(self) -> bool:
+        """Whether there is a reason to flash, from the next step on."""
+        return bool(self._flash_reasons) or self._policies[self._wanted()].is_flash
+
+    @property
+    def needs_detectors(self) -> bool:
+        """Whether cars must be listened to, for what runs or for what is to come."""
+        names = (self.policy, self._wanted())
+        return any(self._policies[name].needs_detectors for name in names)
+
+    def ask(self, plan: str) -> None:
+        """Wish for a plan, and thereby for fixed time, or for a policy, until further notice.
+
+        Raises:
+            PlanError: when there is no such plan or policy.
+        """
+        plans = self._timetables.names
+        if plan not in plans and plan in self._policies:
+            self._usual = plan
+        else:
+            self._timetables.ask(_known(self.junction, plan, plans))
+            self._usual = FIXED
+        self.failure = self._failed = ""
+
+    def end_flash(self) -> bool:
+        """Return whether to flash was usual; a timetable is then, for flash has to end."""
+        was_usual = self._policies[self._usual].is_flash
+        if was_usual:
+            self._usual = FIXED
+        return was_usual
+
+    def ask_for_guest(self, table: Timetable, wave: Wave | None = None) -> None:
+        """Wish for a plan that somebody made; it comes once every promise reckons with it."""
+        self._timetables.offer(table, wave)
+        self._usual = FIXED
+        self.failure = self._failed = ""
+
+    def outlook(self, now_ns: int) -> tuple[Coming, ...]:
+        """Return the greens to come, as the timetable says or the policy foresees."""
+        if self.mode == FLASH:
+            return ()
+        return self._timetables.outlook(now_ns) if self.policy == FIXED else self._coming
+
+    def take(self, request: SignalRequest, now_ns: int) -> None:
+        """Take a wish of an operator or a script.
+
+        Raises:
+            PlanError: saying in words why it cannot be taken.
+        """
+        self.asked = operator_overrides.take(
+            self.asked, request, self._program, self._policies, now_ns
+        )
+        if request.verb == "policy":
+            self.failure = self._failed = ""
+
+    def flash(self, reason: str, *, on: bool) -> None:
+        """Give or take back a reason to flash; it ends when the last reason is gone."""
+        if on:
+            self._flash_reasons.add(reason)
+        else:
+            self._flash_reasons.discard(reason)
+
+    def step(self, now_ns: int, heard: Heard = UNHEARD) -> None:
+        """Go on to `now_ns`."""
+        dt_ns = self._take_time(now_ns)
+        self.asked = operator_overrides.lapse(self.asked, now_ns, *self._just_changed())
+        if self.is_flashing:
+            self.mode = FLASH
+            self.priority = {one.key: "rejected" for one in heard.priority}
+            wishes: frozenset[str] = frozenset()
+        else:
+            self._wished = self._wishes(now_ns, dt_ns, heard)
+            wishes = self._gate(self._wished, now_ns)
+        self._state = kernel.step(
+            self._program, self._state, wishes, dt_ns, flash=self.mode == FLASH
+        )
+        self._show(now_ns)
+        if self.changed or now_ns - self._foreseen_ns >= FORESEE_EVERY_NS:
+            self._foresee(now_ns, heard)
+
+    def spat(self, now_ns: int) -> Spat:
+        """Return what is shown, for the step that was just made."""
+        self._seq += 1
+        return Spat(
+            junction=self.junction,
+            t_ns=now_ns,
+            seq=self._seq,
+            mode=self.mode,
+            plan=self.running,
+            groups=tuple(self._tell(name, shown, now_ns) for name, shown in self._shown.items()),
+            revision=self._revision,
+        )
+
+    def _known_policy(self, policy: str) -> str:
+        if policy not in self._policies:
+            names = list(self._policies)
+            hint = nearest(policy, names)
+            msg = f"junction {self.junction}: no policy {policy!r}{hint}, only {names}"
+            raise PlanError(msg)
+        return policy
+
+    def _wanted(self) -> str:
+        """Return the policy that should run: wished, or usual; rings, where wishes need them."""
+        wished = next((one.policy for one in self.asked if one.verb == "policy"), self._usual)
+        policy = FIXED if wished == self._failed else wished
+        needs_rings = any(one.verb in NEED_RINGS for one in self.asked)
+        by_hand = needs_rings and self._policies[policy].is_timed and self._failed != BY_HAND
+        return BY_HAND if by_hand else policy
+
+    def _take_time(self, now_ns: int) -> int:
+        """Return the time since the last step; what is far too much of it puts the cycle off."""
+        if self._last_ns is None:
+            self._last_ns = now_ns
+            self._begin_again(now_ns)
+        dt_ns = now_ns - self._last_ns
+        self._last_ns = now_ns
+        self._is_late = dt_ns > LATE_NS
+        if self._is_late:
+            self.late_steps += 1
+            self._timetables.put_off(dt_ns - STEP_NS)
+        return dt_ns
+
+    def _begin_again(self, now_ns: int) -> None:
+        self.mode = "start"
+        self.policy = FIXED
+        self._timetables.clear(now_ns, now_ns + self._restart_ns)
+
+    def _wishes(self, now_ns: int, dt_ns: int, heard: Heard) -> frozenset[str]:
+        """Return what timetable or policy wishes now, after a change between them if it is time."""
+        if self.mode == FLASH:
+            self._begin_again(now_ns)
+        wanted = self._wanted()
+        if self.policy != FIXED:
+            if wanted == FIXED:
+                self._return_to_timetable(now_ns)
+            elif wanted != self.policy:
+                self._begin_policy(wanted)
+        elif now_ns >= self._timetables.cycle.ends_ns:
+            if wanted != FIXED and not self._has_promised_greens():
+                self._begin_policy(wanted)
+            else:
+                self._timetables.next_cycle()
+                self.mode = "plan"
+        if self.policy == FIXED:
+            self.priority = {one.key: "rejected" for one in heard.priority}
+            self._timetables.settle(now_ns, goes_on=wanted == FIXED)
+            return self._timetables.wishes(now_ns)
+        return self._ask_policy(now_ns, dt_ns, heard)
+
+    def _has_promised_greens(self) -> bool:
+        """Return whether a red's end has been promised: only the timetable can keep that."""
+        return any(
+            shown.colour == "red" and shown.promise.max_end_ns is not None
+            for shown in self._shown.values()
+        )
+
+    def _begin_policy(self, name: str) -> None:
+        self.policy = name
+        self._memory = self._policies[name].start(self._site)
+
+    def _return_to_timetable(self, now_ns: int) -> None:
+        """Clear the junction, then begin a cycle."""
+        self.mode, self.policy = "start", FIXED
+        ends = self._promises()
+        left = [
+            still_ns(self._state, i, times, ends[i], now_ns)
+            for i, times in enumerate(self._program.times)
+        ]
+        self._timetables.clear(now_ns, now_ns + max(left) + 3 * STEP_NS)
+
+    def _ask_policy(self, now_ns: int, dt_ns: int, heard: Heard) -> frozenset[str]:
+        view = self._view(now_ns, dt_ns, heard)
+        try:
+            self._memory, answer = self._policies[self.policy].step(self._site, self._memory, view)
+            self._check(answer)
+        except Exception as cause:  # noqa: BLE001 a policy is a plug-in: whatever it does, cars go on
+            self._fail(cause)
+            self._return_to_timetable(now_ns)
+            return frozenset()
+        self.mode, self.priority = answer.mode, answer.priority
+        return self._as_asked(answer.groups)
+
+    def _fail(self, cause: Exception) -> None:
+        self._failed = self.policy
+        self.failure = f"policy {self.policy}: {type(cause).__name__}: {cause}"
+
+    def _view(self, now_ns: int, dt_ns: int, heard: Heard) -> JunctionView:
+        return JunctionView(
+            now_ns,
+            dt_ns,
+            self._state,
+            heard.detectors,
+            heard.sees,
+            self.asked,
+            heard.priority,
+            self._timetables.wishes(now_ns),
+        )
+
+    def _foresee(self, now_ns: int, heard: Heard) -> None:
+        """Ask timetable or policy when the present colours will likely end."""
+        self._foreseen_ns = now_ns
+        self._forecasts, self._coming = {}, ()
+        if self.mode == FLASH:
+            return
+        if self.policy == FIXED:
+            if self._wanted() == FIXED:
+                self._forecasts = {
+                    name: self._timetables.likely_end_ns(name, now_ns, red=shown.colour == "red")
+                    for name, shown in self._shown.items()
+                    if not shown.promise.is_exact
+                }
+            return
+        view, promises = self._view(now_ns, 0, heard), self._promises()
+        try:
+            turns = self._policies[self.policy].foresee(self._site, self._memory, view)
+            self._coming = tuple(laid_out(self._program, self._state, promises, turns, now_ns))
+            self._forecasts = forecasts(self._program, self._state, self._coming)
+        except Exception as cause:  # noqa: BLE001 as above; the next step gives it up
+            self._fail(cause)
+
+    def _as_asked(self, wishes: frozenset[str]) -> frozenset[str]:
+        """Return a policy's wishes with those of people in them, which it may have overlooked."""
+        green = {name for name, shown in self._shown.items() if shown.colour == "green"}
+        may_hold = self.mode != "preempt"  # pre-emption goes before a hold
+        held = operator_overrides.groups_of(self.asked, "hold") & green if may_hold else set[str]()
+        return (wishes - (operator_overrides.groups_of(self.asked, "omit") - green)) | held
+
+    def _check(self, answer: Answer) -> None:
+        unknown = [group for group in answer.groups if group not in self._program.groups]
+        if unknown:
+            msg = f"wishes {unknown}, expected groups of {list(self._program.groups)}"
+            raise PlanError(msg)
+
+    def _gate(self, wishes: frozenset[str], now_ns: int) -> frozenset[str]:
+        """Return the wishes as far as they keep what was promised."""
+        passed = set(wishes)
+        for name, shown in self._shown.items():
+            is_green = shown.colour == "green"
+            latest_ns = shown.promise.max_end_ns
+            if now_ns < shown.promise.min_end_ns:
+                (passed.add if is_green else passed.discard)(name)
+            elif is_green and latest_ns is not None and now_ns >= latest_ns - SLACK_NS:
+                passed.discard(name)
+        return frozenset(passed)
+
+    def _just_changed(self) -> tuple[list[str], list[str]]:
+        """Return whose green began, and whose ended, at the last step."""
+        new = {n: s.colour for n, s in self._shown.items() if s.since_ns == self._shown_ns}
+        return [n for n in new if new[n] == "green"], [n for n in new if new[n] == "yellow"]
+
+    def _promises(self) -> list[Promise | None]:
+        shown = [self._shown.get(name) for name in self._program.groups]
+        return [one.promise if one is not None else None for one in shown]
+
+    def _show(self, now_ns: int) -> None:
+        self.changed = False
+        self._shown_ns = now_ns
+        before = self._promises()
+        for index, name in enumerate(self._program.groups):
+            colour = _COLOUR[self._state[index].phase]
+            shown = self._shown.get(name)
+            if shown is None or shown.colour != colour:
+                self.changed = True
+                promise = self._promise(index, colour, now_ns, before)
+                self._shown[name] = _Shown(colour, now_ns, promise)
+            elif colour == "red":
+                promise = self._promise(index, colour, now_ns, before)
+                shown.promise = promise if self._is_late else shown.promise.narrowed(promise)
+            elif colour == "green" and not shown.promise.is_exact:
+                shown.promise = self._of_green(index, shown, now_ns)
+
+    def _of_green(self, index: int, shown: _Shown, now_ns: int) -> Promise:
+        """Return what can be promised by now of a green whose end was not known."""
+        name, least_ns = self._program.groups[index], self._program.times[index].min_green
+        if self.policy != FIXED or self._timetables.cycle.timetable is None:
+            return wished_green(shown.promise, now_ns, least_ns, wished=name in self._wished)
+        promise = self._timetables.green_end(name, now_ns, shown.since_ns + least_ns)
+        return promise if self._is_late else shown.promise.narrowed(promise)
+
+    def _promise(
+        self, index: int, colour: Colour, now_ns: int, before: list[Promise | None]
+    ) -> Promise:
+        name, times = self._program.groups[index], self._program.times[index]
+        is_timed = self.policy == FIXED
+        match colour:
+            case "red" if is_timed:
+                plans = self._timetables.coming if self._wanted() == FIXED else ()
+                return red_end(name, self._timetables.cycle, now_ns, plans)
+            case "red":
+                return earliest_green(self._program, self._state, index, before, now_ns)
+            case "green" if is_timed:
+                return self._timetables.green_end(name, now_ns, now_ns + times.min_green)
+            case "green":
+                return wished_green(None, now_ns, times.min_green, wished=True)
+            case "yellow":
+                return end_after(now_ns + times.yellow)
+            case _:
+                return Promise(now_ns, None)
+
+    def _tell(self, name: str, shown: _Shown, now_ns: int) -> SignalGroup:
+        likely = None
+        if self.mode != FLASH:
+            forecast_ns, is_red = self._forecasts.get(name), shown.colour == "red"
+            planned = self.policy == FIXED
+            likely = within(shown.promise, forecast_ns, now_ns, red=is_red, planned=planned)
+        return SignalGroup(
+            group=name,
+            colour=shown.colour,
+            since_ns=shown.since_ns,
+            min_end_ns=shown.promise.min_end_ns,
+            max_end_ns=shown.promise.max_end_ns,
+            next_colour=_NEXT[shown.colour],
+            likely_end_ns=likely and likely.end_ns,
+            likely_confidence=likely and likely.confidence,
+        )
+
+
+def _known(junction: str, plan: str, plans: Collection[str]) -> str:
+    if plan not in plans:
+        names = [*plans, *policy_names(), FLASH]
+        msg = f"junction {junction}: no plan {plan!r}{nearest(plan, names)}, only {names}"
+        raise PlanError(msg)
+    return plan

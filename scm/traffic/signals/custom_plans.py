@@ -1,0 +1,163 @@
+"""Plans that people made: their stages in words of the bus, checked, and as a timetable.
+
+They come with a request and stay for as long as the junction runs them or is about to. The kernel
+stays safe whatever they say; what is refused here would not do what its maker meant.
+"""
+
+import math
+import time
+from collections.abc import Collection, Sequence
+
+from scm.errors import PlanError
+from scm.store.records import StageRecord
+from scm.traffic.signals import kernel
+from scm.traffic.signals.green_wave import Wave
+from scm.traffic.signals.kernel import GroupTimes, Program
+from scm.traffic.signals.plan import FLASH, Slot, Stage, Timetable, least_between_ns, timetable
+from scm.traffic.signals.program import whole_steps_ns
+from scm.traffic.signals.proof.load_checks import check_table
+from scm.traffic.signals.proof.plan_proof import prove_plan
+from scm.v2x.messages.plan_request import SignalStage
+from scm.v2x.messages.signal_site import SignalPhase
+from scm.v2x.plan_file import PlanFile, PlanProof
+
+LONGEST_CYCLE_S = 300.0
+MOST_STAGES = 24
+
+
+def table_of(plan: str, stages: Sequence[SignalStage], program: Program) -> Timetable:
+    """Return the timetable of a plan that somebody made, and that serves everybody.
+
+    Args:
+        plan: Its name.
+        stages: In the order of the cycle.
+        program: Of the junction.
+
+    Raises:
+        PlanError: naming every problem of the stages at once.
+    """
+    table = limited_table(plan, stages, program)
+    check_table(table, program)
+    return table
+
+
+def limited_table(plan: str, stages: Sequence[SignalStage], program: Program) -> Timetable:
+    """Return the timetable of a plan that is within the limits; see `table_of`."""
+    problems = _problems(stages)
+    if problems:
+        raise PlanError(f"plan {plan!r}: " + "; ".join(problems))
+    cycle = tuple(
+        Stage(stage.groups, whole_steps_ns(stage.green_s), whole_steps_ns(stage.extra_red_s))
+        for stage in stages
+    )
+    table = timetable(plan, cycle, program)
+    if table.length_ns > LONGEST_CYCLE_S * 1e9:
+        got_s = table.length_ns / 1e9
+        msg = f"plan {plan!r}: cycle: got {got_s:g} s, expected {LONGEST_CYCLE_S:g} s at most"
+        raise PlanError(msg)
+    return table
+
+
+def wave_of(table: Timetable, offset_s: float | None) -> Wave | None:
+    """Return the place of a plan's cycle in time; None: it has none.
+
+    Raises:
+        PlanError: when it is not inside the cycle.
+    """
+    if offset_s is None:
+        return None
+    if not 0.0 <= offset_s < table.length_ns / 1e9:
+        expected = f"expected 0 to less than the cycle of {table.length_ns / 1e9:g} s"
+        raise PlanError(f"plan {table.plan!r}: offset_s: got {offset_s:g} s, {expected}")
+    return Wave(table.length_ns, round(offset_s * 1e9))
+
+
+def check_name(plan: str, taken: Collection[str]) -> None:
+    """Refuse a name that means something else.
+
+    Raises:
+        PlanError: naming it.
+    """
+    if plan == FLASH or plan in taken:
+        msg = f"plan {plan!r}: the junction has one of that name, expected another"
+        raise PlanError(msg)
+
+
+def stages_of(table: Timetable, program: Program) -> tuple[SignalStage, ...]:
+    """Return the stages that make a timetable."""
+    following = [*table.slots[1:], Slot(frozenset(), table.length_ns, table.length_ns)]
+    made = []
+    for slot, after in zip(table.slots, following, strict=True):
+        groups = tuple(name for name in program.groups if name in slot.groups)
+        between_ns = least_between_ns(slot.groups, after.groups, program)
+        extra_ns = after.start_ns - slot.end_ns - between_ns
+        made.append(
+            SignalStage(
+                groups=groups,
+                green_s=(slot.end_ns - slot.start_ns) / 1e9,
+                extra_red_s=extra_ns / 1e9,
+            )
+        )
+    return tuple(made)
+
+
+def records_of(stages: Sequence[SignalStage]) -> tuple[StageRecord, ...]:
+    """Return stages as they are stored."""
+    return tuple(
+        StageRecord(groups=s.groups, green_s=s.green_s, extra_red_s=s.extra_red_s) for s in stages
+    )
+
+
+def recalled(records: Sequence[StageRecord]) -> tuple[SignalStage, ...]:
+    """Return stages that were stored."""
+    return tuple(
+        SignalStage(groups=r.groups, green_s=r.green_s, extra_red_s=r.extra_red_s) for r in records
+    )
+
+
+def prove_file(file: PlanFile) -> PlanProof:
+    """Prove a plan for the junction that its file describes.
+
+    Raises:
+        PlanError: saying what is not as it must be.
+    """
+    began_s = time.perf_counter()
+    program = _program(file.phases, file.conflicts)
+    table = table_of(file.plan, file.stages, program)
+    found = prove_plan(kernel, program, table)
+    return PlanProof(
+        digest=file.digest,
+        states=found.states,
+        transitions=found.transitions,
+        plan_states=found.plan_states,
+        plan_transitions=found.plan_transitions,
+        cycle_s=table.length_ns / 1e9,
+        took_s=round(time.perf_counter() - began_s, 3),
+    )
+
+
+def _program(phases: Sequence[SignalPhase], conflicts: Collection[tuple[str, str]]) -> Program:
+    return Program(
+        groups=tuple(phase.group for phase in phases),
+        times=tuple(
+            GroupTimes(
+                whole_steps_ns(phase.min_green_s),
+                whole_steps_ns(phase.yellow_s),
+                whole_steps_ns(phase.red_clear_s),
+            )
+            for phase in phases
+        ),
+        conflicts=frozenset(frozenset(pair) for pair in conflicts),
+    )
+
+
+def _problems(stages: Sequence[SignalStage]) -> list[str]:
+    problems = []
+    if len(stages) > MOST_STAGES:
+        problems.append(f"stages: got {len(stages)}, expected {MOST_STAGES} at most")
+    for number, stage in enumerate(stages, 1):
+        for field, value in (("green_s", stage.green_s), ("extra_red_s", stage.extra_red_s)):
+            if not (math.isfinite(value) and 0.0 <= value <= LONGEST_CYCLE_S):
+                expected = f"expected 0 to {LONGEST_CYCLE_S:g} s"
+                problems.append(f"stage {number}: {field}: got {value:g}, {expected}")
+    return problems

@@ -1,0 +1,157 @@
+"""When a colour will end: promises for SPaT that are kept whatever anybody asks for.
+
+Under a timetable a plan only ever changes at the end of a cycle. So inside a cycle every end is
+known; and of the first red end beyond it, only that some plan's cycle begins there: the earliest
+start of all plans is promised as the minimum, the latest as the maximum. When the next cycle
+begins, the promise narrows to one of them; it never widens. The maximum allows for two late steps.
+A green of the last stage may go on in the next cycle: until that is settled, when the last stage
+begins, the end of that stage is its minimum, and the latest end that any plan gives it the maximum.
+
+Under any other policy nobody knows how long a green will be wished for. A green that is still
+wished is promised for `AHEAD_NS` more, from step to step, so that a car which hears two SPATEM a
+second and loses one never doubts it; once it is no longer wished its end is known. A red lasts at
+least as long as the kernel must keep it; its maximum is unknown.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from scm.traffic.signals.kernel import GroupTimes, Phase, Program, State
+from scm.traffic.signals.plan import Timetable
+from scm.traffic.signals.program import STEP_NS
+
+SLACK_NS = 2 * STEP_NS
+AHEAD_NS = 10 * STEP_NS
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """A colour ends not before `min_end_ns` and not after `max_end_ns` (None: not known)."""
+
+    min_end_ns: int
+    max_end_ns: int | None
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the end is known but for late steps."""
+        return self.max_end_ns is not None and self.max_end_ns - self.min_end_ns <= SLACK_NS
+
+    def narrowed(self, by: "Promise") -> "Promise":
+        """Return what is left when both hold."""
+        known = [end for end in (self.max_end_ns, by.max_end_ns) if end is not None]
+        return Promise(max(self.min_end_ns, by.min_end_ns), min(known, default=None))
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """The cycle that runs now; before the first one `timetable` is None.
+
+    Attributes:
+        began_ns: When its position was 0.
+        ends_ns: When the next one begins.
+    """
+
+    timetable: Timetable | None
+    began_ns: int
+    ends_ns: int
+
+
+def end_after(end_ns: int) -> Promise:
+    """Return the promise of an end that is due at a known time."""
+    return Promise(end_ns, end_ns + SLACK_NS)
+
+
+def green_end(
+    group: str, cycle: Cycle, now_ns: int, least_ns: int, onward: Iterable[Timetable | None]
+) -> Promise:
+    """Return when a green that is on will end.
+
+    Args:
+        group: Which one.
+        cycle: That runs now.
+        now_ns: The present time.
+        least_ns: When it may end at the earliest.
+        onward: Timetables in whose cycle it may go on after this one; None: it may go on in none.
+    """
+    if cycle.timetable is None:
+        return end_after(least_ns)
+    green = cycle.timetable.green_of(group, now_ns - cycle.began_ns)
+    last_ns = cycle.began_ns + cycle.timetable.slots[-1].end_ns
+    if green is not None and cycle.began_ns + green.end_ns < last_ns:
+        return end_after(max(cycle.began_ns + green.end_ns, least_ns))
+    ends_ns, is_open = [], False
+    for table in onward:
+        if table is None or group not in table.slots[0].groups:
+            ends_ns.append(last_ns)
+            continue
+        first = table.greens_of(group)[0]
+        ends_ns.append(cycle.ends_ns + first.end_ns)
+        is_open |= first.end_ns == table.slots[-1].end_ns  # perhaps beyond that cycle as well
+    latest_ns = None if is_open else max(*ends_ns, least_ns) + SLACK_NS
+    return Promise(max(min(ends_ns), least_ns), latest_ns)
+
+
+def red_end(group: str, cycle: Cycle, now_ns: int, plans: Iterable[Timetable]) -> Promise:
+    """Return when a red will end.
+
+    Args:
+        group: Which one.
+        cycle: That runs now.
+        now_ns: The present time.
+        plans: All that may run in the next cycle; none: another policy follows it.
+    """
+    green = cycle.timetable and cycle.timetable.green_of(group, now_ns - cycle.began_ns)
+    if green:
+        return end_after(cycle.began_ns + green.start_ns)
+    starts = [plan.first_start_ns(group) for plan in plans]
+    if not starts:
+        return Promise(cycle.ends_ns, None)
+    return Promise(cycle.ends_ns + min(starts), cycle.ends_ns + max(starts) + SLACK_NS)
+
+
+def wished_green(before: Promise | None, now_ns: int, least_ns: int, *, wished: bool) -> Promise:
+    """Return the promise of a green whose end no timetable knows; None: it begins now."""
+    if before is None:
+        return Promise(now_ns + max(least_ns, AHEAD_NS), None)
+    if before.max_end_ns is not None:
+        return before
+    if wished:
+        return Promise(max(before.min_end_ns, now_ns + AHEAD_NS), None)
+    return end_after(max(before.min_end_ns, now_ns))
+
+
+def earliest_green(
+    program: Program, state: State, number: int, ends: Sequence[Promise | None], now_ns: int
+) -> Promise:
+    """Return the promise of a red that nothing but the kernel keeps red for certain.
+
+    Args:
+        program: Of the junction.
+        state: Of its kernel.
+        number: Of the red group.
+        ends: What every group's colour was promised; None: not yet.
+        now_ns: The present time.
+    """
+    left = [still_ns(state, number, program.times[number], ends[number], now_ns)]
+    for other, name in enumerate(program.groups):
+        if frozenset((program.groups[number], name)) in program.conflicts:
+            left.append(still_ns(state, other, program.times[other], ends[other], now_ns))
+    return Promise(now_ns + max(left), None)
+
+
+def still_ns(
+    state: State, number: int, times: GroupTimes, promised: Promise | None, now_ns: int
+) -> int:
+    """Return for how long a group still is in others' way, or in its own, at the least [ns]."""
+    phase, elapsed_ns = state[number]
+    match phase:
+        case Phase.GREEN:
+            least_ns = times.min_green - elapsed_ns
+            told_ns = 0 if promised is None else promised.min_end_ns - now_ns
+            return max(least_ns, told_ns, 0) + times.yellow + times.clearance
+        case Phase.YELLOW:
+            return times.yellow - elapsed_ns + times.clearance
+        case Phase.CLEARANCE:
+            return times.clearance - elapsed_ns
+        case _:
+            return 0

@@ -1,0 +1,275 @@
+"""One junction of the traffic part: its controller, its detectors, and what is still to be told."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from msgspec.structs import replace
+
+from scm.clock import NS_PER_MS
+from scm.records.city_map import Junction
+from scm.store.records import PlanRecord
+from scm.traffic.signals.controller import Controller, Heard
+from scm.traffic.signals.custom_plans import check_name, recalled, records_of, table_of, wave_of
+from scm.traffic.signals.detectors import Detector, Watcher
+from scm.traffic.signals.operator_overrides import NEED_RINGS, Asked
+from scm.traffic.signals.plan import FLASH
+from scm.traffic.signals.policy import FIXED, policy_names
+from scm.traffic.signals.priority_requests import PriorityDesk
+from scm.traffic.signals.program import STEP_NS
+from scm.traffic.signals.status_reports import JunctionFacts, wishes_of
+from scm.v2x.etsi.convert import roadside_station, spatem_of
+from scm.v2x.etsi.mapem import MapemBody
+from scm.v2x.etsi.topology import mapem_at
+from scm.v2x.exchange import Outgoing
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.mapem_tx import MapemTx
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.plan_request import PlanReply, PlanRequest
+from scm.v2x.messages.signal_request import SignalReply, SignalRequest
+from scm.v2x.messages.spat import Spat
+from scm.v2x.messages.spatem_tx import SpatemTx
+
+MONITOR_SILENT_NS = 3_000 * NS_PER_MS
+SPATEM_EVERY_NS = 500 * NS_PER_MS
+MAPEM_EVERY_NS = 1_000 * NS_PER_MS
+EARLY_NS = STEP_NS // 2
+ENDS = {
+    "monitor": "the monitor reports no fault any more",
+    "silence": "the monitor is back",
+}
+"""Why a junction stops flashing, by what made it flash; a person says so."""
+
+Severity = Literal["info", "warning"]
+
+
+class JunctionSignals:
+    """Steps one controller; hears the monitor, people and vehicles for it."""
+
+    def __init__(
+        self,
+        junction: Junction,
+        controller: Controller,
+        watcher: Watcher,
+        desk: PriorityDesk,
+        mapem: MapemBody,
+        facts: JunctionFacts,
+    ) -> None:
+        self.junction = junction
+        self._facts = facts
+        self._names = {*(plan.plan for plan in facts.site.plans), *policy_names()}
+        self._mapem = mapem
+        self._mapem_ns: int | None = None
+        self.record = PlanRecord(plan="")
+        self.desk = desk
+        self.controller = controller
+        self.watcher = watcher
+        self._told = (controller.mode, controller.running, "")
+        self._asked = "as the map says"
+        self._taken = ""
+        self._why_flash = ""
+        self._why_restart = ""
+        self._monitor_ns: int | None = None
+        self._sent_ns: int | None = None
+        self._wishes = controller.asked
+        self._news: list[Outgoing] = []
+        self._detectors: Mapping[str, Detector] = {}
+
+    def hear_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
+        """Flash while the monitor reports a fault."""
+        self._monitor_ns = arrived_ns
+        self._flash(
+            "monitor",
+            f"the monitor reports {status.fault}: {status.detail}",
+            on=status.fault is not None,
+        )
+
+    def go_on(self, record: PlanRecord) -> None:
+        """Take what was asked for in an earlier run, as if it were asked now.
+
+        Raises:
+            PlanError: when there is no such plan any more.
+        """
+        asked = PlanRequest(junction=self.junction.name, plan=record.plan, by=record.by)
+        if record.plan:
+            stages = recalled(record.stages)
+            self.serve_plan(replace(asked, stages=stages, offset_s=record.offset_s))
+        if record.flash:
+            self.serve_plan(replace(asked, plan=FLASH))
+
+    def serve_plan(self, request: PlanRequest) -> PlanReply:
+        """Take a wish for a plan, or for flash; `record` is what should outlive the process.
+
+        Raises:
+            PlanError: when there is no such plan, or one that came with it is not as it must be.
+        """
+        controller = self.controller
+        who = f"{request.by} asked" + (f": {request.reason}" if request.reason else "")
+        if request.plan == FLASH:
+            self._flash("person", who, on=True)
+            self.record = replace(self.record, flash=True, by=request.by)
+            return PlanReply(junction=request.junction, plan=FLASH)
+        if not request.plan:
+            return self._end_flash(who)
+        if request.stages:
+            check_name(request.plan, self._names)
+            table = table_of(request.plan, request.stages, self._facts.program)
+            controller.ask_for_guest(table, wave_of(table, request.offset_s))
+            self._taken = f"takes plan {request.plan} ({who})"
+        else:
+            controller.ask(request.plan)
+        stages = records_of(request.stages)
+        self.record = PlanRecord(
+            plan=request.plan, by=request.by, stages=stages, offset_s=request.offset_s
+        )
+        self._asked = self._why_restart = who
+        self._flash("person", who, on=False)
+        return self._runs()
+
+    def serve_wish(self, request: SignalRequest, now_ns: int) -> SignalReply:
+        """Take a wish for groups, or for a policy.
+
+        Raises:
+            PlanError: saying why it cannot be taken.
+        """
+        controller = self.controller
+        controller.take(request, now_ns)
+        self._wishes = controller.asked
+        why = f": {request.reason}" if request.reason else ""
+        text = f"{request.by} asked{why}"
+        if request.verb in ("policy", "clear"):
+            self._asked = text
+        if controller.is_flashing and not self._why_flash:
+            self._why_flash = text
+        self._tell("info", "signal_wish", f"{_what(request)} ({text}){_how_long(request)}", now_ns)
+        return SignalReply(
+            junction=request.junction,
+            policy=controller.policy,
+            pending=controller.pending,
+            wishes=wishes_of(controller.asked),
+        )
+
+    def step(self, now_ns: int) -> list[Outgoing]:
+        """Go on to `now_ns`; return what the city and the air are told."""
+        controller = self.controller
+        if self._monitor_ns is not None:
+            silent = now_ns - self._monitor_ns > MONITOR_SILENT_NS
+            self._flash("silence", "the monitor fell silent", on=silent)
+        controller.step(now_ns, self._heard(now_ns))
+        spat = controller.spat(now_ns)
+        self._lapses(now_ns)
+        self._changes(now_ns)
+        news, self._news = self._news, []
+        told = self._facts.tell(controller, self._detectors, now_ns)
+        answers = self.desk.tell(controller.priority, now_ns)
+        return [spat, *self._on_air(spat), *answers, *told, *news]
+
+    def _heard(self, now_ns: int) -> Heard:
+        calls = self.desk.calls(now_ns)
+        if not self.controller.needs_detectors:
+            self._detectors = {}
+            return Heard({}, priority=calls)
+        watcher = self.watcher
+        self._detectors = watcher.by_group(watcher.read(now_ns))
+        return Heard(self._detectors, watcher.sees(now_ns), calls)
+
+    def _end_flash(self, who: str) -> PlanReply:
+        """Go on with what is wanted, which a flash has not changed."""
+        plan = self.controller.plan if self.controller.end_flash() else self.record.plan
+        self._why_restart = who
+        self._flash("person", who, on=False)
+        self.record = replace(self.record, plan=plan, flash=False)
+        return self._runs()
+
+    def _runs(self) -> PlanReply:
+        controller = self.controller
+        plan = FLASH if controller.is_flashing else controller.running
+        return PlanReply(junction=self.junction.name, plan=plan, pending=controller.pending)
+
+    def _flash(self, reason: str, why: str, *, on: bool) -> None:
+        if on and not self.controller.is_flashing:
+            self._why_flash, self._why_restart = why, ""
+        was_flashing = self.controller.is_flashing
+        self.controller.flash(reason, on=on)
+        if was_flashing and not self.controller.is_flashing:
+            self._why_restart = ENDS.get(reason, self._why_restart)
+
+    def _on_air(self, spat: Spat) -> list[Outgoing]:
+        station, now_ns = roadside_station(spat.junction), spat.t_ns
+        sent: list[Outgoing] = []
+        if self.controller.changed or _is_due(self._sent_ns, now_ns, SPATEM_EVERY_NS):
+            self._sent_ns = now_ns
+            body = spatem_of(spat, self.junction)
+            sent.append(SpatemTx(station=station, t_ns=now_ns, body=body))
+        if _is_due(self._mapem_ns, now_ns, MAPEM_EVERY_NS):
+            self._mapem_ns = now_ns
+            lanes = mapem_at(self._mapem, now_ns)
+            sent.append(MapemTx(station=station, t_ns=now_ns, body=lanes))
+        return sent
+
+    def _lapses(self, now_ns: int) -> None:
+        """Tell wishes that ended by themselves."""
+        held = self.controller.asked
+        if held == self._wishes:
+            return
+        for one in self._wishes:
+            if one.until_ns <= now_ns and one not in held:
+                text = f"{_what(one)} of {one.by} lapsed"
+                self._tell("info", "signal_wish_lapsed", text, now_ns)
+        self._wishes = held
+
+    def _changes(self, now_ns: int) -> None:
+        """Tell what changed since this was last asked."""
+        controller = self.controller
+        (mode, running, failure), now = self._told, (
+            controller.mode,
+            controller.running,
+            controller.failure,
+        )  # fmt: skip
+        self._told = now
+        if self._taken:
+            self._tell("info", "plan_taken", self._taken, now_ns)
+            self._taken = ""
+        if running != now[1]:
+            what = "plan" if controller.policy == FIXED else "policy"
+            text = f"runs {what} {now[1]}, before {running} ({self._why_runs()})"
+            self._tell("info", "plan_changed", text, now_ns)
+        if now[2] and failure != now[2]:
+            text = f"falls back to fixed time: {now[2]}"
+            self._tell("warning", "policy_failed", text, now_ns)
+        if mode != FLASH and now[0] == FLASH:
+            self._tell("warning", "signals_flash", f"flashes red: {self._why_flash}", now_ns)
+        if mode == FLASH and now[0] != FLASH:
+            why = f" ({self._why_restart})" if self._why_restart else ""
+            self._why_flash = self._why_restart = ""
+            self._tell("info", "signals_restart", f"restarts all red{why}", now_ns)
+        if mode != "preempt" and now[0] == "preempt":
+            self._tell("info", "signals_preempted", "is pre-empted", now_ns)
+
+    def _why_runs(self) -> str:
+        """Say who wants what runs now: whoever asked for it, or a wish that a plan cannot grant."""
+        if self.controller.policy == FIXED:
+            return self._asked
+        wishes = [one for one in self.controller.asked if one.verb in NEED_RINGS]
+        return ", ".join(f"{one.verb} of {one.by}" for one in wishes) or self._asked
+
+    def _tell(self, severity: Severity, name: str, what: str, now_ns: int) -> None:
+        text = f"junction {self.junction.name} {what}"
+        self._news.append(
+            CityEvent(severity=severity, source="traffic", t_ns=now_ns, name=name, text=text)
+        )
+
+
+def _what(wish: SignalRequest | Asked) -> str:
+    """Return what is wished, in the log's words."""
+    if isinstance(wish, SignalRequest) and wish.verb == "clear":
+        of = " ".join(filter(None, (wish.clears, *wish.groups)))
+        return f"takes back {of or 'all wishes'}"
+    return " ".join(filter(None, (wish.verb, wish.policy, *wish.groups)))
+
+
+def _how_long(request: SignalRequest) -> str:
+    return "" if request.verb == "clear" else f", {request.expires_s:g} s"
+
+
+def _is_due(sent_ns: int | None, now_ns: int, every_ns: int) -> bool:
+    return sent_ns is None or now_ns - sent_ns >= every_ns - EARLY_NS

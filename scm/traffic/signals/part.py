@@ -1,0 +1,206 @@
+"""The traffic part: every junction of the map under its controller, and what the city hears of it.
+
+It serves wishes and hears the monitor. A fault that the monitor reports, or a monitor that was
+there and fell silent, makes the junction flash red until the monitor says that all is well. What
+the controller shows goes out as `Spat` at every step, and over the roadside station's antenna as
+SPATEM twice a second and at once when a colour changes, with the lanes as MAPEM once a second.
+Under a policy that needs detectors it listens to the CAMs that the roadside unit hears, and to what
+the overhead cameras see.
+"""
+
+import logging
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from scm.errors import PlanError, nearest
+from scm.log import event
+from scm.maps.route import Roads
+from scm.records.city_map import CityMap
+from scm.runtime.part import BasePart, Service, Subscription
+from scm.store.records import PlanRecord
+from scm.traffic.signals.controller import Controller
+from scm.traffic.signals.detectors import Seen, Watcher, reach_of
+from scm.traffic.signals.green_wave import links_of, waves_of
+from scm.traffic.signals.junction import JunctionSignals
+from scm.traffic.signals.kernel import Program
+from scm.traffic.signals.map_plan import OWN, own_table
+from scm.traffic.signals.plan import load_timetable, plan_names
+from scm.traffic.signals.policy import FIXED
+from scm.traffic.signals.priority_requests import PriorityDesk
+from scm.traffic.signals.program import STEP_NS, program_of
+from scm.traffic.signals.proof.load_checks import check_junction
+from scm.traffic.signals.sightings import Sightings
+from scm.traffic.signals.status_reports import JunctionFacts
+from scm.traffic.signals.timetables import Tables
+from scm.traffic.signals.timing import NIGEL, CarFacts
+from scm.v2x.etsi.convert import roadside_station
+from scm.v2x.etsi.topology import mapem_of
+from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
+from scm.v2x.message import Refused
+from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.eye_track import EyeTrack
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.plan_request import PlanRequest
+from scm.v2x.messages.signal_request import SignalRequest
+from scm.v2x.messages.srem_rx import SremRx
+
+_log = logging.getLogger(__name__)
+
+
+class TrafficPart(BasePart):
+    """Controls the signals of all junctions of a map; see `scm.runtime.part.Part`."""
+
+    def __init__(
+        self,
+        city_map: CityMap,
+        plan: str | None = None,
+        *,
+        policy: str = FIXED,
+        car: CarFacts = NIGEL,
+        learned: Callable[[Any], Any] | None = None,
+        kept: Mapping[str, PlanRecord] | None = None,
+    ) -> None:
+        """Take the map.
+
+        Args:
+            city_map: Whose junctions.
+            plan: Replaces the plans that the map names.
+            policy: Of all junctions while nobody wishes another one.
+            car: As bad as the worst of the fleet; all least times follow from it.
+            learned: For the policy `learned`.
+            kept: What junctions were asked for in an earlier run, by name.
+
+        Raises:
+            PlanError: when a plan or policy is unknown, or not safe for a junction.
+        """
+        self.name = "traffic"
+        self.role = "part"
+        self.period_ns = STEP_NS
+        self.services = (Service(PlanRequest), Service(SignalRequest))
+        roads = Roads(city_map)
+        programs = {j.name: program_of(j, roads, car) for j in city_map.junctions}
+        tables = tables_of(city_map, roads, programs, car)
+        for name, program in programs.items():
+            check_junction(name, program, (table for table, _ in tables[name].values()))
+        self._sightings = Sightings()
+        self._junctions = {
+            junction.name: JunctionSignals(
+                junction,
+                Controller(
+                    junction.name,
+                    programs[junction.name],
+                    plan or junction.plan,
+                    city_map.revision,
+                    policy=policy,
+                    tables=tables[junction.name],
+                    learned=learned,
+                    car=car,
+                ),
+                Watcher(junction, roads, reach_of(programs[junction.name], roads)),
+                PriorityDesk(junction, roads),
+                mapem_of(roads, junction),
+                JunctionFacts(junction.name, programs[junction.name], tables[junction.name]),
+            )
+            for junction in city_map.junctions
+        }
+        for name, record in (kept or {}).items():
+            if name in self._junctions:
+                self._junctions[name].go_on(record)
+        self._by_station = {roadside_station(name): s for name, s in self._junctions.items()}
+
+    @property
+    def subscriptions(self) -> tuple[Subscription, ...]:
+        """The monitor and those who ask for priority; and cars, where detectors are needed."""
+        listening = [
+            Subscription(CamRx, {"receiver": station})
+            for station, signals in self._by_station.items()
+            if signals.controller.needs_detectors
+        ]
+        tracks = (Subscription(EyeTrack),) if listening else ()
+        return (Subscription(MonitorStatus), Subscription(SremRx), *listening, *tracks)
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Hear wishes, cars and the monitor, step every junction, tell what it shows."""
+        outbox: list[Outgoing] = []
+        for item in inbox:
+            message = item.message
+            if isinstance(message, MonitorStatus):
+                self._hear_monitor(message, item.t_ns)
+            elif isinstance(message, SremRx):
+                self._hear_srem(message, now_ns)
+            elif isinstance(message, CamRx):
+                self._show([message.receiver], self._sightings.of_cam(message), item.t_ns)
+            elif isinstance(message, EyeTrack):
+                self._show(self._by_station, self._sightings.of_track(message), item.t_ns)
+            elif isinstance(message, PlanRequest | SignalRequest):
+                outbox += self._serve(item, message, now_ns)
+        for signals in self._junctions.values():
+            outbox += signals.step(now_ns)
+        return outbox
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Fall silent: cars take no green that is older than a second."""
+        event(_log, "traffic_finished", t_ns=now_ns, junctions=len(self._junctions))
+        return []
+
+    def _hear_srem(self, heard: SremRx, now_ns: int) -> None:
+        signals = self._by_station.get(heard.receiver)
+        if signals is not None:
+            signals.desk.hear(heard, now_ns)
+
+    def _show(self, stations: Iterable[str], seen: Seen | None, arrived_ns: int) -> None:
+        for station in stations if seen is not None else ():
+            signals = self._by_station.get(station)
+            if signals is not None and seen is not None and signals.controller.needs_detectors:
+                signals.watcher.show(seen, arrived_ns)
+
+    def _hear_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
+        signals = self._junctions.get(status.junction)
+        if signals:
+            signals.hear_monitor(status, arrived_ns)
+
+    def _serve(
+        self, item: Incoming, request: PlanRequest | SignalRequest, now_ns: int
+    ) -> list[Outgoing]:
+        signals = self._junctions.get(request.junction)
+        if signals is None:
+            known = list(self._junctions)
+            hint = nearest(request.junction, known)
+            detail = f"no junction {request.junction!r}{hint}, only {known}"
+            return [Answer(item, Refused(code="not_found", detail=detail))]
+        if not request.by.strip():
+            detail = f"junction {request.junction}: by: got nothing, expected who asks"
+            return [Answer(item, Refused(code="invalid", detail=detail))]
+        try:
+            if isinstance(request, SignalRequest):
+                return [Answer(item, signals.serve_wish(request, now_ns))]
+            reply = signals.serve_plan(request)
+            return [Keep("plans", request.junction, signals.record), Answer(item, reply)]
+        except PlanError as refusal:
+            is_wish = isinstance(request, SignalRequest) or request.stages
+            code = "invalid" if is_wish else "not_found"
+            return [Answer(item, Refused(code=code, detail=str(refusal)))]
+
+
+def tables_of(
+    city_map: CityMap, roads: Roads, programs: dict[str, Program], car: CarFacts
+) -> dict[str, Tables]:
+    """Return the timetables of all plans by junction; of several junctions they make green waves.
+
+    A junction with stages of its own has the plan `own` besides, in step with nobody.
+
+    Raises:
+        PlanError: when a plan is not safe for a junction.
+    """
+    links = links_of(city_map, roads, car) if len(programs) > 1 else []
+    tables: dict[str, Tables] = {name: {} for name in programs}
+    for plan in plan_names():
+        alone = {name: load_timetable(plan, program) for name, program in programs.items()}
+        waves = waves_of(links, alone) if links else {n: (t, None) for n, t in alone.items()}
+        for name, pair in waves.items():
+            tables[name] = {**tables[name], plan: pair}
+    for junction in city_map.junctions:
+        if junction.stages:
+            table = own_table(junction.stages, programs[junction.name])
+            tables[junction.name] = {**tables[junction.name], OWN: (table, None)}
+    return tables

@@ -1,0 +1,181 @@
+"""The contract of a policy: it sees a pure view of one junction and answers wishes.
+
+A policy is one file of `policies/` with a constant `POLICY`. It keeps a memory that only it reads
+and that is never changed, only replaced. Whatever it answers, the kernel decides the colours and
+the controller keeps the promises already told; so a policy can be slow or stupid, never unsafe.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
+
+from scm import registry
+from scm.errors import PlanError
+from scm.traffic.signals.detectors import Detector
+from scm.traffic.signals.guaranteed_time import AHEAD_NS
+from scm.traffic.signals.kernel import GroupTimes, Program, State
+from scm.traffic.signals.operator_overrides import Asked
+from scm.traffic.signals.rings import Layout, PhaseTimes, layout_of
+from scm.traffic.signals.timing import NIGEL, CarFacts, headway_s
+
+PACKAGE = "scm.traffic.signals.policies"
+FIXED = "fixed"
+
+PASSAGE_NS = 200_000_000
+MAX1_GREENS, MAX2_GREENS = 3, 5
+
+Mode = Literal["adaptive", "priority", "preempt"]
+Status = Literal["requested", "processing", "granted", "rejected"]
+
+
+class PriorityCall(NamedTuple):
+    """A vehicle asks for its green.
+
+    Attributes:
+        key: Who asks, and which of its requests: (station, request id).
+        group: The signal group of the way that it wants to take; empty: no such way here.
+        eta_ns: When it expects to be at the stop line; None: it does not say.
+        role: `emergency` pre-empts, `transit` is helped; others are rejected.
+        until_ns: When the request lapses.
+    """
+
+    key: tuple[int, int]
+    group: str
+    eta_ns: int | None
+    role: str
+    until_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """What a policy knows of its junction for good.
+
+    Attributes:
+        layout: Its rings and barriers.
+        headway_s: Between cars that leave a queue.
+    """
+
+    junction: str
+    program: Program
+    layout: Layout
+    headway_s: float
+    learned: Callable[[Any], Any] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class JunctionView:
+    """What a policy is shown at one step.
+
+    Attributes:
+        dt_ns: Since the last step.
+        state: Of the kernel, in the order of the program's groups.
+        detectors: By group.
+        sees: Whether detectors heard or saw anything lately; if not, they must not be relied on.
+        asked: Wishes of operators and scripts in force.
+        priority: Requests of vehicles in force.
+        timetabled: What the timetable of the plan in force wishes now.
+    """
+
+    now_ns: int
+    dt_ns: int
+    state: State
+    detectors: Mapping[str, Detector] = field(default_factory=dict)
+    sees: bool = False
+    asked: tuple[Asked, ...] = ()
+    priority: tuple[PriorityCall, ...] = ()
+    timetabled: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a policy wishes.
+
+    Attributes:
+        groups: That would like green now.
+        priority: What became of each vehicle's request, by its key.
+        mode: What Spat tells: `adaptive`, `priority` or `preempt`.
+    """
+
+    groups: frozenset[str]
+    priority: Mapping[tuple[int, int], Status] = field(default_factory=dict)
+    mode: Mode = "adaptive"
+
+
+class Turn(NamedTuple):
+    """What a policy foresees: groups that are green together, and for how long.
+
+    Attributes:
+        groups: Without conflict.
+        green_s: From now, of groups that are green; else from their begin. None: for ever, or
+            nobody knows.
+    """
+
+    groups: frozenset[str]
+    green_s: float | None
+
+
+def foresees_nothing(site: Site, memory: Any, view: JunctionView) -> tuple[Turn, ...]:
+    """Return the outlook of a policy that has none."""
+    del site, memory, view
+    return ()
+
+
+@dataclass(frozen=True, slots=True)
+class Policy:
+    """A plug-in: what it is for, in one sentence, and what it does.
+
+    Attributes:
+        start: Makes its memory.
+        step: From memory and view to the next memory and an answer.
+        foresee: From the memory after a step and its view to the turns to come, those of whoever is
+            green now first, as if nobody came whom it does not see yet. SPaT tells it as likely.
+        is_timed: It keeps to the timetable, so Spat may promise what that says.
+        is_flash: It is no policy but flashing red.
+        needs_detectors: Cars must be listened to for it.
+    """
+
+    about: str
+    start: Callable[[Site], Any]
+    step: Callable[[Site, Any, JunctionView], tuple[Any, Answer]]
+    is_timed: bool = False
+    is_flash: bool = False
+    needs_detectors: bool = True
+    foresee: Callable[[Site, Any, JunctionView], tuple[Turn, ...]] = foresees_nothing
+
+
+def policy_names() -> list[str]:
+    """Return the names of all policies that can be asked for."""
+    return registry.names(PACKAGE)
+
+
+def load_policy(name: str) -> Policy:
+    """Return a policy by name.
+
+    Raises:
+        PlanError: when there is none.
+    """
+    return registry.load(PACKAGE, name, "POLICY", Policy, error=PlanError)
+
+
+def site_of(
+    junction: str,
+    program: Program,
+    learned: Callable[[Any], Any] | None = None,
+    car: CarFacts = NIGEL,
+) -> Site:
+    """Return the site of a junction; max 1 is three least greens, max 2 is five, as shown."""
+    phases = tuple(
+        PhaseTimes(t.min_green, PASSAGE_NS, _most_ns(t, MAX1_GREENS), _most_ns(t, MAX2_GREENS))
+        for t in program.times
+    )
+    return Site(junction, program, layout_of(program, phases), headway_s(car), learned)
+
+
+def _most_ns(times: GroupTimes, greens: int) -> int:
+    """Return when it is decided at the latest that a green ends: what is promised then is in it."""
+    return max(times.min_green, greens * times.min_green - AHEAD_NS)
+
+
+def nothing(site: Site) -> None:
+    """Make the memory of a policy that has none."""
+    del site

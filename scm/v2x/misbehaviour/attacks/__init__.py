@@ -1,1 +1,0 @@
-"""One attack a file, each with `ATTACK`; the contract is `scm.v2x.misbehaviour.attack`."""
