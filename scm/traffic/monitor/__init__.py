@@ -1,1 +1,1 @@
-"""The signal monitor: a second channel that checks what signals show and shares no code with them."""
+"""The signal monitor: a second channel that checks what signals show, without their code."""
