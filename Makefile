@@ -1,4 +1,4 @@
-# Two commands: `make run` starts a city, `make test` runs every test. Both set up .venv first.
+# `make run` starts a city, `make test` runs every test; both set up .venv first. `make docs` builds the site.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 MAP ?= driving_school
 VENV := .venv
@@ -10,7 +10,7 @@ INSTALL = $(VENV)/bin/pip install --quiet --disable-pip-version-check --no-compi
 COMPILE := PYTHONDONTWRITEBYTECODE= $(VENV)/bin/python -c 'import importlib, pkgutil, scm; \
 	[importlib.import_module(found.name) for found in pkgutil.walk_packages(scm.__path__, "scm.")]'
 
-.PHONY: run test bench clean
+.PHONY: run test docs bench clean
 
 run: $(RUNS)
 	@echo "starting the city on $(MAP)"
@@ -18,6 +18,10 @@ run: $(RUNS)
 
 test: $(TESTS)  # hundreds of processes are started: they share what the first compiled
 	PYTHONDONTWRITEBYTECODE= $(VENV)/bin/python -m pytest -n auto --no-loadscope-reorder --max-worker-restart=0 $(PYTEST_ARGS)
+
+docs: $(TESTS)
+	@$(VENV)/bin/python -m sphinx -q -W -b html -d build/site_trees docs build/site
+	@echo "open build/site/index.html"
 
 bench: $(TESTS)
 	$(VENV)/bin/pip install --quiet -e '.[bench]'

@@ -1,31 +1,46 @@
-"""Sphinx settings of the documentation's site; `make docs` builds it into build/site."""
+"""Settings of the documentation's site; `make docs` builds it in build/site."""
 
-import re
 import sys
+import tomllib
 from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "make")]
 
 project = "Smart City Manager"
-author = "the authors of scm"
-project_copyright = author
-release = re.findall(r'^version = "(.+)"$', (ROOT / "pyproject.toml").read_text("utf-8"), re.M)[0]
-version = release
+release = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-root_doc = "index"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "reference"]
+default_role = "code"  # of docstrings, which write `name` as Markdown does
 exclude_patterns = ["make"]
 myst_heading_anchors = 4
-myst_enable_extensions = ["colon_fence"]
-suppress_warnings = ["misc.highlighting_failure"]  # `terms = [...]` in pages of effects is no TOML
+suppress_warnings = ["misc.highlighting_failure"]  # `terms = [..., "servo"]` is not quite TOML
 
-autodoc_member_order = "bysource"
-autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "undoc-members": True}
+autodoc_member_order = "bysource"
+napoleon_use_ivar = True
+toc_object_entries = False
 python_use_unqualified_type_names = True
 
 html_theme = "furo"
 html_title = f"Smart City Manager {release}"
+html_show_copyright = False
 html_show_sourcelink = False
 html_copy_source = False
+
+
+def _leave_out_of_navigation(app: Sphinx, _document: nodes.document) -> None:
+    """Keep the pages of 90 effects out of the navigation: `physics/README` lists them."""
+    name = app.env.current_document.docname
+    if name.startswith("physics/") and name != "physics/README":
+        app.env.metadata[name]["orphan"] = "true"
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Connect what is done to each page."""
+    app.connect("doctree-read", _leave_out_of_navigation)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
