@@ -33,7 +33,6 @@ from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Part, Subscription
 from scm.traffic.monitor.part import MonitorPart
 from scm.traffic.signals.part import TrafficPart
-from scm.v2x.ask import ask
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.credentials import read_credentials
@@ -44,6 +43,7 @@ from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
 from scm.v2x.messages.trip import Trip
+from scm.v2x.request_retry import send_request
 from scm.world.part import WorldPart
 
 R = TypeVar("R", bound=Message)
@@ -134,7 +134,7 @@ class LiveLink:
     def request(self, request: Request) -> Message:
         """Wait for the reply."""
         signed = msgspec.structs.replace(request, actor=request.actor or program_name())
-        return ask(self._bus, signed, REPLY_TIMEOUT_S)
+        return send_request(self._bus, signed, REPLY_TIMEOUT_S)
 
     def subscribe(self, subscription: Subscription, keep: Keep | None = None) -> Mailbox:
         """Return a mailbox subscribed on the bus."""

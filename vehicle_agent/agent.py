@@ -238,21 +238,21 @@ class AgentPart:
     def _on_spatem(self, item: Incoming) -> list[Outgoing]:
         if isinstance(item.message, SpatemRx) and self._stay is not None:
             self._stay.signals.receive_spatem(item.message.body, item.t_ns)
-            self._stay.air.hear("spatem", item.t_ns)
+            self._stay.air.add_frame("spatem", item.t_ns)
         return []
 
     def _on_cam(self, item: Incoming) -> list[Outgoing]:
         message = item.message
         if isinstance(message, CamRx) and self._stay is not None and message.station != self.name:
             self._stay.cars.receive(message.body, item.t_ns)
-            self._stay.air.hear("cam", item.t_ns)
+            self._stay.air.add_frame("cam", item.t_ns)
         return []
 
     def _on_denm(self, item: Incoming) -> list[Outgoing]:
         message = item.message
         if isinstance(message, DenmRx) and self._stay is not None and message.station != self.name:
             self._stay.trips.driver.batch.receive_denm(message.body, item.t_ns)
-            self._stay.air.hear("denm", item.t_ns)
+            self._stay.air.add_frame("denm", item.t_ns)
         return []
 
     def _on_radio(self, item: Incoming) -> list[Outgoing]:
@@ -260,7 +260,7 @@ class AgentPart:
         if isinstance(message, RadioStatus) and self._stay is not None:
             told = dict(zip(message.stations, message.busy, strict=False))
             if self.name in told:
-                self._stay.air.told(told[self.name], item.t_ns)
+                self._stay.air.set_ratio(told[self.name], item.t_ns)
         return []
 
     def _on_monitor(self, item: Incoming) -> list[Outgoing]:

@@ -11,10 +11,10 @@ from scm.log import event
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
 from scm.v2x.cam_trigger import CamTrigger
-from scm.v2x.congestion import OwnControl
+from scm.v2x.congestion import StationControl
 from scm.v2x.etsi.convert import cam_of
 from scm.v2x.etsi.events import CarWarnings
-from scm.v2x.etsi.path import SlowNews
+from scm.v2x.etsi.path import LowFrequencySender
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.contact import Contact
@@ -77,10 +77,10 @@ class Stay:
         self._tried_ns = now_ns
         self.switches = OFF
         radio = city_map.radio
-        self.air = OwnControl(radio.data_rate_mbps, is_on=radio.congestion_control)
+        self.air = StationControl(radio.data_rate_mbps, is_on=radio.congestion_control)
         self._loses_nothing = is_ideal(radio)
         self._cam = CamTrigger()
-        self._slow_news = SlowNews()
+        self._slow_news = LowFrequencySender()
         self._warnings = CarWarnings(vehicle)
         self._hits: list[Contact] = []
         self._seq = self._felt = 0
@@ -104,7 +104,7 @@ class Stay:
 
     def told(self, headlights: Headlights | None, indicators: Indicators | None) -> Switches:
         """Switch the lights, None leaves one as it is; return how they stand."""
-        self.switches = self.switches.told(headlights, indicators)
+        self.switches = self.switches.updated(headlights, indicators)
         return self.switches
 
     def step(self, now_ns: int, epoch: int | None, *, sensed: bool = True) -> list[Outgoing]:
@@ -171,7 +171,7 @@ class Stay:
         sensors = self._body.sensors(self._vehicle, now_ns, wanted=sensed)
         outbox: list[Outgoing] = [state, *sensors]
         if self._cam.due(state, now_ns, self.air.gap_ns(now_ns)):
-            self.air.hear("cam", now_ns)
+            self.air.add_frame("cam", now_ns)
             limits = self._body.limits
             body = cam_of(
                 state,

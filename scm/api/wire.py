@@ -4,11 +4,11 @@ import threading
 from typing import Protocol
 
 from scm.api.trace import traced
-from scm.v2x.ask import ask
 from scm.v2x.bus import Bus, no_answer
 from scm.v2x.exchange import Call, Incoming
 from scm.v2x.key import key_of
 from scm.v2x.message import Message, Request
+from scm.v2x.request_retry import send_request
 
 SLACK_S = 0.5
 
@@ -45,7 +45,7 @@ class BusWire:
 
     def ask(self, request: Request, timeout_s: float) -> Message:
         """Ask until there is an answer, under an id, and the trace of what is being answered."""
-        return ask(self._bus, traced(request), timeout_s)
+        return send_request(self._bus, traced(request), timeout_s)
 
     def ask_once(self, request: Request, timeout_s: float) -> Message:
         """Ask, and wait for the reply."""

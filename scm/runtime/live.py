@@ -22,7 +22,7 @@ from scm.v2x.bus import Bus
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.part_status import PartStatus
-from scm.v2x.write_ahead import KeeperBehind
+from scm.v2x.write_ahead import BackgroundWriter
 
 _log = logging.getLogger(__name__)
 
@@ -46,7 +46,7 @@ def run(
     of the part is logged, published as a `CityEvent` and raised: the process should die.
     """
     with bus:
-        keeper = None if state is None else KeeperBehind(state, part.name, bus.session)
+        keeper = None if state is None else BackgroundWriter(state, part.name, bus.session)
         begin_ns = next_tick_ns(clock.now_ns()) if on_tick else clock.now_ns()
         loop = _Loop(part, Station(part, bus, keeper), clock, begin_ns)
         try:

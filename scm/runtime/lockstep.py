@@ -19,7 +19,7 @@ from scm.v2x.bus_memory import MemoryBus, MemoryNetwork
 from scm.v2x.exchange import Call, Incoming
 from scm.v2x.faults import Faults
 from scm.v2x.message import Message, Request
-from scm.v2x.write_ahead import Keeper
+from scm.v2x.write_ahead import DirectWriter
 
 SCRIPT_MAILBOX_DEPTH = 1_000_000  # a script that runs for hours and then drains loses nothing
 
@@ -63,7 +63,7 @@ class Lockstep:
     def add(self, part: Part, state: Repository | None = None) -> None:
         """Add a part; its first step is due now. `state` stores what must outlive it."""
         bus = self._network.bus(self._city, part.name)
-        keeper = None if state is None else Keeper(state, part.name, bus.session)
+        keeper = None if state is None else DirectWriter(state, part.name, bus.session)
         self._running[self._added] = _Running(part, bus, Station(part, bus, keeper))
         heapq.heappush(self._due, (self.now_ns, self._added))
         self._added += 1

@@ -16,12 +16,12 @@ from scm.log import event
 from scm.runtime.part import Part, Subscription
 from scm.store.audit import Deed
 from scm.store.repository import Table
-from scm.v2x.answers import AnswerBook
+from scm.v2x.answers import AnswerCache
 from scm.v2x.bus import Bus, Mailbox, RawMailbox, check_reply
 from scm.v2x.exchange import Answer, Call, Incoming, Keep, Outgoing, RawSample
 from scm.v2x.mailbox import drain_all
 from scm.v2x.message import Delivery, Message, Refused, Request, encode
-from scm.v2x.write_ahead import Batch, Keeps
+from scm.v2x.write_ahead import Batch, BatchStore
 
 DEPTH = {
     Delivery.STREAM: 1024,
@@ -45,13 +45,13 @@ class Station:
         keeper: Stores what must outlive this process; None: nothing must.
     """
 
-    def __init__(self, part: Part, bus: Bus, keeper: Keeps | None = None) -> None:
+    def __init__(self, part: Part, bus: Bus, keeper: BatchStore | None = None) -> None:
         self._part = part
         self._bus = bus
         self._boxes: list[Mailbox | RawMailbox] = []
         self._replies = self._mailbox(Delivery.RPC)
         self._keeper = keeper
-        self._answers = AnswerBook(None if keeper is None else keeper.stored_answers())
+        self._answers = AnswerCache(None if keeper is None else keeper.stored_answers())
         self._followed: Sequence[Subscription] = ()
         self._active: list[tuple[Subscription, Mailbox]] = []
         self._follow()
@@ -105,7 +105,7 @@ class Station:
         fresh: list[Incoming | RawSample] = []
         for item in drain_all(self._boxes):
             if isinstance(item, Incoming) and _is_request(item):
-                met = self._answers.meet(item, self._closed_for(item))
+                met = self._answers.check(item, self._closed_for(item))
                 if isinstance(met, Answer):
                     self._bus.answer(met)
                 if met != "do":
@@ -147,7 +147,7 @@ class Station:
             return ""
         return self._keeper.stuck
 
-    def _store(self, keeper: Keeps, stored: Sequence[Keep], answers: Sequence[Answer]) -> None:
+    def _store(self, keeper: BatchStore, stored: Sequence[Keep], answers: Sequence[Answer]) -> None:
         values: list[tuple[Table, str, bytes | None]] = [
             (item.table, item.key, None if item.value is None else msgspec.json.encode(item.value))
             for item in stored
@@ -156,8 +156,8 @@ class Station:
             record = self._answers.record(answer)
             if record is not None:
                 values.append(("answers", record[0], msgspec.json.encode(record[1])))
-        forgotten, self._answers.forgotten = self._answers.forgotten, []
-        values += [("answers", key, None) for key in forgotten]
+        dropped, self._answers.dropped = self._answers.dropped, []
+        values += [("answers", key, None) for key in dropped]
         deeds = [
             self._deed(answer)
             for answer in answers
@@ -204,7 +204,7 @@ class Station:
                     self._answer(answer)
 
     def _answer(self, answer: Answer) -> None:
-        for ready in self._answers.settle(answer):
+        for ready in self._answers.complete(answer):
             self._bus.answer(ready)
 
 

@@ -163,7 +163,7 @@ def _transport(fleet: Fleet) -> dict[str, object]:
 def access_control(fleet: Fleet, city: str) -> dict[str, object]:
     """Return Zenoh's `access_control`: everything is denied but what the fleet's roles may do."""
     everyone = [member.name for member in fleet.members.values()]
-    rules = [_told(city)]
+    rules = [_declarations(city)]
     policies: list[dict[str, object]] = [{"rules": [rules[0]["id"]], "subjects": everyone}]
     for member in fleet.members.values():
         own = _rules(member, city)
@@ -180,14 +180,16 @@ def access_control(fleet: Fleet, city: str) -> dict[str, object]:
     }
 
 
-def _told(city: str) -> _Rule:
+def _declarations(city: str) -> _Rule:
     """Return the rule by which the router tells every station who listens and who asks."""
     city_keys = prefix(city)
     keys = [
         *(city_keys + key for key in ("**", "v/*/@camera/*", "eye/*/@preview", "eye/*/@picture")),
         city_keys + "**" + ADVANCED,
     ]
-    return _rule("told", "egress", ("declare_subscriber", "declare_queryable", "query"), keys)
+    return _rule(
+        "declarations", "egress", ("declare_subscriber", "declare_queryable", "query"), keys
+    )
 
 
 def _rules(member: Member, city: str) -> list[_Rule]:
@@ -196,20 +198,20 @@ def _rules(member: Member, city: str) -> list[_Rule]:
     def full(keys: Iterable[str]) -> list[str]:
         return [prefix(city) + key for key in keys]
 
-    says, hears = full(rights.says), full(rights.hears)
-    asks, serves = full(rights.asks), full(rights.serves)
-    kept, missed = [key + ADVANCED for key in says], [key + ADVANCED for key in hears]
+    publishes, subscribes = full(rights.publishes), full(rights.subscribes)
+    requests, services = full(rights.requests), full(rights.services)
+    caches, recovery = [key + ADVANCED for key in publishes], [key + ADVANCED for key in subscribes]
     here = full([presence_of(member.role, name)])
     of_others = ("declare_subscriber", "declare_liveliness_subscriber", "liveliness_query")
     rules = [
-        _rule(f"{name}:says", "ingress", ("put",), says + kept),
-        _rule(f"{name}:replies", "ingress", ("reply",), says + serves),
-        _rule(f"{name}:serves", "ingress", ("declare_queryable",), serves + kept),
-        _rule(f"{name}:here", "ingress", ("liveliness_token",), here + kept),
-        _rule(f"{name}:hears", "ingress", of_others, hears + missed),
-        _rule(f"{name}:asks", "ingress", ("query",), asks + missed),
-        _rule(f"{name}:gets", "egress", ("put", "liveliness_token"), hears + missed),
-        _rule(f"{name}:answered", "egress", ("reply",), asks + hears),
+        _rule(f"{name}:publish", "ingress", ("put",), publishes + caches),
+        _rule(f"{name}:reply", "ingress", ("reply",), publishes + services),
+        _rule(f"{name}:serve", "ingress", ("declare_queryable",), services + caches),
+        _rule(f"{name}:presence", "ingress", ("liveliness_token",), here + caches),
+        _rule(f"{name}:subscribe", "ingress", of_others, subscribes + recovery),
+        _rule(f"{name}:request", "ingress", ("query",), requests + recovery),
+        _rule(f"{name}:receive", "egress", ("put", "liveliness_token"), subscribes + recovery),
+        _rule(f"{name}:receive_reply", "egress", ("reply",), requests + subscribes),
     ]
     return [rule for rule in rules if rule["key_exprs"]]
 

@@ -18,12 +18,12 @@ from scm.errors import MessageError
 from scm.v2x.exchange import Answer, Incoming
 from scm.v2x.message import Message, Refused, Request, decode, encode
 
-KEPT_NS = 24 * 3600 * NS_PER_S
-SURE_NS = 600 * NS_PER_S
-MOST = 65_536
-MOST_WAITING = 64
-LONGEST_ID = 256
-PASSING = ("offline", "timeout")
+RETENTION_NS = 24 * 3600 * NS_PER_S
+MIN_RETENTION_NS = 600 * NS_PER_S
+MAX_ANSWERS = 65_536
+MAX_WAITING = 64
+MAX_ID_LENGTH = 256
+TRANSIENT = ("offline", "timeout")
 
 
 class StoredAnswer(msgspec.Struct, kw_only=True, frozen=True):
@@ -37,7 +37,7 @@ class StoredAnswer(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     t_ns: int
-    asked: str
+    digest: str = msgspec.field(name="asked")
     refused: bool
     reply: msgspec.Raw
 
@@ -46,11 +46,11 @@ class StoredAnswer(msgspec.Struct, kw_only=True, frozen=True):
 class _Waiting:
     """A request under way, and all who asked it."""
 
-    asked: str
+    digest: str
     items: list[Incoming] = field(default_factory=list)
 
 
-class AnswerBook:
+class AnswerCache:
     """The answers of one station.
 
     Args:
@@ -61,14 +61,16 @@ class AnswerBook:
         forgotten: Keys that a store need not hold any more; whoever takes them empties the list.
     """
 
-    def __init__(self, stored: Mapping[str, StoredAnswer] | None = None, most: int = MOST) -> None:
+    def __init__(
+        self, stored: Mapping[str, StoredAnswer] | None = None, most: int = MAX_ANSWERS
+    ) -> None:
         by_age = sorted((stored or {}).items(), key=lambda item: item[1].t_ns)
-        self._given = OrderedDict(by_age[-most:])
+        self._answers = OrderedDict(by_age[-most:])
         self._waiting: dict[str, _Waiting] = {}
         self._most = most
-        self.forgotten = [key for key, _ in by_age[:-most]]
+        self.dropped = [key for key, _ in by_age[:-most]]
 
-    def meet(self, item: Incoming, closed: str = "") -> Answer | Literal["do", "wait"]:
+    def check(self, item: Incoming, closed: str = "") -> Answer | Literal["do", "wait"]:
         """Return what a request that came in meets: an answer, an order to do it, or a wait.
 
         Args:
@@ -78,20 +80,20 @@ class AnswerBook:
         request = _request(item)
         if not request.request_id:
             return _no(item, "offline", closed) if closed else "do"
-        if len(request.request_id) > LONGEST_ID:
+        if len(request.request_id) > MAX_ID_LENGTH:
             got = len(request.request_id)
-            detail = f"request_id: got {got} characters, expected at most {LONGEST_ID}"
+            detail = f"request_id: got {got} characters, expected at most {MAX_ID_LENGTH}"
             return _no(item, "invalid", detail)
         self._forget(item.t_ns)
-        key, asked = key_of(request), _digest(request)
-        known = self._given.get(key) or self._waiting.get(key)
+        key, digest = key_of(request), _digest(request)
+        known = self._answers.get(key) or self._waiting.get(key)
         if known is not None:
-            return _again(item, known, asked)
+            return _again(item, known, digest)
         if not closed and not self._has_room(item.t_ns):
-            closed = f"{len(self._given)} answers are kept already: ask again later"
+            closed = f"{len(self._answers)} answers are kept already: ask again later"
         if closed:
             return _no(item, "offline", closed)
-        self._waiting[key] = _Waiting(asked, [item])
+        self._waiting[key] = _Waiting(digest, [item])
         return "do"
 
     def record(self, answer: Answer) -> tuple[str, StoredAnswer] | None:
@@ -100,16 +102,16 @@ class AnswerBook:
         That something cannot be done just now is not stored: asked again, it may be done.
         """
         request, reply = _request(answer.to), answer.reply
-        if not request.request_id or (isinstance(reply, Refused) and reply.code in PASSING):
+        if not request.request_id or (isinstance(reply, Refused) and reply.code in TRANSIENT):
             return None
         return key_of(request), StoredAnswer(
             t_ns=answer.to.t_ns,
-            asked=_digest(request),
+            digest=_digest(request),
             refused=isinstance(answer.reply, Refused),
             reply=msgspec.Raw(encode(answer.reply)[0]),
         )
 
-    def settle(self, answer: Answer) -> list[Answer]:
+    def complete(self, answer: Answer) -> list[Answer]:
         """Keep an answer that is safe; return it for everybody who waits for it.
 
         A second answer to the same request changes nothing.
@@ -118,41 +120,41 @@ class AnswerBook:
         if not request.request_id:
             return [answer]
         key, record = key_of(request), self.record(answer)
-        if key in self._given:
+        if key in self._answers:
             return []
         if record is not None:
-            self._given[key] = record[1]
+            self._answers[key] = record[1]
         waiting = self._waiting.pop(key, None)
         others = waiting.items if waiting is not None else []
         mine = [item for item in others if item is not answer.to]
         return [answer, *(Answer(item, answer.reply) for item in mine)]
 
     def _has_room(self, now_ns: int) -> bool:
-        if len(self._given) + len(self._waiting) < self._most:
+        if len(self._answers) + len(self._waiting) < self._most:
             return True
-        oldest = next(iter(self._given.values()), None)
-        if oldest is None or now_ns - oldest.t_ns < SURE_NS:
+        oldest = next(iter(self._answers.values()), None)
+        if oldest is None or now_ns - oldest.t_ns < MIN_RETENTION_NS:
             return False
         self._drop_oldest()
         return True
 
     def _forget(self, now_ns: int) -> None:
-        while self._given and now_ns - next(iter(self._given.values())).t_ns > KEPT_NS:
+        while self._answers and now_ns - next(iter(self._answers.values())).t_ns > RETENTION_NS:
             self._drop_oldest()
 
     def _drop_oldest(self) -> None:
-        self.forgotten.append(self._given.popitem(last=False)[0])
+        self.dropped.append(self._answers.popitem(last=False)[0])
 
 
-def _again(item: Incoming, known: StoredAnswer | _Waiting, asked: str) -> Answer | Literal["wait"]:
+def _again(item: Incoming, known: StoredAnswer | _Waiting, digest: str) -> Answer | Literal["wait"]:
     """Return what a request meets whose id came before."""
     request = _request(item)
-    if known.asked != asked:
+    if known.digest != digest:
         detail = f"request_id: {request.request_id!r} was used for another request already"
         return _no(item, "invalid", detail)
     if isinstance(known, StoredAnswer):
         return Answer(item, _reply(request, known))
-    if len(known.items) < MOST_WAITING:
+    if len(known.items) < MAX_WAITING:
         known.items.append(item)
     return "wait"
 

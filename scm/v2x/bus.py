@@ -134,16 +134,16 @@ def check_reply(answer: Answer) -> None:
 def no_server(request: Request, key: str) -> Refused:
     """Return the refusal of a request that nobody serves."""
     detail = f"{request.server} is not running, or cannot be reached"
-    return Refused(code="offline", detail=detail, asked=_asked(request, key))
+    return Refused(code="offline", detail=detail, asked=_describe(request, key))
 
 
 def no_link(request: Request, key: str) -> Refused:
     """Return the refusal of a request that cannot even leave."""
     detail = "the city cannot be reached: there is no connection to its router"
-    return Refused(code="offline", detail=detail, asked=_asked(request, key))
+    return Refused(code="offline", detail=detail, asked=_describe(request, key))
 
 
-def more_telling(before: Refused | None, now: Refused) -> Refused:
+def more_informative(before: Refused | None, now: Refused) -> Refused:
     """Return which of two refusals to tell: whoever knows the thing says more than who does not."""
     return before if before is not None and now.code == "not_found" else now
 
@@ -151,8 +151,8 @@ def more_telling(before: Refused | None, now: Refused) -> Refused:
 def no_answer(call: Call, key: str) -> Refused:
     """Return the refusal of a call that was not answered in time."""
     detail = f"{call.request.server} did not answer within {call.timeout_s:g} s"
-    return Refused(code="timeout", detail=detail, asked=_asked(call.request, key))
+    return Refused(code="timeout", detail=detail, asked=_describe(call.request, key))
 
 
-def _asked(request: Request, key: str) -> str:
+def _describe(request: Request, key: str) -> str:
     return f"{type(request).__name__} on {key}"

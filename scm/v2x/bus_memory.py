@@ -17,7 +17,7 @@ from typing import Self
 
 from scm.clock import Clock, nanoseconds
 from scm.errors import LinkError
-from scm.v2x.bus import check_reply, more_telling, no_answer, no_server
+from scm.v2x.bus import check_reply, more_informative, no_answer, no_server
 from scm.v2x.exchange import Answer, Call, Incoming, RawSample
 from scm.v2x.faults import Faults
 from scm.v2x.key import check_name, everything, intersects, key_of, matches, selector
@@ -30,25 +30,25 @@ OnReply = Callable[[Incoming], None]
 
 
 @dataclass(eq=False)
-class _Wish:
+class _Subscription:
     """Who wants what: `deliver` puts one arrival into the wisher's mailbox."""
 
     owner: "MemoryBus"
     expression: str
     deliver: Callable[[RawSample], None]
     mailbox: Mailbox | RawMailbox
-    keeps: bool = False
+    wants_retained: bool = False
 
 
 @dataclass(eq=False)
-class _Offer:
+class _Service:
     owner: "MemoryBus"
     expression: str
-    deliver: Callable[["_Asked", RawSample], None]
+    deliver: Callable[["_PendingCall", RawSample], None]
 
 
 @dataclass(eq=False)
-class _Asked:
+class _PendingCall:
     """A call under way: settled by the first real reply, by a refusal when all refuse, or time."""
 
     by: "MemoryBus"
@@ -57,22 +57,22 @@ class _Asked:
     key: str
     due_ns: int
     open: set["MemoryBus"] = field(default_factory=set)
-    settled: bool = False
+    is_finished: bool = False
     refused: Refused | None = None
 
-    def settle(self, reply: Message, t_ns: int) -> None:
-        if not self.settled:
-            self.settled = True
+    def finish(self, reply: Message, t_ns: int) -> None:
+        if not self.is_finished:
+            self.is_finished = True
             self.on_reply(Incoming(reply, t_ns, self.call))
 
-    def heard(self, server: "MemoryBus", reply: Message, t_ns: int) -> None:
+    def receive(self, server: "MemoryBus", reply: Message, t_ns: int) -> None:
         self.open.discard(server)
         if not isinstance(reply, Refused):
-            self.settle(reply, t_ns)
+            self.finish(reply, t_ns)
             return
-        self.refused = more_telling(self.refused, reply)
+        self.refused = more_informative(self.refused, reply)
         if not self.open:
-            self.settle(self.refused, t_ns)
+            self.finish(self.refused, t_ns)
 
 
 class MemoryNetwork:
@@ -88,13 +88,13 @@ class MemoryNetwork:
         self.faults = faults
         self.lock = threading.RLock()
         self.buses: list[MemoryBus] = []
-        self.wishes: list[_Wish] = []
-        self.offers: list[_Offer] = []
-        self.asked: list[_Asked] = []
-        self._routes: dict[str, list[_Wish]] = {}
-        self._wished: dict[str, bool] = {}
+        self.subscriptions: list[_Subscription] = []
+        self.services: list[_Service] = []
+        self.pending: list[_PendingCall] = []
+        self._routes: dict[str, list[_Subscription]] = {}
+        self._matched: dict[str, bool] = {}
         self._opened = 0
-        self._late: list[tuple[int, int, Callable[[], None]]] = []
+        self._delayed: list[tuple[int, int, Callable[[], None]]] = []
         self._sent = 0
 
     def bus(self, city: str, station: str) -> "MemoryBus":
@@ -107,30 +107,32 @@ class MemoryNetwork:
 
     def expire(self) -> None:
         """Bring what was late until now, and refuse every call that has waited for too long."""
-        while self._late and self._late[0][0] <= self.clock.now_ns():
+        while self._delayed and self._delayed[0][0] <= self.clock.now_ns():
             with self.lock:
-                heapq.heappop(self._late)[2]()
-        if not self.asked:
+                heapq.heappop(self._delayed)[2]()
+        if not self.pending:
             return
         with self.lock:
             now_ns = self.clock.now_ns()
-            late = [asked for asked in self.asked if asked.due_ns <= now_ns]
-            self.asked = [a for a in self.asked if a.due_ns > now_ns and not a.settled]
-            for asked in late:
-                asked.settle(no_answer(asked.call, asked.key), now_ns)
+            overdue = [pending for pending in self.pending if pending.due_ns <= now_ns]
+            self.pending = [a for a in self.pending if a.due_ns > now_ns and not a.is_finished]
+            for pending in overdue:
+                pending.finish(no_answer(pending.call, pending.key), now_ns)
 
-    def carry(self, sender: "MemoryBus", receiver: "MemoryBus", bring: Callable[[], None]) -> None:
+    def transmit(
+        self, sender: "MemoryBus", receiver: "MemoryBus", deliver_now: Callable[[], None]
+    ) -> None:
         """Bring something from one station to another, as the faults will have it."""
         if self.faults is None or sender is receiver:
-            bring()
+            deliver_now()
             return
         now_ns = self.clock.now_ns()
         for delay_ns in self.faults.delays(sender.station, receiver.station):
             if delay_ns:
                 self._sent += 1
-                heapq.heappush(self._late, (now_ns + delay_ns, self._sent, bring))
+                heapq.heappush(self._delayed, (now_ns + delay_ns, self._sent, deliver_now))
             else:
-                bring()
+                deliver_now()
 
     def route(self, sample: RawSample, sender: "MemoryBus | None" = None) -> None:
         """Deliver a sample to everybody who wishes it, in the order they wished.
@@ -140,67 +142,74 @@ class MemoryNetwork:
             sender: Whose; None: it reaches everybody, whatever the faults.
         """
         with self.lock:
-            wishes = self._routes.get(sample.key)
-            if wishes is None:
-                wishes = [w for w in self.wishes if matches(w.expression, sample.key)]
-                self._routes[sample.key] = wishes
-            for wish in wishes:
+            subscriptions = self._routes.get(sample.key)
+            if subscriptions is None:
+                subscriptions = [w for w in self.subscriptions if matches(w.expression, sample.key)]
+                self._routes[sample.key] = subscriptions
+            for subscription in subscriptions:
                 if self.faults is None or sender is None:
-                    wish.deliver(sample)
+                    subscription.deliver(sample)
                 else:
-                    self.carry(sender, wish.owner, partial(self._bring, wish, sample))
+                    self.transmit(
+                        sender, subscription.owner, partial(self._deliver, subscription, sample)
+                    )
 
-    def _bring(self, wish: _Wish, sample: RawSample) -> None:
-        if wish.owner.connected:
-            wish.deliver(replace(sample, t_ns=self.clock.now_ns()))
+    def _deliver(self, subscription: _Subscription, sample: RawSample) -> None:
+        if subscription.owner.connected:
+            subscription.deliver(replace(sample, t_ns=self.clock.now_ns()))
 
-    def bring_request(self, offer: _Offer, asked: _Asked, sample: RawSample) -> None:
+    def deliver_request(self, service: _Service, pending: _PendingCall, sample: RawSample) -> None:
         """Bring a request to who offered to answer it, if it is still there."""
-        if offer.owner.connected:
-            offer.deliver(asked, replace(sample, t_ns=self.clock.now_ns()))
+        if service.owner.connected:
+            service.deliver(pending, replace(sample, t_ns=self.clock.now_ns()))
 
-    def add_wish(self, wish: _Wish) -> None:
+    def add_subscription(self, subscription: _Subscription) -> None:
         """Remember a wish, and deliver what others kept for late joiners."""
         with self.lock:
-            self.wishes.append(wish)
+            self.subscriptions.append(subscription)
             self._forget_routes()
-            if wish.keeps:
-                kept = [s for bus in self.buses for s in bus.kept(wish.expression)]
+            if subscription.wants_retained:
+                retained = [s for bus in self.buses for s in bus.retained(subscription.expression)]
                 now_ns = self.clock.now_ns()
-                for _, sample in sorted(kept, key=lambda item: item[0]):
-                    wish.deliver(replace(sample, t_ns=now_ns))
+                for _, sample in sorted(retained, key=lambda item: item[0]):
+                    subscription.deliver(replace(sample, t_ns=now_ns))
 
-    def drop_wishes(self, mailbox: Mailbox) -> None:
+    def remove_subscriptions(self, mailbox: Mailbox) -> None:
         """Forget what was to come into a mailbox."""
         with self.lock:
-            self.wishes = [w for w in self.wishes if w.mailbox is not mailbox]
+            self.subscriptions = [w for w in self.subscriptions if w.mailbox is not mailbox]
             self._forget_routes()
 
-    def is_wished(self, expression: str) -> bool:
+    def has_subscriber(self, expression: str) -> bool:
         """Return whether anybody wishes something that matches."""
         with self.lock:
-            known = self._wished.get(expression)
+            known = self._matched.get(expression)
             if known is None:
-                known = any(intersects(wish.expression, expression) for wish in self.wishes)
-                self._wished[expression] = known
+                known = any(
+                    intersects(subscription.expression, expression)
+                    for subscription in self.subscriptions
+                )
+                self._matched[expression] = known
             return known
 
     def _forget_routes(self) -> None:
         """Find out anew who subscribes to what, since that has changed."""
         self._routes.clear()
-        self._wished.clear()
+        self._matched.clear()
 
     def leave(self, bus: "MemoryBus") -> None:
         """Forget a bus and everything it wished, offered, kept and asked."""
         with self.lock:
             self.buses.remove(bus)
-            self.wishes = [w for w in self.wishes if w.owner is not bus]
-            self.offers = [o for o in self.offers if o.owner is not bus]
+            self.subscriptions = [w for w in self.subscriptions if w.owner is not bus]
+            self.services = [o for o in self.services if o.owner is not bus]
             self._forget_routes()
-            left_alone = [a for a in self.asked if bus in a.open]
-            self.asked = [a for a in self.asked if a.by is not bus]
-            for asked in left_alone:
-                asked.heard(bus, no_server(asked.call.request, asked.key), self.clock.now_ns())
+            without_server = [a for a in self.pending if bus in a.open]
+            self.pending = [a for a in self.pending if a.by is not bus]
+            for pending in without_server:
+                pending.receive(
+                    bus, no_server(pending.call.request, pending.key), self.clock.now_ns()
+                )
 
 
 class MemoryBus:
@@ -212,9 +221,9 @@ class MemoryBus:
         self.session = session
         self._network = network
         self._reader = Reader(network.clock)
-        self._kept: dict[str, deque[tuple[int, RawSample]]] = {}
-        self._kept_count = 0
-        self._to_answer: dict[Incoming, _Asked] = {}
+        self._retained: dict[str, deque[tuple[int, RawSample]]] = {}
+        self._retained_count = 0
+        self._to_answer: dict[Incoming, _PendingCall] = {}
         self._presence: list[Presence] = []
         self._closed = False
 
@@ -240,20 +249,20 @@ class MemoryBus:
         sample = RawSample(key, body, attachment, self._network.clock.now_ns())
         with self._network.lock:
             if keep:
-                kept = self._kept.setdefault(key, deque(maxlen=keep))
-                kept.append((self._order(), sample))
+                retained = self._retained.setdefault(key, deque(maxlen=keep))
+                retained.append((self._order(), sample))
             is_presence = isinstance(message, Presence)
             self._network.route(sample, None if is_presence else self)
 
     def _order(self) -> int:
-        self._kept_count += 1
-        return self._kept_count
+        self._retained_count += 1
+        return self._retained_count
 
-    def kept(self, expression: str) -> list[tuple[tuple[int, int], RawSample]]:
+    def retained(self, expression: str) -> list[tuple[tuple[int, int], RawSample]]:
         """Return what this station keeps for late joiners: ((time, order), sample)."""
         return [
             ((sample.t_ns, order), sample)
-            for key, samples in self._kept.items()
+            for key, samples in self._retained.items()
             if matches(expression, key)
             for order, sample in samples
         ]
@@ -268,9 +277,11 @@ class MemoryBus:
             facts = (sample.key, sample.body, sample.attachment, sample.t_ns)
             mailbox.put_later(partial(read, kind, *facts))
 
-        keeps = kind.DELIVERY in (Delivery.EVENT, Delivery.PRESENCE)
-        wish = _Wish(self, selector(self.city, kind, where), deliver, mailbox, keeps)
-        self._network.add_wish(wish)
+        wants_retained = kind.DELIVERY in (Delivery.EVENT, Delivery.PRESENCE)
+        subscription = _Subscription(
+            self, selector(self.city, kind, where), deliver, mailbox, wants_retained
+        )
+        self._network.add_subscription(subscription)
 
     def subscribe_raw(
         self,
@@ -288,47 +299,49 @@ class MemoryBus:
         expression = (
             everything(self.city) if kind is None else selector(self.city, kind, where or {})
         )
-        self._network.add_wish(_Wish(self, expression, deliver, mailbox, keeps=True))
+        self._network.add_subscription(
+            _Subscription(self, expression, deliver, mailbox, wants_retained=True)
+        )
 
     def unsubscribe(self, mailbox: Mailbox) -> None:
         """Bring nothing more into a mailbox; what waits in it stays."""
         self._check_open()
-        self._network.drop_wishes(mailbox)
+        self._network.remove_subscriptions(mailbox)
 
     def is_wanted(self, kind: type[Message], where: Mapping[str, str]) -> bool:
         """Return whether anybody subscribes to messages of a class."""
         self._check_open()
-        return self._network.is_wished(selector(self.city, kind, where))
+        return self._network.has_subscriber(selector(self.city, kind, where))
 
     def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:
         """Bring requests of a class into a mailbox; each waits there for its `answer`."""
         self._check_open()
 
-        def deliver(asked: _Asked, sample: RawSample) -> None:
+        def deliver(pending: _PendingCall, sample: RawSample) -> None:
             def make() -> Incoming | None:
                 read = self._reader.read
                 incoming = read(kind, sample.key, sample.body, sample.attachment, sample.t_ns)
-                if incoming is not None and not asked.settled:
-                    self._to_answer[incoming] = asked
+                if incoming is not None and not pending.is_finished:
+                    self._to_answer[incoming] = pending
                 return incoming
 
             mailbox.put_later(make)
 
-        offer = _Offer(self, selector(self.city, kind, where), deliver)
+        service = _Service(self, selector(self.city, kind, where), deliver)
         with self._network.lock:
-            self._network.offers.append(offer)
+            self._network.services.append(service)
 
     def answer(self, answer: Answer) -> None:
         """Reply to a request that came from `serve`; a second answer to the same is ignored."""
         self._check_open()
         check_reply(answer)
-        asked = self._to_answer.pop(answer.to, None)
-        if asked is not None:
+        pending = self._to_answer.pop(answer.to, None)
+        if pending is not None:
             network = self._network
             reply = decode(type(answer.reply), *encode(answer.reply))
             with network.lock:
-                network.carry(
-                    self, asked.by, lambda: asked.heard(self, reply, network.clock.now_ns())
+                network.transmit(
+                    self, pending.by, lambda: pending.receive(self, reply, network.clock.now_ns())
                 )
 
     def call(self, call: Call, on_reply: OnReply) -> None:
@@ -338,17 +351,17 @@ class MemoryBus:
         key = key_of(self.city, call.request)
         body, attachment = encode(call.request)
         now_ns = self._network.clock.now_ns()
-        asked = _Asked(self, call, on_reply, key, now_ns + nanoseconds(call.timeout_s))
+        pending = _PendingCall(self, call, on_reply, key, now_ns + nanoseconds(call.timeout_s))
         sample = RawSample(key, body, attachment, now_ns)
         with self._network.lock:
-            offers = [o for o in self._network.offers if matches(o.expression, key)]
-            asked.open.update(o.owner for o in offers)
-            self._network.asked.append(asked)
-            for offer in offers:
-                bring = partial(self._network.bring_request, offer, asked, sample)
-                self._network.carry(self, offer.owner, bring)
-        if not offers:
-            asked.settle(no_server(call.request, key), now_ns)
+            services = [o for o in self._network.services if matches(o.expression, key)]
+            pending.open.update(o.owner for o in services)
+            self._network.pending.append(pending)
+            for service in services:
+                deliver_now = partial(self._network.deliver_request, service, pending, sample)
+                self._network.transmit(self, service.owner, deliver_now)
+        if not services:
+            pending.finish(no_server(call.request, key), now_ns)
 
     def announce(self, role: str) -> None:
         """Declare this station present until the bus closes."""
@@ -366,7 +379,7 @@ class MemoryBus:
         for here in self._presence:
             gone = Presence(role=here.role, station=here.station, session=here.session, alive=False)
             self._send(gone, keep=0)
-        self._kept.clear()
+        self._retained.clear()
         self._to_answer.clear()
 
     def __enter__(self) -> Self:

@@ -21,7 +21,7 @@ from scm.clock import Clock, WallClock
 from scm.errors import LinkError, MessageError
 from scm.log import event
 from scm.v2x import zenoh_config
-from scm.v2x.bus import check_reply, more_telling, no_answer, no_link, no_server
+from scm.v2x.bus import check_reply, more_informative, no_answer, no_link, no_server
 from scm.v2x.credentials import Credentials
 from scm.v2x.exchange import Answer, Call, Incoming, RawSample
 from scm.v2x.flood_gate import FloodGate
@@ -37,9 +37,9 @@ from scm.v2x.zenoh_events import declare_event_publisher, declare_event_subscrib
 if TYPE_CHECKING:
     from scm.v2x.signed_cams import SignedCams
 
-REQUESTS_KEPT = 1024
-ASK_AGAIN = timedelta(seconds=1)
-ASK_AGAIN_FOR_ALL = timedelta(seconds=5)
+MAX_OPEN_REQUESTS = 1024
+REQUERY_EVERY = timedelta(seconds=1)
+REQUERY_ALL_EVERY = timedelta(seconds=5)
 _TIMEOUT = b"Timeout"
 _FLOOD = "more than is read of one key in a second"
 
@@ -75,14 +75,14 @@ class ZenohBus:
         self.city = check_name(city, "city")
         self.station = check_name(station, "station")
         self._clock = clock or WallClock()
-        self._air = _signed_cams(credentials)
-        self._reader = Reader(self._clock, None if self._air is None else self._air.check)
+        self._signed = _signed_cams(credentials)
+        self._reader = Reader(self._clock, None if self._signed is None else self._signed.check)
         self._lock = threading.Lock()
         self._closed = False
         self._publishers: dict[tuple[type[Message], tuple[str, ...]], _Publisher] = {}
         self._declared: list[Any] = []
         self._subscribers: list[tuple[Mailbox, Any]] = []
-        self._wishes: dict[str, zenoh.Publisher] = {}
+        self._matching: dict[str, zenoh.Publisher] = {}
         self._to_answer: OrderedDict[Incoming, zenoh.Query] = OrderedDict()
         self._session = _open(endpoint, connect_timeout_s, credentials)
         self.session = str(self._session.zid())
@@ -109,8 +109,8 @@ class ZenohBus:
         While disconnected only an EVENT is kept, for when the connection is back.
         """
         self._check_open()
-        if self._air is not None:
-            message = self._air.signed(message, self._clock.now_ns())
+        if self._signed is not None:
+            message = self._signed.signed(message, self._clock.now_ns())
         if self._connected or message.DELIVERY is Delivery.EVENT:
             publisher = self._publisher(message)
             body, attachment = encode(message)
@@ -145,7 +145,7 @@ class ZenohBus:
 
         callback = self._direct(self._noting(on_sample))
         if kind.DELIVERY is Delivery.EVENT:
-            again = ask_again(kind, ASK_AGAIN)
+            again = requery_interval(kind, REQUERY_EVERY)
             subscriber = declare_event_subscriber(
                 self._session, expression, callback, kind.KEEP, again
             )
@@ -171,12 +171,12 @@ class ZenohBus:
         self._check_open()
         expression = selector(self.city, kind, where)
         with self._lock:
-            asking = self._wishes.get(expression)
-            if asking is None:
-                asking = self._wishes[expression] = self._session.declare_publisher(expression)
-                self._declared.append(asking)
+            probe = self._matching.get(expression)
+            if probe is None:
+                probe = self._matching[expression] = self._session.declare_publisher(expression)
+                self._declared.append(probe)
         # The stubs say bool; it is an object that is always true.
-        status: Any = asking.matching_status
+        status: Any = probe.matching_status
         return bool(status.matching)
 
     def _watch_presence(self, expression: str, mailbox: Mailbox) -> None:
@@ -217,7 +217,7 @@ class ZenohBus:
         if kind is not None and kind.DELIVERY is not Delivery.EVENT:
             self._declare(self._session.declare_subscriber(expression, callback))
             return
-        again = ask_again(kind, ASK_AGAIN_FOR_ALL)
+        again = requery_interval(kind, REQUERY_ALL_EVERY)
         self._declare(declare_event_subscriber(self._session, expression, callback, None, again))
 
     def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:
@@ -254,7 +254,7 @@ class ZenohBus:
             return None
         with self._lock:
             self._to_answer[incoming] = query
-            if len(self._to_answer) > REQUESTS_KEPT:
+            if len(self._to_answer) > MAX_OPEN_REQUESTS:
                 self._to_answer.popitem(last=False)
         return incoming
 
@@ -283,14 +283,14 @@ class ZenohBus:
         """Ask, and hand the reply (or a `Refused`) to `on_reply` later; never blocks."""
         self._check_open()
         key = key_of(self.city, call.request)
-        asked = _Asked(call, on_reply, key, self._clock)
+        pending = _PendingCall(call, on_reply, key, self._clock)
         if not self._connected:
-            asked.settle(no_link(call.request, key))
+            pending.finish(no_link(call.request, key))
             return
         body, attachment = encode(call.request)
         self._session.get(
             key,
-            zenoh.handlers.Callback(asked.heard, asked.done, indirect=False),
+            zenoh.handlers.Callback(pending.receive, pending.done, indirect=False),
             payload=body,
             attachment=attachment,
             timeout=call.timeout_s,
@@ -313,7 +313,7 @@ class ZenohBus:
             declared += [thing for _, thing in self._subscribers]
             self._subscribers.clear()
             self._publishers.clear()
-            self._wishes.clear()
+            self._matching.clear()
         _undeclare(reversed(declared))
         self._to_answer.clear()
         self._session.close()  # type: ignore[no-untyped-call]
@@ -360,7 +360,7 @@ class ZenohBus:
         """Wrap a callback so that it runs on Zenoh's thread and its errors are counted."""
 
         def guarded(item: object) -> None:
-            THREAD_STATES.keep()
+            THREAD_STATES.pin()
             try:
                 callback(item)
             except Exception:  # noqa: BLE001  the edge of a thread that is not ours
@@ -370,7 +370,7 @@ class ZenohBus:
         return zenoh.handlers.Callback(guarded, indirect=False)
 
 
-class _Asked:
+class _PendingCall:
     """A call under way: settled by the first real reply, or at its end by a refusal."""
 
     def __init__(
@@ -381,24 +381,24 @@ class _Asked:
         self._key = key
         self._clock = clock
         self._lock = threading.Lock()
-        self._settled = False
+        self._is_finished = False
         self._refused: Refused | None = None
 
-    def settle(self, reply: Message) -> None:
+    def finish(self, reply: Message) -> None:
         with self._lock:
-            if self._settled:
+            if self._is_finished:
                 return
-            self._settled = True
+            self._is_finished = True
         self._on_reply(Incoming(reply, self._clock.now_ns(), self._call))
 
-    def heard(self, reply: zenoh.Reply) -> None:
+    def receive(self, reply: zenoh.Reply) -> None:
         if reply.ok is None:
             body = reply.err.payload.to_bytes() if reply.err is not None else _TIMEOUT
-            self._refused = more_telling(self._refused, self._read_refusal(body))
+            self._refused = more_informative(self._refused, self._read_refusal(body))
             return
         attachment = reply.ok.attachment
         try:
-            self.settle(
+            self.finish(
                 decode(
                     self._call.request.REPLY,
                     reply.ok.payload.to_bytes(),
@@ -417,7 +417,7 @@ class _Asked:
             return Refused(code="invalid", detail=f"the refusal: {cause}")
 
     def done(self) -> None:
-        self.settle(self._refused or no_server(self._call.request, self._key))
+        self.finish(self._refused or no_server(self._call.request, self._key))
 
 
 def _signed_cams(credentials: Credentials | None) -> "SignedCams | None":
@@ -446,15 +446,15 @@ def _open(
             return zenoh.open(config)
     except zenoh.ZError as cause:
         why = zenoh_config.reason(cause)
-        asked = "" if who is None else ", and does it know these credentials"
+        hint = "" if who is None else ", and does it know these credentials"
         msg = (
             f"no city at {endpoint!r} within {connect_timeout_s} s: "
-            f"is `scm up` running{asked}? ({why})"
+            f"is `scm up` running{hint}? ({why})"
         )
         raise LinkError(msg) from cause
 
 
-def ask_again(kind: type[Message] | None, every: timedelta) -> timedelta | None:
+def requery_interval(kind: type[Message] | None, every: timedelta) -> timedelta | None:
     """Return how often a subscriber asks for events it may have lost; None: it need not.
 
     What comes at a rate shows a gap by its next sample. To ask each of a thousand cars for its trip

@@ -21,16 +21,16 @@ from scm.arrays import Floats, Ints
 from scm.clock import NS_PER_MS, NS_PER_S
 
 WINDOW_NS = 100 * NS_PER_MS
-DOWN_NS = 5 * NS_PER_S
-TOLD_FOR_NS = 2 * NS_PER_S
-TARGET = 0.65
-LIMITS: Floats = np.array([0.30, 0.40, 0.50, TARGET, np.inf])
+RELAX_AFTER_NS = 5 * NS_PER_S
+REPORT_VALID_NS = 2 * NS_PER_S
+ACTIVE_3_LIMIT = 0.65
+LIMITS: Floats = np.array([0.30, 0.40, 0.50, ACTIVE_3_LIMIT, np.inf])
 GAPS_NS: Ints = np.array([50, 100, 200, 250, 1000]) * NS_PER_MS
 
 BYTES = {"cam": 50, "cpm": 120, "denm": 50, "mapem": 210, "spatem": 44, "srem": 45, "ssem": 350}
 """UPER of each kind as a small city says it, rounded; a CPM's is a guess: it has no UPER here."""
 # MAC 30, LLC 8, GeoNetworking 4 + 8 + 28, BTP 4, and a signature with the certificate's digest.
-AROUND_BYTES = 82 + 96
+OVERHEAD_BYTES = 82 + 96
 
 _PREAMBLE_S, _SYMBOL_S = 40e-6, 8e-6
 _SPREAD = 0.618034
@@ -40,7 +40,7 @@ def air_time(kind: str, data_rate_mbps: float) -> float:
     """Return how long a frame of a kind holds the channel [s]; 0 on an endless one."""
     if data_rate_mbps <= 0.0:
         return 0.0
-    bits = 16 + 8 * (BYTES[kind] + AROUND_BYTES) + 6
+    bits = 16 + 8 * (BYTES[kind] + OVERHEAD_BYTES) + 6
     return _PREAMBLE_S + _SYMBOL_S * math.ceil(bits / (1e6 * data_rate_mbps * _SYMBOL_S))
 
 
@@ -71,10 +71,10 @@ class ReactiveControl:
         self._state = np.zeros(count, np.int64)
         self._above_ns = np.zeros(count, np.int64)
         own = np.arange(count) * _SPREAD % 1.0
-        self._down_ns = (DOWN_NS * (0.8 + 0.4 * own)).astype(np.int64)
+        self._down_ns = (RELAX_AFTER_NS * (0.8 + 0.4 * own)).astype(np.int64)
         self.gap_ns: Ints = GAPS_NS[self._state]
 
-    def measure(self, ratio: Floats, now_ns: int) -> None:
+    def update(self, ratio: Floats, now_ns: int) -> None:
         """Take the busy ratio (n,) of the window that ends now."""
         state = self._state
         up = ratio > LIMITS[state]
@@ -86,7 +86,7 @@ class ReactiveControl:
         self.gap_ns = GAPS_NS[self._state]
 
 
-class OwnControl:
+class StationControl:
     """The gap of one station on its own: by the busy ratio that it is told, else by what it hears.
 
     What it hears is less than what is on the air: frames that got lost, and kinds that it does not
@@ -101,34 +101,34 @@ class OwnControl:
         self._rate_mbps = data_rate_mbps
         self._control = ReactiveControl(1) if is_on else None
         self._window_ns: int | None = None
-        self._air_s = self._heard = 0.0
-        self._told: tuple[float, int] | None = None
+        self._air_s = self._last_ratio = 0.0
+        self._reported: tuple[float, int] | None = None
 
-    def told(self, ratio: float, now_ns: int) -> None:
+    def set_ratio(self, ratio: float, now_ns: int) -> None:
         """Take the busy ratio where the station is, as somebody measured it."""
-        self._told = ratio, now_ns
+        self._reported = ratio, now_ns
 
-    def hear(self, kind: str, now_ns: int) -> None:
+    def add_frame(self, kind: str, now_ns: int) -> None:
         """Take a frame of a kind that is on the air now, also one of its own."""
-        self._measure(now_ns)
+        self._update(now_ns)
         self._air_s += air_time(kind, self._rate_mbps)
 
     def gap_ns(self, now_ns: int) -> int:
         """Return the least time between two frames [ns]."""
         if self._control is None:
             return 0
-        self._measure(now_ns)
+        self._update(now_ns)
         return int(self._control.gap_ns[0])
 
-    def _measure(self, now_ns: int) -> None:
+    def _update(self, now_ns: int) -> None:
         if self._window_ns is None:
             self._window_ns = now_ns
         span_ns = now_ns - self._window_ns
         if self._control is None or span_ns < WINDOW_NS:
             return
         now = self._air_s * NS_PER_S / span_ns
-        ratio, self._heard = 0.5 * (self._heard + now), now
+        ratio, self._last_ratio = 0.5 * (self._last_ratio + now), now
         self._window_ns, self._air_s = now_ns, 0.0
-        if self._told is not None and now_ns - self._told[1] <= TOLD_FOR_NS:
-            ratio = self._told[0]
-        self._control.measure(np.array([ratio]), now_ns)
+        if self._reported is not None and now_ns - self._reported[1] <= REPORT_VALID_NS:
+            ratio = self._reported[0]
+        self._control.update(np.array([ratio]), now_ns)

@@ -9,7 +9,7 @@ from functools import lru_cache
 from scm.v2x.key import names_in
 from scm.v2x.message import Message
 
-KEPT = 2048
+MIN_REMEMBERED = 2048
 """As many are remembered at least, twice as many at most: two seconds of a thousand cars."""
 
 
@@ -26,7 +26,7 @@ class Copies:
 
     def add(self, content: bytes) -> None:
         """Remember what was read."""
-        if len(self._new) >= KEPT:
+        if len(self._new) >= MIN_REMEMBERED:
             self._new, self._old = set(), self._new
         self._new.add(content)
 

@@ -13,7 +13,7 @@ from scm.clock import nanoseconds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Weather:
+class FaultRates:
     """How likely each fault is, between 0 and 1.
 
     Attributes:
@@ -21,7 +21,7 @@ class Weather:
     """
 
     drop: float = 0.0
-    double: float = 0.0
+    duplicate: float = 0.0
     late: float = 0.0
     late_s: float = 0.5
 
@@ -33,26 +33,26 @@ class Faults:
         weather: In force now.
     """
 
-    def __init__(self, seed: int, weather: Weather | None = None) -> None:
+    def __init__(self, seed: int, rates: FaultRates | None = None) -> None:
         self._rng = random.Random(seed)
-        self.weather = weather or Weather()
-        self._away: frozenset[str] = frozenset()
+        self.rates = rates or FaultRates()
+        self._partitioned: frozenset[str] = frozenset()
 
-    def cut_off(self, stations: Iterable[str]) -> None:
+    def partition(self, stations: Iterable[str]) -> None:
         """Part these stations from all others; nobody: the network is whole again."""
-        self._away = frozenset(stations)
+        self._partitioned = frozenset(stations)
 
     def delays(self, sender: str, receiver: str) -> tuple[int, ...]:
         """Return when copies of one thing arrive after it was sent [ns]; nothing: it is lost."""
-        if (sender in self._away) != (receiver in self._away):
+        if (sender in self._partitioned) != (receiver in self._partitioned):
             return ()
-        rng, weather = self._rng, self.weather
-        if rng.random() < weather.drop:
+        rng, rates = self._rng, self.rates
+        if rng.random() < rates.drop:
             return ()
-        copies = 2 if rng.random() < weather.double else 1
+        copies = 2 if rng.random() < rates.duplicate else 1
         return tuple(self._delay() for _ in range(copies))
 
     def _delay(self) -> int:
-        if self._rng.random() >= self.weather.late:
+        if self._rng.random() >= self.rates.late:
             return 0
-        return nanoseconds(self._rng.uniform(0.0, self.weather.late_s))
+        return nanoseconds(self._rng.uniform(0.0, self.rates.late_s))

@@ -190,9 +190,9 @@ def check_hosts(hosts: Iterable[str]) -> None:
 
 def name_hosts(fleet: Fleet, hosts: Iterable[str], now: datetime) -> None:
     """Make the router's certificate good at more addresses, and renew it when it ends soon."""
-    wished = (*fleet.hosts, *(host for host in hosts if host not in fleet.hosts))
-    is_new = wished != fleet.hosts
-    fleet.hosts = wished
+    all_hosts = (*fleet.hosts, *(host for host in hosts if host not in fleet.hosts))
+    is_new = all_hosts != fleet.hosts
+    fleet.hosts = all_hosts
     if fleet.auth == "mtls":
         from scm.v2x.certificates import issue_router  # noqa: PLC0415  slow to load, rarely needed
 
@@ -219,7 +219,7 @@ def _has_ticket(member: Member, held: Credentials, now: datetime) -> bool:
 
     if not held.air_authority:
         return False
-    return not speaks(member.role, member.name) or (
+    return not sends_cams(member.role, member.name) or (
         bool(held.ticket) and ticket_ends(held.ticket) - now >= RENEW_BEFORE
     )
 
@@ -230,7 +230,7 @@ def _ends_soon(certificate: str, now: datetime) -> bool:
     return expiry_of(certificate) - now < RENEW_BEFORE
 
 
-def speaks(role: str, name: str) -> bool:
+def sends_cams(role: str, name: str) -> bool:
     """Return whether a station sends CAMs: a car, or the world for those it hosts."""
     return role == "vehicle" or (role, name) == ("part", "world")
 
@@ -239,7 +239,7 @@ def _with_ticket(fleet: Fleet, made: Credentials, now: datetime) -> Credentials:
     """Return credentials with what a station needs on the air."""
     from scm.v2x.tickets import air_authority, issue_ticket  # noqa: PLC0415  slow to load
 
-    if not speaks(made.role, made.station):
+    if not sends_cams(made.role, made.station):
         return replace(made, air_authority=air_authority(fleet.folder, now))
     text = issue_ticket(fleet.folder, made.station, now)
     return replace(made, ticket=text.ticket, ticket_key=text.key, air_authority=text.authority)

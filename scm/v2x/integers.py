@@ -61,8 +61,8 @@ def _is_short(value: int) -> bool:
 
 
 def _of_struct(info: inspect.StructType) -> Check | None:
-    asked = [(field.name, _check(field.type)) for field in info.fields]
-    checks = [(name, check) for name, check in asked if check is not None]
+    fields = [(field.name, _check(field.type)) for field in info.fields]
+    checks = [(name, check) for name, check in fields if check is not None]
 
     def check_fields(value: object) -> bool:
         for name, check in checks:  # noqa: SIM110  a third of the time of `all`

@@ -43,7 +43,7 @@ class Queue(Generic[T]):
         if self._wake is not None:
             self._wake.set()
 
-    def take(self) -> list[tuple[int, Callable[[], T | None]]]:
+    def pop_all(self) -> list[tuple[int, Callable[[], T | None]]]:
         """Return and forget everything that waits, unmade, each with its order of arrival."""
         if not self._items:
             return []
@@ -54,7 +54,7 @@ class Queue(Generic[T]):
 
     def drain(self) -> list[T]:
         """Return and forget everything that waits, oldest first."""
-        return [item for _, make in self.take() if (item := make()) is not None]
+        return [item for _, make in self.pop_all() if (item := make()) is not None]
 
 
 class Mailbox(Queue[Incoming]):
@@ -99,6 +99,6 @@ def drain_all(boxes: Iterable[Mailbox | RawMailbox]) -> list[Incoming | RawSampl
     """Empty several queues of one reader into one list, in order of arrival."""
     waiting: list[tuple[int, Callable[[], Incoming | RawSample | None]]] = []
     for box in boxes:
-        waiting.extend(box.take())
+        waiting.extend(box.pop_all())
     waiting.sort(key=lambda item: item[0])
     return [item for _, make in waiting if (item := make()) is not None]

@@ -121,13 +121,13 @@ class Positions:
     def of(self, body: Body) -> Position:
         """Return where the sender of a message is, and remember what the message says of it."""
         station = body.station_id
-        told = _told(body)
-        if told is not None and place_of(told.latitude, told.longitude) is not None:
-            self._known[station] = told
+        position = _position_in(body)
+        if position is not None and place_of(position.latitude, position.longitude) is not None:
+            self._known[station] = position
         return self._known.get(station, Position(station, ROADSIDE_UNIT, 0, 0))
 
 
-def _told(body: Body) -> Position | None:
+def _position_in(body: Body) -> Position | None:
     """Return what a message says of its own sender's place."""
     if isinstance(body, CamBody):
         place, motion = body.position, body.motion

@@ -59,9 +59,9 @@ class PlanFile(msgspec.Struct, kw_only=True, frozen=True):
     @property
     def digest(self) -> str:
         """Name of what a proof of it proves."""
-        kept = [(p.group, p.min_green_s, p.yellow_s, p.red_clear_s) for p in self.phases]
-        said = [MEANING, self.junction, self.stages, kept, self.conflicts]
-        proven = msgspec.json.encode(said)
+        times = [(p.group, p.min_green_s, p.yellow_s, p.red_clear_s) for p in self.phases]
+        proven_parts = [MEANING, self.junction, self.stages, times, self.conflicts]
+        proven = msgspec.json.encode(proven_parts)
         return hashlib.sha256(proven).hexdigest()[:16]
 
     @property

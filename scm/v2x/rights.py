@@ -25,10 +25,10 @@ class Rights:
         serves: Which requests it answers.
     """
 
-    says: tuple[str, ...] = ()
-    hears: tuple[str, ...] = ()
-    asks: tuple[str, ...] = ()
-    serves: tuple[str, ...] = ()
+    publishes: tuple[str, ...] = ()
+    subscribes: tuple[str, ...] = ()
+    requests: tuple[str, ...] = ()
+    services: tuple[str, ...] = ()
 
     def of(self, name: str) -> "Rights":
         """Return these rights with a station's name filled in."""
@@ -36,15 +36,17 @@ class Rights:
         def own(keys: tuple[str, ...]) -> tuple[str, ...]:
             return tuple(key.replace("{me}", name) for key in keys)
 
-        return Rights(own(self.says), own(self.hears), own(self.asks), own(self.serves))
+        return Rights(
+            own(self.publishes), own(self.subscribes), own(self.requests), own(self.services)
+        )
 
     def __add__(self, other: "Rights") -> "Rights":
         """Return the rights of both."""
         return Rights(
-            self.says + other.says,
-            self.hears + other.hears,
-            self.asks + other.asks,
-            self.serves + other.serves,
+            self.publishes + other.publishes,
+            self.subscribes + other.subscribes,
+            self.requests + other.requests,
+            self.services + other.services,
         )
 
 
@@ -64,15 +66,15 @@ EVERY_REQUEST = (
 )
 
 _EVERYBODY = Rights(
-    says=("part/{me}/status", "event/info/{me}", "event/warning/{me}", "event/error/{me}")
+    publishes=("part/{me}/status", "event/info/{me}", "event/warning/{me}", "event/error/{me}")
 )
-_WATCHES = Rights(hears=EVERYTHING)
+_WATCHES = Rights(subscribes=EVERYTHING)
 
 _OF_ROLE: dict[str, Rights] = {
     # Not `v/{me}/**`: what others tell a car (commands, contacts) it cannot tell itself; nor may
     # it send what only roadside units send (SPATEM, MAPEM, SSEM).
     "vehicle": Rights(
-        says=(
+        publishes=(
             "v/{me}/state",
             "v/{me}/sensors",
             "v/{me}/scan",
@@ -83,7 +85,7 @@ _OF_ROLE: dict[str, Rights] = {
             "v2x/tx/{me}/denm",
             "v2x/tx/{me}/srem",
         ),
-        hears=(
+        subscribes=(
             "world/def",
             "world/stop",
             "world/radio",
@@ -96,22 +98,22 @@ _OF_ROLE: dict[str, Rights] = {
             "eye/pose/{me}",
             "eye/*/pose/{me}",
         ),
-        asks=("v/{me}/join", "v/{me}/lease", "v/{me}/remove"),
-        serves=("v/{me}/cmd/*",),
+        requests=("v/{me}/join", "v/{me}/lease", "v/{me}/remove"),
+        services=("v/{me}/cmd/*",),
     ),
     "viewer": _WATCHES,
-    "operator": _WATCHES + Rights(asks=EVERY_REQUEST),
-    "driver": _WATCHES + Rights(says=("v/*/cmd/drive",), asks=EVERY_REQUEST),
-    "camera": Rights(says=("eye/{me}/@picture",)),
+    "operator": _WATCHES + Rights(requests=EVERY_REQUEST),
+    "driver": _WATCHES + Rights(publishes=("v/*/cmd/drive",), requests=EVERY_REQUEST),
+    "camera": Rights(publishes=("eye/{me}/@picture",)),
     # Of no vehicle's name: the car that it emulates is another station, and knows less.
     "emulator": Rights(
-        says=("v/*/emulated",), hears=("world/def", "world/snapshot", "v/*/emulated")
+        publishes=("v/*/emulated",), subscribes=("world/def", "world/snapshot", "v/*/emulated")
     ),
 }
 
 _OF_PART: dict[str, Rights] = {
     "world": Rights(
-        says=(
+        publishes=(
             "world/*",
             "v/*/state",
             "v/*/sensors",
@@ -122,7 +124,7 @@ _OF_PART: dict[str, Rights] = {
             "v2x/tx/*/*",
             "v2x/rx/*/*/*",
         ),
-        hears=(
+        subscribes=(
             "v/*/alive/*",
             "v/*/state",
             "v/*/cmd/drive",
@@ -130,39 +132,43 @@ _OF_PART: dict[str, Rights] = {
             "tl/*/mon",
             "tl/*/spat",
         ),
-        asks=("v/*/cmd/*",),
-        serves=("world/*", "v/*/lease", "v/*/join", "v/*/remove", "v/*/cmd/*"),
+        requests=("v/*/cmd/*",),
+        services=("world/*", "v/*/lease", "v/*/join", "v/*/remove", "v/*/cmd/*"),
     ),
     "traffic": Rights(
-        says=("tl/*/spat", "tl/*/site", "tl/*/status", "v2x/tx/*/*"),
-        hears=("tl/*/mon", "v2x/rx/*/*/*", "eye/pose/*", "world/def"),
-        serves=("tl/*/req", "tl/*/wish"),
+        publishes=("tl/*/spat", "tl/*/site", "tl/*/status", "v2x/tx/*/*"),
+        subscribes=("tl/*/mon", "v2x/rx/*/*/*", "eye/pose/*", "world/def"),
+        services=("tl/*/req", "tl/*/wish"),
     ),
-    "monitor": Rights(says=("tl/*/mon",), hears=("tl/*/spat",), serves=("tl/*/mon/reset",)),
+    "monitor": Rights(
+        publishes=("tl/*/mon",), subscribes=("tl/*/spat",), services=("tl/*/mon/reset",)
+    ),
     "eye": Rights(
-        says=("eye/*/*", "eye/*/pose/*", "eye/pose/*", "eye/*/@preview", "v2x/tx/*/cpm"),
-        hears=("world/snapshot", "v/*/emulated", "eye/*/pose/*", "eye/*/@picture"),
-        serves=("eye/*/req",),
+        publishes=("eye/*/*", "eye/*/pose/*", "eye/pose/*", "eye/*/@preview", "v2x/tx/*/cpm"),
+        subscribes=("world/snapshot", "v/*/emulated", "eye/*/pose/*", "eye/*/@picture"),
+        services=("eye/*/req",),
     ),
-    "camera": Rights(says=("v/*/@camera/*",), hears=("world/snapshot", "world/def", "tl/*/spat")),
+    "camera": Rights(
+        publishes=("v/*/@camera/*",), subscribes=("world/snapshot", "world/def", "tl/*/spat")
+    ),
     "record": _WATCHES,
-    "api": _WATCHES + Rights(says=("v/*/cmd/drive",), asks=EVERY_REQUEST),
+    "api": _WATCHES + Rights(publishes=("v/*/cmd/drive",), requests=EVERY_REQUEST),
     "up": _WATCHES,
-    "selftest": _WATCHES + Rights(says=("**",), asks=("**",)),
+    "selftest": _WATCHES + Rights(publishes=("**",), requests=("**",)),
     "observer": Rights(
-        says=("traffic/counts", "violation/*"),
-        hears=("eye/pose/*", "v/*/state", "v/*/contact", "tl/*/spat"),
+        publishes=("traffic/counts", "violation/*"),
+        subscribes=("eye/pose/*", "v/*/state", "v/*/contact", "tl/*/spat"),
     ),
     "misbehaviour": Rights(
-        says=("misbehaviour/scores", "misbehaviour/*/report"),
-        hears=("v2x/rx/*/*/*", "eye/pose/*"),
+        publishes=("misbehaviour/scores", "misbehaviour/*/report"),
+        subscribes=("v2x/rx/*/*/*", "eye/pose/*"),
     ),
     "demand": Rights(
-        says=("demand/status",),
-        hears=("v/*/trip",),
-        asks=("world/spawn", "v/*/cmd/route", "v/*/remove"),
+        publishes=("demand/status",),
+        subscribes=("v/*/trip",),
+        requests=("world/spawn", "v/*/cmd/route", "v/*/remove"),
     ),
-    "ros2": _WATCHES + Rights(says=("v/*/cmd/drive",), asks=("v/*/lease",)),
+    "ros2": _WATCHES + Rights(publishes=("v/*/cmd/drive",), requests=("v/*/lease",)),
 }
 """By the part's name; `eye-<camera>` has the rights of `eye`."""
 

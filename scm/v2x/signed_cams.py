@@ -19,7 +19,7 @@ from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.signing import CAM, Signer, Ticket, Verifier
 from scm.v2x.tickets import certificate_of, read_ticket
 
-HOST = "world"
+WORLD_STATION = "world"
 """Who signs for the cars that it simulates itself."""
 
 _encoder = msgspec.json.Encoder()
@@ -74,7 +74,7 @@ class SignedCams:
             msg = f"{message.station}: its signature is no base64"
             raise AccessError(msg) from cause
         found = self._verifier.verify(data, now_ns)
-        if found.station not in (message.station, HOST):
+        if found.station not in (message.station, WORLD_STATION):
             msg = f"{message.station}: it is signed by {found.station}"
             raise AccessError(msg)
         if found.psid != CAM or found.payload != _hash(message):
@@ -91,5 +91,5 @@ class SignedCams:
 
 
 def _hash(cam: CamTx | CamRx) -> bytes:
-    said = f"{cam.station} {cam.t_ns} ".encode() + _encoder.encode(cam.body)
-    return hashlib.sha256(said).digest()
+    signed_bytes = f"{cam.station} {cam.t_ns} ".encode() + _encoder.encode(cam.body)
+    return hashlib.sha256(signed_bytes).digest()

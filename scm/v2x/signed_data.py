@@ -79,14 +79,14 @@ class Certificate:
         return head + issuer + self.to_be_signed() + _SIGNATURE + signature
 
 
-class Reader:
+class ByteReader:
     """Takes bytes from the front."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
         self.at = 0
 
-    def take(self, count: int) -> bytes:
+    def read(self, count: int) -> bytes:
         """Return the next bytes.
 
         Raises:
@@ -106,18 +106,18 @@ class Reader:
             MessageError: when they are others.
         """
         begun = self.at
-        found = self.take(len(wanted))
+        found = self.read(len(wanted))
         if found != wanted:
             msg = f"signed data, byte {begun}: got {found.hex()}, expected {wanted.hex()}"
             raise MessageError(msg)
 
     def byte(self) -> int:
         """Return the next byte."""
-        return self.take(1)[0]
+        return self.read(1)[0]
 
     def number(self, count: int) -> int:
         """Return the next bytes as a number."""
-        return int.from_bytes(self.take(count), "big")
+        return int.from_bytes(self.read(count), "big")
 
     def length(self) -> int:
         """Return a length: one byte, or how many bytes it takes and then they."""
@@ -143,7 +143,7 @@ class Reader:
 class ReadCertificate(NamedTuple):
     """A certificate as it came, with what its signature covers."""
 
-    says: Certificate
+    content: Certificate
     raw: bytes
     to_be_signed: bytes
     signature: bytes
@@ -208,36 +208,36 @@ def read_message(data: bytes) -> SignedMessage:
     Raises:
         MessageError: when it is none, or none of our profile.
     """
-    reader = Reader(data)
+    reader = ByteReader(data)
     reader.expect(_SIGNED_DATA)
     begun = reader.at
     reader.expect(_TBS_START)
-    payload = reader.take(reader.length())
+    payload = reader.read(reader.length())
     head = reader.byte()
     psid = reader.number(reader.length())
     time_us = reader.number(8)
     if head == _WITH_TIME_AND_PLACE:
-        reader.take(10)
+        reader.read(10)
     elif head != _WITH_TIME:
         msg = f"signed data: header {head:#x}, expected a time, and a place or none"
         raise MessageError(msg)
     tbs = reader.since(begun)
     digest, certificate = _read_signer(reader)
     reader.expect(_SIGNATURE)
-    signature = reader.take(2 * NUMBER_BYTES)
+    signature = reader.read(2 * NUMBER_BYTES)
     reader.end()
     return SignedMessage(payload, psid, time_us, tbs, digest, certificate, signature)
 
 
-def _read_signer(reader: Reader) -> tuple[bytes | None, ReadCertificate | None]:
+def _read_signer(reader: ByteReader) -> tuple[bytes | None, ReadCertificate | None]:
     kind = reader.byte()
     if kind == _BY_DIGEST:
-        return reader.take(DIGEST_BYTES), None
+        return reader.read(DIGEST_BYTES), None
     if kind != _BY_CERTIFICATE:
         msg = f"signed data: signer {kind:#x}, expected a digest or a certificate"
         raise MessageError(msg)
     reader.expect(b"\x01\x01")
-    return None, _take_certificate(reader)
+    return None, _read_certificate(reader)
 
 
 def read_certificate(data: bytes) -> ReadCertificate:
@@ -246,47 +246,47 @@ def read_certificate(data: bytes) -> ReadCertificate:
     Raises:
         MessageError: when it is none, or none of our profile.
     """
-    reader = Reader(data)
-    found = _take_certificate(reader)
+    reader = ByteReader(data)
+    found = _read_certificate(reader)
     reader.end()
     return found
 
 
-def _take_certificate(reader: Reader) -> ReadCertificate:
+def _read_certificate(reader: ByteReader) -> ReadCertificate:
     begun = reader.at
     reader.expect(bytes([0x80, VERSION, 0x00]))
-    issuer = reader.take(DIGEST_BYTES) if reader.byte() == _ISSUED_BY[0] else None
+    issuer = reader.read(DIGEST_BYTES) if reader.byte() == _ISSUED_BY[0] else None
     if issuer is None:
         reader.expect(_SELF[1:])
     covered = reader.at
     kind = reader.byte()
     reader.expect(b"\x81")
-    name = reader.take(reader.byte())
+    name = reader.read(reader.byte())
     reader.expect(bytes(5))
     start_s = reader.number(4)
     reader.expect(b"\x84")
     hours = reader.number(2)
-    psids = _take_psids(reader, kind)
+    psids = _read_psids(reader, kind)
     reader.expect(b"\x80\x80")
     parity = reader.byte()
-    key = Point(reader.take(NUMBER_BYTES), parity == _ODD)
+    key = Point(reader.read(NUMBER_BYTES), parity == _ODD)
     tbs = reader.since(covered)
     reader.expect(_SIGNATURE)
-    signature = reader.take(2 * NUMBER_BYTES)
+    signature = reader.read(2 * NUMBER_BYTES)
     try:
-        says = Certificate(
+        content = Certificate(
             issuer=issuer, name=name.decode(), start_s=start_s, hours=hours, psids=psids, key=key
         )
     except UnicodeDecodeError as cause:
         msg = f"certificate: name {name!r} is no text"
         raise MessageError(msg) from cause
-    if says.to_be_signed() != tbs:
+    if content.to_be_signed() != tbs:
         msg = "certificate: it is not written as the standard's canonical form has it"
         raise MessageError(msg)
-    return ReadCertificate(says, reader.since(begun), tbs, signature)
+    return ReadCertificate(content, reader.since(begun), tbs, signature)
 
 
-def _take_psids(reader: Reader, kind: int) -> tuple[int, ...]:
+def _read_psids(reader: ByteReader, kind: int) -> tuple[int, ...]:
     if kind == _MAY_ISSUE:
         reader.expect(bytes([1, 1, 0x00, 0x81]))
         return ()

@@ -35,9 +35,9 @@ from scm.v2x.signed_data import (
 
 CAM, DENM = 36, 37
 CERTIFICATE_EVERY_NS = NS_PER_S
-FRESH_NS = 2 * NS_PER_S
-AHEAD_NS = 500 * NS_PER_MS
-SIGNERS_KEPT = 4096
+MAX_AGE_NS = 2 * NS_PER_S
+MAX_AHEAD_NS = 500 * NS_PER_MS
+MAX_SIGNERS = 4096
 HOURS = 24 * 365
 
 _EPOCH_S = 1_072_915_200  # 2004-01-01 UTC, seconds since 1970
@@ -65,16 +65,16 @@ def digest_of(certificate: bytes) -> bytes:
 def make_authority(name: str, now_ns: int, hours: int = HOURS) -> Ticket:
     """Return a new authority, whose certificate signs itself."""
     key = ec.generate_private_key(ec.SECP256R1())
-    says = Certificate(
+    content = Certificate(
         issuer=None, name=name, start_s=_tai_us(now_ns) // 1_000_000, hours=hours, psids=(),
         key=_point(key),
     )  # fmt: skip
-    return Ticket(says.signed(_sign(key, says.to_be_signed(), b"")), key)
+    return Ticket(content.signed(_sign(key, content.to_be_signed(), b"")), key)
 
 
-def starts_ns(says: Certificate) -> int:
+def starts_ns(content: Certificate) -> int:
     """Return from when on a certificate is good, nanoseconds since 1970."""
-    return _unix_ns(says.start_s * 1_000_000)
+    return _unix_ns(content.start_s * 1_000_000)
 
 
 def issue(
@@ -83,12 +83,12 @@ def issue(
 ) -> Ticket:  # fmt: skip
     """Return a ticket under which a station may sign these kinds of message."""
     key = ec.generate_private_key(ec.SECP256R1())
-    says = Certificate(
+    content = Certificate(
         issuer=authority.digest, name=station, start_s=_tai_us(now_ns) // 1_000_000, hours=hours,
         psids=psids, key=_point(key),
     )  # fmt: skip
-    signature = _sign(authority.key, says.to_be_signed(), authority.certificate)
-    return Ticket(says.signed(signature), key)
+    signature = _sign(authority.key, content.to_be_signed(), authority.certificate)
+    return Ticket(content.signed(signature), key)
 
 
 class Signer:
@@ -127,12 +127,12 @@ class Verified(NamedTuple):
 class _Known:
     """A certificate that was verified."""
 
-    says: Certificate
+    content: Certificate
     raw: bytes
 
     @cached_property
     def key(self) -> ec.EllipticCurvePublicKey:
-        return _public(self.says.key)
+        return _public(self.content.key)
 
     @cached_property
     def hash(self) -> bytes:
@@ -144,7 +144,7 @@ class Verifier:
 
     def __init__(self, authority: bytes) -> None:
         found = read_certificate(authority)
-        root = _Known(found.says, found.raw)
+        root = _Known(found.content, found.raw)
         _check(root.key, found.to_be_signed, hashlib.sha256(b"").digest(), found.signature)
         self._root = root
         self._root_digest = digest_of(authority)
@@ -159,47 +159,47 @@ class Verifier:
         """
         message = read_message(data)
         if message.certificate is not None:
-            signer = self._learn(message.certificate)
+            signer = self._verified_signer(message.certificate)
         else:
-            signer = self._recall(message.digest or b"")
+            signer = self._known_signer(message.digest or b"")
         t_ns = _unix_ns(message.time_us)
-        _check_says(signer.says, message.psid, message.time_us)
-        if not -AHEAD_NS <= now_ns - t_ns <= FRESH_NS:
-            msg = f"{signer.says.name}: it is {(now_ns - t_ns) / NS_PER_S:.1f} s old"
+        _check_permission(signer.content, message.psid, message.time_us)
+        if not -MAX_AHEAD_NS <= now_ns - t_ns <= MAX_AGE_NS:
+            msg = f"{signer.content.name}: it is {(now_ns - t_ns) / NS_PER_S:.1f} s old"
             raise AccessError(msg)
         _check(signer.key, message.to_be_signed, signer.hash, message.signature)
-        return Verified(message.payload, message.psid, signer.says.name, t_ns)
+        return Verified(message.payload, message.psid, signer.content.name, t_ns)
 
-    def _recall(self, digest: bytes) -> _Known:
+    def _known_signer(self, digest: bytes) -> _Known:
         found = self._known.get(digest)
         if found is None:
             msg = f"signer {digest.hex()}: its certificate has not come yet"
             raise AccessError(msg)
         return found
 
-    def _learn(self, came: ReadCertificate) -> _Known:
-        digest = digest_of(came.raw)
+    def _verified_signer(self, certificate: ReadCertificate) -> _Known:
+        digest = digest_of(certificate.raw)
         known = self._known.get(digest)
-        if known is not None and known.raw == came.raw:
+        if known is not None and known.raw == certificate.raw:
             return known
         root = self._root
-        if came.says.issuer != self._root_digest or not came.says.psids:
-            msg = f"{came.says.name}: its certificate is not of our authority"
+        if certificate.content.issuer != self._root_digest or not certificate.content.psids:
+            msg = f"{certificate.content.name}: its certificate is not of our authority"
             raise AccessError(msg)
-        _check(root.key, came.to_be_signed, root.hash, came.signature)
-        found = self._known[digest] = _Known(came.says, came.raw)
-        if len(self._known) > SIGNERS_KEPT:
+        _check(root.key, certificate.to_be_signed, root.hash, certificate.signature)
+        found = self._known[digest] = _Known(certificate.content, certificate.raw)
+        if len(self._known) > MAX_SIGNERS:
             self._known.popitem(last=False)
         return found
 
 
-def _check_says(says: Certificate, psid: int, time_us: int) -> None:
-    if psid not in says.psids:
-        msg = f"{says.name}: it may sign {says.psids}, not {psid}"
+def _check_permission(content: Certificate, psid: int, time_us: int) -> None:
+    if psid not in content.psids:
+        msg = f"{content.name}: it may sign {content.psids}, not {psid}"
         raise AccessError(msg)
-    age_s = time_us // 1_000_000 - says.start_s
-    if not 0 <= age_s <= says.hours * 3600:
-        msg = f"{says.name}: its certificate was not good when this was signed"
+    age_s = time_us // 1_000_000 - content.start_s
+    if not 0 <= age_s <= content.hours * 3600:
+        msg = f"{content.name}: its certificate was not good when this was signed"
         raise AccessError(msg)
 
 

@@ -8,7 +8,7 @@ cost. Whoever comes in once more than he leaves keeps his.
 import ctypes
 import threading
 
-MOST = 64
+MAX_THREADS = 64
 """Threads of one process: what is kept for one outlives it (some 20 kB)."""
 
 
@@ -20,19 +20,19 @@ class ThreadStates:
     """
 
     def __init__(self) -> None:
-        self.kept = 0
+        self.pinned = 0
         self._lock = threading.Lock()
         self._own = threading.local()  # lives in the thread's state: gone if that is not kept
 
-    def keep(self) -> None:
+    def pin(self) -> None:
         """Keep the state of the calling thread; costs next to nothing when it is kept already."""
-        if getattr(self._own, "is_kept", False):
+        if getattr(self._own, "is_pinned", False):
             return
         with self._lock:
-            if self.kept >= MOST:
+            if self.pinned >= MAX_THREADS:
                 return
-            self.kept += 1
-        self._own.is_kept = True
+            self.pinned += 1
+        self._own.is_pinned = True
         ctypes.pythonapi.PyGILState_Ensure()
 
 

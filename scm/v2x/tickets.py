@@ -87,9 +87,9 @@ def ticket_ends(ticket: str) -> datetime:
     Raises:
         AccessError: when it is none.
     """
-    says = read_certificate(certificate_of(ticket)).says
-    begins = datetime.fromtimestamp(starts_ns(says) // NS_PER_S, UTC)
-    return begins + timedelta(hours=says.hours)
+    content = read_certificate(certificate_of(ticket)).content
+    begins = datetime.fromtimestamp(starts_ns(content) // NS_PER_S, UTC)
+    return begins + timedelta(hours=content.hours)
 
 
 def _authority(folder: Path, now: datetime) -> Ticket:

@@ -42,7 +42,7 @@ class Batch:
     answers: Sequence[Answer]
 
 
-class Keeps(Protocol):
+class BatchStore(Protocol):
     """Stores batches in order, each whole or not at all."""
 
     def stored_answers(self) -> dict[str, StoredAnswer]:
@@ -79,7 +79,7 @@ class _Writer:
         self._station = station
         self._session = session
         self._number = 0
-        self._in_doubt = False
+        self._commit_unknown = False
         self.stuck = ""
 
     def stored_answers(self) -> dict[str, StoredAnswer]:
@@ -94,7 +94,7 @@ class _Writer:
         try:
             self._write(batches)
         except StoreError as cause:
-            self._in_doubt = True
+            self._commit_unknown = True
             if not self.stuck:
                 facts = {"station": self._station, "reason": cause}
                 event(_log, "state_not_stored", level=logging.ERROR, **facts)
@@ -103,14 +103,14 @@ class _Writer:
         if self.stuck:
             event(_log, "state_stored_again", station=self._station)
         self._number += 1
-        self._in_doubt, self.stuck = False, ""
+        self._commit_unknown, self.stuck = False, ""
         return True
 
     def _write(self, batches: Sequence[Batch]) -> None:
         store, log = self._store, AuditLog(self._store)
         mark = f"{self._session} {self._number}".encode()
         with store.transaction():
-            if self._in_doubt and store.get("marks", self._station) == mark:
+            if self._commit_unknown and store.get("marks", self._station) == mark:
                 return
             for batch in batches:
                 for table, key, value in batch.values:
@@ -124,7 +124,7 @@ class _Writer:
             store.put("marks", self._station, mark)
 
 
-class Keeper:
+class DirectWriter:
     """Stores at once, in the caller's step; see `Keeps`."""
 
     def __init__(self, store: Repository, station: str, session: str) -> None:
@@ -162,7 +162,7 @@ class Keeper:
         """Nothing waits here longer than a step."""
 
 
-class KeeperBehind:
+class BackgroundWriter:
     """Stores on a thread of its own, everything that waits in one transaction; see `Keeps`."""
 
     def __init__(self, store: Repository, station: str, session: str) -> None:
@@ -204,7 +204,7 @@ class KeeperBehind:
 
     def _run(self) -> None:
         try:
-            while (batches := self._take()) is not None:
+            while (batches := self._next_batches()) is not None:
                 while not self._writer.commit(batches):
                     if self._ending.wait(RETRY_S):
                         return
@@ -213,7 +213,7 @@ class KeeperBehind:
         except Exception as failure:  # noqa: BLE001  the edge of a thread: the part must hear of it
             self._failure = failure
 
-    def _take(self) -> list[Batch] | None:
+    def _next_batches(self) -> list[Batch] | None:
         """Wait for a batch; return all that wait then, or None at the end."""
         first = self._waiting.get()
         if first is None:

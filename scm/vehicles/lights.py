@@ -32,7 +32,7 @@ class Switches:
     headlights: Headlights = "off"
     indicators: Indicators = "off"
 
-    def told(self, headlights: Headlights | None, indicators: Indicators | None) -> "Switches":
+    def updated(self, headlights: Headlights | None, indicators: Indicators | None) -> "Switches":
         """Return the switches after a command; None leaves one as it is."""
         if headlights is None and indicators is None:
             return self

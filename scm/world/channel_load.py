@@ -69,7 +69,7 @@ class Busy:
         self.lost[:] = load_loss(mean, self._radio.hidden_share)
         self._measure_others(frames, others, span_s)
         if self.control is not None:
-            self.control.measure(self.ratio, now_ns)
+            self.control.update(self.ratio, now_ns)
 
     def loss_of(self, names: Sequence[str]) -> Floats:
         """Return what share of frames the load costs stations that are not hosted (n,)."""

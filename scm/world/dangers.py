@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from scm.v2x.etsi.events import CarWarnings, DenmWatch
+from scm.v2x.etsi.events import CarWarnings, DenmReceiver
 
 
 @dataclass(slots=True)
@@ -19,4 +19,4 @@ class Dangers:
     hits: dict[str, tuple[str, ...]] = field(default_factory=dict)
     braked: set[int] = field(default_factory=set)
     warners: dict[str, CarWarnings] = field(default_factory=dict)
-    told: DenmWatch = field(default_factory=DenmWatch)
+    told: DenmReceiver = field(default_factory=DenmReceiver)

@@ -51,7 +51,7 @@ def _command(world: World, command: DriveCommand, now_ns: int) -> None:
         world.ignored += 1
         return
     if car.guard is not None and car.guard.take(command, now_ns):
-        car.switches = car.switches.told(command.headlights, command.indicators)
+        car.switches = car.switches.updated(command.headlights, command.indicators)
 
 
 def _frame(world: World, frame: Frame, now_ns: int) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
-from scm.v2x.etsi.path import SlowNews
+from scm.v2x.etsi.path import LowFrequencySender
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.guard import Guard
@@ -39,7 +39,7 @@ class HostedCar:
     lease: Lease
     guard: Guard | None = None
     switches: Switches = OFF
-    slow_news: SlowNews = field(default_factory=SlowNews)
+    slow_news: LowFrequencySender = field(default_factory=LowFrequencySender)
 
     kind = "hosted"
 

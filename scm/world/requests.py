@@ -165,7 +165,7 @@ def _lease(world: World, request: LeaseRequest, now_ns: int) -> LeaseReply:
 def _lights(world: World, request: LightRequest, now_ns: int) -> LightReply:
     del now_ns
     car = _at_home(world, request.vehicle)
-    car.switches = car.switches.told(request.headlights, request.indicators)
+    car.switches = car.switches.updated(request.headlights, request.indicators)
     told = car.switches
     return LightReply(vehicle=car.name, headlights=told.headlights, indicators=told.indicators)
 

@@ -15,7 +15,7 @@ from scm.v2x.etsi.events import (
     DANGEROUS_SITUATION,
     EMERGENCY_BRAKE,
     HARD_BRAKING_MPS2,
-    LEAST_BRAKING_MPS,
+    MIN_BRAKING_MPS,
     STANDSTILL_MPS,
     STATIONARY_VEHICLE,
     CarWarnings,
@@ -37,7 +37,7 @@ def watch(world: World) -> None:
     """Note who brakes hard: at every step, since a Nigel stops within a tenth of a second."""
     slots = world.slots
     hard = world.garage.signal("accel_x") <= -HARD_BRAKING_MPS2
-    hard &= slots.hosted & (slots.mode == DRIVE) & (slots.speed > LEAST_BRAKING_MPS)
+    hard &= slots.hosted & (slots.mode == DRIVE) & (slots.speed > MIN_BRAKING_MPS)
     world.dangers.braked.update(np.flatnonzero(hard).tolist())
 
 
@@ -69,7 +69,10 @@ def call_denms(world: World, now_ns: int) -> list[DenmTx]:
 
 def tell(world: World, frame: DenmTx, now_ns: int) -> None:
     """Put what is new on the air into the log of the city, whoever warns."""
-    found, situation = world.dangers.told.hear(frame.body, now_ns), frame.body.situation_container
+    found, situation = (
+        world.dangers.told.receive(frame.body, now_ns),
+        frame.body.situation_container,
+    )
     if found == "new" and situation is not None:
         event = situation.event_type
         of_any_kind = _CALLED.get((event.cause, None), "a danger")

@@ -119,10 +119,10 @@ def test_every_part_may_do_what_it_does(city, name):
     part = city[name]
     rights = rights_of("vehicle" if part.role == "v" else "part", name)
     for done, allowed in (
-        (part.said, rights.says),
-        (part.heard, rights.hears),
-        (part.asked, rights.asks),
-        (part.served, rights.serves),
+        (part.said, rights.publishes),
+        (part.heard, rights.subscribes),
+        (part.asked, rights.requests),
+        (part.served, rights.services),
     ):
         assert [key for key in sorted(done) if not covers(key, allowed)] == []
 

@@ -12,7 +12,6 @@ import pytest
 from scm.runtime.parent_watch import with_parent
 from scm.store.audit import AuditLog
 from scm.store.open import open_store
-from scm.v2x.ask import ask, with_id
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
@@ -20,6 +19,7 @@ from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.world_snapshot import WorldSnapshot
+from scm.v2x.request_retry import send_request, with_id
 from scm.v2x.router import Router, free_endpoint
 from tests.e2e.city_process import wait_for
 from tests.e2e.faulty_proxy import FaultyProxy, trouble
@@ -81,7 +81,7 @@ def cars_now(bus):
 
 def ready(bus):
     request = StopRequest(engaged=False, by="test")
-    assert ask(bus, request, PATIENT_S).engaged is False
+    assert send_request(bus, request, PATIENT_S).engaged is False
 
 
 def test_each_request_over_a_bad_line_to_a_world_that_is_killed_has_its_effect_once(
@@ -94,7 +94,7 @@ def test_each_request_over_a_bad_line_to_a_world_that_is_killed_has_its_effect_o
         def send(request, kind):
             request = with_id(request)
             sent.append(request)
-            reply = ask(bus, request, PATIENT_S)
+            reply = send_request(bus, request, PATIENT_S)
             assert isinstance(reply, kind), reply
             answers.append(reply)
             return reply
@@ -127,21 +127,21 @@ def kill_and_start(world):
 def test_a_lease_and_an_answer_outlive_a_world_that_is_killed(router, world):
     with ZenohBus("city", "script", router.listen) as bus:
         ready(bus)
-        ask(bus, SpawnRequest(vehicle="n1"), PATIENT_S)
+        send_request(bus, SpawnRequest(vehicle="n1"), PATIENT_S)
         steal = with_id(
             LeaseRequest(vehicle="n1", owner="ann", verb="steal", reason="test", ttl_ms=60_000)
         )
-        held = ask(bus, steal, PATIENT_S)
+        held = send_request(bus, steal, PATIENT_S)
         assert isinstance(held, LeaseReply)
         kill_and_start(world)
-        assert ask(bus, steal, PATIENT_S) == held
+        assert send_request(bus, steal, PATIENT_S) == held
         assert cars_now(bus) == {"n1"}
-        again = ask(
+        again = send_request(
             bus, LeaseRequest(vehicle="n1", owner="bob", verb="steal", reason="test"), PATIENT_S
         )
         assert again.epoch > held.epoch
         late = LeaseRequest(vehicle="n1", owner="ann", verb="renew", epoch=held.epoch)
-        assert ask(bus, late, PATIENT_S).code == "owned"
+        assert send_request(bus, late, PATIENT_S).code == "owned"
 
 
 def test_a_state_that_cannot_be_opened_ends_the_world_at_once_with_a_reason(router, tmp_path):

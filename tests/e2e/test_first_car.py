@@ -5,12 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-from scm.v2x.ask import ask
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
+from scm.v2x.request_retry import send_request
 from scm.v2x.router import Router, free_endpoint
 from scm.vehicles.car import car_names
 from tests.e2e.city_process import START_S, wait_for
@@ -27,7 +27,7 @@ def test_every_car_file_is_compiled_before_the_world_opens(tmp_path: Path) -> No
             wait_for(here.drain, START_S, "the world is up")
             bus.subscribe(PartStatus, {"station": "world"}, statuses)
             for car in car_names():
-                assert isinstance(ask(bus, SpawnRequest(car=car)), SpawnReply), car
+                assert isinstance(send_request(bus, SpawnRequest(car=car)), SpawnReply), car
             told = wait_for(statuses.drain, 120.0, "the world's status")
         finally:
             world.terminate()

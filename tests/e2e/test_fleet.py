@@ -12,7 +12,6 @@ import zenoh
 from scm.clock import NS_PER_S
 from scm.v2x import zenoh_config
 from scm.v2x.access import guard_of, own_stations
-from scm.v2x.ask import ask
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.credentials import read_credentials
@@ -26,6 +25,7 @@ from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.world_snapshot import WorldSnapshot
+from scm.v2x.request_retry import send_request
 from scm.v2x.router import Router, free_endpoint
 from tests.e2e.city_process import START_S, wait_for
 
@@ -103,7 +103,7 @@ def test_another_car_cannot_drive_remove_or_stop_it_nor_forge_signals(guarded):
         RemoveRequest(vehicle="n7"), StopRequest(engaged=True, by="n8"), SpawnRequest(),
         LeaseRequest(vehicle="n7", owner="n8", verb="steal", reason="mine"),
     ):  # fmt: skip
-        assert isinstance(ask(thief, request, 0.5), Refused)
+        assert isinstance(send_request(thief, request, 0.5), Refused)
     stop = CityStop(t_ns=NS_PER_S, engaged=True, by="n8")
     green = Spat(junction="crossing", t_ns=1, seq=1, mode="plan", plan="forged", groups=())
     brake = DriveCommand(vehicle="n7", t_ns=1, epoch=10**6, seq=1, throttle=-1.0, steering=0.0)
@@ -122,6 +122,6 @@ def test_another_car_cannot_drive_remove_or_stop_it_nor_forge_signals(guarded):
 
 def test_an_operator_stops_the_city_and_lets_it_go(guarded):
     for engaged in (True, False):
-        told = ask(guarded.operator, StopRequest(engaged=engaged, by="anna"), 2.0)
+        told = send_request(guarded.operator, StopRequest(engaged=engaged, by="anna"), 2.0)
         assert isinstance(told, CityStop)
         assert told.engaged is engaged

@@ -15,12 +15,12 @@ from scm.runtime.part import BasePart, Service
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.store.records import PlanRecord, records
-from scm.v2x.ask import Asking, with_id
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.exchange import Answer, Incoming, Keep
-from scm.v2x.faults import Faults, Weather
+from scm.v2x.faults import FaultRates, Faults
 from scm.v2x.message import Refused
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
+from scm.v2x.request_retry import RetriedRequest, with_id
 
 PATIENT_S = 300.0
 CLIENTS = ("ann", "bob", "api")
@@ -94,7 +94,7 @@ class Client(BasePart):
 
     def step(self, now_ns, inbox):
         for item in inbox:
-            self.askings[item.call.request].heard(item)
+            self.askings[item.call.request].receive(item)
         calls = (asking.due(now_ns) for asking in self.askings.values())
         return [call for call in calls if call is not None]
 
@@ -120,7 +120,7 @@ class ExactlyOnce(RuleBasedStateMachine):
 
     def put(self, client, request):
         if request not in self.clients[client].askings:
-            asking = Asking(request, self.city.now_ns, PATIENT_S)
+            asking = RetriedRequest(request, self.city.now_ns, PATIENT_S)
             self.clients[client].askings[request] = asking
 
     @rule(client=st.sampled_from(CLIENTS))
@@ -145,11 +145,11 @@ class ExactlyOnce(RuleBasedStateMachine):
         late_s=st.sampled_from([0.1, 1.5, 20.0]),
     )
     def turn_weather(self, drop, double, late, late_s):
-        self.faults.weather = Weather(drop=drop, double=double, late=late, late_s=late_s)
+        self.faults.rates = FaultRates(drop=drop, duplicate=double, late=late, late_s=late_s)
 
     @rule(away=st.sets(st.sampled_from([*CLIENTS, "traffic"])))
     def cut_off(self, away):
-        self.faults.cut_off(away)
+        self.faults.partition(away)
 
     @rule(sick=st.booleans())
     def sicken(self, sick):
@@ -188,8 +188,8 @@ class ExactlyOnce(RuleBasedStateMachine):
     def teardown(self):
         if not hasattr(self, "shop"):
             return
-        self.faults.weather, self.store.sick = Weather(), False
-        self.faults.cut_off(())
+        self.faults.rates, self.store.sick = FaultRates(), False
+        self.faults.partition(())
         self.city.run_for(60.0)
         self.what_was_acknowledged_was_done_and_every_answer_is_its_questions()
         for client in self.clients.values():
@@ -214,20 +214,20 @@ def request(request_id="r1"):
 
 
 def refused(asking, code, t_ns):
-    asking.heard(Incoming(Refused(code=code, detail="no"), t_ns, None))
+    asking.receive(Incoming(Refused(code=code, detail="no"), t_ns, None))
 
 
 def test_asking_ends_with_the_first_answer():
-    asking = Asking(request(), 0, 10.0)
+    asking = RetriedRequest(request(), 0, 10.0)
     assert asking.due(0).request.request_id == "r1"
     assert asking.due(NS_PER_MS) is None
-    asking.heard(Incoming(PlanReply(junction="x1", plan="calm"), 1, None))
+    asking.receive(Incoming(PlanReply(junction="x1", plan="calm"), 1, None))
     assert isinstance(asking.reply, PlanReply)
     assert asking.due(10**12) is None
 
 
 def test_a_refusal_is_an_answer():
-    asking = Asking(request(), 0, 10.0)
+    asking = RetriedRequest(request(), 0, 10.0)
     asking.due(0)
     refused(asking, "owned", 1)
     assert asking.reply.code == "owned"
@@ -235,7 +235,7 @@ def test_a_refusal_is_an_answer():
 
 @pytest.mark.parametrize("code", ["timeout", "offline"])
 def test_silence_is_asked_into_again_ever_more_slowly_until_the_deadline(code):
-    asking, now_ns, times = Asking(request(), 0, 5.0), 0, []
+    asking, now_ns, times = RetriedRequest(request(), 0, 5.0), 0, []
     while asking.reply is None:
         call = asking.due(now_ns)
         if call is not None:

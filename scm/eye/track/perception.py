@@ -9,7 +9,7 @@ from scm.scenery.bodies import NIGEL, CarBody
 from scm.v2x.etsi.cam_spatem import REFERENCE_LATITUDE_DEG, REFERENCE_LONGITUDE_DEG, SCALE
 from scm.v2x.etsi.convert import its_ms, station_id
 from scm.v2x.etsi.cpm import (
-    MOST_OBJECTS,
+    MAX_OBJECTS,
     PASSENGER_CAR,
     Angle,
     Angles,
@@ -50,7 +50,7 @@ def collective_perception(
         body: The measures of the cars.
     """
     told = [one for one in tracks if not one.stale and "tentative" not in one.flags]
-    told = sorted(told, key=lambda one: one.age_s)[:MOST_OBJECTS]
+    told = sorted(told, key=lambda one: one.age_s)[:MAX_OBJECTS]
     cameras = sorted({name for one in told for name in one.cameras})
     sensors = tuple(SensorInformation(sensor_id=index) for index in range(len(cameras)))
     objects = (_perceived(one, cameras, t_ns, body) for one in told)

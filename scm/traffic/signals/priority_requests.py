@@ -15,7 +15,7 @@ from scm.maps.route import Roads
 from scm.records.city_map import Junction
 from scm.traffic.signals.policy import PriorityCall, Status
 from scm.v2x.etsi.convert import roadside_station, station_id
-from scm.v2x.etsi.priority_requests import Answered, Wish, ssem_of, wishes_of
+from scm.v2x.etsi.priority_requests import PriorityAnswer, PriorityRequest, requests_of, ssem_of
 from scm.v2x.etsi.topology import topology_of
 from scm.v2x.messages.srem_rx import SremRx
 from scm.v2x.messages.ssem_tx import SsemTx
@@ -42,7 +42,7 @@ class PriorityDesk:
     def __init__(self, junction: Junction, roads: Roads) -> None:
         self._junction = junction
         self._groups = topology_of(roads, junction).group_in
-        self._wishes: dict[Key, tuple[Wish, int]] = {}
+        self._wishes: dict[Key, tuple[PriorityRequest, int]] = {}
         self._told: dict[Key, Status] = {}
         self._told_ns = 0
         self._sequence = 0
@@ -50,7 +50,7 @@ class PriorityDesk:
 
     def hear(self, heard: SremRx, now_ns: int) -> None:
         """Take the requests of an SREM that are for this junction."""
-        for wish in wishes_of(heard.body, now_ns):
+        for wish in requests_of(heard.body, now_ns):
             if wish.junction != self._junction.number:
                 continue
             key = (wish.station_id, wish.number)
@@ -80,22 +80,22 @@ class PriorityDesk:
             return []
         self._told, self._told_ns = now, now_ns
         self._sequence += is_new
-        answers = [Answered(self._wishes[key][0], what) for key, what in now.items()]
+        answers = [PriorityAnswer(self._wishes[key][0], what) for key, what in now.items()]
         body = ssem_of(self._junction, answers, self._sequence, now_ns)
         return [SsemTx(station=roadside_station(self._junction.name), t_ns=now_ns, body=body)]
 
-    def _group_of(self, wish: Wish) -> str:
+    def _group_of(self, wish: PriorityRequest) -> str:
         known = wish.lane_in is not None and wish.lane_in <= len(self._groups)
         return self._groups[wish.lane_in - 1] if known and wish.lane_in else ""
 
 
-def _role_of(wish: Wish) -> str:
+def _role_of(wish: PriorityRequest) -> str:
     if wish.role in EMERGENCY:
         return "emergency"
     return "transit" if wish.role in TRANSIT else wish.role
 
 
-def _until_ns(wish: Wish, now_ns: int) -> int:
+def _until_ns(wish: PriorityRequest, now_ns: int) -> int:
     if wish.arrives_ns is None:
         return now_ns + QUIET_NS
     lasts_ns = round((wish.lasts_s or 0.0) * NS_PER_S)

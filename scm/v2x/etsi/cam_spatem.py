@@ -42,7 +42,7 @@ CAM_ID = 2
 SPATEM_ID = 4
 PASSENGER_CAR, ROADSIDE_UNIT = 5, 15
 TIME_MARK_FAR, TIME_MARK_UNKNOWN = 36000, 36001
-MOST_PATH_POINTS = 40
+MAX_PATH_POINTS = 40
 
 PHASE_STATES = (
     "unavailable",
@@ -166,7 +166,7 @@ class VehicleLowFrequency(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
     vehicle_role: Annotated[int, coded(0, 15)] = 0
     exterior_lights: ExteriorLights = ExteriorLights()
-    path_history: Annotated[tuple[PathPoint, ...], Meta(max_length=MOST_PATH_POINTS)] = ()
+    path_history: Annotated[tuple[PathPoint, ...], Meta(max_length=MAX_PATH_POINTS)] = ()
 
 
 class LowFrequencyContainer(msgspec.Struct, kw_only=True, frozen=True, gc=False):
@@ -243,22 +243,22 @@ class MovementState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=Tru
     def max_end_time(self) -> int:
         """0.1 s within the hour; 36001 is unknown."""
         timing = self.state_time_speed[0].timing
-        told = None if timing is None else timing.max_end_time
-        return TIME_MARK_UNKNOWN if told is None else told
+        value = None if timing is None else timing.max_end_time
+        return TIME_MARK_UNKNOWN if value is None else value
 
     @property
     def likely_time(self) -> int:
         """0.1 s within the hour; 36001 is unknown."""
         timing = self.state_time_speed[0].timing
-        told = None if timing is None else timing.likely_time
-        return TIME_MARK_UNKNOWN if told is None else told
+        value = None if timing is None else timing.likely_time
+        return TIME_MARK_UNKNOWN if value is None else value
 
     @property
     def confidence(self) -> float | None:
         """How sure `likely_time` is, a share of 1; None: it is not told."""
         timing = self.state_time_speed[0].timing
-        told = None if timing is None else timing.confidence
-        return None if told is None else TIME_CONFIDENCES[told] / 100.0
+        value = None if timing is None else timing.confidence
+        return None if value is None else TIME_CONFIDENCES[value] / 100.0
 
 
 class IntersectionState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):

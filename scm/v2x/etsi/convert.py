@@ -60,7 +60,7 @@ LENGTH_MAX, WIDTH_MAX = 1022, 61
 ACCEL_MAX = 160
 CURVATURE_MAX, CURVATURE_MIN, CURVATURE_UNKNOWN = 1022, -1023, 1023
 YAW_RATE_MAX = 32766
-MOST_LATITUDE, MOST_LONGITUDE = 900_000_000, 1_800_000_000
+MAX_LATITUDE, MAX_LONGITUDE = 900_000_000, 1_800_000_000
 ASSUMED_LENGTH_M, ASSUMED_WIDTH_M = 0.30, 0.175
 """Of a Nigel: what a receiver takes that must have a size where a CAM tells none."""
 REVISIONS = 128
@@ -124,7 +124,7 @@ class CamView(NamedTuple):
         return None if self.x_m is None or self.y_m is None else (self.x_m, self.y_m)
 
 
-class Told(NamedTuple):
+class SignalState(NamedTuple):
     """What a SPATEM says of one group; seconds count from the body's own time stamp."""
 
     colour: Colour
@@ -185,7 +185,7 @@ def _curvature(state: VehicleState) -> int:
 def position_of(x_m: float, y_m: float) -> ReferencePosition:
     """Return a place of the map as a place on the earth; unavailable beyond its poles and dates."""
     latitude, longitude = latitude_of(y_m), longitude_of(x_m)
-    if abs(latitude) > MOST_LATITUDE or abs(longitude) > MOST_LONGITUDE:
+    if abs(latitude) > MAX_LATITUDE or abs(longitude) > MAX_LONGITUDE:
         latitude, longitude = UNKNOWN_POSITION
     return ReferencePosition(latitude=latitude, longitude=longitude)
 
@@ -289,11 +289,11 @@ def _mark(end_ns: int | None, now_ns: int, *, up: bool) -> int:
 
 
 def _movement(group: SignalGroup, number: int, spat: Spat) -> MovementState:
-    promised = spat.mode != "flash" and group.colour in ("red", "green", "yellow")
-    likely_ns = group.likely_end_ns if promised else None
+    is_guaranteed = spat.mode != "flash" and group.colour in ("red", "green", "yellow")
+    likely_ns = group.likely_end_ns if is_guaranteed else None
     timing = Timing(
-        min_end_time=_mark(group.min_end_ns if promised else None, spat.t_ns, up=False),
-        max_end_time=_mark(group.max_end_ns if promised else None, spat.t_ns, up=True),
+        min_end_time=_mark(group.min_end_ns if is_guaranteed else None, spat.t_ns, up=False),
+        max_end_time=_mark(group.max_end_ns if is_guaranteed else None, spat.t_ns, up=True),
         likely_time=_mark(likely_ns, spat.t_ns, up=False) if likely_ns is not None else None,
         confidence=_confidence(group) if likely_ns is not None else None,
     )
@@ -357,22 +357,22 @@ def _until_s(field: str, of: MovementState, state: IntersectionState) -> float |
     return max(0.0, ahead_ms / 1000.0)
 
 
-def colours_of(body: SpatemBody) -> dict[int, Told]:
+def colours_of(body: SpatemBody) -> dict[int, SignalState]:
     """Return what a SPATEM says of each group number: colour, and seconds to its ends.
 
     Only a protected movement is green. Every state that we do not know counts as dark. A group
     whose number is not told is left out.
     """
     return {
-        state.signal_group: _told(state, body.intersections[0])
+        state.signal_group: _signal_state(state, body.intersections[0])
         for state in body.states
         if number_of(state, "signal_group") is not None
     }
 
 
-def _told(state: MovementState, at: IntersectionState) -> Told:
+def _signal_state(state: MovementState, at: IntersectionState) -> SignalState:
     likely_s = _until_s("likely_time", state, at)
-    return Told(
+    return SignalState(
         _COLOUR_OF.get(state.event_state, "dark"),
         _until_s("min_end_time", state, at),
         _until_s("max_end_time", state, at),

@@ -25,7 +25,7 @@ from scm.v2x.etsi.parts import (
 
 MONOVIDEO = 3
 PASSENGER_CAR = 5
-MOST_OBJECTS = 255
+MAX_OBJECTS = 255
 
 _Span = Annotated[int, coded(-2048, 2047)]
 

@@ -36,7 +36,7 @@ from scm.v2x.etsi.parts import (
 DENM_ID = 1
 CANCELLATION, NEGATION = 0, 1
 DEFAULT_VALIDITY_S = 600
-MOST_TRACES = 7
+MAX_TRACES = 7
 
 
 class ActionId(msgspec.Struct, kw_only=True, frozen=True):
@@ -123,7 +123,7 @@ class DenmLocation(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True
     event_speed: Speed | None = None
     event_position_heading: Heading | None = None
     detection_zones_to_event_position: (
-        Annotated[tuple[Trace, ...], Meta(min_length=1, max_length=MOST_TRACES)] | None
+        Annotated[tuple[Trace, ...], Meta(min_length=1, max_length=MAX_TRACES)] | None
     ) = None
 
 

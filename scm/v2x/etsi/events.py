@@ -40,17 +40,17 @@ from scm.v2x.messages.vehicle_state import VehicleState
 ACCIDENT, STATIONARY_VEHICLE, DANGEROUS_SITUATION = 2, 94, 99
 MULTI_VEHICLE_ACCIDENT, EMERGENCY_BRAKE = 1, 1
 HARD_BRAKING_MPS2 = 2.0  # four times what drivers find comfortable; where they stop for a light 1.2
-LEAST_BRAKING_MPS = 0.05
-BRAKES_NS = 5 * NS_PER_S
+MIN_BRAKING_MPS = 0.05
+BRAKING_EVERY_NS = 5 * NS_PER_S
 COUNTS = 65_536
-MOST_KNOWN = 4096
+MAX_EVENTS = 4096
 STANDSTILL_MPS = 0.02
-STANDS_NS = 2 * NS_PER_S
+STANDING_NS = 2 * NS_PER_S
 RENEW_NS = 15 * NS_PER_S  # half of what a stationary vehicle's warning is valid for
-HITS_NS = 10 * NS_PER_S
+HIT_EVERY_NS = 10 * NS_PER_S
 WALL = "wall"
 
-Heard = Literal["new", "update", "repetition", "ended", "ignored"]
+Reception = Literal["new", "update", "repetition", "ended", "ignored"]
 
 
 class Event(NamedTuple):
@@ -79,7 +79,7 @@ class Event(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Told:
+class _Sent:
     body: DenmBody
     interval_ns: int
     ends_ns: int
@@ -94,7 +94,7 @@ class DenmSender:
         self._station = station_id(station)
         self._station_type = station_type
         self._count = first
-        self._told: dict[ActionId, _Told] = {}
+        self._sent: dict[ActionId, _Sent] = {}
 
     def trigger(self, event: Event, now_ns: int) -> ActionId:
         """Begin to warn of something; return the name of the warning."""
@@ -102,7 +102,7 @@ class DenmSender:
             originating_station_id=self._station, sequence_number=self._count % COUNTS
         )
         self._count += 1
-        self._tell(self._body(action, event, now_ns), event, now_ns)
+        self._send(self._body(action, event, now_ns), event, now_ns)
         return action
 
     def update(self, action: ActionId, event: Event, now_ns: int) -> None:
@@ -112,7 +112,7 @@ class DenmSender:
             MessageError: when it is not known any more, or somebody else's.
         """
         self._own(action)
-        self._tell(self._body(action, event, now_ns), event, now_ns)
+        self._send(self._body(action, event, now_ns), event, now_ns)
 
     def cancel(self, action: ActionId, now_ns: int) -> None:
         """Say that an event of one's own is over.
@@ -120,39 +120,39 @@ class DenmSender:
         Raises:
             MessageError: when it is not known any more, or somebody else's.
         """
-        told = self._own(action)
-        self._end(told.body, CANCELLATION, told.interval_ns, told.ends_ns, now_ns)
+        sent = self._own(action)
+        self._end(sent.body, CANCELLATION, sent.interval_ns, sent.ends_ns, now_ns)
 
-    def negate(self, heard: DenmBody, now_ns: int) -> None:
+    def negate(self, received: DenmBody, now_ns: int) -> None:
         """Say that somebody else's event, heard as `heard`, is over."""
-        management = heard.management_container
+        management = received.management_container
         interval_ns = (management.transmission_interval or 1000) * NS_PER_MS
-        self._end(heard, NEGATION, interval_ns, now_ns + _left_ns(heard, now_ns), now_ns)
+        self._end(received, NEGATION, interval_ns, now_ns + _left_ns(received, now_ns), now_ns)
 
     @property
     def is_busy(self) -> bool:
         """Whether there is something to send now or later."""
-        return bool(self._told)
+        return bool(self._sent)
 
     def due(self, now_ns: int) -> list[DenmBody]:
         """Return what has to be sent now; it counts as sent."""
-        self._told = {name: told for name, told in self._told.items() if told.ends_ns > now_ns}
+        self._sent = {name: sent for name, sent in self._sent.items() if sent.ends_ns > now_ns}
         bodies = []
-        for told in self._told.values():
-            if told.next_ns <= now_ns:
-                told.next_ns = now_ns + told.interval_ns
-                bodies.append(told.body)
+        for sent in self._sent.values():
+            if sent.next_ns <= now_ns:
+                sent.next_ns = now_ns + sent.interval_ns
+                bodies.append(sent.body)
         return bodies
 
-    def _own(self, action: ActionId) -> _Told:
-        told = self._told.get(action)
-        if told is None or told.body.management_container.termination is not None:
+    def _own(self, action: ActionId) -> _Sent:
+        sent = self._sent.get(action)
+        if sent is None or sent.body.management_container.termination is not None:
             msg = f"DENM: expected an event of this station that still lasts, got {action}"
             raise MessageError(msg)
-        return told
+        return sent
 
-    def _tell(self, body: DenmBody, event: Event, now_ns: int) -> None:
-        self._told[body.management_container.action_id] = _Told(
+    def _send(self, body: DenmBody, event: Event, now_ns: int) -> None:
+        self._sent[body.management_container.action_id] = _Sent(
             body, event.interval_ms * NS_PER_MS, now_ns + event.valid_s * NS_PER_S, now_ns
         )
 
@@ -171,11 +171,11 @@ class DenmSender:
             station_id=self._station,
             management_container=management,
         )
-        self._told[before.action_id] = _Told(ended, interval_ns, ends_ns, now_ns)
+        self._sent[before.action_id] = _Sent(ended, interval_ns, ends_ns, now_ns)
 
     def _body(self, action: ActionId, event: Event, now_ns: int) -> DenmBody:
         place = position_of(event.x_m, event.y_m)
-        known = self._told.get(action)
+        known = self._sent.get(action)
         now = its_time(now_ns)
         if known is not None:  # two updates within a millisecond
             now = max(now, known.body.management_container.reference_time + 1)
@@ -207,13 +207,13 @@ class DenmSender:
         )
 
 
-class DenmWatch:
+class DenmReceiver:
     """What a receiver knows of events around it; beyond 4096 the one that ends first is lost."""
 
     def __init__(self) -> None:
         self._known: dict[ActionId, tuple[DenmBody, int]] = {}
 
-    def hear(self, body: DenmBody, now_ns: int) -> Heard:
+    def receive(self, body: DenmBody, now_ns: int) -> Reception:
         """Take a DENM that arrived now; return what it was to this receiver."""
         management = body.management_container
         action, known = management.action_id, self._known.get(management.action_id)
@@ -226,7 +226,7 @@ class DenmWatch:
                 return "ignored"
             if management.reference_time == before.reference_time:
                 return "repetition"
-        if not _may_say(body, is_known=known is not None):
+        if not _may_send(body, is_known=known is not None):
             return "ignored"
         self._known[action] = body, now_ns + left_ns
         self._forget(now_ns)
@@ -245,11 +245,11 @@ class DenmWatch:
 
     def _forget(self, now_ns: int) -> None:
         self._known = {name: one for name, one in self._known.items() if one[1] > now_ns}
-        if len(self._known) > MOST_KNOWN:
+        if len(self._known) > MAX_EVENTS:
             del self._known[min(self._known, key=lambda name: self._known[name][1])]
 
 
-def _may_say(body: DenmBody, *, is_known: bool) -> bool:
+def _may_send(body: DenmBody, *, is_known: bool) -> bool:
     """Return whether a station may say this: its own events, or that another's is over."""
     management = body.management_container
     if management.termination == NEGATION:
@@ -348,11 +348,11 @@ class CarWarnings:
         """
         now_ns = state.t_ns
         for contact in contacts:
-            if contact.against and (self._hit_ns is None or now_ns - self._hit_ns >= HITS_NS):
+            if contact.against and (self._hit_ns is None or now_ns - self._hit_ns >= HIT_EVERY_NS):
                 self._sender.trigger(accident(contact, state), now_ns)
                 self._hit_ns = now_ns
         if has_braked is None:
-            is_moving = state.speed_mps > LEAST_BRAKING_MPS
+            is_moving = state.speed_mps > MIN_BRAKING_MPS
             has_braked = is_moving and state.accel_mps2 <= -HARD_BRAKING_MPS2
         if has_braked and not contacts:
             self._brake(state)
@@ -363,9 +363,9 @@ class CarWarnings:
 
     def _brake(self, state: VehicleState) -> None:
         hit_ns, braked_ns = self._hit_ns, self._braked_ns
-        was_hit = hit_ns is not None and state.t_ns - hit_ns < BRAKES_NS
-        has_told = braked_ns is not None and state.t_ns - braked_ns < BRAKES_NS
-        if not was_hit and not has_told:
+        was_hit = hit_ns is not None and state.t_ns - hit_ns < BRAKING_EVERY_NS
+        has_warned = braked_ns is not None and state.t_ns - braked_ns < BRAKING_EVERY_NS
+        if not was_hit and not has_warned:
             self._sender.trigger(hard_braking(state), state.t_ns)
             self._braked_ns = state.t_ns
 
@@ -379,7 +379,7 @@ class CarWarnings:
             return
         if self._since_ns is None:
             self._since_ns = now_ns
-        if self._stands is None and now_ns - self._since_ns >= STANDS_NS:
+        if self._stands is None and now_ns - self._since_ns >= STANDING_NS:
             self._stands = self._sender.trigger(stationary(state), now_ns), now_ns
         elif self._stands is not None and now_ns - self._stands[1] >= RENEW_NS:
             self._sender.update(self._stands[0], stationary(state), now_ns)

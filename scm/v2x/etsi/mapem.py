@@ -26,9 +26,9 @@ from scm.v2x.etsi.parts import (
 )
 
 MAPEM_ID = 5
-MOST_NODES, MOST_CONNECTIONS, MOST_APPROACHES, MOST_LANES = 63, 16, 15, 255
+MAX_NODES, MAX_CONNECTIONS, MAX_APPROACHES, MAX_LANES = 63, 16, 15, 255
 FARTHEST_CM = 32_767
-MOST_LANE_WIDTH_CM = 32_767
+MAX_LANE_WIDTH_CM = 32_767
 
 DIRECTIONS = ("ingressPath", "egressPath")
 """LaneDirection, first bit first; so are `SHARED` and `VEHICLE_LANE`."""
@@ -58,8 +58,8 @@ STRAIGHT, LEFT, RIGHT, U_TURN = range(4)
 """The first bits of a manoeuvre."""
 
 _Offset = Annotated[int, coded(-32_768, 32_767)]
-MOST_VELOCITY = 8190
-Velocity = Annotated[int, coded(0, 8191, unavailable=8191, out_of_range=(MOST_VELOCITY,))]
+MAX_VELOCITY = 8190
+Velocity = Annotated[int, coded(0, 8191, unavailable=8191, out_of_range=(MAX_VELOCITY,))]
 _Manoeuvres = Annotated[str, Meta(pattern="^[01]{12}$")]
 _Shared = Literal[
     "overlappingLaneDescriptionProvided",
@@ -148,7 +148,7 @@ class Node(msgspec.Struct, kw_only=True, frozen=True):
 class NodeList(msgspec.Struct, kw_only=True, frozen=True):
     """A lane's centre line, from the stop line outwards whichever way cars drive."""
 
-    nodes: Annotated[tuple[Node, ...], Meta(min_length=2, max_length=MOST_NODES)]
+    nodes: Annotated[tuple[Node, ...], Meta(min_length=2, max_length=MAX_NODES)]
 
 
 class LaneType(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
@@ -193,7 +193,7 @@ class MapLane(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     maneuvers: _Manoeuvres | None = None
     node_list: NodeList
     connects_to: (
-        Annotated[tuple[Connection, ...], Meta(min_length=1, max_length=MOST_CONNECTIONS)] | None
+        Annotated[tuple[Connection, ...], Meta(min_length=1, max_length=MAX_CONNECTIONS)] | None
     ) = None
 
 
@@ -206,7 +206,7 @@ class IntersectionGeometry(msgspec.Struct, kw_only=True, frozen=True, omit_defau
     ref_point: Position3d
     lane_width: Annotated[int, coded(0, 32_767)] | None = None
     speed_limits: Annotated[tuple[SpeedLimit, ...], Meta(min_length=1, max_length=9)] | None = None
-    lane_set: Annotated[tuple[MapLane, ...], Meta(min_length=1, max_length=MOST_LANES)]
+    lane_set: Annotated[tuple[MapLane, ...], Meta(min_length=1, max_length=MAX_LANES)]
 
 
 class MapemBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):

@@ -20,10 +20,10 @@ from scm.v2x.etsi.parts import NO_DELTA, DeltaPosition, PathPoint
 from scm.v2x.messages.vehicle_state import VehicleState
 
 EVERY_NS = 500 * NS_PER_MS
-MOST_POINTS = 23
+MAX_POINTS = 23
 APART_M, FARTHEST_M = 4.0 / SCALE, 200.0 / SCALE
 _TIME_STEP_NS = 10 * NS_PER_MS
-_MOST_TIME = 65_535
+_MAX_TIME = 65_535
 
 ROLE_NUMBERS = {"default": 0, "publicTransport": 1, "emergency": 6, "safetyCar": 7, "taxi": 12}
 """VehicleRole by name, those that cars of a city may have."""
@@ -35,13 +35,13 @@ class _At(NamedTuple):
     t_ns: int
 
 
-class SlowNews:
+class LowFrequencySender:
     """The low-frequency container of one car."""
 
     def __init__(self, role: str = "default") -> None:
         """Take the car's role, one of `ROLE_NUMBERS`."""
         self._role = ROLE_NUMBERS[role]
-        self._path: deque[_At] = deque(maxlen=MOST_POINTS)
+        self._path: deque[_At] = deque(maxlen=MAX_POINTS)
         self._sent_ns: int | None = None
 
     def due(self, state: VehicleState, front_m: float) -> LowFrequencyContainer | None:
@@ -86,7 +86,7 @@ def _point(before: _At, here: _At) -> PathPoint:
             delta_latitude=_delta(latitude_of(before.y_m) - latitude_of(here.y_m)),
             delta_longitude=_delta(longitude_of(before.x_m) - longitude_of(here.x_m)),
         ),
-        path_delta_time=max(1, min(_MOST_TIME, steps)),
+        path_delta_time=max(1, min(_MAX_TIME, steps)),
     )
 
 

@@ -14,7 +14,7 @@ from scm.records.city_map import Junction
 from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.etsi.codes import number_of, scaled
 from scm.v2x.etsi.convert import moment_of, position_of, roadside_station, station_id
-from scm.v2x.etsi.mapem import MOST_VELOCITY, Position3d
+from scm.v2x.etsi.mapem import MAX_VELOCITY, Position3d
 from scm.v2x.etsi.parts import PROTOCOL_VERSION, IntersectionId
 from scm.v2x.etsi.priority import (
     CANCEL,
@@ -42,13 +42,13 @@ Verb = Literal["request", "update", "cancel"]
 
 _TYPES: dict[Verb, int] = {"request": REQUEST, "update": UPDATE, "cancel": CANCEL}
 _VERBS: dict[int, Verb] = {number: verb for verb, number in _TYPES.items()}
-_MOST_LASTS_MS = 60_999
+_MAX_LASTS_MS = 60_999
 _FORWARD, _REVERSE = 2, 3
 NO_LANE = 0
 _STANDSTILL_MPS = 0.02
 
 
-class Wish(NamedTuple):
+class PriorityRequest(NamedTuple):
     """A wish for priority.
 
     Attributes:
@@ -74,14 +74,14 @@ class Wish(NamedTuple):
     sequence: int = 0
 
 
-class Answered(NamedTuple):
+class PriorityAnswer(NamedTuple):
     """What becomes of a wish: one of `STATUSES`."""
 
-    wish: Wish
+    request: PriorityRequest
     status: str
 
 
-def srem_of(wish: Wish, state: VehicleState) -> SremBody:
+def srem_of(request: PriorityRequest, state: VehicleState) -> SremBody:
     """Return the SREM by which a car asks; the car of the state is the wish's.
 
     Raises:
@@ -89,38 +89,38 @@ def srem_of(wish: Wish, state: VehicleState) -> SremBody:
         ValueError: for a role that there is not.
     """
     minute, millisecond = moment_of(state.t_ns)
-    arrives = None if wish.arrives_ns is None else moment_of(wish.arrives_ns)
+    arrives = None if request.arrives_ns is None else moment_of(request.arrives_ns)
     package = RequestPackage(
         request=SignalRequestRecord(
-            id=IntersectionId(id=wish.junction),
-            request_id=wish.number,
-            request_type=_TYPES[wish.verb],
-            inbound_lane=AccessPoint(lane=wish.lane_in or NO_LANE),
-            outbound_lane=AccessPoint(lane=wish.lane_out) if wish.lane_out else None,
+            id=IntersectionId(id=request.junction),
+            request_id=request.number,
+            request_type=_TYPES[request.verb],
+            inbound_lane=AccessPoint(lane=request.lane_in or NO_LANE),
+            outbound_lane=AccessPoint(lane=request.lane_out) if request.lane_out else None,
         ),
         minute=None if arrives is None else arrives[0],
         second=None if arrives is None else arrives[1],
         duration=None
-        if wish.lasts_s is None
-        else max(0, min(_MOST_LASTS_MS, round(wish.lasts_s * 1e3))),
+        if request.lasts_s is None
+        else max(0, min(_MAX_LASTS_MS, round(request.lasts_s * 1e3))),
     )
     return SremBody(
         protocol_version=PROTOCOL_VERSION,
         station_id=station_id(state.vehicle),
         timestamp=minute,
         second=millisecond,
-        sequence_number=wish.sequence % COUNTS,
+        sequence_number=request.sequence % COUNTS,
         requests=(package,),
-        requestor=_requestor(wish, state),
+        requestor=_requestor(request, state),
     )
 
 
-def _requestor(wish: Wish, state: VehicleState) -> Requestor:
+def _requestor(request: PriorityRequest, state: VehicleState) -> Requestor:
     place = position_of(state.x_m, state.y_m)
-    speed = min(MOST_VELOCITY, round(abs(state.speed_mps) * SCALE / 0.02))
+    speed = min(MAX_VELOCITY, round(abs(state.speed_mps) * SCALE / 0.02))
     return Requestor(
-        id=wish.station_id,
-        type=RequestorType(role=ROLES.index(wish.role)),
+        id=request.station_id,
+        type=RequestorType(role=ROLES.index(request.role)),
         position=RequestorPosition(
             position=Position3d(latitude=place.latitude, longitude=place.longitude),
             heading=round((90.0 - math.degrees(state.yaw_rad)) * 80.0) % 28_800,
@@ -133,11 +133,11 @@ def _requestor(wish: Wish, state: VehicleState) -> Requestor:
     )
 
 
-def wishes_of(body: SremBody, near_ns: int) -> tuple[Wish, ...]:
+def requests_of(body: SremBody, near_ns: int) -> tuple[PriorityRequest, ...]:
     """Return the wishes of an SREM that arrived about `near_ns`; reserved types are left out."""
     kind = body.requestor.type
     return tuple(
-        Wish(
+        PriorityRequest(
             station_id=body.requestor.id,
             number=package.request.request_id,
             junction=package.request.id.id,
@@ -170,7 +170,9 @@ def _moment_ns(minute: int | None, second: int | None, near_ns: int) -> int | No
     return min(times, key=lambda t_ns: abs(t_ns - near_ns))
 
 
-def ssem_of(junction: Junction, answers: Sequence[Answered], sequence: int, t_ns: int) -> SsemBody:
+def ssem_of(
+    junction: Junction, answers: Sequence[PriorityAnswer], sequence: int, t_ns: int
+) -> SsemBody:
     """Return the SSEM by which a junction's roadside station tells what becomes of wishes.
 
     Args:
@@ -195,18 +197,18 @@ def ssem_of(junction: Junction, answers: Sequence[Answered], sequence: int, t_ns
     )
 
 
-def _package(answer: Answered) -> SignalStatusPackage:
-    wish = answer.wish
-    arrives = None if wish.arrives_ns is None else moment_of(wish.arrives_ns)
+def _package(answer: PriorityAnswer) -> SignalStatusPackage:
+    request = answer.request
+    arrives = None if request.arrives_ns is None else moment_of(request.arrives_ns)
     return SignalStatusPackage(
         requester=Requester(
-            id=wish.station_id,
-            request=wish.number,
-            sequence_number=wish.sequence % COUNTS,
-            role=ROLES.index(wish.role),
+            id=request.station_id,
+            request=request.number,
+            sequence_number=request.sequence % COUNTS,
+            role=ROLES.index(request.role),
         ),
-        inbound_on=AccessPoint(lane=wish.lane_in or NO_LANE),
-        outbound_on=AccessPoint(lane=wish.lane_out) if wish.lane_out else None,
+        inbound_on=AccessPoint(lane=request.lane_in or NO_LANE),
+        outbound_on=AccessPoint(lane=request.lane_out) if request.lane_out else None,
         minute=None if arrives is None else arrives[0],
         second=None if arrives is None else arrives[1],
         status=STATUSES.index(answer.status),

@@ -20,12 +20,12 @@ from scm.v2x.etsi.convert import REVISIONS, moment_of, position_of, roadside_sta
 from scm.v2x.etsi.mapem import (
     FARTHEST_CM,
     LEFT,
-    MOST_APPROACHES,
-    MOST_CONNECTIONS,
-    MOST_LANE_WIDTH_CM,
-    MOST_LANES,
-    MOST_NODES,
-    MOST_VELOCITY,
+    MAX_APPROACHES,
+    MAX_CONNECTIONS,
+    MAX_LANE_WIDTH_CM,
+    MAX_LANES,
+    MAX_NODES,
+    MAX_VELOCITY,
     RIGHT,
     STRAIGHT,
     U_TURN,
@@ -136,20 +136,20 @@ def mapem_of(roads: Roads, junction: Junction) -> MapemBody:
     """
     topology = topology_of(roads, junction)
     stretches = (*topology.lanes_in, *topology.lanes_out)
-    if not stretches or len(stretches) > MOST_LANES:
-        msg = f"junction {junction.name}: expected 1 to {MOST_LANES} lanes, got {len(stretches)}"
+    if not stretches or len(stretches) > MAX_LANES:
+        msg = f"junction {junction.name}: expected 1 to {MAX_LANES} lanes, got {len(stretches)}"
         raise MapError(msg)
     ends = [roads.lane(stretch.lane).at(stretch.near_m) for stretch in topology.lanes_in]
     middle = (sum(end.x for end in ends) / len(ends), sum(end.y for end in ends) / len(ends))
     place = position_of(*middle)
     lane = roads.definition(topology.lanes_in[0].lane)
-    limit = SpeedLimit(speed=min(MOST_VELOCITY, round(lane.speed_limit_mps * _PER_SPEED_STEP)))
+    limit = SpeedLimit(speed=min(MAX_VELOCITY, round(lane.speed_limit_mps * _PER_SPEED_STEP)))
     geometry = IntersectionGeometry(
         name=junction.name,
         id=IntersectionId(id=junction.number),
         revision=roads.city_map.revision % REVISIONS,
         ref_point=Position3d(latitude=place.latitude, longitude=place.longitude),
-        lane_width=min(MOST_LANE_WIDTH_CM, round(lane.width_m * _CM)),
+        lane_width=min(MAX_LANE_WIDTH_CM, round(lane.width_m * _CM)),
         speed_limits=(limit,),
         lane_set=tuple(
             _lane(roads, topology, number, middle) for number in range(1, len(stretches) + 1)
@@ -173,9 +173,9 @@ def _lane(roads: Roads, topology: Topology, number: int, middle: tuple[float, fl
     inward = len(topology.lanes_in)
     leads_in = number <= inward
     stretch = topology.lanes_in[number - 1] if leads_in else topology.lanes_out[number - inward - 1]
-    approach = number if number <= MOST_APPROACHES else None
+    approach = number if number <= MAX_APPROACHES else None
     ways = [way for way in topology.ways if way.lane_in == number]
-    connections = tuple(_connection(roads, topology, way) for way in ways[:MOST_CONNECTIONS])
+    connections = tuple(_connection(roads, topology, way) for way in ways[:MAX_CONNECTIONS])
     turns = [connection.connecting_lane.maneuver or "" for connection in connections]
     return MapLane(
         lane_id=number,
@@ -225,7 +225,7 @@ def _nodes(roads: Roads, stretch: Stretch, middle: tuple[float, float]) -> tuple
     """Return the points of a stretch, rounded where they are so that no error adds up."""
     line = roads.lane(stretch.lane)
     length = stretch.far_m - stretch.near_m
-    steps = min(MOST_NODES - 1, max(1, math.ceil(abs(length) / NODE_M)))
+    steps = min(MAX_NODES - 1, max(1, math.ceil(abs(length) / NODE_M)))
     nodes = []
     x, y = (round(value * _CM) for value in middle)
     for step in range(steps + 1):

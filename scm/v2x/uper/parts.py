@@ -200,8 +200,8 @@ class _AccessPoint:
     """One of three in ASN.1, all three in the record: what is not told is 0 there."""
 
     def to_asn(self, record: Mapping[str, int]) -> tuple[str, int]:
-        told = next((name for name in ("lane", "approach", "connection") if record[name]), "lane")
-        return told, record[told]
+        value = next((name for name in ("lane", "approach", "connection") if record[name]), "lane")
+        return value, record[value]
 
     def of_asn(self, value: tuple[str, int]) -> dict[str, int]:
         return {"lane": 0, "approach": 0, "connection": 0, value[0]: value[1]}

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from scm.geometry import Pose2, wrap_angle
 from scm.v2x.etsi.cam_spatem import SCALE, SpatemBody
 from scm.v2x.etsi.codes import number_of, scaled
-from scm.v2x.etsi.convert import Told, colours_of, place_of
+from scm.v2x.etsi.convert import SignalState, colours_of, place_of
 from scm.v2x.etsi.mapem import IntersectionGeometry, MapemBody, MapLane
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.green_light import HORIZON, MIN_SPEED_SHARE, advised_speed
@@ -56,7 +56,7 @@ class GreenAdvisor:
     def __init__(self, limits: CarLimits, floor: float = MIN_SPEED_SHARE) -> None:
         self._limits, self._floor = limits, floor
         self._maps: dict[int, IntersectionGeometry] = {}
-        self._lights: dict[int, tuple[int, int, dict[int, Told]]] = {}
+        self._lights: dict[int, tuple[int, int, dict[int, SignalState]]] = {}
 
     def receive_mapem(self, body: MapemBody) -> None:
         """Store the lanes of junctions."""
@@ -88,7 +88,7 @@ class GreenAdvisor:
         signal = self._signal_for(number, lane, now_ns)
         return None if signal is None else self._advice(distance, number, lane, signal)
 
-    def _signal_for(self, number: int, lane: MapLane, now_ns: int) -> Told | None:
+    def _signal_for(self, number: int, lane: MapLane, now_ns: int) -> SignalState | None:
         """Return the present state of the group that releases a lane first."""
         arrived_ns, revision, groups = self._lights.get(number, (0, -1, {}))
         age_s = 1e-9 * (now_ns - arrived_ns)
@@ -105,7 +105,7 @@ class GreenAdvisor:
             likely_end_s=_later(first.likely_end_s, age_s),
         )
 
-    def _advice(self, distance: float, number: int, lane: MapLane, signal: Told) -> Advice:
+    def _advice(self, distance: float, number: int, lane: MapLane, signal: SignalState) -> Advice:
         allowed = _limit_mps(self._maps[number])
         wait = (signal.min_end_s or 0.0) if signal.colour == "red" else 0.0
         distance_left = distance - SHORT_OF_LINE

@@ -13,7 +13,7 @@ from scm.arrays import Floats, Ints
 from scm.clock import NS_PER_S
 from scm.v2x.etsi.convert import place_of
 from scm.v2x.etsi.denm import ActionId, DenmBody
-from scm.v2x.etsi.events import DenmWatch
+from scm.v2x.etsi.events import DenmReceiver
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived
 from scm.vehicles.jit import law
 
@@ -52,7 +52,7 @@ class HazardTable:
     """
 
     def __init__(self, channel: Channel) -> None:
-        self._watch = DenmWatch()
+        self._watch = DenmReceiver()
         self._rows: dict[ActionId, int] = {}
         self.hazards = Hazards(
             at=np.zeros((MAX_HAZARDS, 2)),
@@ -67,7 +67,7 @@ class HazardTable:
 
         A DENM without a position warns no driver.
         """
-        found, hazards = self._watch.hear(body, now_ns), self.hazards
+        found, hazards = self._watch.receive(body, now_ns), self.hazards
         action = body.management_container.action_id
         event = body.management_container.event_position
         place = place_of(event.latitude, event.longitude)

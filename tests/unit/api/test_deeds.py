@@ -20,7 +20,7 @@ from scm.v2x.message import Request
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
 from scm.v2x.messages.stop_request import StopRequest
-from scm.v2x.write_ahead import Keeper
+from scm.v2x.write_ahead import DirectWriter
 
 API = "/api/v1"
 REMOVAL = RemoveRequest(vehicle="n9", reason="battery empty")
@@ -138,7 +138,7 @@ class Other(Door):
 )
 def test_a_part_notes_who_sent_a_request_not_whom_it_concerns(store, request_, by):
     network = MemoryNetwork(StepClock(0))
-    station = Station(Door(), network.bus("city", "world"), Keeper(store, "world", "s"))
+    station = Station(Door(), network.bus("city", "world"), DirectWriter(store, "world", "s"))
     network.bus("city", "api").call(Call(request_), print)
     station.send(
         Answer(
@@ -154,7 +154,7 @@ def test_a_part_notes_who_sent_a_request_not_whom_it_concerns(store, request_, b
 
 def test_what_a_part_asks_bears_its_name(store):
     network = MemoryNetwork(StepClock(0))
-    station = Station(Door(), network.bus("city", "world"), Keeper(store, "world", "s"))
+    station = Station(Door(), network.bus("city", "world"), DirectWriter(store, "world", "s"))
     Station(Other(), network.bus("city", "demand")).send([Call(REMOVAL)])
     station.send(Answer(item, RemoveReply(vehicle="n9")) for item in station.inbox())
     assert asked_by(store) == ["demand"]

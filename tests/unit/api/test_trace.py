@@ -17,7 +17,7 @@ from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.stop_request import StopRequest
-from scm.v2x.write_ahead import Keeper
+from scm.v2x.write_ahead import DirectWriter
 
 GIVEN = "4bf92f3577b34da6a3ce929d0e0e4736"
 PARENT = f"00-{GIVEN}-00f067aa0ba902b7-01"
@@ -77,7 +77,7 @@ class Button:
 
 def test_a_station_says_in_log_and_audit_under_which_trace_it_did_something(caplog):
     store, network = MemoryStore(), MemoryNetwork(StepClock(0))
-    station = Station(Button(), network.bus("city", "world"), Keeper(store, "world", "s"))
+    station = Station(Button(), network.bus("city", "world"), DirectWriter(store, "world", "s"))
     request = StopRequest(engaged=True, by="ada", trace_id=GIVEN)
     network.bus("city", "api").call(Call(request), print)
     with caplog.at_level(logging.INFO, "scm.runtime.station"):

@@ -220,9 +220,9 @@ def test_a_guarded_city_lets_it_say_the_truth_and_no_vehicle_hear_it():
     key = key_of("city", EmulatedPose(vehicle="n7", t_ns=0, x_m=0, y_m=0, yaw_rad=0, speed_mps=0))
     key = key.removeprefix(prefix("city"))
     rights = rights_of("emulator", station_of("n7"))
-    assert any(fnmatchcase(key, pattern) for pattern in rights.says)
+    assert any(fnmatchcase(key, pattern) for pattern in rights.publishes)
     heard = [selector("city", wish.kind, wish.where) for wish in part().subscriptions]
-    assert [prefix("city") + pattern for pattern in rights.hears] == heard
+    assert [prefix("city") + pattern for pattern in rights.subscribes] == heard
     assert not any(
         fnmatchcase(key, pattern) for pattern in rights_of("vehicle", "n7").subscriptions
     )

@@ -23,7 +23,7 @@ from scm.v2x.etsi.convert import roadside_station, station_id
 from scm.v2x.etsi.events import DenmSender, accident, city_stop
 from scm.v2x.etsi.json_form import Body
 from scm.v2x.etsi.priority import STATUSES
-from scm.v2x.etsi.priority_requests import Answered, Wish, srem_of, ssem_of
+from scm.v2x.etsi.priority_requests import PriorityAnswer, PriorityRequest, srem_of, ssem_of
 from scm.v2x.etsi.topology import mapem_at, mapem_of, topology_of
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of
@@ -90,7 +90,7 @@ def _made(city_map, state):
     mapem = mapem_at(mapem_of(roads, junction), t_ns)
     lane = topology_of(roads, junction).lane_in(junction.groups[1].name)
     wishes = [
-        Wish(
+        PriorityRequest(
             station_id=station_id(state.vehicle),
             number=number,
             junction=junction.number,
@@ -106,7 +106,7 @@ def _made(city_map, state):
             [("request", "emergency"), ("update", "publicTransport"), ("cancel", "basicVehicle")]
         )
     ]
-    answers = [Answered(wish, status) for wish in wishes for status in STATUSES]
+    answers = [PriorityAnswer(wish, status) for wish in wishes for status in STATUSES]
     return {
         "mapem": (Said(rsu, t_ns, mapem),),
         "srem": tuple(Said(state.vehicle, t_ns, srem_of(wish, state)) for wish in wishes),

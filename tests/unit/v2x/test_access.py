@@ -14,7 +14,6 @@ from scm.clock import WallClock, seconds
 from scm.errors import AccessError, LinkError
 from scm.v2x import zenoh_config
 from scm.v2x.access import guard_of, is_local, own_stations, router_settings
-from scm.v2x.ask import ask
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.certificates import Pair, issue_station, make_authority
@@ -35,6 +34,7 @@ from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.trip import Trip
 from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.request_retry import send_request
 from scm.v2x.router import Router, free_endpoint
 
 CLOCK = WallClock()
@@ -270,7 +270,7 @@ def answer_all(bus, box, reply):
 
 
 def asked(guarded, by, request, deadline_s=PATIENCE_S):
-    return ask(guarded.bus(by), request, deadline_s)
+    return send_request(guarded.bus(by), request, deadline_s)
 
 
 @pytest.fixture(scope="module")

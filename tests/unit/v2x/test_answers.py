@@ -4,7 +4,7 @@ import pytest
 from msgspec import structs
 
 from scm.clock import NS_PER_S
-from scm.v2x.answers import KEPT_NS, LONGEST_ID, SURE_NS, AnswerBook
+from scm.v2x.answers import MAX_ID_LENGTH, MIN_RETENTION_NS, RETENTION_NS, AnswerCache
 from scm.v2x.exchange import Answer, Incoming
 from scm.v2x.message import Refused
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
@@ -19,123 +19,123 @@ def done(item, plan="calm"):
 
 
 def test_a_retry_gets_the_answer_that_was_given():
-    book, first = AnswerBook(), asked()
-    assert book.meet(first) == "do"
-    book.settle(done(first))
-    met = book.meet(asked())
+    cache, first = AnswerCache(), asked()
+    assert cache.check(first) == "do"
+    cache.complete(done(first))
+    met = cache.check(asked())
     assert met.reply == PlanReply(junction="x1", plan="calm")
 
 
 def test_a_retry_under_another_trace_is_the_same_request():
-    book, first = AnswerBook(), asked()
-    book.meet(first)
-    book.settle(done(first))
+    cache, first = AnswerCache(), asked()
+    cache.check(first)
+    cache.complete(done(first))
     again = structs.replace(asked().message, trace_id="4bf92f3577b34da6a3ce929d0e0e4736")
-    assert book.meet(Incoming(again, 0)).reply == PlanReply(junction="x1", plan="calm")
+    assert cache.check(Incoming(again, 0)).reply == PlanReply(junction="x1", plan="calm")
 
 
 def test_who_asks_while_it_is_done_waits_and_gets_the_same_answer():
-    book, first, second = AnswerBook(), asked(), asked()
-    assert book.meet(first) == "do"
-    assert book.meet(second) == "wait"
-    assert [answer.to for answer in book.settle(done(first))] == [first, second]
+    cache, first, second = AnswerCache(), asked(), asked()
+    assert cache.check(first) == "do"
+    assert cache.check(second) == "wait"
+    assert [answer.to for answer in cache.complete(done(first))] == [first, second]
 
 
 def test_an_id_of_another_request_is_refused_before_and_after_that_was_answered():
-    book, first = AnswerBook(), asked()
-    book.meet(first)
-    before = book.meet(asked(plan="busy"))
-    book.settle(done(first))
-    after = book.meet(asked(plan="busy"))
+    cache, first = AnswerCache(), asked()
+    cache.check(first)
+    before = cache.check(asked(plan="busy"))
+    cache.complete(done(first))
+    after = cache.check(asked(plan="busy"))
     assert [met.reply.code for met in (before, after)] == ["invalid", "invalid"]
 
 
 def test_without_an_id_everything_is_done_each_time():
-    book = AnswerBook()
-    assert [book.meet(asked("")) for _ in range(2)] == ["do", "do"]
+    cache = AnswerCache()
+    assert [cache.check(asked("")) for _ in range(2)] == ["do", "do"]
 
 
 def test_the_same_id_of_another_class_of_requests_is_another_one():
     from scm.v2x.messages.monitor_reset import MonitorReset
 
-    book = AnswerBook()
-    book.meet(asked())
+    cache = AnswerCache()
+    cache.check(asked())
     other = MonitorReset(junction="x1", by="t", reason="r", request_id="r1")
-    assert book.meet(Incoming(other, 0)) == "do"
+    assert cache.check(Incoming(other, 0)) == "do"
 
 
 def test_what_could_not_be_done_just_now_may_be_done_when_asked_again():
-    book, first = AnswerBook(), asked()
-    book.meet(first)
-    book.settle(Answer(first, Refused(code="offline", detail="not now")))
-    assert book.meet(asked()) == "do"
+    cache, first = AnswerCache(), asked()
+    cache.check(first)
+    cache.complete(Answer(first, Refused(code="offline", detail="not now")))
+    assert cache.check(asked()) == "do"
 
 
 def test_a_refusal_for_good_is_an_answer_as_any_other():
-    book, first = AnswerBook(), asked()
-    book.meet(first)
-    book.settle(Answer(first, Refused(code="full", detail="no room")))
-    assert book.meet(asked()).reply == Refused(code="full", detail="no room")
+    cache, first = AnswerCache(), asked()
+    cache.check(first)
+    cache.complete(Answer(first, Refused(code="full", detail="no room")))
+    assert cache.check(asked()).reply == Refused(code="full", detail="no room")
 
 
 def test_answers_are_read_back_from_what_was_stored():
-    book, first = AnswerBook(), asked()
-    book.meet(first)
-    again = AnswerBook(dict([book.record(done(first))]))
-    assert again.meet(asked()).reply == PlanReply(junction="x1", plan="calm")
-    assert again.meet(asked(plan="busy")).reply.code == "invalid"
+    cache, first = AnswerCache(), asked()
+    cache.check(first)
+    again = AnswerCache(dict([cache.record(done(first))]))
+    assert again.check(asked()).reply == PlanReply(junction="x1", plan="calm")
+    assert again.check(asked(plan="busy")).reply.code == "invalid"
 
 
 def test_after_a_day_an_answer_is_forgotten_and_named_to_the_store():
-    book, first = AnswerBook(), asked()
-    book.meet(first)
-    key, _ = book.record(done(first))
-    book.settle(done(first))
-    assert isinstance(book.meet(asked(t_ns=KEPT_NS)), Answer)
-    assert book.meet(asked(t_ns=KEPT_NS + 1)) == "do"
-    assert book.forgotten == [key]
+    cache, first = AnswerCache(), asked()
+    cache.check(first)
+    key, _ = cache.record(done(first))
+    cache.complete(done(first))
+    assert isinstance(cache.check(asked(t_ns=RETENTION_NS)), Answer)
+    assert cache.check(asked(t_ns=RETENTION_NS + 1)) == "do"
+    assert cache.dropped == [key]
 
 
 def test_a_full_book_refuses_what_is_new_rather_than_forget_a_young_answer():
-    book = AnswerBook(most=3)
+    cache = AnswerCache(most=3)
     for n in range(3):
         item = asked(f"r{n}", t_ns=n * NS_PER_S)
-        book.meet(item)
-        book.settle(done(item))
-    met = book.meet(asked("r3", t_ns=SURE_NS - 1))
+        cache.check(item)
+        cache.complete(done(item))
+    met = cache.check(asked("r3", t_ns=MIN_RETENTION_NS - 1))
     assert met.reply.code == "offline"
-    assert isinstance(book.meet(asked("r0", t_ns=SURE_NS - 1)), Answer)
-    assert book.meet(asked("r3", t_ns=SURE_NS)) == "do"
-    assert book.meet(asked("r0", t_ns=SURE_NS)).reply.code == "offline"
+    assert isinstance(cache.check(asked("r0", t_ns=MIN_RETENTION_NS - 1)), Answer)
+    assert cache.check(asked("r3", t_ns=MIN_RETENTION_NS)) == "do"
+    assert cache.check(asked("r0", t_ns=MIN_RETENTION_NS)).reply.code == "offline"
 
 
 def test_while_nothing_can_be_stored_only_what_is_known_is_answered():
-    book, first = AnswerBook(), asked()
-    book.meet(first)
-    book.settle(done(first))
-    assert book.meet(asked(), closed="disk full").reply == PlanReply(junction="x1", plan="calm")
-    assert book.meet(asked("r2"), closed="disk full").reply.detail == "disk full"
-    assert book.meet(asked(""), closed="disk full").reply.code == "offline"
+    cache, first = AnswerCache(), asked()
+    cache.check(first)
+    cache.complete(done(first))
+    assert cache.check(asked(), closed="disk full").reply == PlanReply(junction="x1", plan="calm")
+    assert cache.check(asked("r2"), closed="disk full").reply.detail == "disk full"
+    assert cache.check(asked(""), closed="disk full").reply.code == "offline"
 
 
-@pytest.mark.parametrize("request_id", ["\x00", "é\U0001f600", "/" * 20, "x" * LONGEST_ID])
+@pytest.mark.parametrize("request_id", ["\x00", "é\U0001f600", "/" * 20, "x" * MAX_ID_LENGTH])
 def test_whatever_an_id_is_made_of_its_key_is_plain(request_id):
-    book, first = AnswerBook(), asked(request_id)
-    assert book.meet(first) == "do"
-    key, _ = book.record(done(first))
+    cache, first = AnswerCache(), asked(request_id)
+    assert cache.check(first) == "do"
+    key, _ = cache.record(done(first))
     assert key.isascii()
     assert key.count("/") == 1
     assert len(key) < 60
 
 
 def test_an_id_without_end_is_refused():
-    met = AnswerBook().meet(asked("x" * (LONGEST_ID + 1)))
+    met = AnswerCache().check(asked("x" * (MAX_ID_LENGTH + 1)))
     assert met.reply.code == "invalid"
 
 
 def test_a_second_answer_to_one_request_changes_nothing():
-    book, first = AnswerBook(), asked()
-    book.meet(first)
-    book.settle(done(first))
-    assert book.settle(done(first, "busy")) == []
-    assert book.meet(asked()).reply.plan == "calm"
+    cache, first = AnswerCache(), asked()
+    cache.check(first)
+    cache.complete(done(first))
+    assert cache.complete(done(first, "busy")) == []
+    assert cache.check(asked()).reply.plan == "calm"

@@ -7,7 +7,7 @@ from scm.clock import NS_PER_S, StepClock
 from scm.errors import MessageError
 from scm.v2x.bus import Mailbox, RawMailbox
 from scm.v2x.bus_memory import MemoryNetwork
-from scm.v2x.copies import KEPT
+from scm.v2x.copies import MIN_REMEMBERED
 from scm.v2x.etsi.convert import cam_of
 from scm.v2x.exchange import Incoming, RawSample
 from scm.v2x.mailbox import drain_all
@@ -157,9 +157,9 @@ def test_what_is_not_believed_keeps_no_copy_from_being_read():
 
 def test_old_copies_are_forgotten():
     reader = Reader(StepClock())
-    for t_ns in range(2 * KEPT + 1):
+    for t_ns in range(2 * MIN_REMEMBERED + 1):
         assert reader.read_once(*heard_by("a", t_ns=t_ns)) is not None
-    assert reader.read_once(*heard_by("b", t_ns=2 * KEPT)) is None
+    assert reader.read_once(*heard_by("b", t_ns=2 * MIN_REMEMBERED)) is None
     assert reader.read_once(*heard_by("b", t_ns=0)) is not None
 
 

@@ -8,7 +8,7 @@ import pytest
 from scm.clock import WallClock, seconds
 from scm.errors import LinkError, RunError
 from scm.v2x.bus import Mailbox
-from scm.v2x.bus_zenoh import ASK_AGAIN_FOR_ALL, ZenohBus, ask_again
+from scm.v2x.bus_zenoh import REQUERY_ALL_EVERY, ZenohBus, requery_interval
 from scm.v2x.exchange import Call
 from scm.v2x.message import encode
 from scm.v2x.messages.city_event import CityEvent
@@ -79,9 +79,9 @@ def test_a_station_waits_for_a_router_that_comes_later(endpoint):
 
 
 def test_only_events_without_a_rate_are_asked_for_again():
-    assert ask_again(CityEvent, ASK_AGAIN_FOR_ALL) == ASK_AGAIN_FOR_ALL
-    assert ask_again(None, ASK_AGAIN_FOR_ALL) == ASK_AGAIN_FOR_ALL
-    assert ask_again(Trip, ASK_AGAIN_FOR_ALL) is None
+    assert requery_interval(CityEvent, REQUERY_ALL_EVERY) == REQUERY_ALL_EVERY
+    assert requery_interval(None, REQUERY_ALL_EVERY) == REQUERY_ALL_EVERY
+    assert requery_interval(Trip, REQUERY_ALL_EVERY) is None
 
 
 def test_two_routers_at_one_endpoint_are_refused(router):

@@ -5,19 +5,19 @@ import pytest
 
 from scm.clock import NS_PER_MS
 from scm.v2x.congestion import (
-    AROUND_BYTES,
+    ACTIVE_3_LIMIT,
     BYTES,
-    TARGET,
+    OVERHEAD_BYTES,
     WINDOW_NS,
-    OwnControl,
     ReactiveControl,
+    StationControl,
     air_time,
     load_loss,
 )
 
 
 def test_a_frame_takes_the_preamble_and_whole_symbols():
-    symbols = -(-(22 + 8 * (BYTES["cam"] + AROUND_BYTES)) // 48)
+    symbols = -(-(22 + 8 * (BYTES["cam"] + OVERHEAD_BYTES)) // 48)
     assert air_time("cam", 6.0) == pytest.approx(40e-6 + 8e-6 * symbols)
     assert air_time("cam", 0.0) == 0.0
 
@@ -35,19 +35,19 @@ def test_a_busy_channel_makes_stations_speak_less_step_by_step():
     control = ReactiveControl(1)
     gaps = []
     for window in range(5):
-        control.measure(np.array([0.7]), window * WINDOW_NS)
+        control.update(np.array([0.7]), window * WINDOW_NS)
         gaps.append(control.gap_ns[0] // NS_PER_MS)
     assert gaps == [100, 200, 250, 1000, 1000]
 
 
 def test_a_quiet_channel_lets_them_speak_more_after_five_seconds():
     control = ReactiveControl(1)
-    control.measure(np.array([0.35]), 0)
+    control.update(np.array([0.35]), 0)
     for window in range(1, 40):
-        control.measure(np.array([0.1]), window * WINDOW_NS)
+        control.update(np.array([0.1]), window * WINDOW_NS)
     assert control.gap_ns[0] == 100 * NS_PER_MS
     for window in range(40, 62):
-        control.measure(np.array([0.1]), window * WINDOW_NS)
+        control.update(np.array([0.1]), window * WINDOW_NS)
     assert control.gap_ns[0] == 50 * NS_PER_MS
 
 
@@ -64,27 +64,27 @@ def closed_loop(cars, windows, *, controlled):
         before += due.sum() * cam_s
         if tick % 5 == 4:
             ratios.append(before / (WINDOW_NS * 1e-9))
-            control.measure(np.full(cars, min(1.0, np.mean(ratios[-2:]))), now_ns)
+            control.update(np.full(cars, min(1.0, np.mean(ratios[-2:]))), now_ns)
             before = 0.0
     return 0.5 * (np.array(ratios[20:]) + np.array(ratios[19:-1]))
 
 
 def test_control_keeps_two_hundred_cars_in_range_under_the_target():
-    assert closed_loop(200, 300, controlled=False).min() > TARGET
+    assert closed_loop(200, 300, controlled=False).min() > ACTIVE_3_LIMIT
     ratios = closed_loop(200, 300, controlled=True)
-    assert ratios.mean() < TARGET
-    assert np.mean(ratios > TARGET) < 0.05
+    assert ratios.mean() < ACTIVE_3_LIMIT
+    assert np.mean(ratios > ACTIVE_3_LIMIT) < 0.05
 
 
-def alone(frames_a_window, *, is_on=True, told=None, seconds=3.0, told_until_s=np.inf):
+def alone(frames_a_window, *, is_on=True, reported_ratio=None, seconds=3.0, told_until_s=np.inf):
     """Return the gap [ms] of a station that hears so many CAMs in 100 ms, told every second."""
-    control = OwnControl(6.0, is_on=is_on)
+    control = StationControl(6.0, is_on=is_on)
     for step in range(round(seconds * 100)):
         now_ns = step * 10 * NS_PER_MS
         for _ in range(frames_a_window // 10):
-            control.hear("cam", now_ns)
-        if told is not None and step % 100 == 0 and step < 100 * told_until_s:
-            control.told(told, now_ns)
+            control.add_frame("cam", now_ns)
+        if reported_ratio is not None and step % 100 == 0 and step < 100 * told_until_s:
+            control.set_ratio(reported_ratio, now_ns)
         gap = control.gap_ns(now_ns) / NS_PER_MS
     return gap
 
@@ -97,6 +97,6 @@ def test_a_station_alone_speaks_less_by_what_it_hears():
 
 
 def test_what_it_is_told_goes_before_what_it_hears_while_it_is_fresh():
-    assert alone(0, told=0.45) == 200
-    assert alone(130, told=0.1) == 50
-    assert alone(130, told=0.1, seconds=6.0, told_until_s=2.0) == 200
+    assert alone(0, reported_ratio=0.45) == 200
+    assert alone(130, reported_ratio=0.1) == 50
+    assert alone(130, reported_ratio=0.1, seconds=6.0, told_until_s=2.0) == 200

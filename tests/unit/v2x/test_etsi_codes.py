@@ -30,8 +30,15 @@ from scm.v2x.etsi.events import DenmSender, stationary
 from scm.v2x.etsi.json_form import KINDS
 from scm.v2x.etsi.mapem import MapemBody
 from scm.v2x.etsi.parts import Altitude
-from scm.v2x.etsi.path import SlowNews
-from scm.v2x.etsi.priority_requests import Answered, Wish, answers_of, srem_of, ssem_of, wishes_of
+from scm.v2x.etsi.path import LowFrequencySender
+from scm.v2x.etsi.priority_requests import (
+    PriorityAnswer,
+    PriorityRequest,
+    answers_of,
+    requests_of,
+    srem_of,
+    ssem_of,
+)
 from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.spat import SignalGroup, Spat
@@ -118,7 +125,7 @@ def test_the_page_shows_the_table():
 @cache
 def bodies():
     state = a_state(x_m=1.0, y_m=0.5)
-    news = SlowNews()
+    news = LowFrequencySender()
     news.due(a_state(t_ns=NOW - NS_PER_S), 0.2)
     groups = tuple(
         SignalGroup(
@@ -131,7 +138,7 @@ def bodies():
         junction=JUNCTION.name, t_ns=NOW, seq=0, mode="plan", plan="calm", groups=groups,
         revision=MAP.revision,
     )  # fmt: skip
-    wish = Wish(
+    wish = PriorityRequest(
         station_id=station_id("n1"), number=1, junction=JUNCTION.number, lane_in=2, lane_out=4,
         arrives_ns=NOW + NS_PER_S, lasts_s=3.0,
     )  # fmt: skip
@@ -145,7 +152,7 @@ def bodies():
         "spatem": spatem_of(spat, JUNCTION),
         "mapem": mapem_of(ROADS, JUNCTION),
         "srem": srem_of(wish, state),
-        "ssem": ssem_of(JUNCTION, [Answered(wish, "granted")], 0, NOW),
+        "ssem": ssem_of(JUNCTION, [PriorityAnswer(wish, "granted")], 0, NOW),
     }
 
 
@@ -212,7 +219,7 @@ def read(kind, body):
         # who knows no end of a red is advised the limit
         return numbers_in([colours_of(body), told and told._replace(speed_mps=None)])
     if kind == "srem":
-        return numbers_in(list(wishes_of(body, NOW)))
+        return numbers_in(list(requests_of(body, NOW)))
     return numbers_in(answers_of(body, station_id("n1")))
 
 

@@ -13,8 +13,8 @@ from scm.v2x.etsi.events import (
     DANGEROUS_SITUATION,
     STATIONARY_VEHICLE,
     CarWarnings,
+    DenmReceiver,
     DenmSender,
-    DenmWatch,
     Event,
 )
 from scm.v2x.messages.contact import Contact
@@ -77,32 +77,32 @@ def test_what_is_over_cannot_be_told_again():
 
 
 def test_a_receiver_follows_an_event_from_beginning_to_end():
-    sender, watch = DenmSender("n1"), DenmWatch()
+    sender, watch = DenmSender("n1"), DenmReceiver()
     action = sender.trigger(EVENT, NOW)
     (first,) = sender.due(NOW)
-    assert watch.hear(first, NOW) == "new"
-    assert watch.hear(first, NOW + NS_PER_S) == "repetition"
+    assert watch.receive(first, NOW) == "new"
+    assert watch.receive(first, NOW + NS_PER_S) == "repetition"
     sender.update(action, EVENT, NOW + NS_PER_S)
     (second,) = sender.due(NOW + NS_PER_S)
-    assert watch.hear(second, NOW + NS_PER_S) == "update"
-    assert watch.hear(first, NOW + NS_PER_S) == "ignored"
+    assert watch.receive(second, NOW + NS_PER_S) == "update"
+    assert watch.receive(first, NOW + NS_PER_S) == "ignored"
     assert watch.events(NOW + NS_PER_S) == (second,)
     sender.cancel(action, NOW + 2 * NS_PER_S)
     (ended,) = sender.due(NOW + 2 * NS_PER_S)
-    assert watch.hear(ended, NOW + 2 * NS_PER_S) == "ended"
-    assert watch.hear(second, NOW + 2 * NS_PER_S) == "ignored"
+    assert watch.receive(ended, NOW + 2 * NS_PER_S) == "ended"
+    assert watch.receive(second, NOW + 2 * NS_PER_S) == "ignored"
     assert watch.events(NOW + 2 * NS_PER_S) == ()
 
 
 def test_an_event_that_nobody_tells_of_again_ends_by_itself():
-    sender, watch = DenmSender("n1"), DenmWatch()
+    sender, watch = DenmSender("n1"), DenmReceiver()
     sender.trigger(EVENT, NOW)
     (body,) = sender.due(NOW)
     late = NOW + 4 * NS_PER_S
-    assert watch.hear(body, late) == "new"
+    assert watch.receive(body, late) == "new"
     assert watch.events(NOW + 10 * NS_PER_S - 2 * NS_PER_MS) == (body,)
     assert watch.events(NOW + 10 * NS_PER_S + NS_PER_MS) == ()
-    assert watch.hear(body, NOW + 11 * NS_PER_S) == "ignored"
+    assert watch.receive(body, NOW + 11 * NS_PER_S) == "ignored"
 
 
 def test_another_station_may_deny_what_the_receiver_knows_and_nothing_else():
@@ -112,10 +112,10 @@ def test_another_station_may_deny_what_the_receiver_knows_and_nothing_else():
     other.negate(body, NOW + NS_PER_S)
     (denial,) = other.due(NOW + NS_PER_S)
     assert denial.management_container.termination == NEGATION
-    stranger, watch = DenmWatch(), DenmWatch()
-    assert stranger.hear(denial, NOW + NS_PER_S) == "ignored"
-    watch.hear(body, NOW)
-    assert watch.hear(denial, NOW + NS_PER_S) == "ended"
+    stranger, watch = DenmReceiver(), DenmReceiver()
+    assert stranger.receive(denial, NOW + NS_PER_S) == "ignored"
+    watch.receive(body, NOW)
+    assert watch.receive(denial, NOW + NS_PER_S) == "ended"
 
 
 def test_nobody_speaks_of_events_in_anothers_name():
@@ -127,19 +127,19 @@ def test_nobody_speaks_of_events_in_anothers_name():
         station_id=body.station_id + 1,
         management_container=body.management_container,
     )
-    assert DenmWatch().hear(forged, NOW) == "ignored"
+    assert DenmReceiver().receive(forged, NOW) == "ignored"
 
 
 @given(order=st.permutations(range(4)))
 def test_the_newest_word_wins_in_whatever_order_it_comes(order):
-    sender, watch = DenmSender("n1"), DenmWatch()
+    sender, watch = DenmSender("n1"), DenmReceiver()
     action = sender.trigger(EVENT, NOW)
     said = sender.due(NOW)
     for step in (1, 2, 3):
         sender.update(action, EVENT._replace(x_m=float(step)), NOW + step * NS_PER_S)
         said += sender.due(NOW + step * NS_PER_S)
     for number in order:
-        watch.hear(said[number], NOW + 4 * NS_PER_S)
+        watch.receive(said[number], NOW + 4 * NS_PER_S)
     assert watch.events(NOW + 4 * NS_PER_S) == (said[3],)
 
 
@@ -157,15 +157,15 @@ def test_a_hit_car_warns_once_of_many_contacts():
 
 @pytest.mark.parametrize(("mode", "warns"), [("drive", False), ("hold", True), ("stop", True)])
 def test_a_car_warns_of_itself_while_its_guard_keeps_it_standing(mode, warns):
-    car, watch = CarWarnings("n1"), DenmWatch()
+    car, watch = CarWarnings("n1"), DenmReceiver()
     for ms in range(0, 60_000, 100):
         now = NOW + ms * NS_PER_MS
         for body in car.step(state(now, mode)):
-            watch.hear(body, now)
+            watch.receive(body, now)
     causes = [b.situation_container.event_type.cause for b in watch.events(now)]
     assert causes == ([STATIONARY_VEHICLE] if warns else [])
     (*ended,) = car.step(state(now + NS_PER_S, "drive", 0.2))
-    assert [watch.hear(body, now + NS_PER_S) for body in ended] == (["ended"] if warns else [])
+    assert [watch.receive(body, now + NS_PER_S) for body in ended] == (["ended"] if warns else [])
 
 
 def braking(accels, speed_mps=0.2, contacts=()):

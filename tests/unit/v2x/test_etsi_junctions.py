@@ -9,8 +9,15 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.v2x.etsi.convert import place_of, spatem_of, station_id
-from scm.v2x.etsi.path import MOST_POINTS, SlowNews
-from scm.v2x.etsi.priority_requests import Answered, Wish, answers_of, srem_of, ssem_of, wishes_of
+from scm.v2x.etsi.path import MAX_POINTS, LowFrequencySender
+from scm.v2x.etsi.priority_requests import (
+    PriorityAnswer,
+    PriorityRequest,
+    answers_of,
+    requests_of,
+    srem_of,
+    ssem_of,
+)
 from scm.v2x.etsi.topology import mapem_of, topology_of
 from scm.v2x.messages.spat import SignalGroup, Spat
 from tests.unit.v2x.test_etsi_convert import NOW, a_state
@@ -92,7 +99,7 @@ def test_groups_and_lanes_find_each_other():
 
 
 def a_wish(**changes):
-    wish = Wish(
+    wish = PriorityRequest(
         station_id=station_id("n1"), number=5, junction=7, lane_in=2, role="emergency",
         arrives_ns=NOW + 3 * NS_PER_S, lasts_s=2.5, sequence=9,
     )  # fmt: skip
@@ -102,22 +109,22 @@ def a_wish(**changes):
 @pytest.mark.parametrize("verb", ["request", "update", "cancel"])
 def test_a_wish_is_read_back_by_the_junction(verb):
     wish = a_wish(verb=verb, lane_out=3)
-    assert wishes_of(srem_of(wish, a_state()), NOW + NS_PER_S) == (wish,)
+    assert requests_of(srem_of(wish, a_state()), NOW + NS_PER_S) == (wish,)
 
 
 @pytest.mark.parametrize("t_s", [0, -3600, 364 * 86_400])
 def test_an_arrival_is_understood_across_the_turn_of_the_year(t_s):
     arrives = (1_798_761_600 + t_s) * NS_PER_S + 250 * NS_PER_MS
     body = srem_of(a_wish(arrives_ns=arrives), a_state(t_ns=arrives - 5 * NS_PER_S))
-    (wish,) = wishes_of(body, arrives - 5 * NS_PER_S)
+    (wish,) = requests_of(body, arrives - 5 * NS_PER_S)
     assert wish.arrives_ns == arrives
 
 
 def test_a_car_hears_its_own_answer_alone():
     junction = ROADS["driving_school"].city_map.junctions[0]
     answers = [
-        Answered(a_wish(), "granted"),
-        Answered(a_wish(station_id=1, number=6), "rejected"),
+        PriorityAnswer(a_wish(), "granted"),
+        PriorityAnswer(a_wish(station_id=1, number=6), "rejected"),
     ]
     body = ssem_of(junction, answers, 1, NOW)
     assert answers_of(body, station_id("n1")) == {(junction.number, 5): "granted"}
@@ -125,7 +132,7 @@ def test_a_car_hears_its_own_answer_alone():
 
 
 def test_slow_news_comes_every_half_second_and_tells_the_way_back():
-    news, told = SlowNews(role="emergency"), []
+    news, told = LowFrequencySender(role="emergency"), []
     for step in range(200):
         t_ns, x_m = NOW + step * 100 * NS_PER_MS, 0.026 * step
         state = a_state(t_ns=t_ns, x_m=x_m, y_m=0.5 * x_m, lights=("left",))
@@ -137,7 +144,7 @@ def test_slow_news_comes_every_half_second_and_tells_the_way_back():
     assert last.vehicle_role == 6
     assert last.exterior_lights.left_turn_signal_on
     assert not last.exterior_lights.low_beam_headlights_on
-    assert len(last.path_history) <= MOST_POINTS
+    assert len(last.path_history) <= MAX_POINTS
     west = sum(point.path_position.delta_longitude for point in last.path_history)
     south = sum(point.path_position.delta_latitude for point in last.path_history)
     x_m, y_m = place_of(-south, -west)

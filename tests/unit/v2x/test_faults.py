@@ -6,7 +6,7 @@ from scm.clock import NS_PER_S, StepClock
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_memory import MemoryNetwork
 from scm.v2x.exchange import Answer, Call
-from scm.v2x.faults import Faults, Weather
+from scm.v2x.faults import FaultRates, Faults
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spat import Spat
@@ -19,7 +19,7 @@ def spat(seq):
 class Net:
     def __init__(self, seed=1, **weather):
         self.clock = StepClock()
-        self.faults = Faults(seed, Weather(**weather))
+        self.faults = Faults(seed, FaultRates(**weather))
         self.network = MemoryNetwork(self.clock, self.faults)
         self.sender, self.hearer = (self.network.bus("city", name) for name in ("a", "b"))
         self.heard = Mailbox(10_000)
@@ -42,7 +42,7 @@ def test_about_as_much_is_lost_as_was_said():
 
 
 def test_about_as_much_comes_twice_as_was_said():
-    came = Net(double=0.25).send()
+    came = Net(duplicate=0.25).send()
     assert set(came) == set(range(400))
     assert 60 < len(came) - 400 < 140
 
@@ -64,17 +64,17 @@ def test_what_is_late_has_the_time_of_its_arrival():
 
 
 def test_one_seed_is_one_history_and_another_is_another():
-    facts = {"drop": 0.2, "double": 0.2, "late": 0.5}
+    facts = {"drop": 0.2, "duplicate": 0.2, "late": 0.5}
     assert Net(3, **facts).send() == Net(3, **facts).send() != Net(4, **facts).send()
 
 
 def test_the_two_sides_of_a_partition_hear_nothing_of_each_other_until_it_ends():
     net = Net()
-    net.faults.cut_off(["b"])
+    net.faults.partition(["b"])
     assert net.send(3) == []
-    net.faults.cut_off(["a", "b"])
+    net.faults.partition(["a", "b"])
     assert net.send(3) == [0, 1, 2]
-    net.faults.cut_off([])
+    net.faults.partition([])
     assert net.send(3) == [0, 1, 2]
 
 
@@ -97,7 +97,7 @@ def asking(net):
 
 
 def test_a_request_may_come_twice_and_its_reply_comes_once():
-    net = Net(double=1.0)
+    net = Net(duplicate=1.0)
     requests, replies = asking(net)
     items = requests.drain()
     assert len(items) == 2
@@ -112,7 +112,7 @@ def test_a_lost_request_or_answer_is_a_timeout(lost):
     requests, replies = asking(net)
     items = requests.drain()
     assert len(items) == (lost == "answer")
-    net.faults.weather = Weather(drop=1.0)
+    net.faults.rates = FaultRates(drop=1.0)
     for item in items:
         net.hearer.answer(Answer(item, PlanReply(junction="x1", plan="calm")))
     net.clock.set_ns(3 * NS_PER_S)

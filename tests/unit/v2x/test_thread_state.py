@@ -51,13 +51,13 @@ def test_a_thread_that_brings_messages_is_known_again():
 def kept_by(states, threads, times=1):
     def keep():
         for _ in range(times):
-            states.keep()
+            states.pin()
 
     for _ in range(threads):
         thread = threading.Thread(target=keep)
         thread.start()
         thread.join()
-    return states.kept
+    return states.pinned
 
 
 def test_a_thread_is_kept_once():
@@ -65,5 +65,5 @@ def test_a_thread_is_kept_once():
 
 
 def test_no_more_are_kept_than_may_be(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(thread_state, "MOST", 3)
+    monkeypatch.setattr(thread_state, "MAX_THREADS", 3)
     assert kept_by(ThreadStates(), 5) == 3

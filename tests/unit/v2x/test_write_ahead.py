@@ -8,7 +8,7 @@ from scm.errors import StoreError
 from scm.store.audit import AuditLog, Deed
 from scm.store.memory import MemoryStore
 from scm.v2x import write_ahead
-from scm.v2x.write_ahead import Batch, Keeper, KeeperBehind
+from scm.v2x.write_ahead import BackgroundWriter, Batch, DirectWriter
 
 PATIENCE_S = 20.0
 
@@ -47,7 +47,7 @@ def batch(n):
     return Batch([("leases", f"k{n}", b"v")], [Deed(t_ns=n, station="w", kind="K")], [])
 
 
-@pytest.fixture(params=[Keeper, KeeperBehind])
+@pytest.fixture(params=[DirectWriter, BackgroundWriter])
 def kind(request):
     return request.param
 
@@ -124,7 +124,7 @@ def test_what_waits_is_stored_before_the_end(kind, store, monkeypatch):
 
 
 def test_an_end_is_not_kept_waiting_by_a_store_that_fails(store):
-    keeper = KeeperBehind(store, "world", "s1")
+    keeper = BackgroundWriter(store, "world", "s1")
     store.sickness = "before"
     keeper.write(batch(1))
     keeper.close()
@@ -134,7 +134,7 @@ def test_an_end_is_not_kept_waiting_by_a_store_that_fails(store):
 
 
 def test_a_mistake_of_ours_on_the_thread_reaches_the_part(store):
-    keeper = KeeperBehind(store, "world", "s1")
+    keeper = BackgroundWriter(store, "world", "s1")
     keeper.write(Batch([("no such table", "k", b"v")], [], []))
     keeper._thread.join(PATIENCE_S)
     with pytest.raises(KeyError):

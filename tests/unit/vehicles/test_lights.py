@@ -71,7 +71,7 @@ def test_a_driver_about_to_turn_indicates_unless_something_else_was_told():
 
 
 def test_a_command_changes_only_what_it_names():
-    low = OFF.told("low", None)
+    low = OFF.updated("low", None)
     assert low == Switches("low", "off")
-    assert low.told(None, "hazard") == Switches("low", "hazard")
-    assert low.told(None, None) is low
+    assert low.updated(None, "hazard") == Switches("low", "hazard")
+    assert low.updated(None, None) is low

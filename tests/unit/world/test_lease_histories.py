@@ -12,10 +12,10 @@ from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import BasePart
 from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
-from scm.v2x.ask import Asking
-from scm.v2x.faults import Faults, Weather
+from scm.v2x.faults import FaultRates, Faults
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
+from scm.v2x.request_retry import RetriedRequest
 from scm.vehicles.guard import Guard
 from scm.world import driving
 from scm.world.part import WorldPart
@@ -41,7 +41,7 @@ class Owner(BasePart):
     def step(self, now_ns, inbox):
         for item in inbox:
             asking = next(a for a in self.askings if a.request is item.call.request)
-            asking.heard(item)
+            asking.receive(item)
             reply = asking.reply
             if isinstance(reply, LeaseReply) and reply.owner == self.name:
                 self.epochs.append(reply.epoch)
@@ -97,7 +97,9 @@ class Leases(RuleBasedStateMachine):
         request = LeaseRequest(
             request_id=f"r{self.asked}", vehicle=CAR, owner=owner, verb=verb, **more
         )
-        self.owners[owner].askings.append(Asking(request, self.city.now_ns, 60.0, try_s=0.5))
+        self.owners[owner].askings.append(
+            RetriedRequest(request, self.city.now_ns, 60.0, try_s=0.5)
+        )
 
     @rule(owner=st.sampled_from(sorted(OWNERS)), ttl_ms=st.sampled_from([100, 1000, 60_000]))
     def acquire(self, owner, ttl_ms):
@@ -124,11 +126,11 @@ class Leases(RuleBasedStateMachine):
         late_s=st.sampled_from([0.1, 2.0]),
     )
     def turn_weather(self, drop, double, late, late_s):
-        self.faults.weather = Weather(drop=drop, double=double, late=late, late_s=late_s)
+        self.faults.rates = FaultRates(drop=drop, duplicate=double, late=late, late_s=late_s)
 
     @rule(away=st.sets(st.sampled_from([*OWNERS, "world"])))
     def cut_off(self, away):
-        self.faults.cut_off(away)
+        self.faults.partition(away)
 
     @rule(span_s=st.sampled_from([0.02, 0.1, 0.5, 1.5]))
     def wait(self, span_s):

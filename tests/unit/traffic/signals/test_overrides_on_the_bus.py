@@ -10,7 +10,7 @@ from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
 from scm.traffic.signals.part import TrafficPart
 from scm.v2x.etsi.convert import cam_of, station_id
-from scm.v2x.etsi.priority_requests import Wish, answers_of, srem_of
+from scm.v2x.etsi.priority_requests import PriorityRequest, answers_of, srem_of
 from scm.v2x.message import Refused
 from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.city_event import CityEvent
@@ -110,7 +110,7 @@ def test_under_fixed_time_nobody_listens_to_cars_and_under_a_policy_somebody_doe
 
 
 def ask(city, verb="request", vehicle="n1", station="n1"):
-    request = Wish(
+    request = PriorityRequest(
         station_id=station_id(vehicle), number=3, junction=1, lane_in=2, verb=verb, role="ambulance"
     )
     body = srem_of(request, state_at(city, "crossing_south_west", 0.0, vehicle))

@@ -17,10 +17,10 @@ from scm.v2x.exchange import Call, Incoming
 from scm.v2x.key import key_of
 from scm.v2x.message import Message, Refused, Request
 
-TRY_S = 1.0
-PAUSE_S = 0.1
-LONGEST_PAUSE_S = 1.0
-AGAIN = ("timeout", "offline")
+DEFAULT_TRY_S = 1.0
+FIRST_PAUSE_S = 0.1
+MAX_PAUSE_S = 1.0
+RETRIED_CODES = ("timeout", "offline")
 
 
 def with_id(request: Request) -> Request:
@@ -30,7 +30,7 @@ def with_id(request: Request) -> Request:
     return msgspec.structs.replace(request, request_id=uuid.uuid4().hex)
 
 
-class Asking:
+class RetriedRequest:
     """One request on its way to its answer.
 
     Args:
@@ -45,7 +45,7 @@ class Asking:
     """
 
     def __init__(
-        self, request: Request, now_ns: int, deadline_s: float, try_s: float = TRY_S
+        self, request: Request, now_ns: int, deadline_s: float, try_s: float = DEFAULT_TRY_S
     ) -> None:
         self.request = request
         self.reply: Message | None = None
@@ -54,7 +54,7 @@ class Asking:
         self._try_s = try_s
         self._ends_ns = now_ns + nanoseconds(deadline_s)
         self._next_ns: int | None = now_ns
-        self._pause_s = PAUSE_S
+        self._pause_s = FIRST_PAUSE_S
 
     @property
     def next_ns(self) -> int | None:
@@ -70,18 +70,18 @@ class Asking:
         left_s = max(0.0, (self._ends_ns - now_ns) / 1e9)
         return Call(self.request, min(self._try_s, left_s) if self.tries > 1 else self._try_s)
 
-    def heard(self, reply: Incoming) -> None:
+    def receive(self, reply: Incoming) -> None:
         """Take the reply to a try; what is no answer leads to another one while there is time."""
         message = reply.message
-        if not isinstance(message, Refused) or message.code not in AGAIN:
+        if not isinstance(message, Refused) or message.code not in RETRIED_CODES:
             self.reply = message
             return
         self._next_ns = reply.t_ns + nanoseconds(self._pause_s)
-        self._pause_s = min(2.0 * self._pause_s, LONGEST_PAUSE_S)
+        self._pause_s = min(2.0 * self._pause_s, MAX_PAUSE_S)
         if self._next_ns >= self._ends_ns:
-            self.reply = self._given_up(message)
+            self.reply = self._give_up(message)
 
-    def _given_up(self, last: Refused) -> Refused:
+    def _give_up(self, last: Refused) -> Refused:
         if self.tries == 1:
             return last
         detail = (
@@ -92,12 +92,12 @@ class Asking:
         return Refused(code=last.code, detail=detail, asked=f"{last.asked}; {again}".lstrip("; "))
 
 
-def ask(
+def send_request(
     bus: Bus,
     request: Request,
     deadline_s: float = 2.0,
     *,
-    try_s: float = TRY_S,
+    try_s: float = DEFAULT_TRY_S,
     clock: Clock | None = None,
 ) -> Message:
     """Return the reply, or a `Refused` when it was refused or nobody answered in time.
@@ -105,26 +105,26 @@ def ask(
     It is asked again until the deadline, under one id: an effect happens once.
     """
     clock, never = clock or WallClock(), threading.Event()
-    asking = Asking(with_id(request), clock.now_ns(), deadline_s, try_s)
-    while asking.reply is None:
-        call = asking.due(clock.now_ns())
+    pending = RetriedRequest(with_id(request), clock.now_ns(), deadline_s, try_s)
+    while pending.reply is None:
+        call = pending.due(clock.now_ns())
         if call is None:
-            clock.wait_until(asking.next_ns or 0, never)
+            clock.wait_until(pending.next_ns or 0, never)
             continue
         message = _try(bus, call)
-        asking.heard(Incoming(message, clock.now_ns(), call))
-    return asking.reply
+        pending.receive(Incoming(message, clock.now_ns(), call))
+    return pending.reply
 
 
 def _try(bus: Bus, call: Call) -> Message:
     replied = threading.Event()
     replies: list[Incoming] = []
 
-    def take(reply: Incoming) -> None:
+    def on_reply(reply: Incoming) -> None:
         replies.append(reply)
         replied.set()
 
-    bus.call(call, take)
+    bus.call(call, on_reply)
     if replied.wait(call.timeout_s + 0.5):
         return replies[0].message
     return no_answer(call, key_of(bus.city, call.request))
