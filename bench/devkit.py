@@ -36,9 +36,10 @@ from scm.clock import NS_PER_MS, NS_PER_S, WallClock
 from scm.maps.load import load_map
 from scm.maps.route import Path as Way
 from scm.maps.route import Roads
+from scm.records.signals import SignalGroup
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.lidar_scan import LidarScan
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import SnapshotVehicle

@@ -7,7 +7,7 @@ a recording on the city's shelf: `today` is `runs/today.mcap`, which Ctrl-C name
 import argparse
 
 from scm.client import Client
-from scm.client.records.shared import Operation
+from scm.records.operations import Operation
 
 
 def say(work: Operation) -> None:

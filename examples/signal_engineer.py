@@ -6,8 +6,8 @@ Start a city first, `.venv/bin/scm up driving_school`; then `python examples/sig
 import argparse
 
 from scm.client import Client
-from scm.client.records.signals_parts import StageBody
 from scm.client.stream import states
+from scm.records.signal_plans import StageBody
 
 NAME = "more_green"
 

@@ -11,11 +11,11 @@ Scripts, the server and `scm up` each keep their own record: the part that is lo
 
 import threading
 from collections import deque
-from typing import Literal
 
 import msgspec
 
 from scm.clock import NS_PER_S, seconds
+from scm.records.disturbances import Disturbance, Kind
 from scm.v2x.exchange import Incoming
 from scm.v2x.message import Message
 from scm.v2x.messages.monitor_status import MonitorStatus
@@ -33,32 +33,6 @@ MAX_STORED = 1000
 OVERLOAD = "overload"  # the monitor's name for a computer that is too busy
 RESET = "A person resets the monitor, on the signals page."
 OPTIONAL_PARTS = ("eye", "camera", "record")  # the costliest first
-
-Kind = Literal["flash", "monitor", "silent", "part_lost", "late"]
-
-
-class Disturbance(msgspec.Struct, kw_only=True, frozen=True):
-    """Something that makes measurements void.
-
-    Attributes:
-        source: The junction or part that it concerns.
-        start_ns: When it began, on the clock of whoever reports it.
-        end_ns: When it ended; None while it lasts.
-        text: What is wrong, as a clause: `the signals of crossing flash`.
-        advice: What a person can do, in a sentence; empty: nothing.
-    """
-
-    kind: Kind
-    source: str
-    start_ns: int
-    end_ns: int | None = None
-    text: str
-    advice: str = ""
-
-    def within_ns(self, start_ns: int, end_ns: int) -> int:
-        """Return how much of a span it covers [ns]."""
-        last_ns = end_ns if self.end_ns is None else self.end_ns
-        return _overlap_ns(self.start_ns, last_ns, start_ns, end_ns)
 
 
 class Disturbances:
@@ -125,7 +99,8 @@ class Disturbances:
         with self._lock:
             for one in (*self._over, *self._open.values()):
                 if one.kind != "late":
-                    within_ns = one.within_ns(start_ns, end_ns)
+                    one_end_ns = end_ns if one.end_ns is None else one.end_ns
+                    within_ns = _overlap_ns(one.start_ns, one_end_ns, start_ns, end_ns)
                     lasted[one.text] = lasted.get(one.text, 0) + within_ns
             lost_ns = sum(
                 lost_ns * _overlap_ns(first_ns, last_ns, start_ns, end_ns) // (last_ns - first_ns)

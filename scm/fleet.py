@@ -25,10 +25,11 @@ import msgspec
 
 from scm.caller import program_name
 from scm.clock import WallClock, seconds
-from scm.disturbances import MESSAGE_KINDS, Disturbance, Disturbances
+from scm.disturbances import MESSAGE_KINDS, Disturbances
 from scm.errors import RunError, ScmError, VoidError, nearest
 from scm.log import event
 from scm.maps.load import load_map
+from scm.records.disturbances import Disturbance
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Part, Subscription
 from scm.traffic.monitor.part import MonitorPart

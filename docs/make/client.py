@@ -1,32 +1,34 @@
 """Write `scm/client` from the interface's own description: `python docs/make/client.py`.
 
-A noun of the interface (the tag of its routes) becomes a class, an operation a method, a record of
-its answers a struct. Records of one noun lie in its file, those of several in `shared.py`.
-`tests/contract/test_client.py` says when this has to be run again.
+A noun of the interface (the tag of its routes) becomes a class, an operation a method. Its answers
+are the records of `scm.records` and of messages, the same that the routes return.
+`tests/contract/test_client.py` fails when this has to be run again.
 """
 
 import builtins
+import importlib
 import keyword
 import re
 import subprocess
 import sys
 import textwrap
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from scm.api.app import create_app
 from scm.api.view import CityView
 from scm.maps.load import load_map
+from scm.registry import names
 from scm.v2x.message import Refused
 
 FOLDER = Path(__file__).parents[2] / "scm" / "client"
 REFERENCE = "#/components/schemas/"
 KEY = "Idempotency-Key"
-SHARED = "shared"
 WIDTH = 99
-MOST_RECORDS = 20
 BY = "Written by docs/make/client.py: do not change it here."
 CLIENT = '''"""The client of a city, noun by noun.
 
@@ -39,9 +41,9 @@ from typing import Self
 
 from scm.client.connection import Connection
 {imports}
-from scm.client.records.shared import Operation
 from scm.client.teleop import Wheel, taken
 from scm.client.work import finished
+from scm.records.operations import Operation
 
 
 class Client:
@@ -96,59 +98,16 @@ def files(document: Schema) -> dict[str, str]:
         for method, operation in methods.items():
             nouns[operation["tags"][0]].append((method.upper(), path, operation))
     schemas = document["components"]["schemas"]
-    homes = _homes(nouns, schemas)
     made = {"client.py": _client(sorted(nouns))}
     made["nouns/__init__.py"] = f'"""One file a noun of the interface.\n\n{BY}\n"""\n'
-    made["records/__init__.py"] = f'"""What the interface answers.\n\n{BY}\n"""\n'
-    for home in sorted(set(homes.values())):
-        made[f"records/{_file(home)}.py"] = _records(home, homes, schemas)
     for noun, operations in nouns.items():
-        made[f"nouns/{_file(noun)}.py"] = _noun(noun, operations, homes, schemas)
+        made[f"nouns/{_file(noun)}.py"] = _noun(noun, operations, schemas)
     return made
-
-
-def _homes(nouns: dict[str, list[tuple[str, str, Schema]]], schemas: Schema) -> dict[str, str]:
-    """Return which file each record lies in."""
-    users: dict[str, set[str]] = defaultdict(set)
-    for noun, operations in nouns.items():
-        for _, _, operation in operations:
-            todo = [*_references(_success(operation)[1]), *_sent(operation, schemas)]
-            while todo:
-                name = todo.pop()
-                if noun not in users[name]:
-                    users[name].add(noun)
-                    todo.extend(_references(schemas[name]))
-    homes = {
-        name: next(iter(used)) if len(used) == 1 else SHARED
-        for name, used in users.items()
-        if _is_record(schemas[name])
-    }
-    for home, count in Counter(homes.values()).items():
-        if count > MOST_RECORDS:
-            for name in _ordered(home, homes, schemas)[: count // 2]:
-                homes[name] = f"{home}_parts"
-    return homes
 
 
 def _is_record(schema: Schema) -> bool:
     """Say whether a schema has a name in the client: lists of words or of columns have none."""
     return schema.get("type") == "object"
-
-
-def _ordered(home: str, homes: dict[str, str], schemas: Schema) -> list[str]:
-    """Return the records of a file, each behind those it holds."""
-    done: dict[str, None] = {}
-
-    def add(name: str) -> None:
-        for other in _references(schemas[name]):
-            if homes.get(other) == home and other not in done:
-                add(other)
-        done[name] = None
-
-    for name in schemas:
-        if homes.get(name) == home and name not in done:
-            add(name)
-    return list(done)
 
 
 def _references(node: Any) -> Iterator[str]:
@@ -178,15 +137,6 @@ def _success(operation: Schema) -> tuple[str, Schema]:
     return "", {}
 
 
-def _records(home: str, homes: dict[str, str], schemas: Schema) -> str:
-    own = _ordered(home, homes, schemas)
-    body = "\n\n".join(_record(name, schemas) for name in own)
-    used = {name for one in own for name in _references(schemas[one])} - set(own)
-    lines = [f'"""Records of {home}.', "", f'{BY}\n"""', ""]
-    lines += [*_typing(body), "import msgspec", *_imports(used, homes)]
-    return "\n".join([*lines, "", "", body])
-
-
 def _typing(body: str) -> list[str]:
     """Return the imports of the standard library that a file needs."""
     lines = ["from collections.abc import Iterator"] if "Iterator[" in body else []
@@ -194,38 +144,31 @@ def _typing(body: str) -> list[str]:
     return [*lines, f"from typing import {', '.join(names)}"] if names else lines
 
 
-def _imports(used: set[str], homes: dict[str, str]) -> list[str]:
+def _modules() -> dict[str, str]:
+    """Return the module of each record, by its name; of messages where `scm.records` has none."""
+    found: dict[str, str] = {}
+    for package in ("scm.records", "scm.v2x.messages"):
+        for name in names(package):
+            module = f"{package}.{name}"
+            for kind in vars(importlib.import_module(module)).values():
+                if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+                    found.setdefault(kind.__name__, kind.__module__)
+    return found
+
+
+def _imports(used: set[str], schemas: Schema) -> list[str]:
     """Return the imports of records."""
-    by_home = defaultdict(set)
-    for name in used & set(homes):
-        by_home[homes[name]].add(_class(name))
-    return [
-        f"from scm.client.records.{_file(home)} import {', '.join(sorted(names))}"
-        for home, names in sorted(by_home.items())
-    ]
+    by_module, modules = defaultdict(set), _modules()
+    for record in used:
+        if _is_record(schemas[record]):
+            for name in re.findall(r"\w+", _kind(record)):
+                by_module[modules[name]].add(name)
+    return [f"from {module} import {', '.join(sorted(by_module[module]))}" for module in by_module]
 
 
-def _record(name: str, schemas: Schema) -> str:
-    schema = schemas[name]
-    required = set(schema.get("required", ()))
-    words = [(_name(key), one) for key, one in schema.get("properties", {}).items()]
-    about = [f"{key}: {one['description']}" for key, one in words if one.get("description")]
-    lines = [f"class {_class(name)}(msgspec.Struct, kw_only=True, frozen=True):"]
-    lines += _docstring(schema.get("description") or f"{name}.", "Attributes", about, 4)
-    for key, one in schema.get("properties", {}).items():
-        lines.append("    " + _field(key, one, key in required, schemas))
-    return "\n".join(lines) + "\n"
-
-
-def _field(key: str, schema: Schema, required: bool, schemas: Schema) -> str:
-    own, kind = _name(key), _type(schema, schemas)
-    default = "" if required else _default(schema)
-    if default == "None" and "None" not in kind and kind != "Any":
-        kind += " | None"
-    if own != key:
-        facts = f"name={key!r}" + (f", default={default}" if default else "")
-        return f"{own}: {kind} = msgspec.field({facts})"
-    return f"{own}: {kind}" + (f" = {default}" if default else "")
+def _kind(record: str) -> str:
+    """Return a described record as a type of Python: `Page_EventRow_` is `Page[EventRow]`."""
+    return re.sub(r"^Page_(\w+)_$", r"Page[\1]", record)
 
 
 def _default(schema: Schema) -> str:
@@ -244,7 +187,7 @@ def _type(schema: Schema, schemas: Schema) -> str:
     if "$ref" in schema:
         name = schema["$ref"].removeprefix(REFERENCE)
         target = schemas[name]
-        return _class(name) if _is_record(target) else _type(target, schemas)
+        return _kind(name) if _is_record(target) else _type(target, schemas)
     choices = schema.get("anyOf") or schema.get("oneOf")
     if choices:
         kinds = list(dict.fromkeys(_type(one, schemas) for one in choices))
@@ -385,9 +328,7 @@ def _name_of(given: str) -> str:
     return given.partition(":")[0]
 
 
-def _noun(
-    noun: str, operations: list[tuple[str, str, Schema]], homes: dict[str, str], schemas: Schema
-) -> str:
+def _noun(noun: str, operations: list[tuple[str, str, Schema]], schemas: Schema) -> str:
     methods = [_Method(*one, schemas) for one in operations]
     head = [f"class {_class(noun)}Noun:", f'    """Operations on {noun}."""', ""]
     head += ["    def __init__(self, connection: Connection) -> None:"]
@@ -396,7 +337,7 @@ def _noun(
     used = {name for one in operations for name in _references(_success(one[2])[1])}
     used |= {name for one in operations for name in _sent(one[2], schemas)}
     lines = [f'"""Operations on {noun} of a city.', "", f'{BY}\n"""', ""]
-    lines += [*_typing(body), *_imports(used, homes)]
+    lines += [*_typing(body), *_imports(used, schemas)]
     more = ", part" if "{part(" in body else ""
     lines.append(f"from scm.client.connection import Connection{more}")
     lines += ["from scm.client.stream import LiveEvent"] if "[LiveEvent]" in body else []
@@ -461,6 +402,6 @@ def formatted(sources: dict[str, str], folder: Path) -> dict[str, str]:
 
 if __name__ == "__main__":
     written = formatted(files(description()), FOLDER)
-    for old in (*FOLDER.glob("nouns/*.py"), *FOLDER.glob("records/*.py")):
+    for old in FOLDER.glob("nouns/*.py"):
         if str(old.relative_to(FOLDER)) not in written:
             old.unlink()

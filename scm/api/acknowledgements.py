@@ -10,26 +10,11 @@ import msgspec
 
 from scm.clock import Clock
 from scm.errors import StoreError
+from scm.records.events import Acknowledgement
 from scm.store.repository import Repository
 
 KEPT = 5000
 _PREFIX = "event/"
-
-
-class Acknowledgement(msgspec.Struct, kw_only=True, frozen=True):
-    """Who took note of an event.
-
-    Attributes:
-        event: Id of the event.
-        by: Who took note of it.
-        note: What was said to it; may be empty.
-        at_ns: When [ns since 1970].
-    """
-
-    event: str
-    by: str
-    note: str
-    at_ns: int
 
 
 class Acknowledgements:

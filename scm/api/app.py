@@ -133,12 +133,12 @@ def create_app(
     app.state.frames = desk.frames
     app.state.keys = keys
     problem.install(app)
-    openapi.install(app)
     _add_layers(app, desk, clock, site)
     nouns = desk.by_prefix()
     for prefix, routers in nouns.items():
         for noun in routers:
             app.include_router(noun, prefix=prefix, responses=problem.RESPONSES)
+    openapi.install(app, nouns)
     app.state.words = Words(nouns)
     return app
 

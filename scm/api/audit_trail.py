@@ -20,6 +20,7 @@ from scm.api.idempotency import CHANGES
 from scm.api.trace import trace_id
 from scm.clock import Clock
 from scm.errors import StoreError
+from scm.records.audit import AuditRow
 from scm.store.audit import AuditLog, Deed
 from scm.store.repository import Repository
 
@@ -28,35 +29,6 @@ _LOGGER = logging.getLogger(__name__)
 STATION = "api"
 BLOCK = 500
 MOST_LOOKED_AT = 20_000
-
-
-class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One deed of the audit log.
-
-    Attributes:
-        number: Of the entry; numbers have no gaps.
-        t_ns: When it was asked for [ns since 1970].
-        station: Who did it: `world`, `traffic`, `api`.
-        kind: The request's class, or method and path of a call of the web; `unreadable`: what
-            stands there is no entry.
-        text: What was done, in words.
-        by: Who asked: the owner of the API key, the program that called, the part.
-        request_id: Id of the request; empty: it had none.
-        trace_id: Of what led to it: the call of the web and what the city did for it have the same;
-            empty: nobody traced it.
-        request, reply: What was asked and answered, as the station noted it.
-    """
-
-    number: int
-    t_ns: int
-    station: str
-    kind: str
-    text: str
-    by: str
-    request_id: str
-    trace_id: str
-    request: dict[str, Any]
-    reply: dict[str, Any]
 
 
 class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):

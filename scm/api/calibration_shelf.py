@@ -9,54 +9,19 @@ import re
 import threading
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import msgspec
 
 from scm.api.city import not_found
 from scm.api.problem import RefusedError
 from scm.records.city_map import Camera
+from scm.records.eye_calibrations import CalibrationFile, CalibrationRow
 from scm.v2x.message import Refused
 from scm.v2x.messages.calibration_request import MeasuredLens
 
 NAME = re.compile(r"[a-z0-9_-]{1,48}")
-LARGEST_TOML = 64 * 1024
 MOST_KEPT = 500
-
-
-class CalibrationRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One calibration.
-
-    Attributes:
-        kind: `lens`: for `scm eye --calibration`; `place`: a `[[cameras]]` block for the map.
-        camera: Whose place it is; empty: a lens does not say.
-        made_ns: When its file was written [ns since 1970].
-        rms_px: What was left at the board's points [px]; null: of a place.
-        views: Pictures of the board it was made from; null: of a place.
-        reported: Whether there is a report of how it was found.
-    """
-
-    name: str
-    kind: Literal["lens", "place"]
-    camera: str
-    made_ns: int
-    width_px: int
-    height_px: int
-    rms_px: float | None
-    views: int | None
-    reported: bool
-
-
-class CalibrationFile(msgspec.Struct, kw_only=True, frozen=True):
-    """One calibration with its text.
-
-    Attributes:
-        row: As in the list.
-        toml: The file.
-    """
-
-    row: CalibrationRow
-    toml: Annotated[str, msgspec.Meta(examples=['[[cameras]]\nname = "overhead"\nx_m = 1.384\n'])]
 
 
 class _Lens(MeasuredLens, kw_only=True, frozen=True, forbid_unknown_fields=True):

@@ -11,28 +11,10 @@ from collections.abc import Iterator
 
 import msgspec
 
+from scm.records.events import LoggedEvent
 from scm.v2x.messages.city_event import CityEvent
 
 DEPTH = 5000
-
-
-class LoggedEvent(msgspec.Struct, kw_only=True, frozen=True):
-    """An event and its number; numbers start at 1 and have no gaps.
-
-    Attributes:
-        seq: Number of the event since the server started.
-        id: The same for this event for ever: of its time, source, name and text.
-        vehicle: The car it is about; null: none.
-    """
-
-    seq: int
-    id: str
-    severity: str
-    source: str
-    t_ns: int
-    name: str
-    text: str
-    vehicle: str | None = None
 
 
 class EventFilter(msgspec.Struct, kw_only=True, frozen=True):

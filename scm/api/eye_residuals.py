@@ -8,58 +8,14 @@ import math
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 
-import msgspec
-
-from scm.api.residual import Residual
 from scm.clock import NS_PER_S
+from scm.records.eye import Residual, ResidualSample, ResidualStats
 from scm.v2x.messages.eye_pose import EyePose
 
 KEPT_NS = 300 * NS_PER_S
 EVERY_NS = NS_PER_S // 2
 MOST_PAIRS = 2_000
 _DEPTH = KEPT_NS // EVERY_NS
-
-
-class ResidualSample(msgspec.Struct, kw_only=True, frozen=True):
-    """One pose against the truth of its instant.
-
-    Attributes:
-        t_ns: When the frame was exposed.
-        x_m, y_m: Where the car was measured to be.
-        x_mm, y_mm: Measured minus true, along map x and y [mm].
-        yaw_deg: Likewise, + = measured further left [degree].
-    """
-
-    vehicle: str
-    t_ns: int
-    x_m: float
-    y_m: float
-    x_mm: float
-    y_mm: float
-    yaw_deg: float
-
-
-class ResidualStats(msgspec.Struct, kw_only=True, frozen=True):
-    """What samples have in common; all null where there is none.
-
-    Attributes:
-        samples: How many.
-        mean_mm: Mean distance from the truth [mm].
-        p95_mm: 95 of 100 lie nearer [mm].
-        worst_mm: The farthest [mm].
-        bias_x_mm, bias_y_mm: Mean of measured minus true along map x and y [mm].
-        bias_yaw_deg: Likewise of yaw, + = measured further left [degree].
-        yaw_std_deg: Standard deviation of yaw around its bias [degree].
-    """
-
-    samples: int
-    mean_mm: float | None
-    p95_mm: float | None
-    worst_mm: float | None
-    bias_x_mm: float | None
-    bias_y_mm: float | None
-    bias_yaw_deg: float | None
-    yaw_std_deg: float | None
 
 
 class ResidualLog:

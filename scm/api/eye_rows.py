@@ -3,18 +3,16 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Literal, TypedDict
-
-import msgspec
+from typing import TypedDict
 
 from scm.api.picture import Held, Picture, TagSighting
-from scm.api.residual import Residual
 from scm.clock import seconds
 from scm.records.city_map import MapTag
+from scm.records.eye import CameraRow, PoseRow, Residual, SeenRow, TagRow
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
-from scm.v2x.messages.eye_status import EyeStatus, InForce
-from scm.v2x.messages.eye_tags import EyeTags, TagSeen
+from scm.v2x.messages.eye_status import EyeStatus
+from scm.v2x.messages.eye_tags import EyeTags
 
 POSE_SHOWN_S = 2.0
 SILENT_S = 2.0
@@ -23,99 +21,6 @@ SILENT_S = 2.0
 class _Status(TypedDict):
     good: bool | None
     complaints: tuple[str, ...]
-
-
-class SeenRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One car as a camera sees it."""
-
-    vehicle: str
-    tag_id: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    age_s: float
-    residual: Residual | None
-
-
-class TagRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One tag that a camera saw within the last minute.
-
-    Attributes:
-        what: `car`; `map`: it lies on the floor, known to the map; `other`: nobody's.
-        vehicle: The car that wears it; empty: none does.
-        margin: Decision margin of the detector, higher is clearer.
-        hamming: Bits of 36 that were read wrong and corrected; null: not told.
-        size_px: Mean side of its black square in the picture [px].
-        seen_s: How long ago the camera saw it last [s].
-        x_m, y_m, yaw_rad: Of the car, by this camera; of a map tag as its map has it; null: not
-            known.
-    """
-
-    tag_id: int
-    what: Literal["car", "map", "other"]
-    vehicle: str
-    margin: float
-    hamming: int | None
-    size_px: float
-    seen_s: float
-    x_m: float | None
-    y_m: float | None
-    yaw_rad: float | None
-
-
-class PoseRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One car's pose as one camera measured it last.
-
-    Attributes:
-        t_ns: When the frame was exposed.
-        std_x_m, std_y_m, std_yaw_rad: Standard deviations, as the Eye tells them.
-        map_tag_age_ms: Since the camera last saw the map's tag.
-        flags: What is wrong with the camera, by its own account: do not trust it.
-    """
-
-    camera: str
-    vehicle: str
-    tag_id: int
-    t_ns: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    std_x_m: float
-    std_y_m: float
-    std_yaw_rad: float
-    map_tag_age_ms: float
-    age_s: float
-    flags: Annotated[tuple[str, ...], msgspec.Meta(examples=[["bumped"]])]
-    residual: Residual | None
-
-
-class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One camera.
-
-    Attributes:
-        frame_t_ns: Exposure of the newest frame, as text: it names the picture exactly, and is
-            too long for a number in a browser. None: no frame yet.
-        tags: Those of that frame, or of the newest detection when that frame was skipped.
-        tags_t_ns: Exposure of the frame that they were found in, as text; None: none yet.
-        known: Tags of the last minute, whose they are, and where.
-        good: Whether its poses can be trusted, by its own account; None: not said.
-        complaints: What is wrong, in sentences.
-        in_force: By which calibration it sees; null: not said.
-    """
-
-    camera: str
-    frame_t_ns: str | None
-    width_px: int | None
-    height_px: int | None
-    age_s: float | None
-    latency_ms: float | None
-    tags: tuple[TagSeen, ...]
-    tags_t_ns: Annotated[str | None, msgspec.Meta(examples=["120000000000"])]
-    known: tuple[TagRow, ...]
-    seen: tuple[SeenRow, ...]
-    good: bool | None
-    complaints: tuple[str, ...]
-    in_force: InForce | None
 
 
 def camera_rows(

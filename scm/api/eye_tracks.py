@@ -1,52 +1,16 @@
 """The Eye's tracks, where cars are by all cameras together, heard while somebody looks at them."""
 
 import math
-from typing import Annotated
-
-import msgspec
 
 from scm.api.picture import Held
 from scm.clock import NS_PER_S
+from scm.records.eye import TrackRow
 from scm.runtime.part import Subscription
 from scm.v2x.messages.eye_track import EyeTrack
 
 WATCHED_NS = 5 * NS_PER_S
 """So long after somebody asked tracks are heard: 20 a second of each car are many."""
 SHOWN_S = 2.0
-
-
-class TrackRow(msgspec.Struct, kw_only=True, frozen=True):
-    """Where a car is by all overhead cameras together.
-
-    Attributes:
-        t_ns: The time that it holds for, on the Eye's clock.
-        speed_mps: Along the car, + = forward.
-        lateral_speed_mps: + = to the car's left.
-        yaw_rate_radps: + = counter-clockwise.
-        std_x_m, std_y_m, std_yaw_rad, std_speed_mps: Standard deviations.
-        age_s: Since a camera last saw it.
-        stale: Not seen for so long that nobody should drive by it.
-        flags: What is wrong with it; empty: nothing.
-        cameras: Those that saw it last.
-    """
-
-    vehicle: str
-    tag_id: int
-    t_ns: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    speed_mps: float
-    lateral_speed_mps: float
-    yaw_rate_radps: float
-    std_x_m: float
-    std_y_m: float
-    std_yaw_rad: float
-    std_speed_mps: float
-    age_s: float
-    stale: bool
-    flags: Annotated[tuple[str, ...], msgspec.Meta(examples=[["roof_tag_size"]])]
-    cameras: Annotated[tuple[str, ...], msgspec.Meta(examples=[["overhead"]])]
 
 
 class TrackWatch:

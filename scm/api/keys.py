@@ -12,8 +12,9 @@ from collections.abc import Iterator
 
 import msgspec
 
-from scm.api.roles import Role, check_role
+from scm.api.roles import check_role
 from scm.errors import AccessError, StoreError
+from scm.records.keys import Role
 from scm.store.repository import Repository
 
 SECRET_BYTES = 32

@@ -13,14 +13,16 @@ import msgspec
 
 from scm.api import uploads
 from scm.api.city import City, not_found
-from scm.api.operations import Operation, Operations, Teller
+from scm.api.operations import Operations, Teller
 from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
-from scm.api.report_folders import Job, ReportFolders
+from scm.api.report_folders import ReportFolders
 from scm.api.trip_resume import RESUME_NS, RESUME_PAUSE_S, onward, trip_of
 from scm.clock import Clock
 from scm.errors import RecordingError, RunError
 from scm.recorder.run_index import read_index
+from scm.records.mismatch import Job
+from scm.records.operations import Operation
 from scm.v2x.message import Refused
 from scm.v2x.messages.route_request import RouteReply
 from scm.v2x.messages.trip import Trip

@@ -17,9 +17,10 @@ from scm.api.picture import Picture
 from scm.clock import NS_PER_S, nanoseconds
 from scm.maps.route import LanePath
 from scm.records.city_map import Lane
+from scm.records.traffic import LaneCount
 from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.etsi.convert import latitude_of, longitude_of
-from scm.v2x.messages.traffic_counts import LaneCount, TrafficCounts
+from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 TYPES = ("Vehicle", "RoadSegment", "TrafficFlowObserved")

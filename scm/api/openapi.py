@@ -8,13 +8,14 @@ records are put together from those of their parts.
 
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
+from scm.api.inputs import JsonInput, QueryInput
 from scm.api.roles import ROLES, SCHEME
 from scm.api.words import UNITS, WORDS
 from scm.errors import RunError
@@ -23,24 +24,46 @@ _DEFS, _COMPONENTS = "#/$defs/", "#/components/schemas/"
 _ENTRY = re.compile(r"^ {4}(\w+(?:, \w+)*): ")
 _DEPTH = 6
 Schema = dict[str, Any]
+Nouns = Mapping[str, Sequence[APIRouter]]
 
 
-def install(app: FastAPI) -> None:
-    """Let an application describe itself so; it is made once, on the first question."""
+def install(app: FastAPI, nouns: Nouns) -> None:
+    """Let an application describe itself so, once, on the first request.
+
+    Args:
+        app: The application.
+        nouns: Its routers, by the prefix of their addresses.
+    """
 
     def openapi() -> Schema:
         if app.openapi_schema is None:
-            app.openapi_schema = described(
-                get_openapi(
-                    title=app.title,
-                    version=app.version,
-                    routes=app.routes,
-                    servers=app.servers or None,
-                )
+            document = get_openapi(
+                title=app.title,
+                version=app.version,
+                routes=app.routes,
+                servers=app.servers or None,
             )
+            _add_inputs(document, nouns)
+            app.openapi_schema = described(document)
         return app.openapi_schema
 
     app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _add_inputs(document: Schema, nouns: Nouns) -> None:
+    """Add the bodies and queries that routes read as records."""
+    routes = [
+        (document["paths"][prefix + route.path_format], route)
+        for prefix, routers in nouns.items()
+        for router in routers
+        for route in router.routes
+        if isinstance(route, APIRoute)
+    ]
+    for path, route in routes:
+        for read in (dependency.call for dependency in route.dependant.dependencies):
+            if isinstance(read, JsonInput | QueryInput):
+                for method in route.methods or ():
+                    read.describe(path[method.lower()])
 
 
 def operation_id(route: APIRoute) -> str:
@@ -118,10 +141,19 @@ def _describe_fields(schema: Schema) -> None:
     if about:
         schema["description"] = about
     for name, field in fields.items():
+        _lift_words(field)
         words = told.get(name) or (WORDS[name][0] if name in WORDS else "")
         if words:
             field.setdefault("description", words)
         field.pop("title", None)
+
+
+def _lift_words(field: Schema) -> None:
+    """Give a field that may be null the words of what it is otherwise."""
+    for choice in field.get("anyOf", ()):
+        for key in ("description", "examples"):
+            if key in choice:
+                field.setdefault(key, choice.pop(key))
 
 
 def _describe_by_record(field: Schema, schemas: Schema) -> None:

@@ -10,7 +10,6 @@ import re
 import threading
 from collections import OrderedDict, deque
 from collections.abc import Callable
-from typing import Literal
 
 import msgspec
 from fastapi import Response
@@ -19,6 +18,7 @@ from scm.api.city import json_response
 from scm.api.problem import RefusedError
 from scm.clock import Clock
 from scm.errors import ScmError
+from scm.records.operations import Operation, State
 from scm.v2x.message import Refused
 
 _LOGGER = logging.getLogger(__name__)
@@ -31,35 +31,6 @@ _PATH = re.compile(
     r"""(?<=')/(?!api/)(?:[^/'\n]+/)*(?P<quoted>[^/'\n]*)(?=')"""
     r"""|(?<![\w/.:~-])/(?!api/)(?:[^\s/'",;:()]+/)+(?P<plain>[^\s/'",;:()]*)"""
 )
-State = Literal["waiting", "running", "done", "failed", "cancelled"]
-
-
-class Operation(msgspec.Struct, kw_only=True, frozen=True):
-    """One piece of long work.
-
-    Attributes:
-        id: Of this operation, below `/operations`.
-        kind: What work it is: `mismatch`, `export`, ...
-        what: Of which thing, in words.
-        progress: 0 to 1; None: nobody can tell.
-        doing: The step it is at, in words.
-        result: Address of what it made; empty until it is done.
-        error: Why it failed; empty unless it did.
-        owner: Who asked for it.
-    """
-
-    id: str
-    kind: str
-    what: str
-    state: State
-    progress: float | None
-    doing: str
-    result: str
-    error: str
-    owner: str
-    asked_ns: int
-    began_ns: int | None
-    ended_ns: int | None
 
 
 class Cancelled(Exception):  # noqa: N818  it is no error

@@ -9,14 +9,14 @@ import binascii
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
-from typing import Annotated, Generic, TypeVar
+from typing import Annotated
 from urllib.parse import urlencode
 
-import msgspec
 from fastapi import Query, Request, Response
 
 from scm.api.city import json_response
 from scm.api.problem import RefusedError
+from scm.records.page import Page, T
 from scm.v2x.message import Refused
 
 MOST = 500
@@ -31,19 +31,6 @@ Cursor = Annotated[
         examples=["czo0MQ"],
     ),
 ]
-T = TypeVar("T")
-
-
-class Page(msgspec.Struct, Generic[T], kw_only=True, frozen=True):
-    """Some rows of a list.
-
-    Attributes:
-        items: The rows of this page.
-        next: Cursor of those after them; null at the end.
-    """
-
-    items: tuple[T, ...]
-    next: Annotated[str | None, msgspec.Meta(examples=["azptaXNtYXRjaC03"])]
 
 
 def page_of(

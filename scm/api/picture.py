@@ -5,16 +5,16 @@ from dataclasses import dataclass, field
 from functools import wraps
 from typing import Generic, TypeVar
 
-from scm.api.residual import Residual
-from scm.api.stations import StationRow
 from scm.clock import seconds
 from scm.disturbances import Disturbances
+from scm.records.eye import Residual, TagSeen
+from scm.records.stations import StationRow
 from scm.v2x.message import Message
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus
-from scm.v2x.messages.eye_tags import EyeTags, TagSeen
+from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.signal_site import SignalSite
 from scm.v2x.messages.signal_status import SignalStatus

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 
-import msgspec
 import numpy as np
 
 from scm.arrays import Floats
@@ -12,20 +11,6 @@ from scm.maps.route import LanePath, Roads
 AHEAD_M = 12.0
 STEP_M = 0.05
 MOST_AWAY_M = 1.0  # farther from every lane of its trip, a car is not on it
-
-
-class PathRow(msgspec.Struct, kw_only=True, frozen=True):
-    """A car's way ahead; empty while it has no trip, or is not on it.
-
-    Attributes:
-        points_m: x and y in the map frame, every 5 cm, from the car on.
-        is_whole: Whether it ends where the trip does, and not at 12 m.
-    """
-
-    vehicle: str
-    trip_id: str | None
-    points_m: tuple[tuple[float, ...], ...]
-    is_whole: bool
 
 
 def path_ahead(

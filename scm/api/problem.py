@@ -4,21 +4,20 @@ On top of the RFC's members every problem has a `code`, a short machine word.
 """
 
 import errno
-import re
 from collections.abc import Iterator
 from http import HTTPStatus
-from typing import Annotated, Any
+from typing import Any, Self
 
 import msgspec
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
-from msgspec import Meta
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.routing import Match
 
 from scm.api.trace import trace_id
 from scm.errors import StoreError
+from scm.records.problems import Problem
 from scm.v2x.message import Refused
 
 STATUS_OF_CODE = {
@@ -53,38 +52,8 @@ DISK_TROUBLE = frozenset(
 )
 """What the server's disk says when nothing can be written, whoever asks."""
 
-_JSON = re.compile(r"application/([\w.-]+\+)?json\s*(;|$)", re.IGNORECASE)
 _METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
 _STATUSES = (400, 401, 403, 404, 409, 412, 413, 415, 422, 428, 429, 500, 503, 504, 507)
-
-
-class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """The body of an error, RFC 9457.
-
-    Attributes:
-        type: `about:blank`: the status says it all.
-        title: The status in words.
-        status: Of the answer.
-        code: A short word for programs.
-        detail: What is wrong, where, what was expected, in a sentence.
-        asked: Where a part of the city did not answer: the request and its key on the bus.
-        instance: What was asked.
-        trace_id: Names this request in the log of the server (W3C trace context).
-        errors: Each wrong field: `where` it stands, and what was `expected` there.
-    """
-
-    type: Annotated[str, Meta(examples=["about:blank"])]
-    title: Annotated[str, Meta(examples=["Not Found"])]
-    status: Annotated[int, Meta(examples=[404])]
-    code: Annotated[str, Meta(examples=["not_found"])]
-    detail: Annotated[str, Meta(examples=["there is no vehicle named 'n9'"])] = ""
-    asked: Annotated[str, Meta(examples=["StopRequest on scm/@v1/lab/world/stop_request"])] = ""
-    instance: Annotated[str, Meta(examples=["/api/v1/vehicles/n9"])] = ""
-    trace_id: Annotated[str, Meta(examples=["4bf92f3577b34da6a3ce929d0e0e4736"])] = ""
-    errors: Annotated[
-        tuple[dict[str, str], ...],
-        Meta(examples=[[{"where": "body.laps", "expected": "a number above 0"}]]),
-    ] = ()
 
 
 RESPONSES: dict[int | str, dict[str, Any]] = {
@@ -103,6 +72,23 @@ class RefusedError(Exception):
     def __init__(self, refused: Refused) -> None:
         super().__init__(refused.detail)
         self.refused = refused
+
+
+class InvalidError(Exception):
+    """What a caller sent is wrong; becomes a problem at the edge.
+
+    Attributes:
+        errors: Each wrong field: `where` it stands, and what was `expected` there.
+    """
+
+    def __init__(self, errors: tuple[dict[str, str], ...]) -> None:
+        super().__init__(f"{len(errors)} wrong fields")
+        self.errors = errors
+
+    @classmethod
+    def at(cls, where: str, expected: str) -> Self:
+        """Return the error of one place."""
+        return cls(({"where": where, "expected": expected},))
 
 
 def problem(
@@ -138,6 +124,7 @@ def install(app: FastAPI) -> None:
     """Make every error of the application a problem."""
     app.add_exception_handler(RefusedError, _on_refused)
     app.add_exception_handler(RequestValidationError, _on_invalid)
+    app.add_exception_handler(InvalidError, _on_invalid)
     app.add_exception_handler(HTTPException, on_http)
     app.add_exception_handler(ClientDisconnect, _on_gone)
     app.add_exception_handler(OSError, _on_disk)
@@ -154,30 +141,18 @@ async def _on_refused(request: Request, error: Exception) -> Response:
 
 
 async def _on_invalid(request: Request, error: Exception) -> Response:
-    assert isinstance(error, RequestValidationError)  # noqa: S101  the type it was registered for
-    media = request.headers.get("content-type", "")
-    if any(map(_is_no_object, error.errors())) and not _JSON.match(media):
-        detail = f"Content-Type: got {media!r}, expected application/json"
-        return problem(415, "media_type", detail, instance=request.url.path)
-    errors = tuple(map(_told, error.errors()))
+    assert isinstance(error, InvalidError | RequestValidationError)  # noqa: S101  as registered
+    errors = error.errors if isinstance(error, InvalidError) else _in_parameters(error)
     detail = "; ".join(f"{item['where']}: {item['expected']}" for item in errors)
     return problem(422, "invalid", detail, instance=request.url.path, errors=errors)
 
 
-def _is_no_object(found: dict[str, Any]) -> bool:
-    return bool(found["loc"] == ("body",) and found["type"] == "model_attributes_type")
-
-
-def _told(found: dict[str, Any]) -> dict[str, str]:
-    """Return where something is wrong, and what was expected there."""
-    if found["type"] == "json_invalid":
-        why = f"JSON: {found['ctx']['error']} at character {found['loc'][1]}"
-        return {"where": "body", "expected": why}
-    expected = str(found["msg"]).removeprefix("Value error, ")
-    return {
-        "where": ".".join(str(step) for step in found["loc"]),
-        "expected": "a JSON object" if _is_no_object(found) else expected,
-    }
+def _in_parameters(error: RequestValidationError) -> tuple[dict[str, str], ...]:
+    """Return where parameters of a path, query or header are wrong, and what was expected there."""
+    return tuple(
+        {"where": ".".join(str(step) for step in found["loc"]), "expected": str(found["msg"])}
+        for found in error.errors()
+    )
 
 
 async def on_http(request: Request, error: Exception) -> Response:

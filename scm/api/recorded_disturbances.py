@@ -1,35 +1,12 @@
 """What made measurements void while a run was recorded, as far as its messages tell."""
 
-import msgspec
-
 from scm.api.replay import read
 from scm.clock import NS_PER_S
-from scm.disturbances import MESSAGE_KINDS, Disturbance, Disturbances
+from scm.disturbances import MESSAGE_KINDS, Disturbances
 from scm.recorder.mcap_file import SchemaTable
 from scm.recorder.run_index import RunIndex
+from scm.records.disturbances import Disturbance, RecordedDisturbance, RecordedDisturbances
 from scm.v2x.exchange import Incoming
-
-
-class RecordedDisturbance(msgspec.Struct, kw_only=True, frozen=True):
-    """One of them, from when to when since the recording began; see `/disturbances`."""
-
-    kind: str
-    source: str
-    text: str
-    start_s: float
-    end_s: float
-
-
-class RecordedDisturbances(msgspec.Struct, kw_only=True, frozen=True):
-    """What of a recording is void.
-
-    Attributes:
-        disturbances: The oldest first.
-        void: What that means for the recording as a whole, in words; none: all of it counts.
-    """
-
-    disturbances: tuple[RecordedDisturbance, ...]
-    void: tuple[str, ...]
 
 
 def disturbances_of(index: RunIndex) -> RecordedDisturbances:

@@ -8,7 +8,6 @@ import re
 import threading
 from collections import OrderedDict
 from pathlib import Path
-from typing import Literal
 
 import msgspec
 
@@ -17,6 +16,7 @@ from scm.api.problem import RefusedError
 from scm.clock import NS_PER_S, Clock, WallClock
 from scm.errors import RecordingError
 from scm.recorder.run_index import RunIndex, read_index
+from scm.records.recordings import Notes, RecordingRow, State
 from scm.v2x.message import Refused
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
@@ -24,36 +24,6 @@ SUFFIX, NOTES = ".mcap", ".notes.json"
 QUIET_S = 3.0  # a recorder writes four times a second
 KEPT_INDEXES = 200
 _CAR = re.compile(r"scm/@v\d+/[^/]+/v/([^/]+)/state")
-
-State = Literal["being written", "complete", "cut off", "unreadable"]
-
-
-class Notes(msgspec.Struct, kw_only=True, frozen=True):
-    """What people wrote about a recording; the file keeps its name."""
-
-    title: str = ""
-    notes: str = ""
-
-
-class RecordingRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One recording.
-
-    Attributes:
-        state: `being written`; `complete`; `cut off`: its writer was killed, and it is read as far
-            as it goes; `unreadable`: `trouble` says why.
-        begin_ns: When the first message was heard, since 1970; None: it holds none.
-        cars: Those that told of themselves, in the order people count.
-    """
-
-    name: str
-    title: str
-    notes: str
-    state: State
-    trouble: str
-    begin_ns: int | None
-    length_s: float
-    size_bytes: int
-    cars: tuple[str, ...]
 
 
 class RecordingsShelf:

@@ -9,14 +9,25 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
-from typing import Annotated, TypeVar
+from typing import TypeVar
 
 import msgspec
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.recorder.mcap_file import Recorded
 from scm.recorder.run_index import RunIndex
+from scm.records.boxes import SnapshotBox
 from scm.records.city_map import CityMap
+from scm.records.recordings import (
+    CarAt,
+    CarCamera,
+    CarFacts,
+    Frame,
+    Frames,
+    PictureAt,
+    RecordedEvent,
+    SignalChange,
+)
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
@@ -24,7 +35,7 @@ from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
-from scm.v2x.messages.world_snapshot import SnapshotBox, SnapshotVehicle, WorldSnapshot
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 MOST_ROWS = 60_000  # of one answer: a hundred cars for a minute at 10 Hz
 MOST_EVENTS = 20_000
@@ -45,117 +56,6 @@ DEFINITION = _key("world/def")
 EYE, CAR_CAMERA = _key("eye/[^/]+/frame"), _key("v/[^/]+/@camera/[^/]+")
 _PICTURE = _key("(?:eye/[^/]+/frame|v/[^/]+/@camera/[^/]+)")
 _DRAWN = _key("(?:world/snapshot|tl/[^/]+/spat|eye/[^/]+/frame|v/[^/]+/@camera/[^/]+)")
-
-
-class CarAt(msgspec.Struct, kw_only=True, frozen=True, array_like=True):
-    """One car in one frame, without names: `[car, x_m, y_m, yaw_rad, ...]`.
-
-    Attributes:
-        car: Number of its entry in `cars`.
-        lights: Names of those that are on.
-        stuck: It was told to drive and stayed: what it most likely pushed against, names of cars,
-            `wall`, boxes; empty: nothing that is known. None: it was not stuck.
-    """
-
-    car: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    speed_mps: float
-    steering_rad: float
-    mode: str
-    alive: bool
-    lights: tuple[str, ...]
-    stuck: tuple[str, ...] | None
-
-
-class CarFacts(msgspec.Struct, kw_only=True, frozen=True):
-    """What of a car is the same in all frames."""
-
-    vehicle: str
-    kind: str
-    car: str
-    owner: str
-
-
-_CARS_AT = msgspec.Meta(
-    examples=[[[0, 1.384, 0.655, -0.785, 0.21, 0.12, "drive", True, ["low"], None]]]
-)
-
-
-class Frame(msgspec.Struct, kw_only=True, frozen=True):
-    """The city at one moment.
-
-    Attributes:
-        cars: A row each: its number in `cars` of the stretch, x [m], y [m], yaw [rad], speed
-            [m/s], steering angle [rad], mode, whether it is alive, lights that are on, what it
-            is stuck against (null: it is not stuck).
-        boxes: None: as in the frame before.
-    """
-
-    t_s: float
-    cars: Annotated[tuple[CarAt, ...], _CARS_AT]
-    boxes: tuple[SnapshotBox, ...] | None
-
-
-class SignalChange(msgspec.Struct, kw_only=True, frozen=True):
-    """From when on a signal group shows a colour."""
-
-    t_s: float
-    group: str
-    colour: str
-
-
-class PictureAt(msgspec.Struct, kw_only=True, frozen=True):
-    """From when on a picture of a camera is the newest one; `vehicle` empty: an overhead one."""
-
-    t_s: float
-    vehicle: str
-    camera: str
-
-
-class CarCamera(msgspec.Struct, kw_only=True, frozen=True):
-    """A car's own camera: `front` or `rear`."""
-
-    vehicle: str
-    camera: str
-
-
-class Frames(msgspec.Struct, kw_only=True, frozen=True):
-    """A stretch of a recording.
-
-    Attributes:
-        to_s: How far it goes: less than was asked where that would be too much for one answer.
-        cars: Whom the frames' numbers mean.
-        signals: Changes, the colours at `from_s` first; a group is `junction/group`.
-        pictures: The Eye's and the cars' own, of each camera the one that is newest at `from_s`
-            first.
-        damaged: What of the stretch cannot be read, in words.
-        next_s: When the first frame after a stretch without frames comes; None: there is none, or
-            the stretch has frames.
-    """
-
-    from_s: float
-    to_s: float
-    hz: float
-    cars: tuple[CarFacts, ...]
-    frames: tuple[Frame, ...]
-    signals: tuple[SignalChange, ...]
-    pictures: tuple[PictureAt, ...]
-    damaged: tuple[str, ...]
-    next_s: float | None
-
-
-class RecordedEvent(msgspec.Struct, kw_only=True, frozen=True):
-    """An event of a recording; `number` counts from its begin."""
-
-    number: int
-    t_s: float
-    severity: str
-    source: str
-    name: str
-    text: str
-    vehicle: str | None
 
 
 def frames_of(index: RunIndex, from_s: float, to_s: float, hz: float) -> Frames:

@@ -8,9 +8,11 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
+
+from scm.records.mismatch import Job, ReportRow, Together
 
 NAME = r"^[a-z0-9][a-z0-9_-]{0,63}(\.[a-zA-Z0-9_-]{1,64})?$"
 FILES = {
@@ -24,80 +26,7 @@ FILES = {
 }
 _FIELDS, _DRAWN, _JOB, _CARS = "report.json", "drawn.json", "job.json", "cars.json"
 _DRIVE, _TOLD = re.compile(r"next_drive(_\d{1,2})?"), re.compile(r"told_\d{1,4}")
-BUDGET_S = 1800.0  # as `scm mismatch` has it
 MOST_SHOWN_BYTES = 16 * 2**20
-
-
-class Job(msgspec.Struct, kw_only=True, frozen=True):
-    """What a report was made from.
-
-    Attributes:
-        recordings: Of the shelf, or uploads: paths below the shelves.
-        told: Drives that earlier reports suggested, recorded since: likewise.
-        source: The same in words.
-        vehicle: Which car of the recordings; empty: all.
-        car: The car file's name; empty: the recording's own.
-        budget_s: Time allowed for the search; what is not found in it is not looked for.
-        from_s: Part of the recording, seconds since its begin; None: its start.
-        to_s: None: its end.
-        asked_ns: When.
-        owner: Who asked.
-    """
-
-    recordings: tuple[str, ...]
-    source: str
-    told: Annotated[tuple[str, ...], msgspec.Meta(examples=[["told_1"]])] = ()
-    vehicle: str = ""
-    car: str = ""
-    budget_s: float = BUDGET_S
-    from_s: float | None = None
-    to_s: float | None = None
-    asked_ns: int = 0
-    owner: str = ""
-
-
-class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
-    """A report in the list.
-
-    Attributes:
-        name: Below `/mismatch/reports`, and the page's address `/mismatch/NAME`.
-        made_ns: When it was written, since 1970.
-        verdict: `none`, `mismatch`, `undecided`, or `unreadable` where its files are damaged.
-        said: The verdict in a sentence.
-        effects: What was found, in words.
-        vehicle: The car file's name.
-        source: What it was made from, in words.
-        before_m: Position error of free runs on unseen parts with the car as given; None: unknown.
-        after_m: The same with what was found.
-        runtime_s: Of the search.
-        cut_short: Whether time ran out before all was asked.
-    """
-
-    name: str
-    made_ns: int
-    verdict: str
-    said: str
-    effects: tuple[str, ...] = ()
-    vehicle: str = ""
-    source: str = ""
-    before_m: float | None = None
-    after_m: float | None = None
-    runtime_s: float = 0.0
-    cut_short: bool = False
-
-
-class Together(msgspec.Struct, kw_only=True, frozen=True):
-    """What the cars of one search have in common.
-
-    Attributes:
-        said: In a sentence.
-        conclusions: A sentence or two on each effect that several may share.
-        cars: Names of their reports, this one's among them.
-    """
-
-    said: str
-    conclusions: tuple[str, ...]
-    cars: tuple[str, ...]
 
 
 class _Cars(msgspec.Struct):

@@ -7,23 +7,9 @@ short way round, which at 0.3 m/s errs by less than 0.1 mm.
 import math
 from collections.abc import Sequence
 
-import msgspec
-
 from scm.geometry import Pose2, wrap_angle
+from scm.records.eye import Residual
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
-
-
-class Residual(msgspec.Struct, kw_only=True, frozen=True):
-    """Measured minus true: distance on the floor, and yaw (+ = measured further left).
-
-    Attributes:
-        x_mm, y_mm: Along map x and y [mm].
-    """
-
-    position_mm: float
-    x_mm: float
-    y_mm: float
-    yaw_deg: float
 
 
 def truth_at(history: Sequence[WorldSnapshot], vehicle: str, t_ns: int) -> Pose2 | None:

@@ -6,7 +6,7 @@ route names its least role.
 """
 
 from collections.abc import Callable
-from typing import Annotated, Literal, get_args
+from typing import Annotated, get_args
 
 from fastapi import Depends, Security
 from fastapi.openapi.models import HTTPBearer
@@ -16,8 +16,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 
 from scm.errors import AccessError, nearest
+from scm.records.keys import Role
 
-Role = Literal["viewer", "operator", "engineer", "admin"]
 SCHEME = "key"
 """What the description of the interface calls an API key."""
 

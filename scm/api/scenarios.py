@@ -25,13 +25,14 @@ import msgspec
 import scm
 from scm.api.city import not_found
 from scm.api.keys import KeyRing
-from scm.api.operations import Cancelled, Operation, Operations, Teller
+from scm.api.operations import Cancelled, Operations, Teller
 from scm.api.problem import RefusedError
 from scm.errors import ScmError
+from scm.records.operations import Operation
+from scm.records.scenarios import Lines, Scenario
 from scm.v2x.message import Refused
 
 NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,59}$"
-MOST_BYTES = 200_000
 KEPT_LINES, KEPT_RUNS, LINE_CHARACTERS = 2000, 50, 2000
 LOOK_S, GRACE_S = 0.1, 8.0
 SHIPPED = Path(scm.__file__).parents[1] / "examples"
@@ -45,23 +46,6 @@ sys.argv = sys.argv[1:]
 sys.path[0] = str(Path(sys.argv[0]).parent)
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
-
-
-class Scenario(msgspec.Struct, kw_only=True, frozen=True):
-    """One script; `shipped`: it came with the program, and cannot be changed here."""
-
-    name: str
-    about: str
-    shipped: bool
-    text: str = ""
-
-
-class Lines(msgspec.Struct, kw_only=True, frozen=True):
-    """What a run printed; `first` is the number of the first line that is still known."""
-
-    run: str
-    first: int
-    lines: tuple[str, ...]
 
 
 class ScenarioShelf:

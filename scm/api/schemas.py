@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from scm.api.paging import Page
+from scm.records.page import Page
 
 Responses = dict[int | str, dict[str, Any]]
 

@@ -17,8 +17,9 @@ from scm.api.operations import Teller
 from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.errors import PlanError
+from scm.records.signal_plans import PlanProof
 from scm.v2x.message import Refused
-from scm.v2x.plan_file import PlanFile, PlanProof
+from scm.v2x.plan_file import PlanFile
 
 MOST_PLANS = 50
 PLAN_NAME = re.compile(r"[a-z][a-z0-9_-]{0,31}")

@@ -5,65 +5,21 @@ Times are seconds from now: both clocks, the controller's and ours, cancel out.
 
 from collections.abc import Mapping, Sequence
 
-import msgspec
-
 from scm.api.picture import Held, Picture
 from scm.clock import seconds
 from scm.records.city_map import Junction
+from scm.records.signals import (
+    GroupRow,
+    JunctionRow,
+    MonitorRow,
+    SignalGroup,
+    StatusRow,
+)
 from scm.v2x.messages.monitor_status import MonitorStatus
-from scm.v2x.messages.plan_request import SignalStage
-from scm.v2x.messages.signal_request import SignalWish
-from scm.v2x.messages.signal_status import SignalDetector, SignalStatus, SignalTurn
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.signal_status import SignalStatus
+from scm.v2x.messages.spat import Spat
 
 FRESH_S = 1.0
-
-
-class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One signal group.
-
-    Attributes:
-        colour: None while nothing fresh is known.
-        min_s: It will not change before; None: not known.
-        max_s: It will have changed by then; None: not known.
-        likely_s: It will likely change then: a forecast, no promise; None: nobody knows.
-        likely_confidence: Share of such forecasts that come true within a second, 0 to 1.
-        since_ns: When this colour began, on the controller's clock.
-    """
-
-    group: str
-    colour: str | None
-    next_colour: str | None = None
-    min_s: float | None = None
-    max_s: float | None = None
-    likely_s: float | None = None
-    likely_confidence: float | None = None
-    since_ns: int | None = None
-
-
-class MonitorRow(msgspec.Struct, kw_only=True, frozen=True):
-    """The second channel; `fault` is None while all is well, `age_s` since it was last heard."""
-
-    fault: str | None
-    detail: str
-    age_s: float
-
-
-class JunctionRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One junction; `fresh` tells whether its controller was heard within the last second.
-
-    Attributes:
-        t_ns: The controller's clock now; None: it was never heard.
-    """
-
-    junction: str
-    t_ns: int | None
-    fresh: bool
-    mode: str | None
-    plan: str | None
-    plans: tuple[str, ...]
-    groups: tuple[GroupRow, ...]
-    monitor: MonitorRow | None
 
 
 def junction_rows(
@@ -80,30 +36,6 @@ def junction_rows(
         )
         for junction in junctions
     )
-
-
-class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
-    """What runs at a junction and who wants what, on its controller's clock.
-
-    Attributes:
-        pending: Plan or policy to come at the next safe moment; empty: none.
-        detectors: Of its groups; none: nobody listens for cars now.
-        turns: Greens on and to come; none: nobody knows.
-        failure: Why a policy was given up for fixed time; empty: none was.
-        stages, offset_s: Of the plan in force, where somebody made it: as it runs, whatever it was
-            edited to since. No stages: it is one of the junction's own.
-    """
-
-    junction: str
-    policy: str
-    plan: str
-    pending: str
-    wishes: tuple[SignalWish, ...]
-    detectors: tuple[SignalDetector, ...]
-    turns: tuple[SignalTurn, ...]
-    failure: str
-    stages: tuple[SignalStage, ...]
-    offset_s: float | None
 
 
 def status_rows(picture: Picture) -> tuple[StatusRow, ...]:

@@ -5,40 +5,13 @@ from collections import deque
 import msgspec
 
 from scm.clock import NS_PER_S, seconds
+from scm.records.stations import StationRow
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 
 LOST_SHOWN_NS = 60 * NS_PER_S
 LATELY_NS = 60 * NS_PER_S
 _Key = tuple[str, str, str]
-
-
-class StationRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One run of one station.
-
-    Attributes:
-        since_ns: When it was first seen here.
-        lost_ns: When it left or died; None while it is there.
-        age_s: Since its last status; None: it never sent one.
-        late_steps: Steps that were due and left out, since its start.
-        late_share: The same as a share of the steps due in the last minute; None: not known.
-        dropped: Messages that its mailboxes had to drop, since its start.
-        dropped_lately: The same within the last minute.
-    """
-
-    role: str
-    name: str
-    session: str
-    alive: bool
-    since_ns: int
-    lost_ns: int | None = None
-    age_s: float | None = None
-    detail: str = ""
-    step_ms: float = 0.0
-    late_steps: int = 0
-    late_share: float | None = None
-    dropped: int = 0
-    dropped_lately: int = 0
 
 
 class StationTable:

@@ -17,7 +17,7 @@ from scm.api.routes.boxes import boxes_of
 from scm.api.routes.stop import stop_of
 from scm.api.signal_rows import junction_rows, status_rows
 from scm.api.vehicle_rows import vehicles_topic
-from scm.disturbances import Disturbance
+from scm.records.disturbances import Disturbance
 
 EVENTS = "events"
 """The one topic that is no state: its entries come one by one, and never twice."""

@@ -22,6 +22,7 @@ from scm.api.problem import DISK_TROUBLE, RefusedError
 from scm.errors import RecordingError
 from scm.recording.description import FILE_NAME, Description, read_description
 from scm.recording.table import KINDS
+from scm.records.mismatch import Upload
 from scm.runtime.parent_watch import with_parent
 from scm.v2x.message import Refused
 
@@ -39,22 +40,6 @@ ID = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 _CHUNK = 2**20
 _RUN = ".mcap"
 _ENTRY = b"PK\x01\x02"  # begins each entry of a zip's list of contents
-
-
-class Upload(msgspec.Struct, kw_only=True, frozen=True):
-    """A recording that was sent.
-
-    Attributes:
-        upload: Its id, for a mismatch job; the newest twenty are kept.
-        files: Of how many files it is.
-        size_bytes: Unpacked.
-        vehicles: Car files or cars that its description names; empty of a city's run.
-    """
-
-    upload: str
-    files: int
-    size_bytes: int
-    vehicles: tuple[str, ...]
 
 
 def take(shelf: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Upload:

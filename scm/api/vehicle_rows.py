@@ -1,84 +1,13 @@
 """Vehicles as they are shown: the world's truth with trip, own report and the Eye's residual."""
 
-import msgspec
-
 from scm.api.picture import Picture, SeenPose, once_a_picture
-from scm.api.residual import Residual
 from scm.camera.optics import fitted
+from scm.records.eye import Residual
+from scm.records.vehicles import TripRow, VehicleRow, VehiclesTopic
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 POSE_SHOWN_S = 2.0
 TRIP_SHOWN_S = 10.0
-
-
-class TripRow(msgspec.Struct, kw_only=True, frozen=True):
-    """Progress of a trip; `length_m` is None for a route without end.
-
-    Attributes:
-        void: Why its time so far says nothing of the city, in words; none: it counts.
-    """
-
-    trip_id: str
-    done_m: float
-    length_m: float | None
-    arrived: bool
-    waiting_for: str | None
-    route: tuple[str, ...]
-    void: tuple[str, ...]
-
-
-class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One car; pose of the rear axle's centre in the map frame.
-
-    Attributes:
-        cameras: Those that its file gives it; may be empty.
-        age_ms: How old its newest state is now, the snapshot's own age included.
-        lease_left_ms: Until the lease ends if it is not renewed; None: it is at home.
-        battery_v: Of the drive battery, under load as it is; None: not measured.
-        battery_charge: What is left in it, 0 to 1: counted by a simulated car, estimated from the
-            voltage by a real one; None: not known.
-        command_age_ms: How old the newest command of its leaseholder is, since it reached the car,
-            the snapshot's age included; None: nobody else drives it, or none came yet.
-        throttle: As the car reports it; None: it reports nothing.
-        stuck: It was told to drive for seconds and stays: what it most likely pushes against, names
-            of cars, `wall`, boxes; empty: nothing that is known. None: it is not stuck.
-        eye: What the Eye's newest pose differs from the truth; None: not seen lately.
-    """
-
-    vehicle: str
-    kind: str
-    car: str
-    cameras: tuple[str, ...]
-    tag_id: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    speed_mps: float
-    steering_rad: float
-    owner: str
-    epoch: int
-    lease_left_ms: float | None
-    battery_v: float | None
-    battery_charge: float | None
-    command_age_ms: float | None
-    mode: str
-    age_ms: float
-    alive: bool
-    lights: tuple[str, ...]
-    throttle: float | None
-    stuck: tuple[str, ...] | None
-    trip: TripRow | None
-    eye: Residual | None
-
-
-class VehiclesTopic(msgspec.Struct, kw_only=True, frozen=True):
-    """All vehicles and the world's pulse; `t_ns` and `tick` are None until it is heard."""
-
-    t_ns: int | None
-    tick: int | None
-    real_time_factor: float
-    late_ticks: int
-    vehicles: tuple[VehicleRow, ...]
 
 
 @once_a_picture

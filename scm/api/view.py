@@ -12,17 +12,20 @@ from contextlib import contextmanager
 from typing import Any
 
 from scm.api.close_up import CloseUps
-from scm.api.event_log import EventLog, LoggedEvent
-from scm.api.eye_residuals import ResidualLog, ResidualSample
-from scm.api.eye_tracks import TrackRow, TrackWatch
+from scm.api.event_log import EventLog
+from scm.api.eye_residuals import ResidualLog
+from scm.api.eye_tracks import TrackWatch
 from scm.api.picture import Held, Picture, SeenPose, TagSighting
 from scm.api.residual import residual_of, truth_at
 from scm.api.scan_watch import ScanWatch
-from scm.api.signal_history import History, PromiseScore, SignalHistory, Verdict
+from scm.api.signal_history import SignalHistory
 from scm.api.stations import StationTable
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.disturbances import Disturbances
 from scm.geometry import Pose2
+from scm.records.events import LoggedEvent
+from scm.records.eye import ResidualSample, TrackRow
+from scm.records.signal_history import History, PromiseScore, Verdict
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message

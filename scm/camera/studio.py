@@ -25,10 +25,11 @@ from scm.camera.standing import (
     wall_balls,
     wall_thing,
 )
+from scm.records.boxes import SnapshotBox
 from scm.records.city_map import Box, CityMap
 from scm.scenery.bodies import car_rotation
 from scm.scenery.canvas import Colour
-from scm.v2x.messages.world_snapshot import SnapshotBox, SnapshotVehicle
+from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 SKY_HIGH: Colour = (226, 206, 178)
 SKY_LOW: Colour = (238, 232, 224)

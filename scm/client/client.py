@@ -34,9 +34,9 @@ from scm.client.nouns.stop import StopNoun
 from scm.client.nouns.stream import StreamNoun
 from scm.client.nouns.traffic import TrafficNoun
 from scm.client.nouns.vehicles import VehiclesNoun
-from scm.client.records.shared import Operation
 from scm.client.teleop import Wheel, taken
 from scm.client.work import finished
+from scm.records.operations import Operation
 
 
 class Client:

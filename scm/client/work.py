@@ -5,8 +5,8 @@ from collections.abc import Callable
 from time import monotonic
 
 from scm.client.connection import Connection, part
-from scm.client.records.shared import Operation
 from scm.errors import LinkError, ScmError
+from scm.records.operations import Operation
 
 LOOK_S = 0.25
 

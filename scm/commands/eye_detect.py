@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from scm.command import Command
 
 if TYPE_CHECKING:  # the command line starts without what finds tags
-    from scm.v2x.messages.eye_tags import TagSeen
+    from scm.records.eye import TagSeen
 
 _ORDER = (
     "Corners: lower left, lower right, upper right, upper left of the printed tag; the centre of "

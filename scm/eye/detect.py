@@ -19,7 +19,7 @@ import pupil_apriltags
 
 from scm.arrays import Floats, Image
 from scm.eye.picture import LEAST_PX
-from scm.v2x.messages.eye_tags import TagSeen
+from scm.records.eye import TagSeen
 
 PIXEL_ORIGIN_PX = 0.5
 """The library puts the first pixel's centre at (0.5, 0.5); we, as OpenCV, at (0, 0)."""

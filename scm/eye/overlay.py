@@ -7,7 +7,7 @@ import numpy as np
 
 from scm.arrays import Image
 from scm.errors import EyeError
-from scm.v2x.messages.eye_tags import TagSeen
+from scm.records.eye import TagSeen
 
 JPEG_QUALITY = 80
 FRACTION_BITS = 4

@@ -39,6 +39,7 @@ from scm.eye.track.tracks import Tracks
 from scm.eye.watch import Watch
 from scm.log import event
 from scm.records.city_map import CityMap, MapTag
+from scm.records.eye import TagSeen
 from scm.runtime.part import IsWanted, Service, Subscription
 from scm.scenery.bodies import NIGEL, CarBody, car_body
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
@@ -51,7 +52,7 @@ from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_preview import EyePreview
 from scm.v2x.messages.eye_status import Complaint, EyeStatus
-from scm.v2x.messages.eye_tags import EyeTags, TagSeen
+from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 

@@ -22,8 +22,8 @@ from scm.eye.calibration import Calibration, calibrated, covariance_faults
 from scm.eye.camera import CameraModel, camera_model
 from scm.eye.watch import WORTH_M, Watch
 from scm.records.city_map import Camera, MapTag
+from scm.records.eye import Calibrated, InForce
 from scm.v2x.messages.calibration_request import CalibrationRequest, MeasuredLens
-from scm.v2x.messages.eye_status import Calibrated, InForce
 
 MOST_KEPT = 10
 _OF_THE_SENSOR = ("name", "rate_hz", "noise_sigma", "rolling_s")

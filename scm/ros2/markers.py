@@ -10,11 +10,12 @@ from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
+from scm.records.boxes import SnapshotBox
 from scm.records.city_map import Box, CityMap
 from scm.ros2.frames import MAP, header, point, pose, vector
 from scm.ros2.types import constant, ros
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.world_snapshot import SnapshotBox, SnapshotVehicle, WorldSnapshot
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 from scm.vehicles.car import Car
 
 LASTS_NS = 500 * NS_PER_MS

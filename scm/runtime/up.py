@@ -9,11 +9,12 @@ from functools import partial
 from pathlib import Path
 
 from scm.clock import NS_PER_MS, WallClock, seconds
-from scm.disturbances import MESSAGE_KINDS, Disturbance, Disturbances
+from scm.disturbances import MESSAGE_KINDS, Disturbances
 from scm.errors import RunError, nearest
 from scm.eye.station import eye_station
 from scm.maps.load import is_scan, load_map
 from scm.maps.radio import with_radio
+from scm.records.disturbances import Disturbance
 from scm.runtime.live import stop_on_signal
 from scm.runtime.supervisor import Job, PrintLine, Supervisor
 from scm.store.open import open_store

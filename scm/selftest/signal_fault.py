@@ -12,8 +12,9 @@ from signal import Signals
 import msgspec
 
 from scm.clock import NS_PER_MS
+from scm.records.signals import Colour, SignalGroup
 from scm.traffic.monitor.conflict_table import Card
-from scm.v2x.messages.spat import Colour, SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 
 OutputFault = Callable[[Spat], Spat | None]
 

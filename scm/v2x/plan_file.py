@@ -8,31 +8,11 @@ import hashlib
 
 import msgspec
 
-from scm.v2x.messages.plan_request import SignalStage
-from scm.v2x.messages.signal_site import SignalPhase, SignalSite
+from scm.records.signal_plans import PlanProof, SignalPhase, SignalStage
+from scm.v2x.messages.signal_site import SignalSite
 
 MEANING = 2
 """Of stages, and of what the search proves of them; 1: all went red between two stages."""
-
-
-class PlanProof(msgspec.Struct, kw_only=True, frozen=True):
-    """What the search walked through without finding fault.
-
-    Attributes:
-        digest: Of what was proven.
-        states, transitions: Of the kernel, under any wishes.
-        plan_states, plan_transitions: Of the kernel under this plan, however late its steps.
-        cycle_s: What the stages make, with yellow and red clear.
-        took_s: How long the search took.
-    """
-
-    digest: str
-    states: int
-    transitions: int
-    plan_states: int
-    plan_transitions: int
-    cycle_s: float
-    took_s: float
 
 
 class PlanFile(msgspec.Struct, kw_only=True, frozen=True):

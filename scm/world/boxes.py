@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from scm.arrays import Bools, Floats
+from scm.records.boxes import SnapshotBox
 from scm.records.city_map import Box
-from scm.v2x.messages.world_snapshot import SnapshotBox
 
 GRAVITY = 9.80665
 STILL_MPS, STILL_RADPS = 1e-6, 1e-5

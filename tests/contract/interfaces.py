@@ -119,6 +119,21 @@ def _bare(node: Any) -> Any:
     }
 
 
+def meaning(node: Any) -> Any:
+    """Return what a schema means: the order of an `enum` and its `type` add nothing."""
+    if isinstance(node, list):
+        return [meaning(one) for one in node]
+    if not isinstance(node, dict):
+        return node
+    same = {key: meaning(value) for key, value in node.items() if value or key != "required"}
+    if same.get("default", "") in (None, []):
+        del same["default"]
+    if isinstance(same.get("enum"), list):
+        same.pop("type", None)
+        same["enum"] = sorted(same["enum"])
+    return same
+
+
 PARTS = {"rest": rest, "messages": messages, "commands": commands}
 
 

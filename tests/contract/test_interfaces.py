@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.contract.interfaces import FOLDER, PARTS, text_of
+from tests.contract.interfaces import FOLDER, PARTS, meaning, text_of
 
 
 @pytest.mark.parametrize("part", PARTS)
@@ -14,4 +14,7 @@ def test_an_interface_is_as_it_was_written_down(part: str) -> None:
     now = json.loads(text_of(part))
     assert sorted(now) == sorted(before)
     for name, content in before.items():
-        assert now[name] == content, f"{part}: {name}"
+        if part == "rest":
+            assert meaning(now[name]) == meaning(content), f"{part}: {name}"
+        else:
+            assert now[name] == content, f"{part}: {name}"

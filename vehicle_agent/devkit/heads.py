@@ -16,9 +16,10 @@ from collections.abc import Sequence
 
 from scm.clock import NS_PER_S
 from scm.log import event
+from scm.records.signals import Verb
 from scm.v2x.exchange import Call
 from scm.v2x.message import Message, Refused
-from scm.v2x.messages.signal_request import SignalRequest, Verb
+from scm.v2x.messages.signal_request import SignalRequest
 
 RED, YELLOW, GREEN = 1, 2, 3
 LAPSE_S = 30.0

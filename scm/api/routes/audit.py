@@ -2,10 +2,9 @@
 
 from typing import Annotated
 
-import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response
 
-from scm.api.audit_trail import AuditFilter, AuditRow, newest_first
+from scm.api.audit_trail import AuditFilter, newest_first
 from scm.api.city import json_response
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
@@ -13,25 +12,10 @@ from scm.api.roles import ENGINEER
 from scm.api.schemas import answer, answer_file, answer_page
 from scm.api.tables import Form, table_response
 from scm.errors import StoreError
+from scm.records.audit import AuditRow, ChainVerdict
 from scm.store.audit import AuditLog, Head
 from scm.store.repository import Repository
 from scm.v2x.message import Refused
-
-
-class ChainVerdict(msgspec.Struct, kw_only=True, frozen=True):
-    """Whether the chain of entries is whole.
-
-    Attributes:
-        whole: Whether every entry follows the one before as it is now.
-        entries: Number of the newest.
-        digest: Hash of the newest, in hexadecimal: note it elsewhere, and give it again.
-        error: What is broken; empty: nothing.
-    """
-
-    whole: bool
-    entries: int
-    digest: str
-    error: str
 
 
 def _wanted(

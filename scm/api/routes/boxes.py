@@ -1,20 +1,13 @@
 """Construction boxes that cars can push: where they are, and back to their places."""
 
-import msgspec
 from fastapi import APIRouter, Response
 
 from scm.api.city import City, IdempotencyKey, json_response
 from scm.api.picture import Picture
 from scm.api.roles import OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer
+from scm.records.boxes import Boxes, SnapshotBox
 from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
-from scm.v2x.messages.world_snapshot import SnapshotBox
-
-
-class Boxes(msgspec.Struct, kw_only=True, frozen=True):
-    """Where the boxes are that cars can push."""
-
-    boxes: tuple[SnapshotBox, ...]
 
 
 def boxes_of(picture: Picture) -> tuple[SnapshotBox, ...]:

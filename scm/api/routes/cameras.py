@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import AsyncIterator
 
-import msgspec
 from fastapi import APIRouter, Response
 from fastapi.responses import StreamingResponse
 
@@ -13,24 +12,13 @@ from scm.api.roles import VIEWER
 from scm.api.schemas import answer, answer_file
 from scm.api.stream import Stream
 from scm.camera.optics import fitted
+from scm.records.cameras import Cameras
 from scm.v2x.message import Refused
 from scm.v2x.messages.camera_frame import CameraFrame
 
 LOOK_S = 0.02
 PATIENCE_S = 15.0  # the first picture also paints the floor: seconds on a busy computer
 BOUNDARY = "frame"
-
-
-class Cameras(msgspec.Struct, kw_only=True, frozen=True):
-    """A car's cameras.
-
-    Attributes:
-        cameras: Those that its file gives it; may be empty.
-        watched: Those whose pictures somebody looks at now.
-    """
-
-    cameras: tuple[str, ...]
-    watched: tuple[str, ...]
 
 
 def router(city: City, stream: Stream) -> APIRouter:

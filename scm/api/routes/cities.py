@@ -2,63 +2,16 @@
 
 from importlib.metadata import version
 
-import msgspec
 from fastapi import APIRouter, Response
 
 from scm.api.city import City, Name, json_response, not_found
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer
-from scm.api.stations import StationRow
 from scm.clock import seconds
+from scm.records.cities import Cities, CityRow
 
 INTERFACE = "v1"
 SOFTWARE = version("scm")
-
-
-class CityRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One city.
-
-    Attributes:
-        name: Chunk of all its keys on the bus.
-        map: Name of its map; `title` is for people.
-        software: Version of this program.
-        interface: Version of this interface, the first chunk of all addresses.
-        seed: Of all its randomness; None: the world was not heard yet.
-        lanes: How many the map has; likewise `junctions`.
-        vehicles: How many cars are on the map.
-        t_ns: Time of the world; None: it was not heard yet.
-        tick: Of the world's newest snapshot; None: likewise.
-        real_time_factor: Simulated over elapsed time, over the last second.
-        snapshot_age_s: How long ago the world was heard.
-        stopped: Whether the city-wide stop is engaged.
-        parts: Its own processes that are there.
-    """
-
-    name: str
-    map: str
-    title: str
-    software: str
-    interface: str
-    seed: int | None
-    lanes: int
-    junctions: int
-    vehicles: int
-    t_ns: int | None
-    tick: int | None
-    real_time_factor: float
-    snapshot_age_s: float | None
-    stopped: bool
-    parts: tuple[StationRow, ...]
-
-
-class Cities(msgspec.Struct, kw_only=True, frozen=True):
-    """The cities that this server shows.
-
-    Attributes:
-        cities: One: a server belongs to a city.
-    """
-
-    cities: tuple[CityRow, ...]
 
 
 def router(city: City) -> APIRouter:

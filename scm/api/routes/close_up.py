@@ -19,6 +19,7 @@ from scm.api.scan_watch import scanner_of
 from scm.api.schemas import answer, answer_file
 from scm.api.stream import Stream
 from scm.clock import NS_PER_MS, WallClock
+from scm.records.vehicles import LinkRow
 from scm.v2x.message import Refused
 from scm.v2x.messages.echo_request import EchoReply, EchoRequest
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
@@ -41,21 +42,6 @@ class CloseUpFrame(msgspec.Struct, kw_only=True, frozen=True):
     samples: tuple[Sample, ...]
     source: str
     seq: int
-
-
-class LinkRow(msgspec.Struct, kw_only=True, frozen=True):
-    """How long the way to a car's owner and back is.
-
-    Attributes:
-        answered_by: `world` for hosted cars, else the car's own `agent`.
-        round_trip_ms: From here to it and back, its wait for its next step (20 ms) included.
-        clock_ahead_ms: Its clock less ours, as if both ways took equally long.
-    """
-
-    vehicle: str
-    answered_by: str
-    round_trip_ms: float
-    clock_ahead_ms: float
 
 
 def router(city: City, stream: Stream) -> APIRouter:

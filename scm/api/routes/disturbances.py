@@ -1,21 +1,14 @@
 """What makes measurements in the city void: now, and in the last hour."""
 
-import msgspec
 from fastapi import APIRouter, Response
 
 from scm.api.city import City, json_response
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer
 from scm.clock import NS_PER_S
-from scm.disturbances import Disturbance
+from scm.records.disturbances import DisturbanceList
 
 SHOWN_NS = 3600 * NS_PER_S
-
-
-class DisturbanceList(msgspec.Struct, kw_only=True, frozen=True):
-    """What made measurements void in the last hour, the oldest first."""
-
-    disturbances: tuple[Disturbance, ...]
 
 
 def router(city: City) -> APIRouter:

@@ -5,67 +5,16 @@ from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
 
-from scm.api.acknowledgements import Acknowledgement, Acknowledgements
+from scm.api.acknowledgements import Acknowledgements
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
-from scm.api.event_log import EventFilter, LoggedEvent
+from scm.api.event_log import EventFilter
+from scm.api.inputs import Json
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer, answer_file, answer_page
 from scm.api.tables import Form, table_response
-
-
-class EventRow(msgspec.Struct, kw_only=True, frozen=True):
-    """An event, and who took note of it.
-
-    Attributes:
-        seq: Number of the event since the server started.
-        id: The same for this event for ever.
-        vehicle: The car it is about; null: none.
-        acknowledged_by: Who took note of it; null: nobody yet.
-        acknowledged_ns: When [ns since 1970]; null: not yet.
-        note: What was said to it.
-    """
-
-    seq: int
-    id: str
-    severity: str
-    source: str
-    t_ns: int
-    name: str
-    text: str
-    vehicle: str | None
-    acknowledged_by: str | None
-    acknowledged_ns: int | None
-    note: str
-
-
-class AcknowledgeBody(BaseModel):
-    """Events that somebody took note of."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    events: list[Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]] = Field(
-        min_length=1,
-        max_length=1000,
-        description="ids of the events",
-        examples=[["9f3a51c07be2d418"]],
-    )
-    by: str = Field("", max_length=64, description="who; empty: whoever calls", examples=["ada"])
-    note: str = Field(
-        "", max_length=500, description="what there is to say", examples=["tyre put back on"]
-    )
-
-
-class Acknowledged(msgspec.Struct, kw_only=True, frozen=True):
-    """What is acknowledged now.
-
-    Attributes:
-        acknowledgements: Of the events that were named, as they stand.
-    """
-
-    acknowledgements: tuple[Acknowledgement, ...]
+from scm.records.events import AcknowledgeBody, Acknowledged, Acknowledgement, EventRow, LoggedEvent
 
 
 def _wanted(
@@ -145,7 +94,9 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
         responses=answer(Acknowledged),
         dependencies=[OPERATOR],
     )
-    def acknowledge(body: AcknowledgeBody, signer: Signer, key: IdempotencyKey = "") -> Response:
+    def acknowledge(
+        body: Json[AcknowledgeBody], signer: Signer, key: IdempotencyKey = ""
+    ) -> Response:
         acknowledged = seen.add(body.events, signer(body.by), body.note)
         return json_response(Acknowledged(acknowledgements=acknowledged))
 

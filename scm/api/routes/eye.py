@@ -3,17 +3,23 @@
 import asyncio
 from typing import Annotated
 
-import msgspec
 from fastapi import APIRouter, Query, Request, Response
 
 from scm.api.city import City, Name, json_response, not_found
-from scm.api.eye_residuals import ResidualSample, ResidualStats, stats_of, thinned
-from scm.api.eye_rows import CameraRow, PoseRow, camera_rows, frame_of, pose_rows, tags_of
-from scm.api.eye_tracks import TrackRow
+from scm.api.eye_residuals import stats_of, thinned
+from scm.api.eye_rows import camera_rows, frame_of, pose_rows, tags_of
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer, answer_file, answer_page
-from scm.records.city_map import Camera
+from scm.records.eye import (
+    CameraRow,
+    CameraState,
+    Overhead,
+    PoseRow,
+    Residuals,
+    TrackList,
+    VehicleResiduals,
+)
 from scm.v2x.messages.eye_tags import EyeTags
 
 LONGEST_WINDOW_S = 300.0
@@ -31,53 +37,6 @@ Vehicle = Annotated[
 Most = Annotated[
     int, Query(ge=0, le=MOST_SAMPLES, description="samples at most, evenly taken", examples=[500])
 ]
-
-
-class Overhead(msgspec.Struct, kw_only=True, frozen=True):
-    """The Eye's cameras, with what each sees."""
-
-    cameras: tuple[CameraRow, ...]
-
-
-class CameraState(msgspec.Struct, kw_only=True, frozen=True):
-    """One camera.
-
-    Attributes:
-        state: As in the list.
-        mounted: Its lens and where it hangs, by the map; null: the map does not know it.
-    """
-
-    state: CameraRow
-    mounted: Camera | None
-
-
-class TrackList(msgspec.Struct, kw_only=True, frozen=True):
-    """The Eye's tracks, by name."""
-
-    tracks: tuple[TrackRow, ...]
-
-
-class VehicleResiduals(msgspec.Struct, kw_only=True, frozen=True):
-    """What one car's poses were off by."""
-
-    vehicle: str
-    stats: ResidualStats
-
-
-class Residuals(msgspec.Struct, kw_only=True, frozen=True):
-    """What a camera's poses were off by, against the truth of a simulated city.
-
-    Attributes:
-        stats: Of all its cars together.
-        vehicles: Of each car.
-        samples: Poses with their residuals, two a second of each car, evenly thinned.
-    """
-
-    camera: str
-    window_s: float
-    stats: ResidualStats
-    vehicles: tuple[VehicleResiduals, ...]
-    samples: tuple[ResidualSample, ...]
 
 
 def router(city: City) -> APIRouter:

@@ -1,38 +1,43 @@
 """Calibrating overhead cameras: pictures of a board, measuring lens and place, what is kept."""
 
 from pathlib import Path as FilePath
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import msgspec
 from fastapi import APIRouter, Path, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
 from scm.api.calibration_desk import CalibrationDesk, FloorTag
-from scm.api.calibration_shelf import (
-    LARGEST_TOML,
-    CalibrationFile,
-    CalibrationRow,
-    CalibrationShelf,
-)
+from scm.api.calibration_shelf import CalibrationShelf
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
 from scm.api.etag import Matching, tagged
 from scm.api.eye_rows import frame_of
-from scm.api.operations import Operation, Operations, accepted
+from scm.api.inputs import Json
+from scm.api.operations import Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
 from scm.api.roles import ENGINEER, VIEWER
 from scm.api.schemas import answer, answer_file, answer_page
+from scm.records.eye_calibrations import (
+    NAME,
+    CalibrationBody,
+    CalibrationFile,
+    CalibrationRow,
+    LensBody,
+    PlaceBody,
+    View,
+    Views,
+)
+from scm.records.operations import Operation
 from scm.v2x.message import Refused
 
-_NAME = r"^[a-z0-9_-]{1,48}$"
 _MEDIA = {".jpg": "image/jpeg", ".png": "image/png"}
 _PICTURES = {
     media: {"schema": {"type": "string", "contentMediaType": media}} for media in _MEDIA.values()
 }
 
 CalibrationName = Annotated[
-    str, Path(pattern=_NAME, description="a calibration's name", examples=["overhead-place"])
+    str, Path(pattern=NAME, description="a calibration's name", examples=["overhead-place"])
 ]
 ViewName = Annotated[
     str,
@@ -42,104 +47,6 @@ ViewName = Annotated[
         examples=["0001.jpg"],
     ),
 ]
-SaveAs = Annotated[
-    str,
-    Field(
-        pattern=_NAME,
-        description="what the result is called, with a number where it is taken by then",
-        examples=["overhead-2025"],
-    ),
-]
-
-
-class View(msgspec.Struct, kw_only=True, frozen=True):
-    """One picture of a board.
-
-    Attributes:
-        name: Of its file.
-        made_ns: When it came [ns since 1970].
-        found: What was found in it last, as docs/dashboard/eye.md lists it; null: no board, or
-            nobody looked.
-    """
-
-    name: str
-    made_ns: int
-    found: Annotated[Any, msgspec.Meta(examples=[{"points": 40, "sharpness": 3.1}])]
-
-
-class Views(msgspec.Struct, kw_only=True, frozen=True):
-    """A camera's pictures of a board.
-
-    Attributes:
-        views: In the order they came.
-        findings: Of all together, as docs/dashboard/eye.md lists them; null: nobody looked.
-    """
-
-    views: tuple[View, ...]
-    findings: Annotated[Any, msgspec.Meta(examples=[{"size_px": [1280, 720], "refused": []}])]
-
-
-class Body(BaseModel):
-    """What a route takes: nothing beyond its fields."""
-
-    model_config = ConfigDict(extra="forbid")
-
-
-class LensBody(Body):
-    """What was printed, and whether the lens is to be measured or the board only found."""
-
-    board: Literal["chessboard", "charuco", "tags"] = Field(
-        "chessboard", description="what was printed", examples=["chessboard"]
-    )
-    columns: int = Field(ge=2, le=60, description="squares, or tags, across", examples=[9])
-    rows: int = Field(ge=2, le=60, description="squares, or tags, down", examples=[6])
-    square_m: float = Field(
-        gt=0.0, le=2.0, description="edge of a square; of tags middle to middle", examples=[0.03]
-    )
-    marker_m: float | None = Field(
-        None, gt=0.0, le=2.0, description="black edge of a marker or tag", examples=[0.022]
-    )
-    dictionary: str = Field(
-        "DICT_4X4_50",
-        pattern=r"^DICT_[A-Za-z0-9_]{1,40}$",
-        description="markers of a ChArUco board",
-        examples=["DICT_4X4_50"],
-    )
-    first_id: int = Field(0, ge=0, le=586, description="of the tag at the lower left", examples=[0])
-    fisheye: bool = Field(
-        default=False, description="a lens of more than about 100 degrees", examples=[False]
-    )
-    save_as: SaveAs | None = Field(
-        None,
-        description="what the lens is called, as with a place; null: only look",
-        examples=["overhead-lens"],
-    )
-
-
-class PlaceBody(Body):
-    """From what the camera's place is to be found, and what the result is called."""
-
-    lens: SaveAs | None = Field(
-        None, description="a lens on the shelf; null: the map's", examples=["overhead-lens"]
-    )
-    tags: tuple[dict[str, float], ...] = Field(
-        (),
-        max_length=40,
-        description="tags on the floor beside the map's: id, x_m, y_m, yaw_rad, size_m of each",
-        examples=[[{"id": 100, "x_m": 0.2, "y_m": 0.08, "yaw_rad": 0.0, "size_m": 0.12}]],
-    )
-    save_as: SaveAs
-
-
-class CalibrationBody(Body):
-    """A calibration's text."""
-
-    toml: str = Field(
-        min_length=1,
-        max_length=LARGEST_TOML,
-        description="a lens of `scm eye calibrate`, or one [[cameras]] block",
-        examples=['[[cameras]]\nname = "overhead"\nx_m = 1.384\n'],
-    )
 
 
 def router(city: City, work: Operations) -> APIRouter:
@@ -230,7 +137,9 @@ def _add_measuring(routes: APIRouter, city: City, there: Any, work: Operations) 
         dependencies=[ENGINEER],
         responses=answer(Operation, 202),
     )
-    def lens(request: Request, name: Name, body: LensBody, key: IdempotencyKey = "") -> Response:
+    def lens(
+        request: Request, name: Name, body: Json[LensBody], key: IdempotencyKey = ""
+    ) -> Response:
         del key  # the same key gets the same operation
         desk = there()
         if not desk.views(name):
@@ -248,7 +157,9 @@ def _add_measuring(routes: APIRouter, city: City, there: Any, work: Operations) 
         dependencies=[ENGINEER],
         responses=answer(Operation, 202),
     )
-    def place(request: Request, name: Name, body: PlaceBody, key: IdempotencyKey = "") -> Response:
+    def place(
+        request: Request, name: Name, body: Json[PlaceBody], key: IdempotencyKey = ""
+    ) -> Response:
         del key  # the same key gets the same operation
         desk = there()
         if all(camera.name != name for camera in city.city_map.cameras):
@@ -285,7 +196,7 @@ def _add_shelf(routes: APIRouter, there: Any) -> None:
     def write(
         request: Request,
         name: CalibrationName,
-        body: CalibrationBody,
+        body: Json[CalibrationBody],
         condition: Matching,
         key: IdempotencyKey = "",
     ) -> Response:

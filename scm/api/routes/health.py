@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 
-import msgspec
 from fastapi import APIRouter, Response
 
 from scm.api.city import City, json_response
@@ -14,50 +13,11 @@ from scm.api.problem import problem
 from scm.api.schemas import answer
 from scm.clock import seconds
 from scm.log import event
+from scm.records.health import Alive, Check, Ready
 
 READY_S = 2.0
 LEAST_FREE_BYTES = 200 * 2**20
 _log = logging.getLogger(__name__)
-
-
-class Alive(msgspec.Struct, kw_only=True, frozen=True):
-    """The server answers.
-
-    Attributes:
-        status: `ok`.
-    """
-
-    status: str
-
-
-class Check(msgspec.Struct, kw_only=True, frozen=True):
-    """One thing that the server needs.
-
-    Attributes:
-        name: `router`: its connection to the bus; `world`: snapshots come; `parts`: every part of
-            the city that should be there is; `disk`: there is room on the shelves for recordings,
-            reports and the like.
-        good: Whether it is there.
-        detail: What was found, in words.
-    """
-
-    name: str
-    good: bool
-    detail: str
-
-
-class Ready(msgspec.Struct, kw_only=True, frozen=True):
-    """The server can do its work.
-
-    Attributes:
-        status: `ready`.
-        snapshot_age_s: How long ago the world was heard.
-        checks: What was looked at.
-    """
-
-    status: str
-    snapshot_age_s: float | None
-    checks: tuple[Check, ...]
 
 
 def router(city: City) -> APIRouter:

@@ -2,39 +2,14 @@
 
 from typing import Annotated
 
-import msgspec
 from fastapi import APIRouter, Path, Response
 
 from scm.api.city import IdempotencyKey, json_response, not_found
 from scm.api.keys import KeyRecord, KeyRing
-from scm.api.roles import ADMIN, Role
+from scm.api.roles import ADMIN
 from scm.api.schemas import answer
 from scm.errors import AccessError
-
-
-class KeyRow(msgspec.Struct, kw_only=True, frozen=True):
-    """An API key without its secret.
-
-    Attributes:
-        id: Public part of the key.
-        owner: Whose it is.
-        made_s: When it was made, seconds since 1970.
-    """
-
-    id: str
-    owner: str
-    role: Role
-    made_s: int
-
-
-class AllKeys(msgspec.Struct, kw_only=True, frozen=True):
-    """All API keys.
-
-    Attributes:
-        keys: By their id.
-    """
-
-    keys: tuple[KeyRow, ...]
+from scm.records.keys import AllKeys, KeyRow
 
 
 def router(keys: KeyRing | None) -> APIRouter:

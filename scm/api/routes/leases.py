@@ -2,67 +2,15 @@
 
 from collections.abc import Iterator
 
-import msgspec
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
+from scm.api.inputs import Json
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import OPERATOR, VIEWER
 from scm.api.schemas import answer, answer_page
+from scm.records.leases import LeaseRow, RenewBody, TakeBody
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
-
-_TTL_MS = Field(
-    1000, ge=100, le=60_000, description="how long it lives unless renewed [ms]", examples=[1000]
-)
-_PROGRAM = r"^[a-z0-9_-]{0,32}$"
-
-
-class TakeBody(BaseModel):
-    """A car to drive."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    program: str = Field(
-        "",
-        pattern=_PROGRAM,
-        description="tells programs of one caller apart: each holds its own leases",
-        examples=["lane_keeper"],
-    )
-    ttl_ms: int = _TTL_MS
-    reason: str = Field(
-        "",
-        max_length=500,
-        description="why it is taken from whoever holds it; empty: only if it is free",
-        examples=["n1 blocks the crossing"],
-    )
-
-
-class RenewBody(BaseModel):
-    """A lease to keep."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    program: str = Field(
-        "", pattern=_PROGRAM, description="as when it was taken", examples=["lane_keeper"]
-    )
-    epoch: int = Field(ge=0, description="as the lease was given", examples=[12])
-    ttl_ms: int = _TTL_MS
-
-
-class LeaseRow(msgspec.Struct, kw_only=True, frozen=True):
-    """Who drives a car.
-
-    Attributes:
-        owner: `world` or the car's own name while nobody else does.
-        epoch: Grows with each change of owner; commands carry it.
-        left_ms: Until it ends if it is not renewed; None: it is at home, and never ends.
-    """
-
-    vehicle: str
-    owner: str
-    epoch: int
-    left_ms: float | None
 
 
 def router(city: City) -> APIRouter:
@@ -95,7 +43,9 @@ def _add_taking(routes: APIRouter, city: City) -> None:
         dependencies=[OPERATOR],
         responses=answer(LeaseReply, 201),
     )
-    def take(request: Request, name: Name, body: TakeBody, key: IdempotencyKey = "") -> Response:
+    def take(
+        request: Request, name: Name, body: Json[TakeBody], key: IdempotencyKey = ""
+    ) -> Response:
         asked = LeaseRequest(
             request_id=key,
             vehicle=name,
@@ -112,7 +62,9 @@ def _add_taking(routes: APIRouter, city: City) -> None:
         dependencies=[OPERATOR],
         responses=answer(LeaseReply),
     )
-    def renew(request: Request, name: Name, body: RenewBody, key: IdempotencyKey = "") -> Response:
+    def renew(
+        request: Request, name: Name, body: Json[RenewBody], key: IdempotencyKey = ""
+    ) -> Response:
         asked = LeaseRequest(
             request_id=key,
             vehicle=name,
@@ -136,7 +88,10 @@ def _add_returning(routes: APIRouter, city: City) -> None:
         name: Name,
         epoch: int = Query(ge=0, description="as the lease was given", examples=[12]),
         program: str = Query(
-            "", pattern=_PROGRAM, description="as when it was taken", examples=["lane_keeper"]
+            "",
+            pattern=r"^[a-z0-9_-]{0,32}$",
+            description="as when it was taken",
+            examples=["lane_keeper"],
         ),
         key: IdempotencyKey = "",
     ) -> Response:

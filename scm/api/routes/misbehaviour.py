@@ -1,33 +1,14 @@
 """Misbehaviour: what is held against each station that speaks, and reports with evidence."""
 
-import msgspec
 from fastapi import APIRouter, Response
 
 from scm.api.city import City, Name, json_response, not_found
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer
+from scm.records.misbehaviour import Misbehaviour
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
-from scm.v2x.messages.misbehaviour_scores import StationScore
 
 FRESH_S = 5.0
-
-
-class Misbehaviour(msgspec.Struct, kw_only=True, frozen=True):
-    """What is held against those who speak on the air.
-
-    Attributes:
-        watched: Whether a misbehaviour part is there: it has told scores within the last seconds.
-        witness: Whether an Eye is there to hold claims against.
-        t_ns: Of these scores; None: there are none.
-        stations: With the score of each.
-        reported: Names of those that were ever reported; who is suspected now stands in `stations`.
-    """
-
-    watched: bool
-    witness: bool
-    t_ns: int | None
-    stations: tuple[StationScore, ...]
-    reported: tuple[str, ...]
 
 
 def router(city: City) -> APIRouter:

@@ -3,25 +3,36 @@
 import csv
 from pathlib import Path as FilePath
 from tempfile import TemporaryFile
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import FileResponse
-from pydantic import BaseModel, ConfigDict, Field, model_validator
 from starlette.concurrency import run_in_threadpool
 
 from scm.api import uploads
 from scm.api.city import City, IdempotencyKey, json_response, not_found
+from scm.api.inputs import Json
 from scm.api.mismatch_jobs import MismatchJobs
-from scm.api.operations import Operation, accepted
+from scm.api.operations import accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
-from scm.api.report_folders import BUDGET_S, FILES, NAME, Job, ReportRow, Together
+from scm.api.report_folders import FILES, NAME
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.api.schemas import answer, answer_file, answer_nothing, answer_page
+from scm.records.mismatch import (
+    DrivePlan,
+    DrivePlans,
+    Job,
+    JobBody,
+    Offers,
+    PlayBody,
+    Report,
+    ReportRow,
+    Upload,
+)
+from scm.records.operations import Operation
 from scm.vehicles.car_files import car_files
 
-_CAR = r"^[a-z0-9_-]{0,32}$"
 _ZIP = {"application/zip": {"schema": {"type": "string", "contentMediaType": "application/zip"}}}
 Title = Annotated[str, Query(max_length=128, description="what to call it", examples=["my drive"])]
 ReportName = Annotated[
@@ -33,131 +44,6 @@ DriveName = Annotated[
         pattern=r"^next_drive(_\d{1,2})?$", description="a suggested drive", examples=["next_drive"]
     ),
 ]
-
-
-class JobBody(BaseModel):
-    """A search: of a recording of the shelf, of an upload, or again with what was driven since."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    recording: str = Field(
-        "",
-        max_length=128,
-        description="name on the recordings shelf",
-        examples=["city-120000.mcap"],
-    )
-    upload: str = Field(
-        "", max_length=64, description="id of an upload, instead", examples=["drive-1f2e3d4c"]
-    )
-    again: str = Field(
-        "", max_length=130, description="a report, instead: its recordings and drives since",
-        examples=["again-n1"],
-    )  # fmt: skip
-    vehicle: str = Field(
-        "", pattern=r"^[A-Za-z0-9_-]{0,64}$", description="which car of it; empty: all",
-        examples=["n1"],
-    )  # fmt: skip
-    car: str = Field(
-        "", pattern=_CAR, description="its car file's name; empty: what the recording says",
-        examples=["nigel"],
-    )  # fmt: skip
-    budget_s: float | None = Field(
-        None, ge=5.0, le=4 * BUDGET_S, examples=[120.0],
-        description="what is not found in time to be told after it is not looked for [s]; "
-        "null: 1800, of a search again as before",
-    )  # fmt: skip
-    from_s: float | None = Field(
-        None,
-        ge=0.0,
-        description="leave out what is before, since its begin [s]",
-        examples=[10.0],
-    )
-    to_s: float | None = Field(
-        None, gt=0.0, description="leave out what is after [s]", examples=[100.0]
-    )
-
-    @model_validator(mode="after")
-    def _is_of_one(self) -> "JobBody":
-        given = [name for name in ("recording", "upload", "again") if getattr(self, name)]
-        if len(given) != 1:
-            msg = f"got {' and '.join(given) or 'nothing'}, expected recording, upload or again"
-            raise ValueError(msg)
-        if self.from_s is not None and self.to_s is not None and self.to_s <= self.from_s:
-            msg = f"to_s: got {self.to_s:g}, expected more than from_s, {self.from_s:g}"
-            raise ValueError(msg)
-        return self
-
-
-class PlayBody(BaseModel):
-    """Who drives."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    vehicle: str = Field(
-        pattern=r"^[a-z0-9_-]{1,32}$", description="a car of the city", examples=["n1"]
-    )
-    part: int = Field(
-        1, ge=1, le=99, description="of a drive in parts, between which the car is changed",
-        examples=[1],
-    )  # fmt: skip
-
-
-class Offers(msgspec.Struct, kw_only=True, frozen=True):
-    """What a search may be asked of.
-
-    Attributes:
-        recordings: Runs of the city on the shelf, newest first.
-        cars: Names of car files.
-        most_upload_bytes: The largest zip that is taken.
-    """
-
-    recordings: tuple[str, ...]
-    cars: tuple[str, ...]
-    most_upload_bytes: int
-
-
-class Report(msgspec.Struct, kw_only=True, frozen=True):
-    """One report.
-
-    Attributes:
-        row: As in the list.
-        report: The fields of `report.json`, as docs/mismatch.md lists them; None: damaged.
-        drawn: What its pictures draw and the words beside them; None of an older report.
-        job: What it was made from; None: nobody noted it.
-        drives: Names of the drives it suggests.
-        told: How many of them were driven and recorded since.
-        files: What can be downloaded.
-        together: What its car has in common with others of the search; None: it was alone.
-    """
-
-    row: ReportRow
-    report: dict[str, Any] | None
-    drawn: dict[str, Any] | None
-    job: Job | None
-    drives: tuple[str, ...]
-    told: int
-    files: tuple[str, ...]
-    together: Together | None
-
-
-class DrivePlan(msgspec.Struct, kw_only=True, frozen=True):
-    """One part of a suggested drive.
-
-    Attributes:
-        commands: Rows of time [s], throttle and steering, each held until the next.
-        way: Where the likeliest explanation takes the car: rows of x [m], y [m], yaw [rad].
-        lasts_s: How long it takes.
-    """
-
-    commands: tuple[tuple[float, ...], ...]
-    way: tuple[tuple[float, ...], ...]
-    lasts_s: float
-
-
-class DrivePlans(msgspec.Struct, kw_only=True, frozen=True):
-    """The parts of a suggested drive, in their order."""
-
-    parts: tuple[DrivePlan, ...]
 
 
 def router(city: City, jobs: MismatchJobs) -> APIRouter:
@@ -190,7 +76,7 @@ def _add_jobs(routes: APIRouter, city: City, jobs: MismatchJobs) -> None:
         dependencies=[OPERATOR],
         responses=answer(Operation, 202),
     )
-    def search(request: Request, body: JobBody, key: IdempotencyKey = "") -> Response:
+    def search(request: Request, body: Json[JobBody], key: IdempotencyKey = "") -> Response:
         del key  # the same wish twice is two searches of one answer: harmless
         return accepted(jobs.search(_job(jobs, body, str(request.scope.get("scm_owner", "")))))
 
@@ -201,7 +87,7 @@ def _add_uploads(routes: APIRouter, jobs: MismatchJobs) -> None:
         summary="Send a recording: a zip with recording.yaml, or of a run",
         status_code=201,
         dependencies=[OPERATOR],
-        responses=answer(uploads.Upload, 201),
+        responses=answer(Upload, 201),
         openapi_extra={"requestBody": {"required": True, "content": _ZIP}},
     )
     async def upload(request: Request, name: Title = "", key: IdempotencyKey = "") -> Response:
@@ -294,7 +180,7 @@ def _add_drives(routes: APIRouter, jobs: MismatchJobs) -> None:
         responses=answer(Operation, 202),
     )
     def play(
-        request: Request, name: ReportName, drive: DriveName, body: PlayBody,
+        request: Request, name: ReportName, drive: DriveName, body: Json[PlayBody],
         key: IdempotencyKey = "",
     ) -> Response:  # fmt: skip
         del key  # drives of one city run one at a time, and a car's lease has one owner
@@ -302,7 +188,7 @@ def _add_drives(routes: APIRouter, jobs: MismatchJobs) -> None:
         return accepted(jobs.drive(name, drive, body.vehicle, body.part, owner))
 
 
-def _job(jobs: MismatchJobs, body: JobBody, owner: str) -> Job:
+def _job(jobs: MismatchJobs, body: Json[JobBody], owner: str) -> Job:
     """Return what is asked for; what nobody says of a search again is as in the one before."""
     if body.again:
         before = jobs.again(body.again)

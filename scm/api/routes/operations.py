@@ -3,10 +3,11 @@
 from fastapi import APIRouter, Request, Response
 
 from scm.api.city import IdempotencyKey, Name, json_response, not_found
-from scm.api.operations import Operation, Operations
+from scm.api.operations import Operations
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import OPERATOR, VIEWER
 from scm.api.schemas import answer, answer_page
+from scm.records.operations import Operation
 
 
 def router(operations: Operations) -> APIRouter:

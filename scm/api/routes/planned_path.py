@@ -5,11 +5,12 @@ from functools import cache
 from fastapi import APIRouter, Response
 
 from scm.api.city import City, Name, json_response, not_found
-from scm.api.planned_path import PathRow, path_ahead
+from scm.api.planned_path import path_ahead
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer
 from scm.geometry import Pose2
 from scm.maps.route import Roads
+from scm.records.vehicles import PathRow
 
 
 def router(city: City) -> APIRouter:

@@ -6,38 +6,42 @@ from collections.abc import AsyncIterator
 from pathlib import Path as FilePath
 from typing import Annotated
 
-import msgspec
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
-from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api import replay
 from scm.api.city import City, IdempotencyKey, json_response, not_found
 from scm.api.city import Name as BusName
 from scm.api.etag import Matching, tagged
-from scm.api.operations import Operation, Operations, Teller, accepted
-from scm.api.paging import Cursor, Limit, Page, page_of, page_response
+from scm.api.inputs import Json
+from scm.api.operations import Operations, Teller, accepted
+from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
 from scm.api.ranged import send_file
-from scm.api.recorded_disturbances import RecordedDisturbances, disturbances_of
-from scm.api.recordings_shelf import (
-    NAME,
-    Notes,
-    RecordingRow,
-    RecordingsShelf,
-    cars_of,
-    natural,
-    unreadable,
-)
+from scm.api.recorded_disturbances import disturbances_of
+from scm.api.recordings_shelf import NAME, RecordingsShelf, cars_of, natural, unreadable
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.api.schemas import answer, answer_file, answer_nothing, answer_page
 from scm.clock import NS_PER_S
 from scm.errors import RecordingError
 from scm.maps.draw import draw_svg
 from scm.recorder.run_index import RunIndex
-from scm.records.city_map import Box, Light
+from scm.records.disturbances import RecordedDisturbances
+from scm.records.operations import Operation
+from scm.records.page import Page
+from scm.records.recordings import (
+    CarCamera,
+    CarFacts,
+    Frames,
+    Notes,
+    NotesBody,
+    PartBody,
+    RecordedEvent,
+    RecordingRow,
+    Summary,
+)
 from scm.v2x.message import Refused
 
 MCAP = "application/octet-stream"
@@ -69,52 +73,9 @@ Vehicle = Annotated[
 
 
 Camera = Annotated[str, Path(pattern=NAME, description="an overhead camera", examples=["overhead"])]
-CarCamera = Annotated[str, Path(pattern=NAME, description="one of its cameras", examples=["front"])]
-
-
-class NotesBody(BaseModel):
-    """What to call a recording, and what to know of it; its file keeps its name."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    title: str = Field("", max_length=120, description="shown first", examples=["Brisk plan"])
-    notes: str = Field(
-        "", max_length=4000, description="in words, as long as need be", examples=["n3 slipped"]
-    )
-
-
-class PartBody(BaseModel):
-    """From when to when of a recording shall be one of its own."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    from_s: float = Field(
-        0.0, ge=0.0, le=1e7, description="seconds since the recording began", examples=[60.0]
-    )
-    to_s: float | None = Field(
-        None, ge=0.0, le=1e7, description="likewise; without: to the end", examples=[180.0]
-    )
-
-
-class Summary(msgspec.Struct, kw_only=True, frozen=True):
-    """What is known of a recording before any of it is shown.
-
-    Attributes:
-        cars: All cars that it tells of.
-        map_title: Of the map that was driven on; empty: it does not tell.
-        first_frame_s: When the world first told where cars are: it may have begun later.
-        eye_cameras: The overhead cameras of which it has pictures.
-        car_cameras: The cars' own, likewise.
-    """
-
-    recording: RecordingRow
-    cars: tuple[replay.CarFacts, ...]
-    map_title: str
-    lights: tuple[Light, ...]
-    boxes: tuple[Box, ...]
-    first_frame_s: float
-    eye_cameras: tuple[str, ...]
-    car_cameras: tuple[replay.CarCamera, ...]
+CameraOnCar = Annotated[
+    str, Path(pattern=NAME, description="one of its cameras", examples=["front"])
+]
 
 
 def router(city: City, work: Operations) -> APIRouter:
@@ -243,7 +204,7 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:
     @routes.get(
         "/{name}/frames",
         summary="Where everything was, from a time to another",
-        responses=answer(replay.Frames),
+        responses=answer(Frames),
     )
     def frames(
         name: Name,
@@ -261,7 +222,7 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:
     @routes.get(
         "/{name}/events",
         summary="Its events, in their order",
-        responses=answer_page(replay.RecordedEvent),
+        responses=answer_page(RecordedEvent),
     )
     def events(request: Request, name: Name, limit: Limit = 500, cursor: Cursor = "") -> Response:
         rows = replay.events_of(_readable(shelf, name))
@@ -296,7 +257,7 @@ def _add_pictures(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None
         response_class=Response,
     )
     def car_picture(
-        name: Name, vehicle: BusName, camera: CarCamera, t_s: Seconds = 0.0
+        name: Name, vehicle: BusName, camera: CameraOnCar, t_s: Seconds = 0.0
     ) -> Response:
         return _picture(name, _readable(shelf, name), camera, t_s, vehicle)
 
@@ -326,7 +287,7 @@ def _add_notes(routes: APIRouter, shelf: RecordingsShelf) -> None:
     def write(
         request: Request,
         name: Name,
-        body: NotesBody,
+        body: Json[NotesBody],
         condition: Matching,
         key: IdempotencyKey = "",
     ) -> Response:
@@ -346,7 +307,9 @@ def _add_parts(routes: APIRouter, shelf: RecordingsShelf, work: Operations) -> N
         dependencies=[OPERATOR],
         responses=answer(Operation, 202),
     )
-    def cut(request: Request, name: Name, body: PartBody, key: IdempotencyKey = "") -> Response:
+    def cut(
+        request: Request, name: Name, body: Json[PartBody], key: IdempotencyKey = ""
+    ) -> Response:
         del key  # the same key gets the same operation
         index = _readable(shelf, name)
         length_s = (index.end_ns - index.begin_ns) / NS_PER_S
@@ -405,11 +368,11 @@ def _picture(name: str, index: RunIndex, camera: str, t_s: float, vehicle: str =
     return Response(jpeg, 200, headers, "image/jpeg")
 
 
-def _cars(index: RunIndex) -> tuple[replay.CarFacts, ...]:
+def _cars(index: RunIndex) -> tuple[CarFacts, ...]:
     return tuple(sorted(replay.cars_in(index), key=lambda car: natural(car.vehicle)))
 
 
-def _car_cameras(index: RunIndex) -> tuple[replay.CarCamera, ...]:
+def _car_cameras(index: RunIndex) -> tuple[CarCamera, ...]:
     found = replay.car_cameras(index)
     return tuple(sorted(found, key=lambda one: (natural(one.vehicle), one.camera)))
 

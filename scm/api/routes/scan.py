@@ -10,9 +10,10 @@ from scm.api.city import City, Name, json_response, not_found
 from scm.api.encoding import encode
 from scm.api.problem import RefusedError
 from scm.api.roles import VIEWER
-from scm.api.scan_watch import ScanRow, scan_row, scanner_of
+from scm.api.scan_watch import scan_row, scanner_of
 from scm.api.schemas import answer, answer_file
 from scm.api.stream import Stream
+from scm.records.scans import ScanRow
 from scm.v2x.message import Refused
 
 LOOK_S = 0.02

@@ -3,16 +3,18 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, json_response, not_found
 from scm.api.etag import Matching, tagged
+from scm.api.inputs import Json
 from scm.api.keys import KeyRing
-from scm.api.operations import Operation, Operations, accepted
+from scm.api.operations import Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import ADMIN, OPERATOR, VIEWER
-from scm.api.scenarios import MOST_BYTES, NAME, Lines, Scenario, ScenarioRuns, ScenarioShelf
+from scm.api.scenarios import NAME, ScenarioRuns, ScenarioShelf
 from scm.api.schemas import answer, answer_nothing, answer_page
+from scm.records.operations import Operation
+from scm.records.scenarios import Lines, RunBody, Scenario, ScenarioBody
 
 Name = Annotated[
     str, Path(pattern=NAME, description="a script without .py", examples=["travel_times"])
@@ -21,31 +23,6 @@ Run = Annotated[
     str,
     Path(pattern=r"^scenario-[0-9]{1,9}$", description="its operation", examples=["scenario-3"]),
 ]
-
-
-class ScenarioBody(BaseModel):
-    """A script, whole."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    text: str = Field(
-        max_length=MOST_BYTES,
-        description="Python that drives the fleet, as `scm.fleet` says",
-        examples=['"""Say hello."""\nprint("hello")\n'],
-    )
-
-
-class RunBody(BaseModel):
-    """How to run a script."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    arguments: list[Annotated[str, Field(max_length=200, pattern=r"^[^\x00]*$")]] = Field(
-        default_factory=list,
-        max_length=50,
-        description="of its command line; {connect} becomes the address of this city's router",
-        examples=[["--live", "--connect", "{connect}"]],
-    )
 
 
 def router(city: City, work: Operations, keys: KeyRing | None) -> APIRouter:
@@ -62,7 +39,9 @@ def router(city: City, work: Operations, keys: KeyRing | None) -> APIRouter:
         dependencies=[OPERATOR],
         responses=answer(Operation, 202),
     )
-    def run(request: Request, name: Name, body: RunBody, key: IdempotencyKey = "") -> Response:
+    def run(
+        request: Request, name: Name, body: Json[RunBody], key: IdempotencyKey = ""
+    ) -> Response:
         del key  # the same key gets the same operation
         owner = str(request.scope["scm_owner"])
         own = str(request.scope["scm_key"])
@@ -102,7 +81,7 @@ def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
     def write(
         request: Request,
         name: Name,
-        body: ScenarioBody,
+        body: Json[ScenarioBody],
         condition: Matching,
         key: IdempotencyKey = "",
     ) -> Response:

@@ -1,27 +1,12 @@
 """Who is calling; and a cookie for pages, whose event stream and pictures cannot send a header."""
 
-import msgspec
 from fastapi import APIRouter, Request, Response
 
 from scm.api.city import json_response
 from scm.api.gate import COOKIE
-from scm.api.roles import VIEWER, Role
+from scm.api.roles import VIEWER
 from scm.api.schemas import answer
-
-
-class Session(msgspec.Struct, kw_only=True, frozen=True):
-    """Who is calling.
-
-    Attributes:
-        owner: Whose key it is; without keys: `this machine`.
-    """
-
-    owner: str
-    role: Role
-
-
-class Ended(msgspec.Struct, kw_only=True, frozen=True):
-    """The cookie is forgotten: nothing more to say."""
+from scm.records.session import Ended, Session
 
 
 def router() -> APIRouter:

@@ -1,27 +1,37 @@
 """Signal plans: list, read, prove, save, delete; a plan is saved when the search has proven it."""
 
 import logging
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Path, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
 from scm.api.etag import Matching, tagged
-from scm.api.operations import Operation, Operations, accepted
+from scm.api.inputs import Json
+from scm.api.operations import Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER, Signer
-from scm.api.routes.signals import By, Reason, junction_of, site_of
+from scm.api.routes.signals import junction_of, site_of
 from scm.api.schemas import answer, answer_page
 from scm.api.signal_plans import PlanShelf
 from scm.clock import WallClock
 from scm.errors import PlanError
+from scm.records.operations import Operation
+from scm.records.signal_plans import (
+    PlanBody,
+    PlanProof,
+    PlanRow,
+    SignalPlan,
+    SignalStage,
+    StageBody,
+    StagesBody,
+)
 from scm.v2x.message import Refused
-from scm.v2x.messages.plan_request import SignalStage
-from scm.v2x.messages.signal_site import SignalPlan, SignalSite
-from scm.v2x.plan_file import PlanFile, PlanProof, fits
+from scm.v2x.messages.signal_site import SignalSite
+from scm.v2x.plan_file import PlanFile, fits
 
 _LOGGER = logging.getLogger(__name__)
 
@@ -34,88 +44,6 @@ Digest = Annotated[
     str,
     Path(pattern=r"^[0-9a-f]{16}$", description="of a proof", examples=["9f3a51c07be2d418"]),
 ]
-
-
-class StageBody(BaseModel):
-    """One stage of the cycle; yellow and red clear after it are the kernel's."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    groups: list[Annotated[str, Field(max_length=64)]] = Field(
-        min_length=1, max_length=64, description="that are green together", examples=[["north"]]
-    )
-    green_s: float = Field(ge=0.0, le=300.0, description="how long they are green", examples=[12.0])
-    extra_red_s: float = Field(
-        0.0, ge=0.0, le=300.0, description="all red on top of red clear", examples=[1.0]
-    )
-
-
-class StagesBody(BaseModel):
-    """What to prove."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    plan: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")] = Field(
-        description="what the plan will be called", examples=["rush"]
-    )
-    stages: list[StageBody] = Field(
-        min_length=1,
-        max_length=24,
-        description="in the order of the cycle",
-        examples=[[{"groups": ["north"], "green_s": 12.0, "extra_red_s": 0.0}]],
-    )
-
-
-class PlanBody(BaseModel):
-    """A plan to save; these very stages must have been proven for this junction."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    about: str = Field(
-        "", max_length=200, description="what it is for", examples=["more green for the north"]
-    )
-    by: By = ""
-    reason: Reason = ""
-    stages: list[StageBody] = Field(
-        min_length=1,
-        max_length=24,
-        description="in the order of the cycle",
-        examples=[[{"groups": ["north"], "green_s": 12.0, "extra_red_s": 0.0}]],
-    )
-    offset_s: float | None = Field(
-        None,
-        ge=0.0,
-        lt=300.0,
-        description="when its cycle begins, after a time that is a whole number of cycles on the "
-        "controller's clock, less than the cycle; plans with the same cycle keep step so; null: "
-        "with nobody",
-        examples=[9.6],
-    )
-
-
-class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
-    """A plan as it may be asked for.
-
-    Attributes:
-        source: `shipped` with the city or its map, or `saved` by somebody.
-        usable: Whether it is proven for the junction as it is now.
-        offset_s: When its cycle begins, after a time that is a whole number of cycles on the
-            controller's clock; null: in step with nobody.
-        saved_ns: When it was saved; 0: it was not.
-    """
-
-    junction: str
-    plan: str
-    about: str
-    source: Literal["shipped", "saved"]
-    usable: bool
-    cycle_s: float
-    stages: tuple[SignalStage, ...]
-    offset_s: float | None = None
-    by: str = ""
-    reason: str = ""
-    saved_ns: int = 0
-    proof: PlanProof | None = None
 
 
 def router(city: City, shelf: PlanShelf, work: Operations) -> APIRouter:
@@ -151,7 +79,9 @@ def _add_proving(routes: APIRouter, city: City, shelf: PlanShelf, work: Operatio
         dependencies=[OPERATOR],
         responses=answer(Operation, 202),
     )
-    def prove(request: Request, name: Name, body: StagesBody, key: IdempotencyKey = "") -> Response:
+    def prove(
+        request: Request, name: Name, body: Json[StagesBody], key: IdempotencyKey = ""
+    ) -> Response:
         del key  # proven twice is proven
         file = _file(site_of(city, name), body.plan, body.stages)
         owner = str(request.scope.get("scm_owner", ""))
@@ -180,7 +110,7 @@ def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         request: Request,
         name: Name,
         plan: PlanName,
-        body: PlanBody,
+        body: Json[PlanBody],
         signer: Signer,
         condition: Matching,
         key: IdempotencyKey = "",
@@ -217,7 +147,7 @@ def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
 
 
 def _keep(
-    shelf: PlanShelf, file: PlanFile, body: PlanBody, by: str, before: PlanRow | None
+    shelf: PlanShelf, file: PlanFile, body: Json[PlanBody], by: str, before: PlanRow | None
 ) -> PlanFile:
     """Save a plan with its proof, and return it.
 
@@ -262,7 +192,7 @@ def _check_offset(plan: str, offset_s: float | None, cycle_s: float) -> None:
         raise RefusedError(Refused(code="invalid", detail=f"{detail}, its cycle"))
 
 
-def _file(site: SignalSite, plan: str, stages: list[StageBody]) -> PlanFile:
+def _file(site: SignalSite, plan: str, stages: Sequence[StageBody]) -> PlanFile:
     return PlanFile(
         junction=site.junction,
         plan=plan,

@@ -4,33 +4,40 @@ Nobody sets a colour. A wish is taken or refused in words, has who, why and an e
 kernel decides when it is safe.
 """
 
-from typing import Annotated, Literal
-
 import msgspec
 from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
 from scm.api.etag import tagged
+from scm.api.inputs import Json
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer, answer_page
-from scm.api.signal_history import History, PromiseScore, Verdict
 from scm.api.signal_plans import PlanShelf
-from scm.api.signal_rows import JunctionRow, StatusRow, junction_rows, status_row
+from scm.api.signal_rows import junction_rows, status_row
 from scm.records.city_map import Junction
+from scm.records.signal_history import History, PromiseScore, Verdict
+from scm.records.signals import (
+    LONGEST_S,
+    ClearBody,
+    FlashBody,
+    FlashReply,
+    JunctionRow,
+    PlanChoiceBody,
+    PolicyBody,
+    ResetBody,
+    Signals,
+    SignalWish,
+    StatusRow,
+    Verb,
+    WishBody,
+)
 from scm.v2x.message import Refused
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
-from scm.v2x.messages.signal_request import (
-    LONGEST_S,
-    SignalReply,
-    SignalRequest,
-    SignalWish,
-    Verb,
-)
+from scm.v2x.messages.signal_request import SignalReply, SignalRequest
 from scm.v2x.messages.signal_site import SignalSite
 from scm.v2x.plan_file import fits
 
@@ -41,112 +48,6 @@ _VERBS: dict[str, tuple[Verb, str]] = {
     "omits": ("omit", "Omit groups: they are not begun"),
     "preempts": ("preempt", "Pre-empt for one group: it comes next and stays"),
 }
-By = Annotated[
-    str,
-    Field(
-        max_length=64, description="who asks, for the log; empty: whoever calls", examples=["ada"]
-    ),
-]
-Reason = Annotated[str, Field(max_length=500, description="why", examples=["school is out"])]
-ExpiresS = Annotated[
-    float,
-    Field(gt=0.0, le=LONGEST_S, description="seconds until it lapses by itself", examples=[60.0]),
-]
-
-
-class _Body(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-    by: By = ""
-    reason: Reason = ""
-
-
-class PlanBody(_Body):
-    """What to run until further notice; the signal kernel decides when it is safe to begin."""
-
-    plan: str = Field(
-        min_length=1,
-        max_length=64,
-        description="a plan by name (shipped, the map's own, or saved), a policy, or `flash`",
-        examples=["calm"],
-    )
-
-
-class WishBody(_Body):
-    """A wish for signal groups; it lapses, and the junction goes back to what runs."""
-
-    groups: list[Annotated[str, Field(max_length=64)]] = Field(
-        min_length=1, max_length=64, description="signal groups", examples=[["south_east"]]
-    )
-    expires_s: ExpiresS = 60.0
-
-
-class PolicyBody(_Body):
-    """A policy for a while."""
-
-    policy: str = Field(min_length=1, max_length=64, description="its name", examples=["actuated"])
-    expires_s: ExpiresS = 300.0
-
-
-class FlashBody(_Body):
-    """Flashing red, at once."""
-
-    engaged: bool = Field(description="true: flash; false: go on, all red first", examples=[True])
-    expires_s: ExpiresS | None = Field(
-        None, description="seconds until it ends by itself; null: not by itself", examples=[120.0]
-    )
-
-
-class ClearBody(_Body):
-    """Which wishes to take back; both empty: all."""
-
-    groups: list[Annotated[str, Field(max_length=64)]] = Field(
-        default_factory=list,
-        max_length=64,
-        description="wishes for any of these groups; empty: whatever they are for",
-        examples=[["south_east"]],
-    )
-    verb: Literal["", "call", "hold", "force_off", "omit", "preempt", "policy"] = Field(
-        "", description="wishes of this kind; empty: of any", examples=["hold"]
-    )
-
-
-class ResetBody(BaseModel):
-    """Who clears a fault, and why: both end up in the log."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    by: By = ""
-    reason: str = Field(
-        min_length=1, max_length=500, description="why it is over", examples=["lamp replaced"]
-    )
-
-
-class FlashReply(msgspec.Struct, kw_only=True, frozen=True):
-    """What runs now: a `SignalReply` where the wish has an end of its own, else a `PlanReply`.
-
-    Attributes:
-        policy: In force now; not told by a `PlanReply`.
-        plan: In force now; not told by a `SignalReply`.
-        pending: To come into force at the next safe moment; empty: none.
-        wishes: In force now; not told by a `PlanReply`.
-    """
-
-    junction: str
-    pending: str
-    policy: str | None = None
-    plan: str | None = None
-    wishes: tuple[SignalWish, ...] = ()
-
-
-class Signals(msgspec.Struct, kw_only=True, frozen=True):
-    """All junctions of the map.
-
-    Attributes:
-        signals: One row a junction, in the map's order.
-    """
-
-    signals: tuple[JunctionRow, ...]
 
 
 def router(city: City, shelf: PlanShelf) -> APIRouter:
@@ -259,7 +160,9 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
         dependencies=[OPERATOR],
         responses=answer(SignalReply),
     )
-    def clear(name: Name, body: ClearBody, signer: Signer, key: IdempotencyKey = "") -> Response:
+    def clear(
+        name: Name, body: Json[ClearBody], signer: Signer, key: IdempotencyKey = ""
+    ) -> Response:
         junction_of(city, name)
         request = SignalRequest(
             request_id=key,
@@ -274,7 +177,9 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
 
 
 def _add_verb(routes: APIRouter, city: City, noun: str, verb: Verb, summary: str) -> None:
-    def wish(name: Name, body: WishBody, signer: Signer, key: IdempotencyKey = "") -> Response:
+    def wish(
+        name: Name, body: Json[WishBody], signer: Signer, key: IdempotencyKey = ""
+    ) -> Response:
         junction_of(city, name)
         request = SignalRequest(
             request_id=key,
@@ -303,7 +208,9 @@ def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         dependencies=[OPERATOR],
         responses=answer(PlanReply),
     )
-    def plan(name: Name, body: PlanBody, signer: Signer, key: IdempotencyKey = "") -> Response:
+    def plan(
+        name: Name, body: Json[PlanChoiceBody], signer: Signer, key: IdempotencyKey = ""
+    ) -> Response:
         junction_of(city, name)
         request = _wish_for(city, shelf, name, body.plan)
         who = {"by": signer(body.by), "reason": body.reason, "request_id": key}
@@ -315,7 +222,9 @@ def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         dependencies=[OPERATOR],
         responses=answer(SignalReply),
     )
-    def policy(name: Name, body: PolicyBody, signer: Signer, key: IdempotencyKey = "") -> Response:
+    def policy(
+        name: Name, body: Json[PolicyBody], signer: Signer, key: IdempotencyKey = ""
+    ) -> Response:
         junction_of(city, name)
         request = _policy(name, body.policy, body, signer(body.by), key)
         return json_response(city.ask(request, SignalReply))
@@ -330,7 +239,9 @@ def _add_flash(routes: APIRouter, city: City) -> None:
         dependencies=[OPERATOR],
         responses=answer(FlashReply),
     )
-    def flash(name: Name, body: FlashBody, signer: Signer, key: IdempotencyKey = "") -> Response:
+    def flash(
+        name: Name, body: Json[FlashBody], signer: Signer, key: IdempotencyKey = ""
+    ) -> Response:
         junction_of(city, name)
         by = signer(body.by)
         if body.engaged and body.expires_s is not None:
@@ -390,7 +301,9 @@ def _add_monitor(routes: APIRouter, city: City) -> None:
         dependencies=[ENGINEER],
         responses=answer(MonitorStatus),
     )
-    def reset(name: Name, body: ResetBody, signer: Signer, key: IdempotencyKey = "") -> Response:
+    def reset(
+        name: Name, body: Json[ResetBody], signer: Signer, key: IdempotencyKey = ""
+    ) -> Response:
         junction_of(city, name)
         by, reason = signer(body.by), body.reason
         request = MonitorReset(request_id=key, junction=name, by=by, reason=reason)

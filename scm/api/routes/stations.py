@@ -1,36 +1,14 @@
 """Stations: every part, vehicle and client on the bus, with those lost in the last minute."""
 
-import msgspec
 from fastapi import APIRouter, Response
 
 from scm.api.city import City, Name, json_response, not_found
-from scm.api.event_log import LoggedEvent
 from scm.api.paging import MOST
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer
-from scm.api.stations import StationRow
+from scm.records.stations import StationEvents, StationRow, Stations
 
 _LOOKED_THROUGH = 2000
-
-
-class Stations(msgspec.Struct, kw_only=True, frozen=True):
-    """Some stations.
-
-    Attributes:
-        stations: A row for each run of a station: one that was restarted may be listed twice.
-    """
-
-    stations: tuple[StationRow, ...]
-
-
-class StationEvents(msgspec.Struct, kw_only=True, frozen=True):
-    """What the log still holds of one station.
-
-    Attributes:
-        events: Those it told, and those about it, newest first.
-    """
-
-    events: tuple[LoggedEvent, ...]
 
 
 def router(city: City) -> APIRouter:

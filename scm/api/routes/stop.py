@@ -8,31 +8,17 @@ from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 
 from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, json_response
+from scm.api.inputs import Json
 from scm.api.picture import Picture
 from scm.api.problem import RefusedError
 from scm.api.roles import OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer
+from scm.records.stop import StopBody
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.stop_request import StopRequest
-
-
-class StopBody(BaseModel):
-    """The state wished for: setting it twice is the same as once."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    engaged: bool = Field(description="true: stop every car", examples=[True])
-    by: str = Field(
-        "", max_length=64, description="who wishes it; empty: whoever calls", examples=["ada"]
-    )
-    reason: str = Field(
-        "", max_length=500, description="why, for the log", examples=["a hand on the floor"]
-    )
-
 
 THREADS = 8
 
@@ -58,7 +44,7 @@ def router(city: City) -> APIRouter:
         responses=answer(CityStop),
     )
     async def set_stop(
-        asked: Request, body: StopBody, signer: Signer, key: IdempotencyKey = ""
+        asked: Request, body: Json[StopBody], signer: Signer, key: IdempotencyKey = ""
     ) -> Response:
         if not (body.engaged or asked.scope.get("scm_is_sure", True)):
             detail = "the store of API keys cannot be read now: it must know your key for that"

@@ -9,29 +9,7 @@ from scm.api.city import City, json_response, not_found
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer
 from scm.clock import nanoseconds
-from scm.v2x.messages.traffic_counts import TrafficCounts
-from scm.v2x.messages.violation import Violation
-
-
-class Counts(TrafficCounts, kw_only=True, frozen=True):
-    """Counts of the observer.
-
-    Attributes:
-        void: Why the window's counts, delays and queues say nothing of plans, in words; none: they
-            do.
-    """
-
-    void: tuple[str, ...] = ()
-
-
-class Violations(msgspec.Struct, kw_only=True, frozen=True):
-    """Broken rules.
-
-    Attributes:
-        violations: Newest first.
-    """
-
-    violations: tuple[Violation, ...]
+from scm.records.traffic import Counts, Violations
 
 
 def router(city: City) -> APIRouter:

@@ -1,75 +1,19 @@
 """Vehicles: list, look at one, put one on the map, send it on a route, take it off."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, ConfigDict, Field
 
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
+from scm.api.inputs import Json
 from scm.api.roles import OPERATOR, VIEWER
 from scm.api.schemas import answer
-from scm.api.vehicle_rows import VehicleRow, VehiclesTopic, vehicles_topic
+from scm.api.vehicle_rows import vehicles_topic
+from scm.records.vehicles import LightsBody, RouteBody, SpawnBody, VehicleRow, VehiclesTopic
 from scm.v2x.messages.light_request import LightReply, LightRequest
 from scm.v2x.messages.remove_request import RemoveReply, RemoveRequest
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
-
-_NAME_OR_EMPTY = r"^[a-z0-9_-]{0,32}$"
-
-
-class SpawnBody(BaseModel):
-    """A hosted car to put on the map; everything may be left to the world."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    vehicle: str = Field(
-        "",
-        pattern=_NAME_OR_EMPTY,
-        description="its name; empty: the world names it",
-        examples=["n9"],
-    )
-    car: str = Field(
-        "nigel", pattern=_NAME_OR_EMPTY, description="name of its car file", examples=["nigel"]
-    )
-    spawn: str = Field(
-        "",
-        max_length=64,
-        description="a spawn place, or X,Y,DEG (metres, degrees, map frame); empty: any free one",
-        examples=["north_1", "1.384,0.655,315"],
-    )
-
-
-class RouteBody(BaseModel):
-    """Where to go; `via` empty: circulate for ever."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    via: list[str] = Field(
-        default_factory=list,
-        max_length=200,
-        description="lanes to pass, in this order",
-        examples=[["outer_north", "outer_west"]],
-    )
-    laps: int = Field(1, ge=1, le=10_000, description="how often to pass them", examples=[2])
-    speed_mps: float | None = Field(
-        None, gt=0.0, le=10.0, description="wished on free road; null: the limits", examples=[0.3]
-    )
-    then: Literal["stop", "circulate"] = Field(
-        "stop", description="at the end of the last lane: stand, or drive on without end"
-    )
-
-
-class LightsBody(BaseModel):
-    """How to switch headlights and indicators; what is left out stays as it is."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    headlights: Literal["off", "low", "high"] | None = Field(
-        None, description="null: as they are", examples=["low"]
-    )
-    indicators: Literal["off", "left", "right", "hazard"] | None = Field(
-        None, description="null: as they are", examples=["left"]
-    )
 
 
 def router(city: City) -> APIRouter:
@@ -87,7 +31,7 @@ def router(city: City) -> APIRouter:
         dependencies=[OPERATOR],
         responses=answer(SpawnReply, 201, "It stands there."),
     )
-    def spawn(body: SpawnBody, key: IdempotencyKey = "") -> Response:
+    def spawn(body: Json[SpawnBody], key: IdempotencyKey = "") -> Response:
         request = SpawnRequest(request_id=key, vehicle=body.vehicle, car=body.car, spawn=body.spawn)
         reply = city.ask(request, SpawnReply)
         return json_response(reply, 201, {"Location": f"/api/v1/vehicles/{reply.vehicle}"})
@@ -123,7 +67,7 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
         dependencies=[OPERATOR],
         responses=answer(RouteReply),
     )
-    def route(name: Name, body: RouteBody, key: IdempotencyKey = "") -> Response:
+    def route(name: Name, body: Json[RouteBody], key: IdempotencyKey = "") -> Response:
         request = RouteRequest(
             request_id=key,
             vehicle=name,
@@ -140,7 +84,7 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
         dependencies=[OPERATOR],
         responses=answer(LightReply),
     )
-    def lights(name: Name, body: LightsBody, key: IdempotencyKey = "") -> Response:
+    def lights(name: Name, body: Json[LightsBody], key: IdempotencyKey = "") -> Response:
         request = LightRequest(
             request_id=key, vehicle=name, headlights=body.headlights, indicators=body.indicators
         )

@@ -6,7 +6,8 @@ Written by docs/make/client.py: do not change it here.
 from typing import Literal
 
 from scm.client.connection import Connection, part
-from scm.client.records.audit import ChainVerdict, PageAuditRow
+from scm.records.audit import AuditRow, ChainVerdict
+from scm.records.page import Page
 
 
 class AuditNoun:
@@ -24,7 +25,7 @@ class AuditNoun:
         by: str = "",
         kind: str = "",
         text: str = "",
-    ) -> PageAuditRow:
+    ) -> Page[AuditRow]:
         """Deeds, newest first.
 
         Args:
@@ -38,7 +39,7 @@ class AuditNoun:
         return self._connection.ask(
             "GET",
             "/api/v1/audit",
-            PageAuditRow,
+            Page[AuditRow],
             query={
                 "limit": limit,
                 "cursor": cursor,

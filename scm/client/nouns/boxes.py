@@ -4,7 +4,8 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection
-from scm.client.records.boxes import Boxes, BoxesReply
+from scm.records.boxes import Boxes
+from scm.v2x.messages.boxes_request import BoxesReply
 
 
 class BoxesNoun:

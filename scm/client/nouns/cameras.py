@@ -6,7 +6,7 @@ Written by docs/make/client.py: do not change it here.
 from collections.abc import Iterator
 
 from scm.client.connection import Connection, part
-from scm.client.records.cameras import Cameras
+from scm.records.cameras import Cameras
 
 
 class CamerasNoun:

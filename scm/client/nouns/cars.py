@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Literal
 
 from scm.client.connection import Connection, part
-from scm.client.records.cars import CarFile, CarFiles
+from scm.records.cars import CarFile, CarFiles
 
 
 class CarsNoun:
@@ -27,10 +27,10 @@ class CarsNoun:
         scale: str = "",
         mass_kg: float,
         wheelbase_m: float,
-        motor: Literal["geared", "direct"] = "direct",
+        motor: Literal["direct", "geared"] = "direct",
         top_speed_mps: float,
         acceleration_mps2: float | None = None,
-        driven: Literal["rear", "front", "all"] = "rear",
+        driven: Literal["all", "front", "rear"] = "rear",
         length_m: float | None = None,
         width_m: float | None = None,
         track_m: float | None = None,
@@ -94,10 +94,10 @@ class CarsNoun:
         scale: str = "",
         mass_kg: float,
         wheelbase_m: float,
-        motor: Literal["geared", "direct"] = "direct",
+        motor: Literal["direct", "geared"] = "direct",
         top_speed_mps: float,
         acceleration_mps2: float | None = None,
-        driven: Literal["rear", "front", "all"] = "rear",
+        driven: Literal["all", "front", "rear"] = "rear",
         length_m: float | None = None,
         width_m: float | None = None,
         track_m: float | None = None,
@@ -116,13 +116,13 @@ class CarsNoun:
             wheelbase_m: front axle to rear axle
             motor: geared: it holds the car when it is off; direct: it can be pushed
             top_speed_mps: at full throttle on the level
-            acceleration_mps2: from standing, at full throttle
+            acceleration_mps2: acceleration_mps2
             driven: which wheels
-            length_m: of the whole car
-            width_m: of the whole car
-            track_m: middle of a wheel to the other's
-            wheel_radius_m: under load
-            steering_limit_rad: of a front wheel, to either side
+            length_m: length_m
+            width_m: width_m
+            track_m: track_m
+            wheel_radius_m: wheel_radius_m
+            steering_limit_rad: steering_limit_rad
             tag_size_m: black edge of the tag on its roof; 0: none
             lidar: whether it has one
             camera: whether it has one

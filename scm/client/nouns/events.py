@@ -6,7 +6,8 @@ Written by docs/make/client.py: do not change it here.
 from typing import Literal
 
 from scm.client.connection import Connection, part
-from scm.client.records.events import Acknowledged, Acknowledgement, PageEventRow
+from scm.records.events import Acknowledged, Acknowledgement, EventRow
+from scm.records.page import Page
 
 
 class EventsNoun:
@@ -29,7 +30,7 @@ class EventsNoun:
         text: str = "",
         since_ns: int | None = None,
         until_ns: int | None = None,
-    ) -> PageEventRow:
+    ) -> Page[EventRow]:
         """Events, newest first.
 
         Args:
@@ -48,7 +49,7 @@ class EventsNoun:
         return self._connection.ask(
             "GET",
             "/api/v1/events",
-            PageEventRow,
+            Page[EventRow],
             query={
                 "open": open_,
                 "after": after,
@@ -111,7 +112,7 @@ class EventsNoun:
 
         Args:
             events: ids of the events
-            by: who; empty: whoever calls
+            by: who asks, for the log; empty: whoever calls
             note: what there is to say
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

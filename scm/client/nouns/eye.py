@@ -7,17 +7,12 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 from scm.client.connection import Connection, part
-from scm.client.records.eye import (
-    CalibrationFile,
-    CalibrationReply,
-    PageCalibrationRow,
-    Residuals,
-    TrackList,
-    View,
-    Views,
-)
-from scm.client.records.eye_parts import CameraState, EyeTags, Overhead, PageCameraRow, PagePoseRow
-from scm.client.records.shared import Operation
+from scm.records.eye import CameraRow, CameraState, Overhead, PoseRow, Residuals, TrackList
+from scm.records.eye_calibrations import CalibrationFile, CalibrationRow, View, Views
+from scm.records.operations import Operation
+from scm.records.page import Page
+from scm.v2x.messages.calibration_request import CalibrationReply
+from scm.v2x.messages.eye_tags import EyeTags
 
 
 class EyeNoun:
@@ -30,7 +25,7 @@ class EyeNoun:
         """All cameras, with tags and poses seen."""
         return self._connection.ask("GET", "/api/v1/eye", Overhead)
 
-    def cameras(self, *, limit: int = 100, cursor: str = "") -> PageCameraRow:
+    def cameras(self, *, limit: int = 100, cursor: str = "") -> Page[CameraRow]:
         """The cameras, a page.
 
         Args:
@@ -38,7 +33,7 @@ class EyeNoun:
             cursor: `next` of the page before; empty: the first page
         """
         return self._connection.ask(
-            "GET", "/api/v1/eye/cameras", PageCameraRow, query={"limit": limit, "cursor": cursor}
+            "GET", "/api/v1/eye/cameras", Page[CameraRow], query={"limit": limit, "cursor": cursor}
         )
 
     def camera(self, name: str) -> CameraState:
@@ -68,7 +63,7 @@ class EyeNoun:
         """
         return self._connection.ask("GET", f"/api/v1/eye/cameras/{part(name)}/tags", EyeTags)
 
-    def poses(self, *, limit: int = 100, cursor: str = "") -> PagePoseRow:
+    def poses(self, *, limit: int = 100, cursor: str = "") -> Page[PoseRow]:
         """The newest pose of each car by each camera.
 
         Args:
@@ -76,7 +71,7 @@ class EyeNoun:
             cursor: `next` of the page before; empty: the first page
         """
         return self._connection.ask(
-            "GET", "/api/v1/eye/poses", PagePoseRow, query={"limit": limit, "cursor": cursor}
+            "GET", "/api/v1/eye/poses", Page[PoseRow], query={"limit": limit, "cursor": cursor}
         )
 
     def tracks(self) -> TrackList:
@@ -160,7 +155,7 @@ class EyeNoun:
         self,
         name: str,
         *,
-        board: Literal["chessboard", "charuco", "tags"] = "chessboard",
+        board: Literal["charuco", "chessboard", "tags"] = "chessboard",
         columns: int,
         rows: int,
         square_m: float,
@@ -230,7 +225,7 @@ class EyeNoun:
             key=idempotency_key,
         )
 
-    def calibrations(self, *, limit: int = 100, cursor: str = "") -> PageCalibrationRow:
+    def calibrations(self, *, limit: int = 100, cursor: str = "") -> Page[CalibrationRow]:
         """All calibrations kept, newest first.
 
         Args:
@@ -240,7 +235,7 @@ class EyeNoun:
         return self._connection.ask(
             "GET",
             "/api/v1/eye/calibrations",
-            PageCalibrationRow,
+            Page[CalibrationRow],
             query={"limit": limit, "cursor": cursor},
         )
 
@@ -337,7 +332,7 @@ class EyeNoun:
 
         Args:
             name: a name on the bus
-            by: who asks; empty: whoever calls
+            by: who asks, for the log; empty: whoever calls
             reason: why
             calibration: a calibration on the shelf
             accept_unsure: whether it is meant although the Eye would flag its poses as unsure and
@@ -364,7 +359,7 @@ class EyeNoun:
 
         Args:
             name: a name on the bus
-            by: who asks; empty: whoever calls
+            by: who asks, for the log; empty: whoever calls
             reason: why
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

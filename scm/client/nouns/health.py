@@ -4,7 +4,7 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection
-from scm.client.records.health import Alive, Ready
+from scm.records.health import Alive, Ready
 
 
 class HealthNoun:

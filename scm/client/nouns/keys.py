@@ -4,7 +4,7 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection, part
-from scm.client.records.keys import AllKeys, KeyRow
+from scm.records.keys import AllKeys, KeyRow
 
 
 class KeysNoun:

@@ -4,7 +4,9 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection, part
-from scm.client.records.leases import LeaseReply, LeaseRow, PageLeaseRow
+from scm.records.leases import LeaseRow
+from scm.records.page import Page
+from scm.v2x.messages.lease_request import LeaseReply
 
 
 class LeasesNoun:
@@ -13,7 +15,7 @@ class LeasesNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def all_leases(self, *, limit: int = 100, cursor: str = "") -> PageLeaseRow:
+    def all_leases(self, *, limit: int = 100, cursor: str = "") -> Page[LeaseRow]:
         """Who drives which car.
 
         Args:
@@ -21,7 +23,7 @@ class LeasesNoun:
             cursor: `next` of the page before; empty: the first page
         """
         return self._connection.ask(
-            "GET", "/api/v1/leases", PageLeaseRow, query={"limit": limit, "cursor": cursor}
+            "GET", "/api/v1/leases", Page[LeaseRow], query={"limit": limit, "cursor": cursor}
         )
 
     def one_lease(self, name: str) -> LeaseRow:

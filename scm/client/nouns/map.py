@@ -4,7 +4,7 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection
-from scm.client.records.map import CityMap
+from scm.records.city_map import CityMap
 
 
 class MapNoun:

@@ -4,8 +4,8 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection, part
-from scm.client.records.misbehaviour import MisbehaviourReport
-from scm.client.records.misbehaviour_parts import Misbehaviour
+from scm.records.misbehaviour import Misbehaviour
+from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 
 
 class MisbehaviourNoun:

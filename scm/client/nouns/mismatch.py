@@ -6,8 +6,9 @@ Written by docs/make/client.py: do not change it here.
 from collections.abc import Iterator
 
 from scm.client.connection import Connection, part
-from scm.client.records.mismatch import DrivePlans, Offers, PageReportRow, Report, Upload
-from scm.client.records.shared import Operation
+from scm.records.mismatch import DrivePlans, Offers, Report, ReportRow, Upload
+from scm.records.operations import Operation
+from scm.records.page import Page
 
 
 class MismatchNoun:
@@ -81,7 +82,7 @@ class MismatchNoun:
             key=idempotency_key,
         )
 
-    def reports(self, *, limit: int = 100, cursor: str = "") -> PageReportRow:
+    def reports(self, *, limit: int = 100, cursor: str = "") -> Page[ReportRow]:
         """All reports, newest first.
 
         Args:
@@ -91,7 +92,7 @@ class MismatchNoun:
         return self._connection.ask(
             "GET",
             "/api/v1/mismatch/reports",
-            PageReportRow,
+            Page[ReportRow],
             query={"limit": limit, "cursor": cursor},
         )
 

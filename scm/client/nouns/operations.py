@@ -4,8 +4,8 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection, part
-from scm.client.records.operations import PageOperation
-from scm.client.records.shared import Operation
+from scm.records.operations import Operation
+from scm.records.page import Page
 
 
 class OperationsNoun:
@@ -14,7 +14,7 @@ class OperationsNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def all_operations(self, *, limit: int = 100, cursor: str = "") -> PageOperation:
+    def all_operations(self, *, limit: int = 100, cursor: str = "") -> Page[Operation]:
         """Long work, newest first.
 
         Args:
@@ -22,7 +22,7 @@ class OperationsNoun:
             cursor: `next` of the page before; empty: the first page
         """
         return self._connection.ask(
-            "GET", "/api/v1/operations", PageOperation, query={"limit": limit, "cursor": cursor}
+            "GET", "/api/v1/operations", Page[Operation], query={"limit": limit, "cursor": cursor}
         )
 
     def one_operation(self, name: str) -> Operation:

@@ -6,16 +6,10 @@ Written by docs/make/client.py: do not change it here.
 from collections.abc import Iterator
 
 from scm.client.connection import Connection, part
-from scm.client.records.recordings import (
-    Frames,
-    Notes,
-    PageRecordedEvent,
-    PageRecordingRow,
-    RecordedDisturbances,
-    RecordingRow,
-    Summary,
-)
-from scm.client.records.shared import Operation
+from scm.records.disturbances import RecordedDisturbances
+from scm.records.operations import Operation
+from scm.records.page import Page
+from scm.records.recordings import Frames, Notes, RecordedEvent, RecordingRow, Summary
 
 
 class RecordingsNoun:
@@ -82,7 +76,7 @@ class RecordingsNoun:
             query={"from_s": from_s, "to_s": to_s, "hz": hz},
         )
 
-    def events(self, name: str, *, limit: int = 500, cursor: str = "") -> PageRecordedEvent:
+    def events(self, name: str, *, limit: int = 500, cursor: str = "") -> Page[RecordedEvent]:
         """Its events, in their order.
 
         Args:
@@ -93,7 +87,7 @@ class RecordingsNoun:
         return self._connection.ask(
             "GET",
             f"/api/v1/recordings/{part(name)}/events",
-            PageRecordedEvent,
+            Page[RecordedEvent],
             query={"limit": limit, "cursor": cursor},
         )
 
@@ -202,7 +196,7 @@ class RecordingsNoun:
             key=idempotency_key,
         )
 
-    def all_recordings(self, *, limit: int = 100, cursor: str = "") -> PageRecordingRow:
+    def all_recordings(self, *, limit: int = 100, cursor: str = "") -> Page[RecordingRow]:
         """All recordings, the one written last first.
 
         Args:
@@ -210,7 +204,10 @@ class RecordingsNoun:
             cursor: `next` of the page before; empty: the first page
         """
         return self._connection.ask(
-            "GET", "/api/v1/recordings", PageRecordingRow, query={"limit": limit, "cursor": cursor}
+            "GET",
+            "/api/v1/recordings",
+            Page[RecordingRow],
+            query={"limit": limit, "cursor": cursor},
         )
 
     def one_recording(self, name: str) -> RecordingRow:

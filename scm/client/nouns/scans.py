@@ -6,8 +6,8 @@ Written by docs/make/client.py: do not change it here.
 from collections.abc import Iterator
 
 from scm.client.connection import Connection, part
-from scm.client.records.scans import ScanRow
 from scm.client.stream import LiveEvent
+from scm.records.scans import ScanRow
 
 
 class ScansNoun:

@@ -4,8 +4,9 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection, part
-from scm.client.records.scenarios import Lines, PageScenario, Scenario
-from scm.client.records.shared import Operation
+from scm.records.operations import Operation
+from scm.records.page import Page
+from scm.records.scenarios import Lines, Scenario
 
 
 class ScenariosNoun:
@@ -14,7 +15,7 @@ class ScenariosNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def all_scenarios(self, *, limit: int = 100, cursor: str = "") -> PageScenario:
+    def all_scenarios(self, *, limit: int = 100, cursor: str = "") -> Page[Scenario]:
         """All scripts, one's own first.
 
         Args:
@@ -22,7 +23,7 @@ class ScenariosNoun:
             cursor: `next` of the page before; empty: the first page
         """
         return self._connection.ask(
-            "GET", "/api/v1/scenarios", PageScenario, query={"limit": limit, "cursor": cursor}
+            "GET", "/api/v1/scenarios", Page[Scenario], query={"limit": limit, "cursor": cursor}
         )
 
     def one(self, name: str) -> Scenario:
@@ -84,7 +85,7 @@ class ScenariosNoun:
         )
 
     def run(
-        self, name: str, *, arguments: tuple[str, ...] | None = None, idempotency_key: str = ""
+        self, name: str, *, arguments: tuple[str, ...] = (), idempotency_key: str = ""
     ) -> Operation:
         """Run a script.
 

@@ -4,7 +4,7 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection
-from scm.client.records.session import Ended, Session
+from scm.records.session import Ended, Session
 
 
 class SessionNoun:

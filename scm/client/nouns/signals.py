@@ -6,21 +6,15 @@ Written by docs/make/client.py: do not change it here.
 from typing import Literal
 
 from scm.client.connection import Connection, part
-from scm.client.records.shared import Operation
-from scm.client.records.signals import (
-    FlashReply,
-    History,
-    MonitorStatus,
-    PagePlanRow,
-    PageSignalWish,
-    PageVerdict,
-    PlanProof,
-    PlanReply,
-    PlanRow,
-    PromiseScore,
-    SignalReply,
-)
-from scm.client.records.signals_parts import JunctionRow, Signals, SignalSite, StageBody, StatusRow
+from scm.records.operations import Operation
+from scm.records.page import Page
+from scm.records.signal_history import History, PromiseScore, Verdict
+from scm.records.signal_plans import PlanProof, PlanRow, StageBody
+from scm.records.signals import FlashReply, JunctionRow, Signals, SignalWish, StatusRow
+from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.plan_request import PlanReply
+from scm.v2x.messages.signal_request import SignalReply
+from scm.v2x.messages.signal_site import SignalSite
 
 
 class SignalsNoun:
@@ -73,7 +67,7 @@ class SignalsNoun:
         """
         return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/promises", PromiseScore)
 
-    def wishes(self, name: str, *, limit: int = 100, cursor: str = "") -> PageSignalWish:
+    def wishes(self, name: str, *, limit: int = 100, cursor: str = "") -> Page[SignalWish]:
         """Wishes in force, each with who, why and its end.
 
         Args:
@@ -84,7 +78,7 @@ class SignalsNoun:
         return self._connection.ask(
             "GET",
             f"/api/v1/signals/{part(name)}/wishes",
-            PageSignalWish,
+            Page[SignalWish],
             query={"limit": limit, "cursor": cursor},
         )
 
@@ -103,7 +97,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
             by: who asks, for the log; empty: whoever calls
-            reason: why
+            reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -131,7 +125,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
             by: who asks, for the log; empty: whoever calls
-            reason: why
+            reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -159,7 +153,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
             by: who asks, for the log; empty: whoever calls
-            reason: why
+            reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -187,7 +181,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
             by: who asks, for the log; empty: whoever calls
-            reason: why
+            reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -215,7 +209,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
             by: who asks, for the log; empty: whoever calls
-            reason: why
+            reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -234,8 +228,8 @@ class SignalsNoun:
         *,
         by: str = "",
         reason: str = "",
-        groups: tuple[str, ...] | None = None,
-        verb: Literal["", "call", "hold", "force_off", "omit", "preempt", "policy"] = "",
+        groups: tuple[str, ...] = (),
+        verb: Literal["", "call", "force_off", "hold", "omit", "policy", "preempt"] = "",
         idempotency_key: str = "",
     ) -> SignalReply:
         """Take back what was asked of groups.
@@ -243,7 +237,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
             by: who asks, for the log; empty: whoever calls
-            reason: why
+            reason: why, for the log
             groups: wishes for any of these groups; empty: whatever they are for
             verb: wishes of this kind; empty: of any
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -264,7 +258,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
             by: who asks, for the log; empty: whoever calls
-            reason: why
+            reason: why, for the log
             plan: a plan by name (shipped, the map's own, or saved), a policy, or `flash`
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
@@ -291,7 +285,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
             by: who asks, for the log; empty: whoever calls
-            reason: why
+            reason: why, for the log
             policy: its name
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -319,7 +313,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
             by: who asks, for the log; empty: whoever calls
-            reason: why
+            reason: why, for the log
             engaged: true: flash; false: go on, all red first
             expires_s: seconds until it ends by itself; null: not by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -332,7 +326,7 @@ class SignalsNoun:
             key=idempotency_key,
         )
 
-    def verdicts(self, name: str, *, limit: int = 100, cursor: str = "") -> PageVerdict:
+    def verdicts(self, name: str, *, limit: int = 100, cursor: str = "") -> Page[Verdict]:
         """What the monitor said, newest first.
 
         Args:
@@ -343,7 +337,7 @@ class SignalsNoun:
         return self._connection.ask(
             "GET",
             f"/api/v1/signals/{part(name)}/monitor",
-            PageVerdict,
+            Page[Verdict],
             query={"limit": limit, "cursor": cursor},
         )
 
@@ -366,7 +360,7 @@ class SignalsNoun:
             key=idempotency_key,
         )
 
-    def plans(self, name: str, *, limit: int = 100, cursor: str = "") -> PagePlanRow:
+    def plans(self, name: str, *, limit: int = 100, cursor: str = "") -> Page[PlanRow]:
         """All plans of a junction.
 
         Args:
@@ -377,7 +371,7 @@ class SignalsNoun:
         return self._connection.ask(
             "GET",
             f"/api/v1/signals/{part(name)}/plans",
-            PagePlanRow,
+            Page[PlanRow],
             query={"limit": limit, "cursor": cursor},
         )
 
@@ -415,7 +409,7 @@ class SignalsNoun:
             if_none_match: `*`: only where there is none yet
             about: what it is for
             by: who asks, for the log; empty: whoever calls
-            reason: why
+            reason: why, for the log
             stages: in the order of the cycle
             offset_s: when its cycle begins, after a time that is a whole number of cycles on the
                 controller's clock, less than the cycle; plans with the same cycle keep step so;

@@ -4,7 +4,7 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection, part
-from scm.client.records.stations import StationEvents, Stations
+from scm.records.stations import StationEvents, Stations
 
 
 class StationsNoun:

@@ -4,7 +4,7 @@ Written by docs/make/client.py: do not change it here.
 """
 
 from scm.client.connection import Connection
-from scm.client.records.stop import CityStop
+from scm.v2x.messages.city_stop import CityStop
 
 
 class StopNoun:
@@ -24,7 +24,7 @@ class StopNoun:
 
         Args:
             engaged: true: stop every car
-            by: who wishes it; empty: whoever calls
+            by: who asks, for the log; empty: whoever calls
             reason: why, for the log
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

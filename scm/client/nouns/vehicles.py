@@ -7,17 +7,12 @@ from collections.abc import Iterator
 from typing import Literal
 
 from scm.client.connection import Connection, part
-from scm.client.records.vehicles import (
-    LightReply,
-    LinkRow,
-    PathRow,
-    RemoveReply,
-    RouteReply,
-    SpawnReply,
-    VehicleRow,
-    VehiclesTopic,
-)
 from scm.client.stream import LiveEvent
+from scm.records.vehicles import LinkRow, PathRow, VehicleRow, VehiclesTopic
+from scm.v2x.messages.light_request import LightReply
+from scm.v2x.messages.remove_request import RemoveReply
+from scm.v2x.messages.route_request import RouteReply
+from scm.v2x.messages.spawn_request import SpawnReply
 
 
 class VehiclesNoun:
@@ -77,10 +72,10 @@ class VehiclesNoun:
         self,
         name: str,
         *,
-        via: tuple[str, ...] | None = None,
+        via: tuple[str, ...] = (),
         laps: int = 1,
         speed_mps: float | None = None,
-        then: Literal["stop", "circulate"] = "stop",
+        then: Literal["circulate", "stop"] = "stop",
         idempotency_key: str = "",
     ) -> RouteReply:
         """Send a car on a route.
@@ -105,8 +100,8 @@ class VehiclesNoun:
         self,
         name: str,
         *,
-        headlights: Literal["off", "low", "high"] | None = None,
-        indicators: Literal["off", "left", "right", "hazard"] | None = None,
+        headlights: Literal["high", "low", "off"] | None = None,
+        indicators: Literal["hazard", "left", "off", "right"] | None = None,
         idempotency_key: str = "",
     ) -> LightReply:
         """Switch a car's headlights and indicators.

@@ -26,8 +26,8 @@ from scm.eye.camera import LARGEST_TILT_RAD, LENS_PARAMETERS, CameraModel, camer
 from scm.eye.detect import CORNER_STD_PX
 from scm.geometry import wrap_angle
 from scm.records.city_map import Camera, CityMap, MapTag, Record
+from scm.records.eye import TagSeen
 from scm.scenery.tags import TAG_COUNT, floor_corners
-from scm.v2x.messages.eye_tags import TagSeen
 
 NAMES = ("x_m", "y_m", "z_m", "yaw_rad", "tilt_x_rad", "tilt_y_rad")
 SURE = 0.95

@@ -24,8 +24,8 @@ from scm.eye.camera import CameraModel, camera_model
 from scm.eye.picture import read_picture
 from scm.eye.source import grey_of
 from scm.records.city_map import Camera, MapTag
+from scm.records.eye import TagSeen
 from scm.scenery.board import Board
-from scm.v2x.messages.eye_tags import TagSeen
 
 Told = dict[str, Any]
 

@@ -28,8 +28,8 @@ from scm.eye.detect import (
 from scm.eye.find.codes import tag_cells
 from scm.eye.find.measure import BITS, BORDER, MARGIN, measure
 from scm.eye.picture import LEAST_PX
+from scm.records.eye import TagSeen
 from scm.scenery.tags import TAG_COUNT
-from scm.v2x.messages.eye_tags import TagSeen
 
 DECIMATED_ROWS = 1080
 """A taller frame is searched in a picture that is smaller by as much more."""

@@ -1,5 +1,6 @@
 """Two conflicting groups turn green and stay green."""
 
+from scm.records.signals import Colour
 from scm.selftest.signal_fault import (
     OutputFault,
     SignalFault,
@@ -8,7 +9,7 @@ from scm.selftest.signal_fault import (
     recolour,
 )
 from scm.traffic.monitor.conflict_table import Card
-from scm.v2x.messages.spat import Colour, Spat
+from scm.v2x.messages.spat import Spat
 
 
 def _output_fault(table: Card) -> OutputFault:

@@ -11,6 +11,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import CarError
 from scm.log import event
 from scm.records.city_map import CityMap
+from scm.records.misbehaviour import StationScore
 from scm.runtime.part import BasePart, Subscription
 from scm.traffic.car_facts import facts_of, outline_of
 from scm.traffic.misbehaviour.check import Sender
@@ -29,7 +30,7 @@ from scm.v2x.messages.misbehaviour_report import (
     MisbehaviourReport,
     Observation,
 )
-from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores, StationScore
+from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 from scm.v2x.messages.part_status import PartStatus
 
 _log = logging.getLogger(__name__)

@@ -20,13 +20,14 @@ from statistics import fmean
 
 from scm.clock import NS_PER_S, seconds
 from scm.maps.route import OnLane, Roads
+from scm.records.traffic import ApproachCount, LaneCount
 from scm.traffic.observation.car_estimates import Belief
 from scm.traffic.observation.lane_tracking import Followed, Lines
 from scm.traffic.observation.service_level import level_of, share_below
 from scm.traffic.signals.sightings import NIGEL_FRONT_M
 from scm.v2x.etsi.convert import ASSUMED_LENGTH_M
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.traffic_counts import ApproachCount, LaneCount, TrafficCounts
+from scm.v2x.messages.traffic_counts import TrafficCounts
 
 WINDOW_NS = 900 * NS_PER_S
 AGAIN_NS = 4 * NS_PER_S

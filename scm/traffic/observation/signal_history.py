@@ -4,7 +4,8 @@ from collections import deque
 from typing import NamedTuple
 
 from scm.clock import NS_PER_S
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.records.signals import SignalGroup
+from scm.v2x.messages.spat import Spat
 
 DEPTH = 40
 KNOWN_NS = NS_PER_S // 2

@@ -21,13 +21,14 @@ from typing import NamedTuple
 from scm.clock import NS_PER_S, seconds
 from scm.geometry import Pose2
 from scm.maps.route import Roads
+from scm.records.signals import SignalGroup
+from scm.records.traffic import Kind, TrackPoint
 from scm.traffic.observation.car_estimates import Belief
 from scm.traffic.observation.lane_tracking import Followed, Lines
 from scm.traffic.observation.signal_history import Shown, SignalMemory
 from scm.traffic.signals.sightings import NIGEL_FRONT_M
 from scm.v2x.messages.contact import Contact
-from scm.v2x.messages.spat import SignalGroup
-from scm.v2x.messages.violation import Kind, TrackPoint, Violation
+from scm.v2x.messages.violation import Violation
 
 SIGMAS = 3.0
 GRACE_S = 0.3

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from scm.errors import PlanError, nearest
+from scm.records.signals import Colour, SignalGroup
 from scm.traffic.signals import kernel, operator_overrides
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.forecast import Coming, forecasts, laid_out, within
@@ -42,7 +43,7 @@ from scm.traffic.signals.program import STEP_NS
 from scm.traffic.signals.timetables import Tables, Timetables
 from scm.traffic.signals.timing import NIGEL, CarFacts
 from scm.v2x.messages.signal_request import SignalRequest
-from scm.v2x.messages.spat import Colour, SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 
 LATE_NS = 3 * STEP_NS
 FORESEE_EVERY_NS = 5 * STEP_NS

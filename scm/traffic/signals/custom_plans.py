@@ -9,6 +9,7 @@ import time
 from collections.abc import Collection, Sequence
 
 from scm.errors import PlanError
+from scm.records.signal_plans import PlanProof, SignalPhase, SignalStage
 from scm.store.records import StageRecord
 from scm.traffic.signals import kernel
 from scm.traffic.signals.green_wave import Wave
@@ -17,9 +18,7 @@ from scm.traffic.signals.plan import FLASH, Slot, Stage, Timetable, least_betwee
 from scm.traffic.signals.program import whole_steps_ns
 from scm.traffic.signals.proof.load_checks import check_table
 from scm.traffic.signals.proof.plan_proof import prove_plan
-from scm.v2x.messages.plan_request import SignalStage
-from scm.v2x.messages.signal_site import SignalPhase
-from scm.v2x.plan_file import PlanFile, PlanProof
+from scm.v2x.plan_file import PlanFile
 
 LONGEST_CYCLE_S = 300.0
 MOST_STAGES = 24

@@ -12,13 +12,13 @@ import msgspec
 from scm.errors import PlanError
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap, Junction, PlanStage
+from scm.records.signal_plans import SignalStage
 from scm.traffic.signals.custom_plans import limited_table
 from scm.traffic.signals.kernel import Program
 from scm.traffic.signals.plan import Timetable
 from scm.traffic.signals.program import program_of
 from scm.traffic.signals.proof.load_checks import check_junction
 from scm.traffic.signals.timing import NIGEL, CarFacts
-from scm.v2x.messages.plan_request import SignalStage
 
 OWN = "own"
 

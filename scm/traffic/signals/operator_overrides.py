@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from scm.clock import NS_PER_S
 from scm.errors import PlanError, nearest
+from scm.records.signals import LONGEST_S, Verb
 from scm.traffic.signals.kernel import Program
-from scm.v2x.messages.signal_request import LONGEST_S, SignalRequest, Verb
+from scm.v2x.messages.signal_request import SignalRequest
 
 NEED_RINGS = ("hold", "force_off", "omit", "preempt")
 

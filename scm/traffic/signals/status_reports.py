@@ -7,6 +7,8 @@ from msgspec.structs import replace
 from scm import registry
 from scm.clock import NS_PER_S
 from scm.errors import PlanError
+from scm.records.signal_plans import SignalPhase, SignalPlan, SignalPolicy, SignalSlot
+from scm.records.signals import SignalDetector, SignalTurn, SignalWish
 from scm.traffic.signals.controller import Controller
 from scm.traffic.signals.custom_plans import stages_of
 from scm.traffic.signals.detectors import Detector
@@ -19,15 +21,8 @@ from scm.traffic.signals.policy import load_policy, policy_names, site_of
 from scm.traffic.signals.program import STEP_NS
 from scm.traffic.signals.timetables import Tables
 from scm.v2x.exchange import Outgoing
-from scm.v2x.messages.signal_request import SignalWish
-from scm.v2x.messages.signal_site import (
-    SignalPhase,
-    SignalPlan,
-    SignalPolicy,
-    SignalSite,
-    SignalSlot,
-)
-from scm.v2x.messages.signal_status import SignalDetector, SignalStatus, SignalTurn
+from scm.v2x.messages.signal_site import SignalSite
+from scm.v2x.messages.signal_status import SignalStatus
 
 SITE_EVERY_NS = 10 * NS_PER_S
 STATUS_EVERY_NS = NS_PER_S

@@ -19,6 +19,7 @@ from typing import NamedTuple
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import wrap_angle
 from scm.records.city_map import Junction
+from scm.records.signals import Colour, SignalGroup
 from scm.v2x.etsi.cam_spatem import (
     PHASE_STATES,
     REFERENCE_LATITUDE_DEG,
@@ -52,7 +53,7 @@ from scm.v2x.etsi.parts import (
     ReferencePosition,
     Speed,
 )
-from scm.v2x.messages.spat import Colour, SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 
 SPEED_MAX = 16382

@@ -5,8 +5,8 @@ from typing import ClassVar, Literal
 import msgspec
 
 from scm.records.city_map import Camera
+from scm.records.eye import InForce
 from scm.v2x.message import Message, Request
-from scm.v2x.messages.eye_status import InForce
 
 
 class MeasuredLens(msgspec.Struct, kw_only=True, frozen=True):

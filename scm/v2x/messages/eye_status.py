@@ -4,6 +4,7 @@ from typing import ClassVar
 
 import msgspec
 
+from scm.records.eye import InForce
 from scm.v2x.message import Message
 
 
@@ -17,35 +18,6 @@ class Complaint(msgspec.Struct, kw_only=True, frozen=True):
 
     code: str
     said: str
-
-
-class Calibrated(msgspec.Struct, kw_only=True, frozen=True):
-    """Names of calibrations.
-
-    Attributes:
-        lens: Of the lens alone; empty: the one that the place was found with.
-        place: Of the place and its lens; empty: as the camera was started, by the map file.
-    """
-
-    lens: str = ""
-    place: str = ""
-
-
-class InForce(msgspec.Struct, kw_only=True, frozen=True):
-    """By which calibration a camera sees.
-
-    Attributes:
-        now: What it sees by.
-        since_ns: When that was put in force, on the Eye's clock; None: it was started so.
-        by: Who did, and `reason` why.
-        before: What can be put back; None: nothing.
-    """
-
-    now: Calibrated
-    since_ns: int | None = None
-    by: str = ""
-    reason: str = ""
-    before: Calibrated | None = None
 
 
 class EyeStatus(Message, kw_only=True, frozen=True):

@@ -2,25 +2,8 @@
 
 from typing import ClassVar
 
-import msgspec
-
+from scm.records.signal_plans import SignalStage
 from scm.v2x.message import Message, Request
-
-
-class SignalStage(msgspec.Struct, kw_only=True, frozen=True):
-    """Groups that are green together, for how long, and how much later the next stage begins.
-
-    Groups of the next stage as well stay green between them; all others are red meanwhile.
-
-    Attributes:
-        green_s: The stage's split without yellow and red clear of those that leave it, which the
-            kernel adds.
-        extra_red_s: On top of red clear.
-    """
-
-    groups: tuple[str, ...]
-    green_s: float
-    extra_red_s: float = 0.0
 
 
 class PlanReply(Message, kw_only=True, frozen=True):

@@ -2,28 +2,8 @@
 
 from typing import ClassVar, Literal
 
-import msgspec
-
+from scm.records.signals import SignalWish, Verb
 from scm.v2x.message import Message, Request
-
-Verb = Literal["call", "hold", "force_off", "omit", "preempt", "policy", "clear"]
-LONGEST_S = 900.0
-
-
-class SignalWish(msgspec.Struct, kw_only=True, frozen=True):
-    """A wish that is in force.
-
-    Attributes:
-        ends_ns: When it lapses at the latest.
-        policy: With the verb `policy`: which one.
-    """
-
-    verb: Verb
-    groups: tuple[str, ...]
-    by: str
-    reason: str
-    ends_ns: int
-    policy: str = ""
 
 
 class SignalReply(Message, kw_only=True, frozen=True):
@@ -52,7 +32,7 @@ class SignalRequest(Request, kw_only=True, frozen=True):
             wishes, or those for these groups.
         clears: With `clear`: takes back wishes with this verb alone; empty: with any.
         by: Who wishes; `reason`: why. Both are told.
-        expires_s: When the wish lapses, from now; `LONGEST_S` at most.
+        expires_s: When the wish lapses, from now; 900 s at most.
     """
 
     KEY: ClassVar[str] = "tl/{junction}/wish"

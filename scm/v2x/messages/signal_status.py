@@ -2,30 +2,9 @@
 
 from typing import ClassVar
 
-import msgspec
-
+from scm.records.signal_plans import SignalStage
+from scm.records.signals import SignalDetector, SignalTurn, SignalWish
 from scm.v2x.message import Message
-from scm.v2x.messages.plan_request import SignalStage
-from scm.v2x.messages.signal_request import SignalWish
-
-
-class SignalTurn(msgspec.Struct, kw_only=True, frozen=True):
-    """Groups that will likely be green together; `end_ns` None: nobody knows until when.
-
-    Groups of the next turn as well stay green between them.
-    """
-
-    groups: tuple[str, ...]
-    start_ns: int
-    end_ns: int | None
-
-
-class SignalDetector(msgspec.Struct, kw_only=True, frozen=True):
-    """What the detectors of a group's lanes see; `queue` counts cars."""
-
-    group: str
-    call: bool
-    queue: int
 
 
 class SignalStatus(Message, kw_only=True, frozen=True):

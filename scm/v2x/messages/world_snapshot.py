@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import msgspec
 
+from scm.records.boxes import SnapshotBox
 from scm.v2x.message import Message
 
 
@@ -51,15 +52,6 @@ class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     alive: bool = True
     lights: tuple[str, ...] = ()
     stuck: tuple[str, ...] | None = None
-
-
-class SnapshotBox(msgspec.Struct, kw_only=True, frozen=True):
-    """One construction box that cars can push; pose of its middle, map frame."""
-
-    name: str
-    x_m: float
-    y_m: float
-    yaw_rad: float
 
 
 class WorldSnapshot(Message, kw_only=True, frozen=True):

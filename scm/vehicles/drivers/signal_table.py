@@ -13,10 +13,10 @@ from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_S
 from scm.maps.roadside import roadside_place
 from scm.records.city_map import CityMap
+from scm.records.signals import Colour
 from scm.v2x.etsi.cam_spatem import SpatemBody
 from scm.v2x.etsi.convert import REVISIONS, colours_of
 from scm.v2x.messages.monitor_status import MonitorStatus
-from scm.v2x.messages.spat import Colour
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived, ideal
 from scm.vehicles.jit import law, plain
 

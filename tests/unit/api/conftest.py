@@ -14,12 +14,13 @@ from scm.api.keys import KeyRing
 from scm.api.view import CityView
 from scm.clock import NS_PER_S, StepClock
 from scm.maps.load import load_map
+from scm.records.signals import SignalGroup
 from scm.store.memory import MemoryStore
 from scm.v2x.exchange import Incoming
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 

@@ -15,13 +15,14 @@ from scm.api.calibration_desk import LARGEST_PICTURE, MOST_CAMERAS, MOST_VIEWS, 
 from scm.api.keys import KeyRing
 from scm.api.problem import RefusedError
 from scm.api.shelves import Shelves, shelves_in
+from scm.records.eye import Calibrated, InForce, TagSeen
 from scm.store.memory import MemoryStore
 from scm.v2x.message import Refused
 from scm.v2x.messages.calibration_request import CalibrationReply, CalibrationRequest
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
-from scm.v2x.messages.eye_status import Calibrated, EyeStatus, InForce
-from scm.v2x.messages.eye_tags import EyeTags, TagSeen
+from scm.v2x.messages.eye_status import EyeStatus
+from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.eye_track import EyeTrack
 
 API = "/api/v1"

@@ -1,8 +1,9 @@
 """The routes of misbehaviour: scores, and reports with their evidence."""
 
 from scm.clock import NS_PER_S
+from scm.records.misbehaviour import StationScore
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport, Observation
-from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores, StationScore
+from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 
 URL = "/api/v1/misbehaviour"
 

@@ -5,9 +5,10 @@ import math
 import msgspec
 import pytest
 
+from scm.records.traffic import LaneCount
 from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.etsi.convert import place_of
-from scm.v2x.messages.traffic_counts import LaneCount, TrafficCounts
+from scm.v2x.messages.traffic_counts import TrafficCounts
 
 WHERE = "/ngsi-ld/v1/entities"
 LD = {"Accept": "application/ld+json"}

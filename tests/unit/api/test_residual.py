@@ -2,9 +2,10 @@ import math
 
 import pytest
 
-from scm.api.eye_residuals import KEPT_NS, ResidualLog, ResidualSample, stats_of
-from scm.api.residual import Residual, residual_of, truth_at
+from scm.api.eye_residuals import KEPT_NS, ResidualLog, stats_of
+from scm.api.residual import residual_of, truth_at
 from scm.geometry import Pose2
+from scm.records.eye import Residual, ResidualSample
 from scm.v2x.messages.eye_pose import EyePose
 
 

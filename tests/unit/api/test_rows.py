@@ -5,10 +5,11 @@ from scm.api.eye_rows import camera_rows, frame_of, tags_of
 from scm.api.signal_rows import junction_rows
 from scm.api.vehicle_rows import vehicles_topic
 from scm.clock import NS_PER_S
+from scm.records.eye import TagSeen
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import Complaint, EyeStatus
-from scm.v2x.messages.eye_tags import EyeTags, TagSeen
+from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.trip import Trip
 

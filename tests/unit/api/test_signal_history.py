@@ -4,8 +4,9 @@ import pytest
 
 from scm.api.signal_history import KEPT_S, SignalHistory
 from scm.clock import NS_PER_S
+from scm.records.signals import SignalGroup
 from scm.v2x.messages.monitor_status import MonitorStatus
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 
 NAMES = ("north",)
 

@@ -7,9 +7,11 @@ import pytest
 
 from scm.api.app import create_app
 from scm.api.shelves import Shelves
-from scm.v2x.messages.plan_request import PlanReply, PlanRequest, SignalStage
-from scm.v2x.messages.signal_request import SignalReply, SignalRequest, SignalWish
-from scm.v2x.messages.signal_site import SignalPhase, SignalPlan, SignalPolicy, SignalSite
+from scm.records.signal_plans import SignalPhase, SignalPlan, SignalPolicy, SignalStage
+from scm.records.signals import SignalWish
+from scm.v2x.messages.plan_request import PlanReply, PlanRequest
+from scm.v2x.messages.signal_request import SignalReply, SignalRequest
+from scm.v2x.messages.signal_site import SignalSite
 from scm.v2x.messages.signal_status import SignalStatus
 
 AT = "/api/v1/signals/crossing"

@@ -5,12 +5,12 @@ import re
 import shutil
 
 import pytest
+from msgspec.structs import fields as fields_of
 
 from scm.api import dashboard
 from scm.api.dashboard import PAGES, STATIC_DIR, page_text
-from scm.api.routes.eye_in_force import BackBody
-from scm.api.routes.signals import FlashBody, ResetBody
-from scm.api.routes.signals import PlanBody as SignalPlanBody
+from scm.records.eye_calibrations import BackBody
+from scm.records.signals import FlashBody, PlanChoiceBody, ResetBody
 
 OURS = sorted((STATIC_DIR / "js").rglob("*.js"))
 STYLES = sorted((STATIC_DIR / "css").rglob("*.css"))
@@ -95,11 +95,12 @@ def test_a_page_names_every_module_that_it_will_import(page, place):
 
 def test_a_page_asks_for_a_reason_where_rest_needs_one_and_nowhere_else():
     needs = {"pages/eye/in_force.js": BackBody, "pages/signals/monitor.js": ResetBody}
-    offers = {"pages/signals/plans.js": SignalPlanBody, "pages/signals/wishes.js": FlashBody}
+    offers = {"pages/signals/plans.js": PlanChoiceBody, "pages/signals/wishes.js": FlashBody}
     field = re.compile(r'<input[^>]*name="reason"[^>]*>', re.DOTALL)
     for place, body in (needs | offers).items():
         fields = field.findall((STATIC_DIR / "js" / place).read_text("utf-8"))
-        is_needed = body.model_fields["reason"].is_required()
+        (reason,) = (one for one in fields_of(body) if one.name == "reason")
+        is_needed = reason.required
         assert is_needed == (place in needs)
         assert fields, place
         assert all(("required" in one) == is_needed for one in fields), place

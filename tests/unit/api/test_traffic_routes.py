@@ -1,5 +1,6 @@
+from scm.records.traffic import ApproachCount
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.traffic_counts import ApproachCount, TrafficCounts
+from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.violation import Violation
 
 API = "/api/v1"

@@ -11,7 +11,7 @@ import pytest
 from scm.api import calibration_shelf, recordings_shelf, scenarios, signal_plans
 from scm.api.app import create_app
 from scm.api.shelves import shelves_in
-from scm.v2x.plan_file import PlanProof
+from scm.records.signal_plans import PlanProof
 from tests.unit.api.conftest import HERE
 from tests.unit.api.test_eye_routes import LENS, PLACE
 from tests.unit.api.test_signal_routes import STAGES, site, status

@@ -15,10 +15,10 @@ from scm.errors import EyeError
 from scm.eye.detect import Settings, look
 from scm.maps.load import load_map
 from scm.maps.route import LanePath
+from scm.records.boxes import SnapshotBox
 from scm.scenery.bodies import car_rotation
 from scm.scenery.solids import prism, rectangle
 from scm.scenery.tags import tag_corners
-from scm.v2x.messages.world_snapshot import SnapshotBox
 
 UP = np.eye(3)
 RED, BLUE = (0, 0, 250), (250, 0, 0)

@@ -6,9 +6,9 @@ import pytest
 
 from scm.client import work as module
 from scm.client.connection import Connection
-from scm.client.records.shared import Operation
 from scm.client.work import WorkError, finished
 from scm.errors import LinkError
+from scm.records.operations import Operation
 
 BEGUN = Operation(
     id="m-1",

@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
+from scm.records.signals import SignalGroup
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.lidar_scan import LidarScan
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import load_car

@@ -5,7 +5,8 @@ import numpy as np
 from scm.eye.camera import camera_model
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.maps.load import load_map
-from scm.v2x.messages.world_snapshot import SnapshotBox, WorldSnapshot
+from scm.records.boxes import SnapshotBox
+from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 CITY = load_map("proving_ground")
 

@@ -16,8 +16,8 @@ from scm.eye.render.floor import draw_map_tag
 from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.records.city_map import Camera, MapTag
+from scm.records.eye import TagSeen
 from scm.scenery.tags import tag_corners
-from scm.v2x.messages.eye_tags import TagSeen
 
 HIGH = Camera(
     name="overhead", x_m=1.5, y_m=-0.2, z_m=2.5, yaw_rad=0.1, tilt_x_rad=0.3, tilt_y_rad=0.18,

@@ -11,6 +11,7 @@ from scm.eye.sight import MOST_KEPT, SightRecord
 from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.maps.load import load_map
+from scm.records.eye import Calibrated
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
 from scm.store.audit import AuditLog
@@ -20,7 +21,7 @@ from scm.v2x.message import Refused
 from scm.v2x.messages.calibration_request import CalibrationRequest, MeasuredLens
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.eye_pose import EyePose
-from scm.v2x.messages.eye_status import Calibrated, EyeStatus
+from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.api.report_folders import BUDGET_S
 from scm.clock import StepClock, nanoseconds
 from scm.mismatch import diagnose
 from scm.mismatch.budget import DEFAULT_S, MOST_KEPT, WORDS, Budget, Question
@@ -17,6 +16,7 @@ from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.report.first_screen import cards_of
 from scm.mismatch.select.many_effects import ManyEffectsSearch
 from scm.mismatch.select.search import Search
+from scm.records.mismatch import BUDGET_S
 from tests.unit.mismatch.discovery import made_effect
 from tests.unit.mismatch.made_drive import big_nigel, driven, made_drive, nigel
 from tests.unit.mismatch.made_fit import candidate

@@ -7,13 +7,15 @@ import msgspec
 from scm.clock import NS_PER_S
 from scm.maps.load import load_map
 from scm.recorder.mcap_file import RunFile
+from scm.records.boxes import SnapshotBox
+from scm.records.signals import SignalGroup
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import prefix
 from scm.v2x.messages.city_event import CityEvent
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
-from scm.v2x.messages.world_snapshot import SnapshotBox, SnapshotVehicle, WorldSnapshot
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 BEGIN_NS = 1_700_000_000 * NS_PER_S
 HZ = 20

@@ -15,13 +15,14 @@ from scm.recorder.autodrive_run import read_tracks
 from scm.recorder.mcap_file import RunFile
 from scm.recording.autodrive import CAR, stamp_of
 from scm.recording.read import read_recordings
+from scm.records.signals import SignalGroup
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of
 from scm.v2x.message import Message, encode
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.lidar_scan import LidarScan
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scm.maps.load import load_map
+from scm.records.signals import SignalGroup
 from scm.ros2 import markers
 from scm.ros2.frames import vector
 from scm.ros2.part import RosPart
@@ -20,7 +21,7 @@ from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.remove_request import RemoveRequest
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 from scm.vehicles.car import load_car

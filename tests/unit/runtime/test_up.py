@@ -7,8 +7,9 @@ import pytest
 
 from scm.__main__ import parse
 from scm.commands.up import options_of
-from scm.disturbances import OPTIONAL_PARTS, Disturbance
+from scm.disturbances import OPTIONAL_PARTS
 from scm.errors import MapError, RunError, ScmError
+from scm.records.disturbances import Disturbance
 from scm.runtime.up import OPTIONAL, CityOptions, _parts, _plan_of, _report_disturbance, run_city
 from scm.v2x.router import Router, free_endpoint
 

@@ -19,6 +19,7 @@ from scm.eye.track.perception import collective_perception
 from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.route import Roads
+from scm.records.signals import SignalGroup
 from scm.traffic.misbehaviour.claim import claim_of
 from scm.traffic.misbehaviour.limits import Limits
 from scm.traffic.signals.sightings import Sightings
@@ -41,7 +42,7 @@ from scm.v2x.etsi.priority_requests import (
 )
 from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.messages.cam_rx import CamRx
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.v2x.pcap import Positions
 from scm.v2x.uper import cam, codec, denm, mapem, spatem, srem, ssem
 from scm.v2x.uper.parts import Chosen, Each, Fields, Names, Only

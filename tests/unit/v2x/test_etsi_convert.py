@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.records.city_map import Conflict, Group, Junction
+from scm.records.signals import SignalGroup
 from scm.v2x.etsi import convert as ec
 from scm.v2x.etsi.cam_spatem import (
     PHASE_STATES,
@@ -22,7 +23,7 @@ from scm.v2x.etsi.cam_spatem import (
     VehicleLength,
 )
 from scm.v2x.etsi.parts import Heading, Speed
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 
 MOVE = Conflict(lane="l", from_m=0.0, to_m=0.5)

@@ -8,6 +8,7 @@ import pytest
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.load import load_map
 from scm.maps.route import Roads
+from scm.records.signals import SignalGroup
 from scm.v2x.etsi.convert import place_of, spatem_of, station_id
 from scm.v2x.etsi.path import MAX_POINTS, LowFrequencySender
 from scm.v2x.etsi.priority_requests import (
@@ -19,7 +20,7 @@ from scm.v2x.etsi.priority_requests import (
     ssem_of,
 )
 from scm.v2x.etsi.topology import mapem_of, topology_of
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from tests.unit.v2x.test_etsi_convert import NOW, a_state
 
 ROADS = {name: Roads(load_map(name)) for name in ("driving_school", "grid:3x3")}

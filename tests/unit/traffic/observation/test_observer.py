@@ -9,6 +9,7 @@ import pytest
 from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.route import Roads
+from scm.records.signals import SignalGroup
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import BasePart, Subscription
 from scm.traffic.observation.part import ObserverPart
@@ -18,7 +19,7 @@ from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.join_request import JoinReply, JoinRequest
 from scm.v2x.messages.route_request import RouteRequest
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.violation import Violation
 from scm.v2x.messages.world_snapshot import WorldSnapshot

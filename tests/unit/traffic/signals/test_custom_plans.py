@@ -7,6 +7,7 @@ import pytest
 
 from scm.errors import PlanError
 from scm.maps.load import load_map
+from scm.records.signal_plans import SignalStage
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
 from scm.store.records import PlanRecord
@@ -25,7 +26,7 @@ from scm.traffic.signals.plan import load_timetable
 from scm.traffic.signals.program import STEP_NS
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
-from scm.v2x.messages.plan_request import PlanReply, PlanRequest, SignalStage
+from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.signal_site import SignalSite
 from scm.v2x.messages.signal_status import SignalStatus

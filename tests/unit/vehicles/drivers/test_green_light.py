@@ -12,9 +12,10 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.records.city_map import RadioChannel
+from scm.records.signals import SignalGroup
 from scm.v2x.etsi.convert import spatem_of
 from scm.v2x.etsi.topology import mapem_of, topology_of
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.driver_batch import DriverBatch
 from scm.vehicles.drivers.green_advisor import GreenAdvisor

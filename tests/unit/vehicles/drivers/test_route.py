@@ -10,8 +10,9 @@ from scm.clock import NS_PER_MS
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.load import load_map
 from scm.maps.route import Path, Roads
+from scm.records.signals import SignalGroup
 from scm.v2x.etsi.convert import spatem_of
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.vehicles.driver import CarLimits, Other, RouteView
 from scm.vehicles.drivers.signal_table import SignalTable
 from scm.vehicles.drivers.single_car import RouteDriver

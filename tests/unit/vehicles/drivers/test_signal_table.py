@@ -5,9 +5,10 @@ from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.load import load_map
+from scm.records.signals import SignalGroup
 from scm.v2x.etsi.convert import spatem_of
 from scm.v2x.messages.monitor_status import MonitorStatus
-from scm.v2x.messages.spat import SignalGroup, Spat
+from scm.v2x.messages.spat import Spat
 from scm.vehicles.drivers.signal_table import SignalTable
 
 AT = ("crossing", "south_east")

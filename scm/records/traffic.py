@@ -1,0 +1,128 @@
+"""Counts of traffic, and violations."""
+
+from typing import Literal
+
+import msgspec
+
+from scm.records.signals import SignalGroup
+
+Kind = Literal["red_light", "stop_line", "speed", "wrong_way", "collision"]
+
+
+class LaneCount(msgspec.Struct, kw_only=True, frozen=True):
+    """Cars that passed the counting place of a lane, in the window.
+
+    Attributes:
+        flow_hz: Cars a second; times 3600: an hour.
+        headway_s: Mean time from one to the next.
+        speed_mps: Mean, where they passed.
+    """
+
+    lane: str
+    passed: int
+    flow_hz: float
+    headway_s: float | None = None
+    speed_mps: float | None = None
+
+
+class ApproachCount(msgspec.Struct, kw_only=True, frozen=True):
+    """One lane that leads to a line before a junction; means are over the window.
+
+    Attributes:
+        delay_s: Mean control delay: from entering the lane to leaving the junction, beyond what
+            that takes at the limits.
+        level: HCM's level of service of that delay, `A` to `F`; empty: nobody passed yet.
+        stops: Mean number of stops of a car.
+        queue: Cars that stand before the line now; `queue_m`: from the line to the tail of the
+            last; `queue_most`: 95 % of the time no more.
+        saturation_headway_s: Mean headway of cars that leave a queue one after another.
+        saturation: Flow over what could pass in the green time; None: too few have queued.
+    """
+
+    junction: str
+    lane: str
+    passed: int
+    flow_hz: float
+    headway_s: float | None = None
+    speed_mps: float | None = None
+    delay_s: float | None = None
+    level: str = ""
+    stops: float = 0.0
+    queue: int = 0
+    queue_m: float = 0.0
+    queue_most: int = 0
+    saturation_headway_s: float | None = None
+    saturation: float | None = None
+
+
+class TrackPoint(msgspec.Struct, kw_only=True, frozen=True):
+    """Where the car was believed to be: rear axle, map frame; `source` says who told it."""
+
+    t_ns: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    speed_mps: float
+    source: str
+
+
+class TrafficCounts(msgspec.Struct, kw_only=True, frozen=True, gc=False):
+    """All lanes on which somebody was counted, and all approaches; over the last `window_s`."""
+
+    t_ns: int
+    window_s: float
+    lanes: tuple[LaneCount, ...] = ()
+    approaches: tuple[ApproachCount, ...] = ()
+
+
+class Counts(TrafficCounts, kw_only=True, frozen=True):
+    """Counts of the observer.
+
+    Attributes:
+        void: Why the window's counts, delays and queues say nothing of plans, in words; none: they
+            do.
+    """
+
+    void: tuple[str, ...] = ()
+
+
+class Violation(msgspec.Struct, kw_only=True, frozen=True, gc=False):
+    """One event: told once, however long it lasts.
+
+    Attributes:
+        number: Counts the violations that this observer has told, from 1.
+        lane: Where it happened; empty: on no lane.
+        at_m: Where along that lane the rear axle was.
+        text: One sentence with what was allowed and what was done.
+        certainty: That it was beyond what is allowed, from the doubt of the poses; 0 to 1.
+        sources: Who told the poses, and what was shown: `eye`, `self`, `spat`, `contact`.
+        junction, signal: Whose signal, and what its group showed then.
+        against: In a collision: names of cars, or `wall`.
+        track: The seconds before, oldest first.
+    """
+
+    vehicle: str
+    number: int
+    kind: Kind
+    t_ns: int
+    x_m: float
+    y_m: float
+    lane: str = ""
+    at_m: float = 0.0
+    text: str
+    certainty: float
+    sources: tuple[str, ...]
+    junction: str = ""
+    signal: SignalGroup | None = None
+    against: tuple[str, ...] = ()
+    track: tuple[TrackPoint, ...] = ()
+
+
+class Violations(msgspec.Struct, kw_only=True, frozen=True):
+    """Broken rules.
+
+    Attributes:
+        violations: Newest first.
+    """
+
+    violations: tuple[Violation, ...]
