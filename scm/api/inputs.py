@@ -80,7 +80,6 @@ class QueryInput(Generic[T]):
                 "name": name,
                 "in": "query",
                 "required": name in record["required"],
-                "description": schema.pop("description", ""),
                 "schema": schema,
             }
             for name, schema in record["properties"].items()

@@ -93,6 +93,9 @@ def described(document: Schema) -> Schema:
         _add_example(name, field, schemas)
     for operation in operations(document):
         for parameter in operation.get("parameters", ()):
+            _lift_words(parameter["schema"])
+            if "description" in parameter["schema"]:
+                parameter["description"] = parameter["schema"].pop("description")
             _add_example(parameter["name"], parameter["schema"], schemas)
         if "security" in operation:
             operation["security"] = [_least_role(operation["security"])]

@@ -116,13 +116,13 @@ class CarsNoun:
             wheelbase_m: front axle to rear axle
             motor: geared: it holds the car when it is off; direct: it can be pushed
             top_speed_mps: at full throttle on the level
-            acceleration_mps2: acceleration_mps2
+            acceleration_mps2: from standing, at full throttle
             driven: which wheels
-            length_m: length_m
-            width_m: width_m
-            track_m: track_m
-            wheel_radius_m: wheel_radius_m
-            steering_limit_rad: steering_limit_rad
+            length_m: of the whole car
+            width_m: of the whole car
+            track_m: middle of a wheel to the other's
+            wheel_radius_m: under load
+            steering_limit_rad: of a front wheel, to either side
             tag_size_m: black edge of the tag on its roof; 0: none
             lidar: whether it has one
             camera: whether it has one
