@@ -20,7 +20,7 @@ PENDING = (
     "scm/api", "scm/camera", "scm/client", "scm/data_quality",
     "scm/eye", "scm/maps", "scm/mismatch", "scm/play.py",
     "scm/play_watch.py", "scm/recorder", "scm/recording", "scm/records", "scm/replay",
-    "scm/ros2", "scm/scenery", "scm/traffic", "scm/v2x",
+    "scm/ros2", "scm/scenery", "scm/traffic",
     "scm/vehicles", "scm/world", "vehicle_agent",
 )  # fmt: skip
 """Where old names still stand; this list only gets shorter."""
