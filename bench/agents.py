@@ -49,17 +49,17 @@ def _line(count: int) -> str:
     with ExitStack() as stack:
         router = _start(stack, "scm.selftest.router", endpoint)
         bus = stack.enter_context(_bus("stopwatch", endpoint))
-        hears_all = _start(stack, *words, "ears", str(count))
+        listener = _start(stack, *words, "ears", str(count))
         first = [str(i * share) for i in range(SENDERS)]
         senders = [_start(stack, *words, "send", number, str(share)) for number in first]
-        everybody = [hears_all, *senders, _start(stack, *words, "probe")]
+        everybody = [listener, *senders, _start(stack, *words, "probe")]
         for process in everybody:
             _line_of(process)
         for process in everybody:
             print(file=process.stdin, flush=True)
         used, ages_ms = _listen(bus, router.pid)
         lags = [float(_line_of(sender).split()[1]) for sender in senders]
-        arrived, half, most = _line_of(hears_all).split()
+        arrived, half, most = _line_of(listener).split()
     p50, p99 = percentiles(ages_ms)
     held = "ok" if used < BAR_SHARE and p99 < BAR_P99_MS else "MISSED"
     held += ", and so do who sends: the machine is busy" if max(lags) > BAR_P99_MS else ""

@@ -23,7 +23,7 @@ from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.router import Router, free_endpoint
 
-ASKED = 1000
+REQUESTS = 1000
 CARS = 50
 RATE_HZ = 50.0
 SECONDS = 2.0
@@ -64,8 +64,8 @@ def state(car: int) -> VehicleState:
 def other(endpoint: str) -> None:
     bare = zenoh.open(zenoh.Config.from_json5(zenoh_config.client(endpoint, 5.0)))
     with ZenohBus("city", "other", endpoint, clock=Monotonic()) as bus:
-        for ask in (lambda done: ask_bare(bare, done), lambda done: ask_bus(bus, done)):
-            print(*round_trips(ask), flush=True)
+        for request in (lambda done: request_bare(bare, done), lambda done: request_bus(bus, done)):
+            print(*round_trips(request), flush=True)
         publishers = [
             bare.declare_publisher(
                 BARE_STATE.format(car),
@@ -83,22 +83,22 @@ def other(endpoint: str) -> None:
     bare.close()
 
 
-def ask_bare(session: zenoh.Session, done: threading.Event) -> None:
+def request_bare(session: zenoh.Session, done: threading.Event) -> None:
     body = encode(REQUEST)[0]
-    hear = zenoh.handlers.Callback(lambda _: done.set(), indirect=False)
-    session.get(BARE_QUESTION, hear, payload=body, consolidation=zenoh.ConsolidationMode.NONE)
+    callback = zenoh.handlers.Callback(lambda _: done.set(), indirect=False)
+    session.get(BARE_QUESTION, callback, payload=body, consolidation=zenoh.ConsolidationMode.NONE)
 
 
-def ask_bus(bus: ZenohBus, done: threading.Event) -> None:
+def request_bus(bus: ZenohBus, done: threading.Event) -> None:
     bus.call(Call(REQUEST), lambda _: done.set())
 
 
-def round_trips(ask: Callable[[threading.Event], None]) -> list[int]:
+def round_trips(request: Callable[[threading.Event], None]) -> list[int]:
     took = []
-    for _ in range(ASKED):
+    for _ in range(REQUESTS):
         done = threading.Event()
         began_ns = time.monotonic_ns()
-        ask(done)
+        request(done)
         if not done.wait(5.0):
             sys.exit("no answer")
         took.append(time.monotonic_ns() - began_ns)
@@ -162,10 +162,10 @@ class Ears:
         self._bus.serve(PlanRequest, {}, self._questions)
         self._bus.subscribe(VehicleState, {}, self._states)
         answer = zenoh.handlers.Callback(self._answer_bare, indirect=False)
-        hear = zenoh.handlers.Callback(self._hear_bare, indirect=False)
+        callback = zenoh.handlers.Callback(self._receive_bare, indirect=False)
         self._declared = [
             self._bare.declare_queryable(BARE_QUESTION, answer),
-            self._bare.declare_subscriber(BARE_STATE.format("*"), hear),
+            self._bare.declare_subscriber(BARE_STATE.format("*"), callback),
         ]
         self._thread.start()
         return self
@@ -187,7 +187,7 @@ class Ears:
         query.reply(query.key_expr, encode(REPLY)[0])
         query.drop()
 
-    def _hear_bare(self, sample: zenoh.Sample) -> None:
+    def _receive_bare(self, sample: zenoh.Sample) -> None:
         sent_ns = decode(VehicleState, sample.payload.to_bytes()).t_ns
         self.bare_us.append((time.monotonic_ns() - sent_ns) / 1e3)
 

@@ -30,13 +30,13 @@ FIRMWARE = ROOT / "vehicle_agent" / "firmware"
 EYE_S = 0.05
 """As the Eye tells: 20 times a second."""
 SURE = tuple(tuple(1e-6 * (row == column) for column in range(6)) for row in range(6))
-SIGHT_AGE_S = 0.02
+POSE_AGE_S = 0.02
 DRIVES_S = 0.4
 """For so long the motor must have run before anything is done to it."""
 START_S, DRIVES_LATEST_S = 60.0, 20.0
 
 
-class Told:
+class ReadProcess:
     """A process whose lines are read as they come.
 
     Attributes:
@@ -61,7 +61,7 @@ class Told:
         for line in self.process.stdout or ():
             self.lines.append((time.monotonic_ns(), line.strip()))
 
-    def said(self, word: str, since_ns: int) -> int | None:
+    def mentioned_ns(self, word: str, since_ns: int) -> int | None:
         """Return when a watched process says that something was, after `since_ns`."""
         for _, line in list(self.lines):
             name, _, stamp = line.rpartition(" ")
@@ -75,7 +75,7 @@ class Told:
         self._reader.join(5.0)
 
 
-class Motor(Told):
+class Motor(ReadProcess):
     """A device at the end of the cable, and when its motor's PWM changed."""
 
     def changes(self) -> list[tuple[int, int]]:
@@ -84,7 +84,7 @@ class Motor(Told):
         return [(t, int(match[1])) for t, match in found if match]
 
     def pwm(self) -> int:
-        """Return what it was last told."""
+        """Return its last command."""
         return next((pwm for _, pwm in reversed(self.changes())), 0)
 
     def runs(self) -> bool:
@@ -115,14 +115,14 @@ def ours(link: Path) -> Motor:
 FIRMWARES: dict[str, Callable[..., Motor]] = {"published": published, "ours": ours}
 
 
-class Sight:
+class FixedEye:
     """An Eye that sees one car, always at the same place, while `is_open`."""
 
     def __init__(self, endpoint: str, map_name: str) -> None:
         self.is_open, self.vehicle = True, ""
         self.bus = ZenohBus("city", "bench", endpoint)
-        self.told = Mailbox(200)
-        self.bus.subscribe(PartStatus, {}, self.told)
+        self.statuses = Mailbox(200)
+        self.bus.subscribe(PartStatus, {}, self.statuses)
         self._pose = place_of(load_map(map_name), "")
         self._end, self._clock = threading.Event(), WallClock()
         self._thread = threading.Thread(target=self._look, daemon=True)
@@ -138,7 +138,7 @@ class Sight:
         return EyeTrack(
             vehicle=self.vehicle, tag_id=1, t_ns=self._clock.now_ns(), x_m=x, y_m=y, yaw_rad=yaw,
             speed_mps=0.0, lateral_speed_mps=0.0, yaw_rate_radps=0.0, covariance=SURE,
-            age_s=SIGHT_AGE_S, stale=False,
+            age_s=POSE_AGE_S, stale=False,
         )  # fmt: skip
 
     def close(self) -> None:
@@ -160,28 +160,28 @@ def wait_for(condition: Callable[[], object], span_s: float) -> bool:
 class Rig:
     """One car with its device; a new agent whenever the last one was ended."""
 
-    def __init__(self, endpoint: str, sight: Sight, motor: Motor, link: Path) -> None:
-        self.endpoint, self.sight, self.motor = endpoint, sight, motor
-        self.agents = Told("bench.watched_agent")
+    def __init__(self, endpoint: str, eye: FixedEye, motor: Motor, link: Path) -> None:
+        self.endpoint, self.eye, self.motor = endpoint, eye, motor
+        self.agents = ReadProcess("bench.watched_agent")
         self.agent: int | None = None
         self._link, self._number, self._in_vain = link, 0, False
 
     def drive(self) -> int:
         """Have the motor run, by a new agent where there is none; return its process number."""
-        self.sight.is_open = True
+        self.eye.is_open = True
         if self.agent is None or not Path(f"/proc/{self.agent}").exists():
             self._number += 1
             runs_on, began_ns = self.motor.pwm() > 0, time.monotonic_ns()
-            self.sight.vehicle = f"k{time.monotonic_ns() % 10**6}-{self._number}"
+            self.eye.vehicle = f"k{time.monotonic_ns() % 10**6}-{self._number}"
             self.agent = self._new_agent(
-                f"join --name {self.sight.vehicle} --connect {self.endpoint} --serial {self._link}"
+                f"join --name {self.eye.vehicle} --connect {self.endpoint} --serial {self._link}"
             )
             if runs_on:  # as the last agent left it, until the port is opened
                 wait_for(lambda: self.motor.stopped(began_ns), START_S)
         if not wait_for(self.motor.runs, DRIVES_LATEST_S):
-            said = [line for _, line in (*self.agents.lines[-20:], *self.motor.lines[-5:])]
-            said += [repr(item.message) for item in self.sight.told.drain()[-8:]]
-            print("the car does not drive:", *said, sep="\n", file=sys.stderr, flush=True)
+            lines = [line for _, line in (*self.agents.lines[-20:], *self.motor.lines[-5:])]
+            lines += [repr(item.message) for item in self.eye.statuses.drain()[-8:]]
+            print("the car does not drive:", *lines, sep="\n", file=sys.stderr, flush=True)
             if self._in_vain:
                 raise SystemExit(1)
             self._in_vain = True
@@ -218,13 +218,13 @@ def rig(endpoint: str, map_name: str, device: Callable[[Path], Motor]) -> Iterat
     """Yield a car whose cable leads to a device of its own."""
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / "nigel"
-        motor, sight = device(link), Sight(endpoint, map_name)
-        made = Rig(endpoint, sight, motor, link)
+        motor, eye = device(link), FixedEye(endpoint, map_name)
+        made = Rig(endpoint, eye, motor, link)
         try:
             wait_for(link.is_symlink, START_S)
             yield made
         finally:
             made.end_agent()
             made.agents.end()
-            sight.close()
+            eye.close()
             motor.end()

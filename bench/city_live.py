@@ -26,7 +26,7 @@ from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.v2x.router import free_endpoint
 
 MAP, CARS = "grid:6x6:12", 1000
-SETTLE_S, SPAN_S, START_S = 5.0, 12.0, 90.0
+WARM_UP_S, SPAN_S, START_S = 5.0, 12.0, 90.0
 TICKS_A_SECOND = 50
 MEEK = 10
 _PID = re.compile(r"^\s+(\S+)\s.*pid (\d+)$")
@@ -48,8 +48,8 @@ def city(cars: int = CARS, map_name: str = MAP) -> Iterator[tuple[str, dict[str,
                 up.wait(10.0)
             except subprocess.TimeoutExpired:
                 up.kill()
-            kept = sum(path.stat().st_size for path in Path(folder).iterdir()) / 2**20
-            print(f"    the recording: {kept:.0f} MiB")
+            recorded_mib = sum(path.stat().st_size for path in Path(folder).iterdir()) / 2**20
+            print(f"    the recording: {recorded_mib:.0f} MiB")
 
 
 def started(up: "subprocess.Popen[str]") -> tuple[dict[str, int], int]:
@@ -79,22 +79,22 @@ def memory_mib(pid: int) -> float:
 def measure(parts: dict[str, int], endpoint: str) -> None:
     """Watch a running city for a while and print what it took."""
     with ZenohBus("city", "bench", endpoint) as bus:
-        heard, told = Mailbox(10_000), Mailbox(1_000_000)
+        received, reports = Mailbox(10_000), Mailbox(1_000_000)
         for kind in (WorldSnapshot, PartStatus):
-            bus.subscribe(kind, {}, heard)
-        bus.subscribe(VehicleState, {}, told)
-        while not any(isinstance(item.message, WorldSnapshot) for item in heard.drain()):
+            bus.subscribe(kind, {}, received)
+        bus.subscribe(VehicleState, {}, reports)
+        while not any(isinstance(item.message, WorldSnapshot) for item in received.drain()):
             time.sleep(0.1)
-        time.sleep(SETTLE_S)
-        heard.drain()
-        told.drain()
+        time.sleep(WARM_UP_S)
+        received.drain()
+        reports.drain()
         before = {name: used_s(pid) for name, pid in parts.items()}
         began = time.perf_counter()
         time.sleep(SPAN_S)
         took = time.perf_counter() - began
         share = {name: (used_s(pid) - before[name]) / took for name, pid in parts.items()}
-        messages = [item.message for item in heard.drain()]
-        counts = Counter(item.message.vehicle for item in told.drain())
+        messages = [item.message for item in received.drain()]
+        counts = Counter(item.message.vehicle for item in reports.drain())
     shots = [m for m in messages if isinstance(m, WorldSnapshot)]
     status = {m.station: m for m in messages if isinstance(m, PartStatus)}
     first, last = shots[0], shots[-1]
@@ -109,9 +109,11 @@ def measure(parts: dict[str, int], endpoint: str) -> None:
         f"({late / (simulated_s * TICKS_A_SECOND):.1%})"
     )
     for name, value in sorted(share.items(), key=lambda item: -item[1]):
-        said = status.get(name)
-        step = f"slowest step {said.step_ms:5.1f} ms, {said.late_steps} late, " if said else ""
-        dropped = f"{said.dropped} dropped, " if said else ""
+        report = status.get(name)
+        step = (
+            f"slowest step {report.step_ms:5.1f} ms, {report.late_steps} late, " if report else ""
+        )
+        dropped = f"{report.dropped} dropped, " if report else ""
         memory = memory_mib(parts[name])
         print(f"    {name:<9} {value:>6.1%} of a core   {step}{dropped}{memory:.0f} MiB")
 

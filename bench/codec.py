@@ -17,8 +17,10 @@ def main() -> None:
     from tests.unit.v2x.etsi_city import city_says
 
     print(f"{'':8}{'JSON':>14}{'bytes':>7}{'UPER':>18}{'bytes':>7}{'asn1tools':>18}{'ratio':>12}")
-    for kind, said in city_says().items():
-        longest = max((one.body for one in said), key=lambda one: len(msgspec.json.encode(one)))
+    for kind, published in city_says().items():
+        longest = max(
+            (one.body for one in published), key=lambda one: len(msgspec.json.encode(one))
+        )
         print(_line(kind, longest), flush=True)
     print("\nmicroseconds to encode / to decode, the best of three; ratio: ours over asn1tools'.")
     print("Ours also turns records into ASN.1 values and back; asn1tools gets and gives values.")

@@ -98,13 +98,13 @@ def ours(
     city_map: CityMap, motion: Floats, *, moving: bool
 ) -> tuple[Callable[[int], object], list[int]]:
     contacts = Contacts(city_map)
-    slots = np.arange(len(motion))
-    for slot in slots.tolist():
-        contacts.add(slot, HULL)
+    rows = np.arange(len(motion))
+    for row in rows.tolist():
+        contacts.add(row, HULL)
     seen: list[int] = []
 
     def step(k: int) -> None:
-        seen.append(len(contacts.step(slots, at(motion, k, moving=moving)).pairs))
+        seen.append(len(contacts.step(rows, at(motion, k, moving=moving)).pairs))
 
     return step, seen
 

@@ -30,7 +30,7 @@ from bench.city_live import city, used_s
 CHROMIUM = "/usr/bin/chromium"
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run"]
 PATIENCE_MS = 120_000
-SETTLE_S, START_S, LEAST_TICKS, KEEPS_UP = 5.0, 300.0, 250, 0.9
+WARM_UP_S, START_S, LEAST_TICKS, KEEPS_UP = 5.0, 300.0, 250, 0.9
 SPAN_S = 12.0
 
 PAINT_CARS, BAR_PAINT_MS, BAR_TOUCH_MS = 200, 1000.0, 100.0
@@ -87,7 +87,9 @@ def processors() -> tuple[int, int]:
     return sum(jiffies), jiffies[7]
 
 
-def say(what: str, value: float, limit: float, unit: str, *, more_is_better: bool = False) -> None:
+def report(
+    what: str, value: float, limit: float, unit: str, *, more_is_better: bool = False
+) -> None:
     held = value >= limit if more_is_better else value <= limit
     load = os.getloadavg()[0]
     print(
@@ -97,17 +99,17 @@ def say(what: str, value: float, limit: float, unit: str, *, more_is_better: boo
     )
 
 
-def settle(port: int) -> None:
-    """Wait until the world has run for a while; say so where it does not keep up with real time."""
+def warm_up(port: int) -> None:
+    """Wait until the world has run for a while; print if it cannot keep up."""
     deadline = time.monotonic() + START_S
     while time.monotonic() < deadline:
-        time.sleep(SETTLE_S)
+        time.sleep(WARM_UP_S)
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/vehicles") as answer:
-            told = json.load(answer)
-        if told["tick"] is not None and told["tick"] >= LEAST_TICKS:
+            state = json.load(answer)
+        if state["tick"] is not None and state["tick"] >= LEAST_TICKS:
             break
-    if told["real_time_factor"] < KEEPS_UP:
-        print(f"    the world does not keep up: {told['real_time_factor']:.2f} of real time")
+    if state["real_time_factor"] < KEEPS_UP:
+        print(f"    the world does not keep up: {state['real_time_factor']:.2f} of real time")
 
 
 @contextmanager
@@ -130,12 +132,12 @@ def visited(url: str, script: str = "") -> Iterator[Any]:
 
 def paint() -> None:
     with city(PAINT_CARS, MAPS[PAINT_CARS]) as (_, _, port):
-        settle(port)
+        warm_up(port)
         with visited(f"http://127.0.0.1:{port}", NOTE_TOUCHES) as page:
             painted = page.evaluate(
                 "() => performance.getEntriesByName('first-contentful-paint')[0].startTime"
             )
-            say(f"first contentful paint, {PAINT_CARS} cars", painted, BAR_PAINT_MS, "ms")
+            report(f"first contentful paint, {PAINT_CARS} cars", painted, BAR_PAINT_MS, "ms")
             drawn = page.evaluate(FIRST_CAR, SCENE)
             print(f"    the first car is drawn after {drawn:.0f} ms")
             touch(page)
@@ -145,7 +147,7 @@ def paint() -> None:
         slowest[name] = max(slowest.get(name, 0.0), took_ms)
     worst = max(slowest.values(), default=16.0)
     half = statistics.median(took for _, took in touches) if touches else 16.0
-    say(f"slowest touch to next picture, {PAINT_CARS} cars", worst, BAR_TOUCH_MS, "ms")
+    report(f"slowest touch to next picture, {PAINT_CARS} cars", worst, BAR_TOUCH_MS, "ms")
     print(f"    {len(touches)} of 16 ms and more, half under {half:.0f} ms; {slowest}")
     print(f"    pages are there after [ms]: {opened}")
 
@@ -168,42 +170,42 @@ def touch(page: Any) -> None:
 
 def frames() -> None:
     with city(FRAME_CARS, MAPS[FRAME_CARS]) as (_, _, port):
-        settle(port)
+        warm_up(port)
         with visited(f"http://127.0.0.1:{port}") as page:
-            page.wait_for_timeout(1000.0 * SETTLE_S)
+            page.wait_for_timeout(1000.0 * WARM_UP_S)
             rate, states, took_ms, cars = page.evaluate(
                 """async ([scene, ms]) => {
                     const { drawn } = await import(scene);
                     const { fleet } = await import(scene.replace("scene", "fleet"));
-                    const [began, first, told] = [performance.now(), drawn.frames, fleet.sequence];
+                    const [began, first, state] = [performance.now(), drawn.frames, fleet.sequence];
                     await new Promise((resolve) => setTimeout(resolve, ms));
                     const s = (performance.now() - began) / 1000;
                     const count = drawn.frames - first;
-                    return [count / s, (fleet.sequence - told) / s, drawn.took_ms, drawn.cars];
+                    return [count / s, (fleet.sequence - state) / s, drawn.took_ms, drawn.cars];
                 }""",
                 [SCENE, 1000.0 * SPAN_S],
             )
-    say(f"map of {cars} cars: frames", rate, BAR_FRAMES, "/s", more_is_better=True)
+    report(f"map of {cars} cars: frames", rate, BAR_FRAMES, "/s", more_is_better=True)
     print(f"    {states:.1f} new states/s, {took_ms:.1f} ms to draw the last frame")
 
 
 def api() -> None:
     with city(API_CARS, MAPS[API_CARS]) as (_, _, port):
-        settle(port)
-        took_ms = sorted(asyncio.run(ask_evenly(port)))
+        warm_up(port)
+        took_ms = sorted(asyncio.run(request_evenly(port)))
     p99 = took_ms[int(0.99 * len(took_ms))]
-    say(f"REST p99 at {API_RATE:g} requests/s, {API_CARS} cars", p99, BAR_API_MS, "ms")
+    report(f"REST p99 at {API_RATE:g} requests/s, {API_CARS} cars", p99, BAR_API_MS, "ms")
     print(f"    {len(took_ms)} answers, p50 {statistics.median(took_ms):.1f} ms")
 
 
-async def ask_evenly(port: int) -> list[float]:
+async def request_evenly(port: int) -> list[float]:
     """Ask at even beats over some connections; return each answer's time since it was due [ms]."""
     free: asyncio.Queue[Any] = asyncio.Queue()
     for _ in range(CONNECTIONS):
         free.put_nowait(await asyncio.open_connection("127.0.0.1", port))
     took_ms: list[float] = []
 
-    async def ask(due: float, path: str) -> None:
+    async def request(due: float, path: str) -> None:
         reader, writer = await free.get()
         writer.write(f"GET /api/v1/{path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
         head = await reader.readuntil(b"\r\n\r\n")
@@ -215,25 +217,25 @@ async def ask_evenly(port: int) -> list[float]:
         free.put_nowait((reader, writer))
 
     for path in PATHS:
-        await ask(0.0, path)
+        await request(0.0, path)
     took_ms.clear()
     began, tasks = time.perf_counter(), list[asyncio.Task[None]]()
     for number in range(round(API_RATE * SPAN_S)):
         due = began + number / API_RATE
         await asyncio.sleep(max(0.0, due - time.perf_counter()))
-        tasks.append(asyncio.create_task(ask(due, PATHS[number % len(PATHS)])))
+        tasks.append(asyncio.create_task(request(due, PATHS[number % len(PATHS)])))
     await asyncio.gather(*tasks)
     return took_ms
 
 
 def sse() -> None:
     with city(API_CARS, MAPS[API_CARS]) as (_, parts, port):
-        settle(port)
+        warm_up(port)
         alone = asyncio.run(watch(port, parts["api"], 0, ""))[0]
         for name, path in (("SSE", "stream?topics=vehicles,signals"), ("binary", "vehicles.bin")):
             share, rate = asyncio.run(watch(port, parts["api"], VIEWERS, path))
             what = f"server for {VIEWERS} {name} viewers, {API_CARS} cars, beyond none"
-            say(what, 100.0 * (share - alone), 100.0 * BAR_SHARE, "%")
+            report(what, 100.0 * (share - alone), 100.0 * BAR_SHARE, "%")
             print(f"    {100 * share:.1f} % in all, {100 * alone:.1f} % alone; {rate:.1f} chunks/s")
 
 

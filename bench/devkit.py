@@ -93,8 +93,8 @@ class FedCity:
             self.tick(tick)
 
     def tick(self, tick):
-        t_ns, hear = self.clock.now_ns(), self.telemetry.hear
-        hear(
+        t_ns, update = self.clock.now_ns(), self.telemetry.hear
+        update(
             VehicleState(
                 vehicle="n1", t_ns=t_ns, seq=tick, x_m=0.001 * tick, y_m=1.0, yaw_rad=0.1,
                 speed_mps=0.2, yaw_rate_radps=0.0, steering_rad=0.05, throttle=0.5,
@@ -102,7 +102,7 @@ class FedCity:
             )
         )  # fmt: skip
         self.state_ns = t_ns
-        hear(
+        update(
             VehicleSensors(
                 vehicle="n1", t_ns=t_ns, encoder_left=tick, encoder_right=tick,
                 accel_mps2=(0.0, 0.1, 9.8), gyro_radps=(0.0, 0.0, 0.1),
@@ -115,9 +115,9 @@ class FedCity:
                 vehicle="n1", t_ns=t_ns, beams=360, range_min_m=0.15, range_max_m=12.0,
                 payload=ranges.tobytes(),
             )  # fmt: skip
-            hear(scan)
+            update(scan)
             group = SignalGroup(group="south_east", colour="green", since_ns=t_ns, min_end_ns=t_ns)
-            hear(
+            update(
                 Spat(
                     junction="crossing", t_ns=t_ns, seq=tick, mode="plan", plan="p", groups=(group,)
                 )
@@ -125,7 +125,7 @@ class FedCity:
         if tick * 15 // 50 != (tick - 1) * 15 // 50:
             for camera, jpegs in self.jpegs.items():
                 payload = bytes(jpegs[tick % len(jpegs)])
-                hear(
+                update(
                     CameraFrame(
                         vehicle="n1", camera=camera, t_ns=t_ns, width_px=1280, height_px=720,
                         payload=payload,
@@ -147,7 +147,7 @@ class Watch:
     """Notes the time between replies and the age of what they answer, in milliseconds."""
 
     def __init__(self):
-        self.told_ns = 0
+        self.state_ns = 0
         self.last_ns = None
         self.gaps, self.ages = array("f"), array("f")
 
@@ -155,9 +155,9 @@ class Watch:
         if self.last_ns is not None:
             self.gaps.append((now_ns - self.last_ns) / NS_PER_MS)
         self.last_ns = now_ns
-        self.ages.append((now_ns - self.told_ns) / NS_PER_MS)
+        self.ages.append((now_ns - self.state_ns) / NS_PER_MS)
 
-    def tell(self):
+    def summary(self):
         """Return the longest gap, and the median, 99 % and greatest age; begin anew."""
         gaps, ages = self.gaps, self.ages
         self.gaps, self.ages = array("f"), array("f")
@@ -183,7 +183,7 @@ class Bench:
         )  # fmt: skip
 
     def packet(self):
-        self.watch.told_ns = self.fed.state_ns
+        self.watch.state_ns = self.fed.state_ns
         return self.telemetry.packet()
 
     def replied(self, data, t_ns):
@@ -237,12 +237,12 @@ def soak(generation, span_s, max_hz, seen):
         gc.collect()
         begin = {who: resident_mb(pid) for who, pid in pids.items()}
         most = dict(begin)
-        bench.watch.tell()
+        bench.watch.summary()
         for part in range(SOAK_PARTS):
             rate, _, _ = bench.measure(span_s / SOAK_PARTS)
             now = {who: resident_mb(pid) for who, pid in pids.items()}
             most = {who: max(most[who], now[who]) for who in now}
-            gap, *ages = bench.watch.tell()
+            gap, *ages = bench.watch.summary()
             held = ", ".join(f"{who} {mb:.1f} MB" for who, mb in now.items())
             print(
                 f"{generation:4}{span_s * (part + 1) / SOAK_PARTS:6.0f} s{rate:5.0f} /s, {held}, "

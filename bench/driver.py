@@ -40,20 +40,20 @@ class Streaming:
         self.x, self.y, self.yaw, self.speed, self.angle = np.zeros((5, cars))
         rng = np.random.default_rng(0)
         places = [(s.lane or "", s.at_m or 0.0) for s in city_map.spawns]
-        for slot, at in enumerate(rng.choice(len(places), cars, replace=False)):
+        for row, at in enumerate(rng.choice(len(places), cars, replace=False)):
             lane, s = places[at]
-            self.x[slot], self.y[slot], self.yaw[slot] = roads.lane(lane).at(s)
-            self.drivers.enter(slot, NIGEL, seed=slot)
-            self.drivers.circulate(slot, lane, s)
-        self._slots = np.arange(cars)
+            self.x[row], self.y[row], self.yaw[row] = roads.lane(lane).at(s)
+            self.drivers.enter(row, NIGEL, seed=row)
+            self.drivers.circulate(row, lane, s)
+        self._rows = np.arange(cars)
 
-    def hear(self) -> None:
+    def receive_cams(self) -> None:
         """Let a tenth of the cars tell where they are, as about one in fifty ticks does."""
-        slots = self._slots[(self.now_ns // TICK_NS) % 10 :: 10] if self.now_ns else self._slots
-        front_x = self.x[slots] + NIGEL.front * np.cos(self.yaw[slots])
-        front_y = self.y[slots] + NIGEL.front * np.sin(self.yaw[slots])
-        told = self.yaw[slots], self.speed[slots], np.zeros(len(slots))
-        self.drivers.receive_cams(slots, self.now_ns, front_x, front_y, *told)
+        rows = self._rows[(self.now_ns // TICK_NS) % 10 :: 10] if self.now_ns else self._rows
+        front_x = self.x[rows] + NIGEL.front * np.cos(self.yaw[rows])
+        front_y = self.y[rows] + NIGEL.front * np.sin(self.yaw[rows])
+        motion = self.yaw[rows], self.speed[rows], np.zeros(len(rows))
+        self.drivers.receive_cams(rows, self.now_ns, front_x, front_y, *motion)
 
     def decide(self) -> None:
         self.drivers.decide(self.now_ns, self.x, self.y, self.yaw, self.speed, self.driven)
@@ -61,9 +61,9 @@ class Streaming:
     def move(self) -> None:
         self.now_ns += TICK_NS
         step = TICK_NS * 1e-9
-        wished = self.drivers.steering * NIGEL.steer_limit
+        target = self.drivers.steering * NIGEL.steer_limit
         most = NIGEL.steer_rate * step
-        self.angle += np.clip(wished - self.angle, -most, most)
+        self.angle += np.clip(target - self.angle, -most, most)
         self.speed += (0.267 * np.maximum(0.0, self.drivers.throttle) - self.speed) * 0.28
         self.x += self.speed * np.cos(self.yaw) * step
         self.y += self.speed * np.sin(self.yaw) * step
@@ -104,13 +104,13 @@ def crowd_us(cars: int, side: int) -> tuple[float, float]:
     times: list[float] = []
     ends = time.perf_counter() + SECONDS
     while time.perf_counter() < ends or len(times) < 100:
-        city.hear()
+        city.receive_cams()
         start = time.perf_counter()
         city.decide()
         times.append(time.perf_counter() - start)
         city.move()
-    settled = times[20:]
-    return 1e6 * float(np.median(settled)) / cars, 1e6 * min(settled) / cars
+    steady = times[20:]
+    return 1e6 * float(np.median(steady)) / cars, 1e6 * min(steady) / cars
 
 
 def main() -> None:

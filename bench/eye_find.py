@@ -169,13 +169,13 @@ def judge(find: Callable, shots: list) -> dict[str, float]:
         wrong += sum(i not in true and i != HIDDEN_ID for i, _ in seen)
     worst = np.abs(off).max(axis=(1, 2)) if off else np.array([math.nan])
     # A tag that a neighbour's body half hides has no true corners to be measured.
-    kept = [error for error, most in zip(off, worst, strict=True) if most < 2.0]
+    matched = [error for error, most in zip(off, worst, strict=True) if most < 2.0]
     return {
         "ms": 1e3 * float(np.median(costs)),
         "frames/s": 1.0 / float(np.mean(costs)),
         "found %": 100.0 * len(off) / total,
         "wrong": wrong,
-        "corner px": float(np.sqrt(np.mean(np.square(kept)))) if kept else math.nan,
+        "corner px": float(np.sqrt(np.mean(np.square(matched)))) if matched else math.nan,
         "95 % px": float(np.percentile(worst, 95)),
     }
 
@@ -238,10 +238,10 @@ def main() -> None:
     show(f"1080p, {CARS} cars, clean", rows)
     against_library(rows)
     bar("found, clean", rows["scm, tracked and a strip"]["found %"], 99.9, "%")
-    for title, spoil, least in (
+    for title, degrade, least in (
         ("smeared by 6 px", smeared, 97.0), ("30 % vignette, noise 8", dim_and_noisy, 98.0),
     ):  # fmt: skip
-        shots = [(spoil(grey, rng), true) for grey, true in clean]
+        shots = [(degrade(grey, rng), true) for grey, true in clean]
         rows = {
             "scm, tracked and a strip": judge(known, often(shots, 8)),
             "scm, nothing known": judge(unknown, shots),

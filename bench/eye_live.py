@@ -28,7 +28,7 @@ from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 CARS, FRAMES, RATE_HZ, SPEED_MPS = 10, 45, 30.0, 0.26
-SETTLED = 10  # frames until tracks have their speed
+WARM_UP_FRAMES = 10  # frames until tracks have their speed
 DRAWS = 4
 LOOK = Look(exposure_s=0.004, rolling_s=0.010, defocus_px=0.7, noise_sigma=2.0, colour=False)
 CITY = msgspec.structs.replace(load_map("driving_school"), walls=(), boxes=(), lights=())
@@ -64,9 +64,9 @@ class Judged:
     square: list[float] = field(default_factory=list)
     step_ms: list[float] = field(default_factory=list)
     found: int = 0
-    asked: int = 0
+    expected: int = 0
 
-    def take(self, kind, message, truth, covariance):
+    def add(self, kind, message, truth, covariance):
         """Hold a message against the truth."""
         off = np.array([message.x_m - truth.x_m, message.y_m - truth.y_m])
         self.place[kind].append(float(np.hypot(*off)))
@@ -111,16 +111,16 @@ def watch(shots: list[Shot], camera, judged: Judged) -> None:
         start = time.perf_counter()
         out = eye.step(shot.t_ns, [Incoming(light, shot.t_ns)])
         judged.step_ms.append((time.perf_counter() - start) * 1e3)
-        if k < SETTLED:
+        if k < WARM_UP_FRAMES:
             continue
-        judged.asked += len(truth)
+        judged.expected += len(truth)
         for message in out:
             if isinstance(message, EyePose):
                 judged.found += 1
-                judged.take("pose", message, truth[message.vehicle], None)
+                judged.add("pose", message, truth[message.vehicle], None)
             if isinstance(message, EyeTrack) and message.vehicle in truth:
                 square = np.array(message.covariance)[:2, :2]
-                judged.take("track", message, truth[message.vehicle], square)
+                judged.add("track", message, truth[message.vehicle], square)
 
 
 def row(name: str, judged: Judged) -> str:
@@ -137,13 +137,13 @@ def row(name: str, judged: Judged) -> str:
     inside = 100.0 * np.mean((square > low) & (square < high))
     cells.append(f"| {square.mean():.2f} | {inside:.0f} % ")
     cells.append(
-        f"| {100.0 * judged.found / judged.asked:.2f} % | {np.median(judged.step_ms):.1f} |"
+        f"| {100.0 * judged.found / judged.expected:.2f} % | {np.median(judged.step_ms):.1f} |"
     )
     return "".join(cells)
 
 
 def verdicts(judged: Judged) -> list[tuple[str, float, float]]:
-    """Return what is asked of tracks and steps: its name, what was measured, and the limit."""
+    """Return what is expected of tracks and steps: its name, what was measured, and the limit."""
     place, turn = np.array(judged.place["track"]) * 1e3, np.degrees(judged.turn["track"])
     return [
         ("position rms mm", float(np.sqrt((place**2).mean())), 1.5),
@@ -158,7 +158,7 @@ def main() -> None:
     """Print the tables."""
     cv2.setNumThreads(1)
     print(f"{CARS} cars at {SPEED_MPS} m/s, 1080p, {FRAMES} frames, {DRAWS} cameras a tilt")
-    print("asked: 1.5 mm / 0.25 deg, 95 % within 3 mm / 0.5 deg, square 2 and 95 %, step 15 ms")
+    print("expected: 1.5 mm / 0.25 deg, 95 % within 3 mm / 0.5 deg, square 2 and 95 %, step 15 ms")
     heads = "tilt", "pose rms", "pose 95", "track rms", "track 95", "square", "within 95"
     print("| " + " | ".join((*heads, "found", "step ms")) + " |")
     print("|---|---|---|---|---|---|---|---|---|")

@@ -63,7 +63,7 @@ def see(endpoint: str, camera, images) -> None:
 
 
 def main() -> None:
-    """Print how old poses and tracks are when they are heard."""
+    """Print how old poses and tracks are when they are received."""
     shots = eye_live.film_of(0.0, 0)
     images = [cv2.cvtColor(shot.image, cv2.COLOR_GRAY2BGR) for shot in shots]
     images += images[::-1]  # there and back, so that no car leaps
@@ -77,14 +77,17 @@ def main() -> None:
         )
         eye.start()
         eye.join()
-        heard = [(item.t_ns, item.message) for item in poses.drain()]
-        told = [(item.t_ns, item.message) for item in tracks.drain()]
-    began = min(t_ns for t_ns, _ in heard) + WARM_S * 1e9
-    late = np.array([(t - pose.t_ns) / 1e6 for t, pose in heard if t > began])
-    way = np.array([(t - track.t_ns) / 1e6 for t, track in told if t > began])
+        received = [(item.t_ns, item.message) for item in poses.drain()]
+        estimated = [(item.t_ns, item.message) for item in tracks.drain()]
+    began = min(t_ns for t_ns, _ in received) + WARM_S * 1e9
+    late = np.array([(t - pose.t_ns) / 1e6 for t, pose in received if t > began])
+    way = np.array([(t - track.t_ns) / 1e6 for t, track in estimated if t > began])
     print(f"{len(late)} poses of {eye_live.CARS} cars, colour frames, over the bus")
     print("| from | median ms | 95 % ms | 99 % ms |\n|---|---|---|---|")
-    for name, values in (("exposure to pose heard", late), ("telling a track to its hearing", way)):
+    for name, values in (
+        ("exposure to pose received", late),
+        ("publishing a track to its receipt", way),
+    ):
         middle, most, rare = np.percentile(values, [50, 95, 99])
         print(f"| {name} | {middle:.1f} | {most:.1f} | {rare:.1f} |")
     verdict = "holds" if np.median(late) < LIMIT_MS else "MISSED"

@@ -4,8 +4,8 @@ Run with `python -m bench.flow [lights | signs | MAP ...] --seconds S`. Printed 
 passed an hour, the same in each quarter of the time, the longest time that a car stood without a
 red light before it or its queue, cars that touched, simulated over elapsed time.
 `--loss 0.2` lets each driver miss so many radio frames. `--observe S` lets the observer judge the
-first S seconds by the true poses with a camera's noise, so what it tells is false unless cars
-touch. `--flash` lets all signals flash red. `--progress` tells each minute on the error output.
+first S seconds by the true poses with a camera's noise, so what it reports is false unless cars
+touch. `--flash` lets all signals flash red. `--progress` prints a line each minute on stderr.
 """
 
 import argparse
@@ -57,45 +57,45 @@ class Cameras(BasePart):
         self._dice = np.random.default_rng(1)
         variances = (POSE_STD_M, POSE_STD_M, YAW_STD_RAD, SPEED_STD_MPS, 0.01, 0.01)
         rows = np.diag(np.square(variances)).tolist()
-        self._doubt: tuple[Row6, ...] = tuple(map(tuple, rows))  # type: ignore[arg-type]
+        self._covariance: tuple[Row6, ...] = tuple(map(tuple, rows))  # type: ignore[arg-type]
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Tell a track of every hosted car."""
         del inbox
-        slots = self._world.slots
-        of = np.flatnonzero(slots.hosted)
+        vehicles = self._world.slots
+        of = np.flatnonzero(vehicles.hosted)
         noise = self._dice.normal(size=(4, len(of)))
         rows = zip(
             of.tolist(),
-            (slots.x[of] + POSE_STD_M * noise[0]).tolist(),
-            (slots.y[of] + POSE_STD_M * noise[1]).tolist(),
-            (slots.yaw[of] + YAW_STD_RAD * noise[2]).tolist(),
-            (slots.speed[of] + SPEED_STD_MPS * noise[3]).tolist(),
+            (vehicles.x[of] + POSE_STD_M * noise[0]).tolist(),
+            (vehicles.y[of] + POSE_STD_M * noise[1]).tolist(),
+            (vehicles.yaw[of] + YAW_STD_RAD * noise[2]).tolist(),
+            (vehicles.speed[of] + SPEED_STD_MPS * noise[3]).tolist(),
             strict=True,
         )
         return [self._track(now_ns, *row) for row in rows]
 
     def _track(
-        self, now_ns: int, slot: int, x: float, y: float, yaw: float, speed: float
+        self, now_ns: int, vehicle: int, x: float, y: float, yaw: float, speed: float
     ) -> EyeTrack:
         return EyeTrack(
-            vehicle=self._world.slots.names[slot], tag_id=1, t_ns=now_ns, x_m=x, y_m=y,
+            vehicle=self._world.slots.names[vehicle], tag_id=1, t_ns=now_ns, x_m=x, y_m=y,
             yaw_rad=yaw, speed_mps=speed, lateral_speed_mps=0.0, yaw_rate_radps=0.0, age_s=0.0,
-            stale=False, covariance=self._doubt,  # type: ignore[arg-type]
+            stale=False, covariance=self._covariance,  # type: ignore[arg-type]
         )  # fmt: skip
 
 
 class Observed:
-    """Cameras and an observer that run in a city for its first time; what the observer told.
+    """Cameras and an observer that run in a city for its first time; what the observer found.
 
     Attributes:
-        told: How many violations of each kind, and the first few in words.
+        violations: How many violations of each kind, and the first few in words.
     """
 
     def __init__(self, city: Lockstep, world: World, span_s: float) -> None:
         self._city, self._left_s = city, span_s
         self._parts = [Cameras(world), ObserverPart(world.city_map)]
-        self.told: Counter[str] = Counter()
+        self.violations: Counter[str] = Counter()
         self.words: list[str] = []
         self.counts: TrafficCounts | None = None
         for part in self._parts:
@@ -103,12 +103,12 @@ class Observed:
         self._mailbox = city.subscribe(Subscription(Violation))
 
     def look(self, passed_s: float) -> None:
-        """Note what was told since; take the parts away when their time is over."""
+        """Note what was found since; take the parts away when their time is over."""
         if not self._parts:
             return
         for item in self._mailbox.drain():
             violation = item.message
-            self.told[violation.kind] += 1
+            self.violations[violation.kind] += 1
             self.words.append(violation.text)
         self._left_s -= passed_s
         observer = self._parts[-1]
@@ -125,10 +125,14 @@ class TouchCount(Contacts):
     pairs: set[tuple[int, int]]
     began: list[tuple[int, int]]
 
-    def step(self, slots: Ints, motion: Floats) -> Touches:
+    def step(self, vehicles: Ints, motion: Floats) -> Touches:
         """Solve a contact step, and note which cars touch that did not before."""
-        touches = super().step(slots, motion)
-        now = {(int(slots[a]), int(slots[b])) for a, b in touches.pairs.tolist() if min(a, b) >= 0}
+        touches = super().step(vehicles, motion)
+        now = {
+            (int(vehicles[a]), int(vehicles[b]))
+            for a, b in touches.pairs.tolist()
+            if min(a, b) >= 0
+        }
         self.began += sorted(now - self.pairs)
         self.pairs = now
         return touches
@@ -177,13 +181,13 @@ class Count:
         self._began = time.perf_counter()
         self.took_s = 0.0
 
-    def look(self, at_s: float, *, tells: bool) -> None:
+    def look(self, at_s: float, *, prints_progress: bool) -> None:
         """Take note of an instant; `at_s` after the count began."""
         self.standing.look(self._world.drivers, self._world.slots.speed, LOOK_S)
         self.took_s = time.perf_counter() - self._began
         while at_s >= len(self._passed) * self._span_s / 4.0 and len(self._passed) <= 4:
             self._passed.append(self._world.drivers.passed.copy())
-        if tells and at_s % 60.0 < LOOK_S:
+        if prints_progress and at_s % 60.0 < LOOK_S:
             print(
                 f"{at_s:.0f} s of the city's time in {self.took_s:.0f} s; now longest stand "
                 f"{self.standing.now_s.max():.0f} s, ever {self.standing.longest_s.max():.0f} s; "
@@ -220,7 +224,7 @@ def flow(
     *,
     policy: str = FIXED,
     observed_s: float = 0.0,
-    tells: bool = False,
+    prints_progress: bool = False,
 ) -> tuple[dict[str, float], Observed | None]:
     """Run a city for a time, or until so much real time is over; return what there is to tell."""
     city_map = load_map(name)
@@ -237,7 +241,7 @@ def flow(
         while at_s < span_s and count.took_s <= wall_s:
             city.run_for(LOOK_S)
             at_s += LOOK_S
-            count.look(at_s, tells=tells)
+            count.look(at_s, prints_progress=prints_progress)
             if observed is not None:
                 observed.look(LOOK_S)
     return count.row(at_s), observed
@@ -268,7 +272,7 @@ def main() -> None:
         row, observed = flow(
             MAPS.get(city, city), given.cars, given.seconds, given.loss, given.wall,
             policy="flashing" if given.flash else given.policy,
-            observed_s=given.observe, tells=given.progress,
+            observed_s=given.observe, prints_progress=given.progress,
         )  # fmt: skip
         quarters = " ".join(f"{row[f'quarter{i}']:.0f}" for i in range(4) if f"quarter{i}" in row)
         print(
@@ -278,8 +282,8 @@ def main() -> None:
             flush=True,
         )
         if observed is not None:
-            told = ", ".join(f"{n} {kind}" for kind, n in observed.told.items()) or "nothing"
-            print(f"\nThe observer told, in {given.observe:.0f} s: {told}")
+            found = ", ".join(f"{n} {kind}" for kind, n in observed.violations.items()) or "nothing"
+            print(f"\nThe observer found, in {given.observe:.0f} s: {found}")
             print("\n".join(f"- {words}" for words in observed.words[:20]), flush=True)
 
 

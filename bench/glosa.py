@@ -25,7 +25,7 @@ from scm.world.part import WorldPart
 
 MAPS = ("grid:4x4:4",)
 LOSSES = (0.0, 0.3, 0.9)
-LOOK_S, SETTLE_S = 0.1, 20.0
+LOOK_S, WARM_UP_S = 0.1, 20.0
 STANDS_MPS, DRIVES_MPS = 0.01, 0.05
 
 
@@ -86,7 +86,7 @@ def drive(city_map: CityMap, cars: int, span_s: float, policy: str, seed: int) -
     touched = counted(world)
     fill(world, cars)
     with Lockstep([part, TrafficPart(city_map, policy=policy), MonitorPart(city_map)]) as city:
-        city.run_for(SETTLE_S)
+        city.run_for(WARM_UP_S)
         watch, passed = Watch(world.slots.hosted.copy(), world.slots.speed), drivers.passed.sum()
         for _ in range(round(span_s / LOOK_S)):
             city.run_for(LOOK_S)

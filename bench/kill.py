@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.car_rig import FIRMWARES, Motor, Rig, Told, published, rig, wait_for
+from bench.car_rig import FIRMWARES, Motor, ReadProcess, Rig, published, rig, wait_for
 from scm.v2x.exchange import Call
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.router import free_endpoint
@@ -30,7 +30,7 @@ from scm.v2x.router import free_endpoint
 MAP = "driving_school"
 OURS_MS, FRAME_MS = 300.0, 20.0
 PATIENCE_S = 4.0
-SETTLE_S = 1.0
+STEADY_S = 1.0
 PULLED = tuple(f"unplug@{t}:5" for t in range(16, 400, 10))
 NOBODY = "nobody can say it"
 KEEPER_GONE = "keeper gone"
@@ -42,9 +42,9 @@ class Town:
 
     def __init__(self) -> None:
         self.endpoint = free_endpoint()
-        self.router = Told("scm.selftest.router", self.endpoint)
+        self.router = ReadProcess("scm.selftest.router", self.endpoint)
         wait_for(lambda: listens(self.endpoint), 10.0)
-        self.world = Told("scm", "world", MAP, "--connect", self.endpoint, "--hosted", "0")
+        self.world = ReadProcess("scm", "world", MAP, "--connect", self.endpoint, "--hosted", "0")
 
     def signal(self, number: int) -> None:
         for process in (self.router, self.world):
@@ -53,7 +53,7 @@ class Town:
     def renew_router(self) -> None:
         """Have a router again at the same address."""
         self.router.end()
-        self.router = Told("scm.selftest.router", self.endpoint)
+        self.router = ReadProcess("scm.selftest.router", self.endpoint)
         wait_for(lambda: listens(self.endpoint), 10.0)
 
     def close(self) -> None:
@@ -75,7 +75,7 @@ class Row:
 
     Attributes:
         do: Does it; returns when [monotonic ns].
-        undo: Mends what would stay broken.
+        revert: Repairs what would stay broken.
         gap: Whether the published firmware cannot be helped: nobody can reach it.
         knows: What the host prints when it first knows.
         ends: Whether the next trial needs another agent.
@@ -83,7 +83,7 @@ class Row:
 
     name: str
     do: Callable[[Rig, Town], int]
-    undo: Callable[[Rig, Town], None] = lambda _rig, _town: None
+    revert: Callable[[Rig, Town], None] = lambda _rig, _town: None
     gap: bool = False
     knows: str = "notice"
     ends: bool = False
@@ -128,35 +128,35 @@ def struck(pid: int, number: int) -> int:
     return t_ns
 
 
-def told_to_fail(number: int) -> Callable[[Rig, Town], int]:
+def failing_step(number: int) -> Callable[[Rig, Town], int]:
     """Return the deed of asking the agent's next step to fail; it says when it does."""
 
     def do(rig: Rig, town: Town) -> int:
         del town
         agent = rig.drive()
-        asked_ns = struck(agent, number)
-        wait_for(lambda: rig.agents.said("deed", asked_ns), 2.0)
-        return rig.agents.said("deed", asked_ns) or asked_ns
+        requested_ns = struck(agent, number)
+        wait_for(lambda: rig.agents.mentioned_ns("deed", requested_ns), 2.0)
+        return rig.agents.mentioned_ns("deed", requested_ns) or requested_ns
 
     return do
 
 
 def blind(rig: Rig, town: Town) -> int:
     del town
-    rig.sight.is_open = False
+    rig.eye.is_open = False
     return time.monotonic_ns()
 
 
 def kill_router(rig: Rig, town: Town) -> int:
     t_ns = struck(town.router.pid, signal.SIGKILL)
-    rig.sight.is_open = False
+    rig.eye.is_open = False
     return t_ns
 
 
 def stop_city(rig: Rig, town: Town) -> int:
     t_ns = time.monotonic_ns()
     town.signal(signal.SIGSTOP)
-    rig.sight.is_open = False
+    rig.eye.is_open = False
     return t_ns
 
 
@@ -164,15 +164,15 @@ def steal(rig: Rig, town: Town) -> int:
     """Have somebody else take the car and never speak up."""
     del town
     request = LeaseRequest(
-        vehicle=rig.sight.vehicle, owner="thief", verb="steal", reason="bench", ttl_ms=10_000
+        vehicle=rig.eye.vehicle, owner="thief", verb="steal", reason="bench", ttl_ms=10_000
     )
     t_ns = time.monotonic_ns()
-    rig.sight.bus.call(Call(request, timeout_s=1.0), lambda _reply: None)
+    rig.eye.bus.call(Call(request, timeout_s=1.0), lambda _reply: None)
     return t_ns
 
 
 def pull(rig: Rig, town: Town) -> int:
-    """Pull the cable: the emulator does it at its own times, the board when told."""
+    """Pull the cable: the emulator does it at its own times, the board on command."""
     del town
     motor, now_ns = rig.motor, time.monotonic_ns()
     if not is_emulated(motor):
@@ -205,7 +205,7 @@ def wake(rig: Rig, town: Town) -> None:
     for pid in (rig.agent, *children(rig.agent)):
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGCONT)
-    time.sleep(SETTLE_S)
+    time.sleep(STEADY_S)
 
 
 def children(pid: int) -> list[int]:
@@ -229,7 +229,7 @@ def signals_of(who: str, deed: Callable[[int], Callable[[Rig, Town], int]]) -> l
             Row(
                 f"{who}: {number.name}",
                 deed(number),
-                undo=wake if number is signal.SIGSTOP else Row.undo,
+                revert=wake if number is signal.SIGSTOP else Row.revert,
                 knows=KEEPER_GONE if is_gone else "notice",
                 ends=who == "agent" and number is not signal.SIGSTOP,
             )
@@ -239,8 +239,8 @@ def signals_of(who: str, deed: Callable[[int], Callable[[Rig, Town], int]]) -> l
 
 ROWS = (
     *signals_of("agent", to_agent),
-    Row("agent: its step raises", told_to_fail(signal.SIGUSR1), ends=True),
-    Row("agent: its loop stalls", told_to_fail(signal.SIGUSR2)),
+    Row("agent: its step raises", failing_step(signal.SIGUSR1), ends=True),
+    Row("agent: its loop stalls", failing_step(signal.SIGUSR2)),
     *signals_of("keeper", to_keeper),
     Row("bus: the router is killed", kill_router, new_router, ends=True),
     Row("bus: the city is stopped (SIGSTOP)", stop_city, wake, ends=True),
@@ -271,11 +271,11 @@ def tried(row: Row, made: Rig, town: Town) -> Trial:
     did_ns = row.do(made, town)
     wait_for(lambda: made.motor.stopped(did_ns), PATIENCE_S)
     stopped_ns = made.motor.stopped(did_ns)
-    row.undo(made, town)
+    row.revert(made, town)
     time.sleep(0.05)
-    said = [made.agents.said(word, did_ns) for word in (row.knows, KEEPER_GONE)]
-    knew_ns = min((t_ns for t_ns in said if t_ns is not None), default=None)
-    sent_ns = made.agents.said("written", did_ns)
+    times = [made.agents.mentioned_ns(word, did_ns) for word in (row.knows, KEEPER_GONE)]
+    knew_ns = min((t_ns for t_ns in times if t_ns is not None), default=None)
+    sent_ns = made.agents.mentioned_ns("written", did_ns)
     if row.ends:
         made.end_agent()
     if stopped_ns is None:
@@ -285,7 +285,7 @@ def tried(row: Row, made: Rig, town: Town) -> Trial:
     return Trial((stopped_ns - did_ns) / 1e6, notice, sent)
 
 
-def told(values: list[float | None]) -> str:
+def median_and_worst(values: list[float | None]) -> str:
     """Return median and worst of what was measured; never: not while one waited."""
     known = [value for value in values if value is not None]
     if not known:
@@ -306,7 +306,7 @@ def verdict(row: Row, firmware: str, trials: list[Trial]) -> str:
 
 
 def measure(firmware: str, rows: list[Row], times: int, town: Town) -> Iterator[bool]:
-    """Print a line a row; yield whether each kept its bar."""
+    """Print a line a row; yield whether each passed its bar."""
 
     def device(link: Path) -> Motor:
         emulates = firmware == "published"
@@ -320,11 +320,11 @@ def measure(firmware: str, rows: list[Row], times: int, town: Town) -> Iterator[
             for row in some:
                 trials = [tried(row, made, town) for _ in range(times)]
                 judged = verdict(row, firmware, trials)
-                cells = [told([t.deed_ms for t in trials]), NOBODY, "-"]
+                cells = [median_and_worst([t.deed_ms for t in trials]), NOBODY, "-"]
                 if not row.gap:
-                    cells[1] = told([t.notice_ms for t in trials])
+                    cells[1] = median_and_worst([t.notice_ms for t in trials])
                 if row.knows == "notice":
-                    cells[2] = told([t.sent_ms for t in trials])
+                    cells[2] = median_and_worst([t.sent_ms for t in trials])
                 print(f"| {row.name} | {firmware} | {' | '.join(cells)} | {judged} |", flush=True)
                 yield judged != "FAIL"
 
@@ -343,10 +343,10 @@ def main() -> None:
     print("|---|---|---|---|---|---|")
     try:
         firmwares = given.firmware or list(FIRMWARES)
-        kept = [good for one in firmwares for good in measure(one, rows, given.times, town)]
+        passed = [good for one in firmwares for good in measure(one, rows, given.times, town)]
     finally:
         town.close()
-    if not all(kept):
+    if not all(passed):
         raise SystemExit(1)
 
 

@@ -59,13 +59,13 @@ def main() -> None:
         signals = [TrafficPart(city_map, policy=policy), MonitorPart(city_map)]
         parts = [world, *signals, demand, Cameras(world.world), observer]
         with Lockstep(parts) as city:
-            told = city.subscribe(Subscription(Violation))
+            violations = city.subscribe(Subscription(Violation))
             city.run_for(given.seconds)
             for (lane, _), per_h in WAYS.items():
                 cells = row_of(observer, lane, city.now_ns)
                 print(f"| {policy} | {lane} | {per_h:.0f} | {cells} |", flush=True)
-            violations = [item.message.text for item in told.drain()]
-        print(f"\n{policy}: {demand.status}; the observer told {violations or 'nothing'}\n")
+            violations = [item.message.text for item in violations.drain()]
+        print(f"\n{policy}: {demand.status}; the observer reported {violations or 'nothing'}\n")
 
 
 if __name__ == "__main__":

@@ -2,8 +2,8 @@
 
 Run with `python -m bench misbehaviour`, or `python -m bench.misbehaviour [school | grid | cost]
 [--seeds 21 22 23] [--span SECONDS] [--attacks NAME ...] [--healthy] [--own-eye] [--why]
-[--keep FOLDER]`. A city is run in lockstep with honest cars, once for each seed, and kept in the
-folder; what they said, made noisy, is told again with some lying, each time judged in four ways:
+[--keep FOLDER]`. A city is run in lockstep with honest cars, once for each seed, and stored in the
+folder; what they sent, made noisy, is replayed with some lying, each time judged in four ways:
 with and without the Eye, with and without loss.
 """
 
@@ -68,15 +68,15 @@ TOWNS = {
 
 
 class Story(msgspec.Struct):
-    """What an honest city said and what was seen of it, in order of time."""
+    """What an honest city sent and what was seen of it, in order of time."""
 
     town: Town
     frames: list[Frame]
     tracks: list[EyeTrack]
 
 
-def tell(town: Town, seed: int, *, own_eye: bool = False) -> Story:
-    """Run a city and note what its cars said; they come one after the other."""
+def run_honest_city(town: Town, seed: int, *, own_eye: bool = False) -> Story:
+    """Run a city and note what its cars sent; they come one after the other."""
     city_map = load_map(town.map)
     parts = [WorldPart(city_map, seed, room=town.cars), TrafficPart(city_map)]
     if own_eye:
@@ -101,28 +101,30 @@ def tell(town: Town, seed: int, *, own_eye: bool = False) -> Story:
             if number >= town.cars // 2:
                 city.run_for(20.0 / town.cars)
         city.run_for(town.span_s)
-        said = [noisy(Frame(m.station, m.t_ns, m.body), rng) for m in drained(frames)]
+        sent = [noisy(Frame(m.station, m.t_ns, m.body), rng) for m in drained(frames)]
         if own_eye:
-            return Story(town, said, list(drained(tracks)))
-        return Story(town, said, [one for m in drained(truths) for one in stand_in(m, rng)])
+            return Story(town, sent, list(drained(tracks)))
+        return Story(town, sent, [one for m in drained(truths) for one in stand_in(m, rng)])
 
 
-def kept(town: Town, seed: int, folder: Path | None, *, own_eye: bool) -> Story:
-    """Return a story, from a folder where it was told before."""
+def stored_story(town: Town, seed: int, folder: Path | None, *, own_eye: bool) -> Story:
+    """Return a story, from a folder where it was stored before."""
     if folder is None:
-        return tell(town, seed, own_eye=own_eye)
+        return run_honest_city(town, seed, own_eye=own_eye)
     eye = "eye" if own_eye else "stand-in"
     path = folder / f"{town.map.replace(':', '_')}-{town.span_s:.0f}s-{seed}-{eye}.story"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
         began = time.monotonic()
-        story = tell(town, seed, own_eye=own_eye)
+        story = run_honest_city(town, seed, own_eye=own_eye)
         path.write_bytes(msgspec.msgpack.encode(story))
-        say(f"told {path.name} in {time.monotonic() - began:.0f} s: {len(story.frames)} CAMs")
+        report(
+            f"simulated {path.name} in {time.monotonic() - began:.0f} s: {len(story.frames)} CAMs"
+        )
     return msgspec.msgpack.decode(path.read_bytes(), type=Story)
 
 
-def say(text: str) -> None:
+def report(text: str) -> None:
     """Tell how far it is, beside the tables."""
     print(text, file=sys.stderr, flush=True)
 
@@ -135,21 +137,21 @@ def drained(mailbox) -> Iterator:
 
 def noisy(frame: Frame, rng: random.Random) -> Frame:
     """Return a frame of a car that knows itself only so well."""
-    told = read_cam(frame.body)
-    x_m, y_m = told.place or (math.nan, math.nan)  # cars of the city know where they are
+    reported = read_cam(frame.body)
+    x_m, y_m = reported.place or (math.nan, math.nan)  # cars of the city know where they are
     body = moved(frame.body, rng.gauss(x_m, OWN_M), rng.gauss(y_m, OWN_M))
     accel = frame.body.motion.longitudinal_acceleration.value * 0.1 / SCALE
     body = driven(
         body,
-        speed_mps=rng.gauss(told.speed_mps or 0.0, OWN_MPS),
-        yaw_rad=rng.gauss(told.yaw_rad or 0.0, OWN_RAD),
+        speed_mps=rng.gauss(reported.speed_mps or 0.0, OWN_MPS),
+        yaw_rad=rng.gauss(reported.yaw_rad or 0.0, OWN_RAD),
         accel_mps2=rng.gauss(accel, OWN_MPS2),
     )
     return frame._replace(body=body)
 
 
 def stand_in(truth: WorldSnapshot, rng: random.Random) -> Iterator[EyeTrack]:
-    """Yield what an Eye would tell of all cars: the truth with its noise, and some not at all."""
+    """Yield what an Eye would report of all cars: the truth with its noise, and some missing."""
     variances = (EYE_M, EYE_M, EYE_RAD, EYE_MPS, EYE_MPS, 0.1)
     covariance = tuple(
         tuple(v * v if i == j else 0.0 for j in range(6)) for i, v in enumerate(variances)
@@ -185,7 +187,7 @@ def lied(story: Story, attack: str, liars: set[str], ground: Ground, seed: int) 
 
 
 class Outcome(NamedTuple):
-    """What came of one telling: who lied since when, who was reported when, and what was held."""
+    """The outcome of one replay: who lied since when, who was reported when, and what was held."""
 
     lied_ns: dict[str, int]
     reported_ns: dict[str, int]
@@ -248,7 +250,7 @@ class Tally:
                 self.blamed += 1
                 self.blamed_why[outcome.why[station]] += 1
 
-    def take(self, other: "Tally") -> None:
+    def merge(self, other: "Tally") -> None:
         """Add another tally's counts."""
         self.liars, self.found = self.liars + other.liars, self.found + other.found
         self.blamed, self.hours = self.blamed + other.blamed, self.hours + other.hours
@@ -257,8 +259,8 @@ class Tally:
     def cell(self, *, why: bool = False) -> str:
         """Return recall, precision, median time, false alarms an hour."""
         recall = self.found / self.liars if self.liars else float("nan")
-        told = self.found + self.blamed
-        precision = self.found / told if told else float("nan")
+        suspected = self.found + self.blamed
+        precision = self.found / suspected if suspected else float("nan")
         delays = sorted(self.delays_s)
         median = f"{delays[len(delays) // 2]:.1f}" if delays else "-"
         text = f"{recall:.2f}, {precision:.2f}, {median}, {self.blamed / self.hours:.2f}"
@@ -298,7 +300,7 @@ def table(
 ) -> None:
     """Print a table, a row an attack."""
     ground = Ground(load_map(town.map), None if own_eye else lambda _x, _y: True)
-    stories = {seed: kept(town, seed, folder, own_eye=own_eye) for seed in seeds}
+    stories = {seed: stored_story(town, seed, folder, own_eye=own_eye) for seed in seeds}
     print(f"\n### {town.title}, seeds {seeds}{', the real Eye' if own_eye else ''}\n")
     healthy(stories, ground)
     if not attacks:
@@ -313,7 +315,7 @@ def table(
         print(f"| {attack} | {liars} | {' | '.join(cells)} |", flush=True)
         if attack in POSITION_AND_SPEED:
             for title, tally in tallies.items():
-                sums[title].take(tally)
+                sums[title].merge(tally)
     if all(tally.liars for tally in sums.values()):
         liars = sums["Eye"].liars
         cells = [tally.cell() for tally in sums.values()]
@@ -333,11 +335,11 @@ def attacked(
                 honest = story.town.cars - len(liars)
                 tallies[title].add(outcome, honest, liars, story.town.span_s)
                 if why:
-                    tell_missed(f"{attack}, {title}, seed {seed}", outcome, story, air)
+                    report_missed(f"{attack}, {title}, seed {seed}", outcome, story, air)
     return tallies
 
 
-def tell_missed(where: str, outcome: Outcome, story: Story, air: list[Sent]) -> None:
+def report_missed(where: str, outcome: Outcome, story: Story, air: list[Sent]) -> None:
     """Say of each liar that was missed how great its lies were, and of the honest who was blamed.
 
     Sizes are those of single lies, middle and greatest; the time is that of the frames that lie.
@@ -351,16 +353,16 @@ def tell_missed(where: str, outcome: Outcome, story: Story, air: list[Sent]) -> 
         )
         middle = sizes[len(sizes) // 2] if sizes else "other times"
         count = sum(sent.lies and sent.frame.station == name for sent in air)
-        say(f"missed: {where}, {name}: {count} lies, middle {middle}, greatest {sizes[-1:]}, "
+        report(f"missed: {where}, {name}: {count} lies, middle {middle}, greatest {sizes[-1:]}, "
             f"score {outcome.highest[name]:.1f}")  # fmt: skip
     for name in sorted(set(outcome.reported_ns) - set(outcome.lied_ns)):
-        say(f"blamed: {where}, {name}: {outcome.why[name]}")
+        report(f"blamed: {where}, {name}: {outcome.why[name]}")
 
 
-def size_of(told: Frame, true: Frame) -> tuple[float, float, float]:
+def size_of(claimed: Frame, true: Frame) -> tuple[float, float, float]:
     """Return how far a frame lies off in speed [m/s], place [m] and acceleration [m/s^2]."""
-    one, other = read_cam(told.body), read_cam(true.body)
-    accels = (f.body.motion.longitudinal_acceleration.value * 0.1 / SCALE for f in (told, true))
+    one, other = read_cam(claimed.body), read_cam(true.body)
+    accels = (f.body.motion.longitudinal_acceleration.value * 0.1 / SCALE for f in (claimed, true))
     return (
         round(abs((one.speed_mps or 0.0) - (other.speed_mps or 0.0)), 3),
         round(math.hypot(one.x_m - other.x_m, one.y_m - other.y_m), 3),
@@ -385,7 +387,7 @@ def healthy(stories: dict[int, Story], ground: Ground) -> None:
 def cost(folder: Path | None, cars: int = 200, rate_hz: float = 10.0) -> None:
     """Print the share of a core that so many cars cost, by what a smaller city costs a CAM."""
     town = TOWNS["grid"]
-    story = kept(town, 1, folder, own_eye=False)
+    story = stored_story(town, 1, folder, own_eye=False)
     ground = Ground(load_map(town.map), lambda _x, _y: True)
     air = [Sent(frame, lies=False) for frame in story.frames]
     for title, eye in (("with Eye and its tracks", True), ("CAMs alone", False)):
@@ -406,7 +408,7 @@ def main() -> None:
     parser.add_argument("--attacks", nargs="*", default=attack_names())
     parser.add_argument("--healthy", action="store_true", help="only the honest city")
     parser.add_argument("--own-eye", action="store_true", help="render and find tags, slowly")
-    parser.add_argument("--keep", type=Path, help="folder of the honest runs, told once")
+    parser.add_argument("--keep", type=Path, help="folder of the honest runs, simulated once")
     parser.add_argument("--why", action="store_true", help="name the checks, and whom they missed")
     given = parser.parse_args()
     for what in given.what or ("school", "grid", "cost"):

@@ -125,14 +125,14 @@ def _one(case, label, answer, sparse, found, table):
 
 def _named(row, label, names):
     """Count what a peer named; a law that has no name cannot be right."""
-    listed = label.kind != "unlisted"
-    exact = listed and set(names) == set(label.names)
-    among = listed and set(label.names) <= set(names)
+    is_known = label.kind != "unlisted"
+    exact = is_known and set(names) == set(label.names)
+    among = is_known and set(label.names) <= set(names)
     _count(row, label, exact, among, bool(names))
 
 
-def _count(row, label, exact, among, said):
-    row["exact" if label.names else "healthy"].append(exact if label.names else said)
+def _count(row, label, exact, among, named):
+    row["exact" if label.names else "healthy"].append(exact if label.names else named)
     if label.names:
         row["among"].append(among)
 

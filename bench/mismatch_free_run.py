@@ -12,7 +12,7 @@ from scm.recording.motion import Poses
 from scm.replay.commands import Commands
 from scm.vehicles.fleet import Fleet
 
-EVERY_S, STEP_S, SETTLED_S = 0.1, 0.005, 3.0
+EVERY_S, STEP_S, WARM_UP_S = 0.1, 0.005, 3.0
 
 
 def position_error(recording, car, pushes, horizon_s=1.0):
@@ -31,7 +31,7 @@ def position_error(recording, car, pushes, horizon_s=1.0):
     per, errors, history = round(horizon_s / EVERY_S), [], _History()
     for k, now in enumerate(t):
         if k and k % per == 0 and seen.valid[k]:
-            if now > first + SETTLED_S:
+            if now > first + WARM_UP_S:
                 errors.append(np.hypot(fleet.x[0] - seen.x[k], fleet.y[0] - seen.y[k]))
             _carry(fleet, seen, k)
         steps = now + STEP_S * np.arange(round(EVERY_S / STEP_S)) + 1e-9

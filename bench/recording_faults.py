@@ -26,7 +26,7 @@ from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 
 STEP_S, SECONDS, HORIZON_S = 0.01, 30.0, 1.0
-KEPT = ("x", "y", "yaw", "yaw_rate", "wheel_angle.rl", "wheel_angle.rr")
+COMPARED = ("x", "y", "yaw", "yaw_rate", "wheel_angle.rl", "wheel_angle.rr")
 SAME, SAME_M = (
     1.5,
     0.003,
@@ -68,7 +68,7 @@ def clean() -> dict[str, dict[str, np.ndarray]]:
     steering = rng.uniform(-0.8, 0.8, len(t))[(t / 1.7).astype(int)]
     fleet = Fleet(car, 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
-    run = {n: v[:, 0] for n, v in fleet.rollout(throttle, steering, STEP_S, KEPT).items()}
+    run = {n: v[:, 0] for n, v in fleet.rollout(throttle, steering, STEP_S, COMPARED).items()}
     counts = car.value("encoder.counts_per_revolution") / (2.0 * np.pi)
     after, slow, held = t + STEP_S, slice(None, None, 2), slice(None, None, 5)
     wrapped = np.arctan2(np.sin(run["yaw"]), np.cos(run["yaw"]))
@@ -277,7 +277,7 @@ class Outcome:
 
     kind: str
     faults: tuple[str, ...]
-    said: str = ""
+    text: str = ""
 
     @property
     def is_right(self) -> bool:
@@ -286,11 +286,11 @@ class Outcome:
 
 
 def errors_of(path: Path) -> tuple[np.ndarray, str]:
-    """Return the windows' position errors [m], and all that was said of the recording."""
+    """Return the windows' position errors [m], and the remarks on the recording."""
     (recording,) = read_recordings(path)
     car = load_car(recording.vehicle)
     prepared = prepare(recording, car)
-    said = " ".join(
+    text = " ".join(
         [*prepared.account, *(f"{p.name} {p.said} {p.corrected}" for p in prepared.problems)]
     )
     runs, failures = [], []
@@ -300,9 +300,9 @@ def errors_of(path: Path) -> tuple[np.ndarray, str]:
         except ScmError as error:
             failures.append(str(error))
     if not runs:
-        raise ScmError("; ".join(failures) + " " + said)
+        raise ScmError("; ".join(failures) + " " + text)
     run = joined(runs)
-    return run.position_error()[:, -1], " ".join([said, *failures, *map(str, run.left_out)])
+    return run.position_error()[:, -1], " ".join([text, *failures, *map(str, run.left_out)])
 
 
 @cache
@@ -327,7 +327,7 @@ def tried(seed: int) -> Outcome:
     begun = time.process_time()
     try:
         with tempfile.TemporaryDirectory() as folder:
-            errors, said = errors_of(write(made, Path(folder)))
+            errors, text = errors_of(write(made, Path(folder)))
     except ScmError as error:
         known = not made.words or any(
             w in str(error).lower() for words in made.words for w in words
@@ -341,14 +341,14 @@ def tried(seed: int) -> Outcome:
     high = max(SAME * float(np.percentile(good, 90)), float(np.percentile(good, 90)) + SAME_M)
     same = float(np.percentile(errors, 90)) < high
     lost = len(errors) < FEWEST * len(good)
-    named = all(any(w in said.lower() for w in words) for words in made.words)
+    named = all(any(w in text.lower() for w in words) for words in made.words)
     if same and (not lost or named):
-        return Outcome("same" if not lost else "named", names, said)
+        return Outcome("same" if not lost else "named", names, text)
     if named and made.words:
-        return Outcome("named", names, said)
+        return Outcome("named", names, text)
     return Outcome("wrong without a word", names,
                    f"p90 {np.percentile(errors, 90):.4f} of {np.percentile(good, 90):.4f}, "
-                   f"{len(errors)} of {len(good)} windows; {said[:300]}")  # fmt: skip
+                   f"{len(errors)} of {len(good)} windows; {text[:300]}")  # fmt: skip
 
 
 def main() -> None:
@@ -367,7 +367,7 @@ def main() -> None:
         kinds[outcome.kind] += 1
         if not outcome.is_right:
             wrong[outcome.kind, outcome.faults] += 1
-            print(f"{seed + k}: {outcome.kind}: {', '.join(outcome.faults)}: {outcome.said[:400]}")
+            print(f"{seed + k}: {outcome.kind}: {', '.join(outcome.faults)}: {outcome.text[:400]}")
     print(dict(kinds))
     print(f"{sum(wrong.values())} of {count} misled")
 

@@ -36,8 +36,8 @@ def main() -> None:
         if kind == "lidar":
             continue  # see bench/lidar.py
         bank = Bank(registry.load(PACKAGE, kind, "SENSOR", Sensor), 0, CARS)
-        for slot in range(CARS):
-            bank.fit(slot, f"n{slot}", car, truth, slot, 0)
+        for vehicle in range(CARS):
+            bank.fit(vehicle, f"n{vehicle}", car, truth, vehicle, 0)
         second_of(bank, 0)
         wanted, count = second_of(bank, TICKS * TICK_NS)
         bank.wanted[:] = False

@@ -24,7 +24,7 @@ from scm.traffic.signals.program import STEP_NS, program_of
 from scm.traffic.signals.timing import NIGEL
 
 DT_S = STEP_NS / NS_PER_S
-DECEL, ACCEL, TIME_GAP_S, STAND_GAP_M, LENGTH_M, SIGHT_M = 0.5, 0.5, 0.8, 0.12, 0.30, 2.0
+DECEL, ACCEL, TIME_GAP_S, STAND_GAP_M, LENGTH_M, RANGE_M = 0.5, 0.5, 0.8, 0.12, 0.30, 2.0
 CAM_EVERY, CAM_LATE, WARM_UP_S, FAVOUR = 10, 1, 100.0, 4.0
 
 POLICIES = (("fixed", "calm"), ("fixed", "brisk"), ("actuated", "calm"), ("max_pressure", "calm"))
@@ -47,7 +47,7 @@ class Car:
     longest_s: float = 0.0
     stops: int = 0
     goes_on: str = ""
-    heard: list[Seen] = field(default_factory=list)
+    delayed: list[Seen] = field(default_factory=list)
 
 
 class Flow:
@@ -98,27 +98,27 @@ class Flow:
             for car in self.cars:
                 self._drive(car, lanes)
             for car in self.cars:
-                self._tell(car, step)
+                self._send_cam(car, step)
             self.now_ns += STEP_NS
 
     def _signals(self) -> None:
         for name, controller in self.controllers.items():
             watcher = self.watchers[name]
-            heard = Heard({})
+            observation = Heard({})
             if controller.needs_detectors:
-                heard = Heard(watcher.by_group(watcher.read(self.now_ns)), sees=True)
-            controller.step(self.now_ns, heard)
+                observation = Heard(watcher.by_group(watcher.read(self.now_ns)), sees=True)
+            controller.step(self.now_ns, observation)
             for group in controller.spat(self.now_ns).groups:
                 self.colours[name, group.group] = group.colour
 
-    def _tell(self, car: Car, step: int) -> None:
+    def _send_cam(self, car: Car, step: int) -> None:
         if (step + car.who * 3) % CAM_EVERY == 0:
             pose: Pose2 = self.roads.lane(car.lanes[0]).at(car.at_m)
             speed = car.speed_mps
             seen = Seen(car.who, self.now_ns, pose.x, pose.y, pose.yaw, speed, LENGTH_M)
-            car.heard.append(seen)
-        if car.heard and self.now_ns - car.heard[0].t_ns >= CAM_LATE * STEP_NS:
-            seen = car.heard.pop(0)
+            car.delayed.append(seen)
+        if car.delayed and self.now_ns - car.delayed[0].t_ns >= CAM_LATE * STEP_NS:
+            seen = car.delayed.pop(0)
             for name, watcher in self.watchers.items():
                 if self.controllers[name].needs_detectors:
                     watcher.show(seen, self.now_ns)
@@ -139,9 +139,9 @@ class Flow:
         return ""
 
     def _drive(self, car: Car, lanes: dict[str, list[Car]]) -> None:
-        free_m, line_m, line = SIGHT_M, SIGHT_M, None
+        free_m, line_m, line = RANGE_M, RANGE_M, None
         begin, number = -car.at_m, 0
-        while begin < SIGHT_M:
+        while begin < RANGE_M:
             lane = car.lanes[number]
             for other in lanes.get(lane, []):
                 gap = begin + other.at_m - LENGTH_M
@@ -149,7 +149,7 @@ class Flow:
                     free_m = min(free_m, gap)
             if line is None:
                 line = next((n for n in self.roads.stop_lines_on(lane) if begin + n.at_m > 0), None)
-                line_m = begin + line.at_m if line else SIGHT_M
+                line_m = begin + line.at_m if line else RANGE_M
             begin += self.roads.length_of(lane)
             number += 1
             if number == len(car.lanes):
@@ -157,7 +157,7 @@ class Flow:
         speed = car.speed_mps
         limit = self.roads.definition(car.lanes[0]).speed_limit_mps
         gap_m = max(0.0, free_m - STAND_GAP_M)
-        if free_m < SIGHT_M:
+        if free_m < RANGE_M:
             behind = lanes and (2.0 * DECEL * (gap_m + speed**2 / (2 * DECEL))) ** 0.5
             limit = min(limit, behind, gap_m / TIME_GAP_S)
         if line is not None:

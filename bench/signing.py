@@ -83,8 +83,8 @@ def _print_city() -> None:
         sent[:] = [encode(air[cam.station].signed(cam, cam.t_ns)) for cam in cams]
 
     def read(check: Callable[[CamTx, int], None]) -> None:
-        for said in sent:
-            cam = decode(CamTx, *said)
+        for frame in sent:
+            cam = decode(CamTx, *frame)
             check(cam, cam.t_ns)
 
     plain = _share(plain_write) + _share(lambda: read(lambda cam, t_ns: None))

@@ -46,7 +46,7 @@ def tried(made: Rig, port: int) -> float | None:
 
 
 def row(firmware: str, cars: int, times: int) -> bool:
-    """Print one line; return whether every press kept the bar."""
+    """Print one line; return whether every press passed the bar."""
     with (
         city(cars, MAP) as (endpoint, _, port),
         rig(endpoint, MAP, FIRMWARES[firmware]) as made,
@@ -71,12 +71,12 @@ def main() -> None:
     print(f"milliseconds from the press to PWM 0; bar {BAR_MS:g}")
     print("| firmware | other cars | presses | median | worst | |")
     print("|---|---|---|---|---|---|")
-    kept = [
+    passed = [
         row(firmware, cars, given.times)
         for firmware in given.firmware or list(FIRMWARES)
         for cars in given.cars
     ]
-    if not all(kept):
+    if not all(passed):
         raise SystemExit(1)
 
 

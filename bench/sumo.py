@@ -134,9 +134,9 @@ def capacities(city_map: CityMap) -> tuple[dict[str, float], dict[str, tuple[str
     for crossing in city_map.crossings:
         ways = [way.to_m for approach in crossing.approaches for way in approach.ways]
         limit = min(roads.definition(a.lane).speed_limit_mps for a in crossing.approaches)
-        takes_s = (sum(ways) / len(ways) + NIGEL.length_m) / min(NIGEL.slow_mps, limit)
+        passing_s = (sum(ways) / len(ways) + NIGEL.length_m) / min(NIGEL.slow_mps, limit)
         for approach in crossing.approaches:
-            unlit[approach.lane] = crossing.name, hour / takes_s
+            unlit[approach.lane] = crossing.name, hour / passing_s
     return lit, unlit
 
 
@@ -175,16 +175,18 @@ def drive(city_map: CityMap, flows: Sequence[Flow], span_s: float) -> Outcome:
     world.attach(lambda _kind, _where: False)
     touched = counted(world.world)
     demand = DemandPart(city_map, flows)
-    slots, stands, longest = world.world.slots, np.zeros(MOST_CARS), (0.0, "")
+    vehicles, stands, longest = world.world.slots, np.zeros(MOST_CARS), (0.0, "")
     parts = [world, TrafficPart(city_map), demand] if city_map.junctions else [world, demand]
     with Lockstep(parts) as city:
         for _ in range(round(span_s)):
             city.run_for(1.0)
-            stands = np.where(slots.hosted & (np.abs(slots.speed) < STANDS_MPS), stands + 1.0, 0.0)
+            stands = np.where(
+                vehicles.hosted & (np.abs(vehicles.speed) < STANDS_MPS), stands + 1.0, 0.0
+            )
             worst = int(stands.argmax())
             if stands[worst] > longest[0]:
-                at = f"({slots.x[worst]:.2f}, {slots.y[worst]:.2f})"
-                longest = float(stands[worst]), f"{slots.names[worst]} at {at}"
+                at = f"({vehicles.x[worst]:.2f}, {vehicles.y[worst]:.2f})"
+                longest = float(stands[worst]), f"{vehicles.names[worst]} at {at}"
     status = demand.status
     words = (
         f"{status.wanted} wanted, {status.entered} entered, {status.arrived} arrived, "

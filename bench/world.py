@@ -140,10 +140,10 @@ def row_of(cars: int, stages: Stages) -> str:
     stages.spent_ms = dict.fromkeys(STAGES, 0.0)
     tick_ms = timed(lambda: tick(world, next(now), []), ticks)
     spent = {name.strip("_"): ms / ticks for name, ms in stages.spent_ms.items()}
-    said = [out for out in world.outbox if isinstance(out, Message)]
-    json_ms = timed(lambda: [encode(message) for message in said], 5)
-    slots, motion = everybody(world, 0)
-    ours_us = timed(lambda: world.contacts.step(slots, motion), 30) * 1e3
+    messages = [out for out in world.outbox if isinstance(out, Message)]
+    json_ms = timed(lambda: [encode(one) for one in messages], 5)
+    vehicles, motion = everybody(world, 0)
+    ours_us = timed(lambda: world.contacts.step(vehicles, motion), 30) * 1e3
     peer_us = timed(by_attribute(world), 30) * 1e3
     parts = " ".join(f"{name} {ms:.2f}" for name, ms in spent.items())
     return (

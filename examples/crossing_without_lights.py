@@ -68,12 +68,12 @@ def run(
 ) -> tuple[list[float], float]:
     """Return when each car was over the junction [s], and the least distance between two [m]."""
     part = crossing(radio, seed)
-    slots = part.world.slots
+    vehicles = part.world.slots
     through, least = [math.inf] * 4, math.inf
     with Lockstep([part]) as city:
         for step in range(round(longest_s / 0.1)):
             city.run_for(0.1)
-            poses = [(slots.x[n], slots.y[n], slots.yaw[n]) for n in range(4)]
+            poses = [(vehicles.x[n], vehicles.y[n], vehicles.yaw[n]) for n in range(4)]
             for one, other in itertools.permutations(poses, 2):
                 least = min(least, apart(*one, corners_of(*other)))
             for n in range(4):

@@ -10,7 +10,7 @@ from scm.client import Client
 from scm.records.operations import Operation
 
 
-def say(work: Operation) -> None:
+def print_progress(work: Operation) -> None:
     if work.doing:
         print(f"{100.0 * (work.progress or 0.0):3.0f} %  {work.doing}", flush=True)
 
@@ -26,7 +26,7 @@ def main() -> None:
         work = city.mismatch.search(
             recording=arguments.recording, vehicle=arguments.vehicle, budget_s=arguments.budget_s
         )
-        done = city.wait(work, say)
+        done = city.wait(work, print_progress)
         row = city.mismatch.report(done.result.rpartition("/")[2]).row
         print(row.said, *row.effects, sep="\n")
         if row.before_m is not None and row.after_m is not None:

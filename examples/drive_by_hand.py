@@ -22,10 +22,10 @@ def main() -> None:
         vehicle = arguments.vehicle or city.vehicles.all_vehicles().vehicles[0].vehicle
         places, fastest_mps = [], 0.0
         with city.wheel(vehicle, arguments.reason) as wheel:
-            for beat in range(round(arguments.seconds / 0.05)):
-                told = wheel.drive(throttle=0.4, steering=0.5 * math.sin(beat / 8.0))
-                fastest_mps = max(fastest_mps, told.speed_mps or 0.0)
-                if beat % 4 == 0:
+            for step in range(round(arguments.seconds / 0.05)):
+                report = wheel.drive(throttle=0.4, steering=0.5 * math.sin(step / 8.0))
+                fastest_mps = max(fastest_mps, report.speed_mps or 0.0)
+                if step % 4 == 0:
                     car = city.vehicles.one_car(vehicle)
                     places.append((car.x_m, car.y_m))
         way_m = sum(math.dist(one, other) for one, other in pairwise(places))

@@ -48,9 +48,9 @@ def main() -> None:
             city.signals.plan(junction, plan=before, **why)
             gone = city.signals.delete(junction, NAME, if_match="*")
         print(f"{junction}: cycle {old.cycle_s:.1f} s under {before}, {gone.cycle_s:.1f} s so")
-        told = city.signals.promises(junction)
-        broken = told.early + told.late
-        print(f"{told.judged} colours ended as SPaT had promised, {broken} otherwise")
+        forecast = city.signals.promises(junction)
+        broken = forecast.early + forecast.late
+        print(f"{forecast.judged} colours ended as SPaT had promised, {broken} otherwise")
 
 
 if __name__ == "__main__":

@@ -53,7 +53,7 @@ def main() -> None:
     grainy = dataclasses.replace(front, exposure=0.9, gain=4.0, read_noise=2.0)
     day, dusk = Daylight(), Daylight(intensity=0.12, azimuth=0.3, elevation=0.35, ambient=0.4)
 
-    def take(optics: Optics, daylight: Daylight, camera: str, label: str) -> Image:
+    def view(optics: Optics, daylight: Daylight, camera: str, label: str) -> Image:
         found = cars()
         image = Studio(CITY, daylight).picture(optics, found[0], found, SHOWN, camera, 0).copy()
         at, font = (28, 690), cv2.FONT_HERSHEY_SIMPLEX
@@ -62,10 +62,10 @@ def main() -> None:
         return image
 
     grid = np.vstack((
-        np.hstack((take(front, day, "front", "front"), take(rear, day, "rear", "rear"))),
+        np.hstack((view(front, day, "front", "front"), view(rear, day, "rear", "rear"))),
         np.hstack((
-            take(bent, day, "front", "k1 = -0.32, k2 = 0.1"),
-            take(grainy, dusk, "front", "light 0.12, gain 4"),
+            view(bent, day, "front", "k1 = -0.32, k2 = 0.1"),
+            view(grainy, dusk, "front", "light 0.12, gain 4"),
         )),
     ))  # fmt: skip
     small = cv2.resize(grid, None, fx=0.6, fy=0.6, interpolation=cv2.INTER_AREA)

@@ -55,8 +55,8 @@ def main(names: list[str]) -> None:
         paths = [ROOT / "recordings" / folder / file for file in files]
         if name in REPLAYED:
             _replay(paths, DATA / folder, REPLAYED[name])
-        found = diagnose(paths, None, DATA / folder, budget_s=BUDGET_S, notify=_tell)
-        _say(f"{name}: {len(files)} recordings, {found.diagnosis.runtime_s:.0f} s")
+        found = diagnose(paths, None, DATA / folder, budget_s=BUDGET_S, notify=_progress)
+        _print(f"{name}: {len(files)} recordings, {found.diagnosis.runtime_s:.0f} s")
         report = ROOT / "runs" / f"diagnosis-{name}"
         write(found, report)
         _figures(found)
@@ -73,7 +73,7 @@ def _replay(paths: Sequence[Path], data: Path, cars: Sequence[str]) -> None:
             car = load_car(name)
             for title, described in (("as they arrived", arrived), ("at the car", paths)):
                 runs = [run for path in described for run in _runs(path, data, car)]
-                _say(f"{name}, commands {title}: {_strays(runs)}")
+                _print(f"{name}, commands {title}: {_strays(runs)}")
 
 
 def _by_arrival(path: Path, folder: Path) -> Path:
@@ -107,28 +107,28 @@ def _strays(runs: Sequence[FreeRun]) -> str:
 def _figures(found: Found) -> None:
     """Print the verdict, each effect, and position errors of free runs held out."""
     diagnosis = found.diagnosis
-    _say(f"verdict: {diagnosis.verdict.value}")
+    _print(f"verdict: {diagnosis.verdict.value}")
     for problem in diagnosis.data:
-        _say(f"data: {problem}")
+        _print(f"data: {problem}")
     for effect in diagnosis.effects:
         numbers = ", ".join(
             f"{name} {e.value:.4g} ({e.low:.4g} to {e.high:.4g})"
             for name, e in effect.parameters.items()
         )
-        rivals = ", ".join(f"{r.name} {r.probability:.2f}" for r in effect.alternatives[:3])
-        _say(f"effect: {effect.name}: {numbers}; {effect.text} rivals: {rivals}")
+        alternatives = ", ".join(f"{r.name} {r.probability:.2f}" for r in effect.alternatives[:3])
+        _print(f"effect: {effect.name}: {numbers}; {effect.text} alternatives: {alternatives}")
     for own in found.evidence.refitted:
         if abs(own.found.value - own.given) > 0.5 * (own.given_std or 1.0):
-            _say(f"own: {own.key}: {own.given:.4g} -> {own.found.value:.4g}")
+            _print(f"own: {own.key}: {own.given:.4g} -> {own.found.value:.4g}")
     model, retuned, runs = found.model, found.retuned_car, found.evidence.free_runs
     if model is None or retuned is None or runs is None or diagnosis.fit is None:
         return
     tuned = judge(model.drives, model.car, retuned, split(model), diagnosis.fit.horizon_s)[1]
-    _say(f"free runs of {diagnosis.fit.horizon_s:g} s, position [cm], held out:")
+    _print(f"free runs of {diagnosis.fit.horizon_s:g} s, position [cm], held out:")
     for title, side in (("nominal", runs), ("retuned", tuned), ("found", runs)):
-        _say(f"  {title}: {_errors(side, 'before' if title == 'nominal' else 'after')}")
+        _print(f"  {title}: {_errors(side, 'before' if title == 'nominal' else 'after')}")
     for name, before in diagnosis.fit.confirm.before.items():
-        _say(f"  rms {name}: {before:.4g} -> {diagnosis.fit.confirm.after[name]:.4g}")
+        _print(f"  rms {name}: {before:.4g} -> {diagnosis.fit.confirm.after[name]:.4g}")
 
 
 def _errors(runs: FreeRuns, side: str) -> str:
@@ -142,12 +142,12 @@ def _errors(runs: FreeRuns, side: str) -> str:
     )
 
 
-def _say(text: str) -> None:
+def _print(text: str) -> None:
     sys.stdout.write(text + "\n")
     sys.stdout.flush()
 
 
-def _tell(text: str) -> None:
+def _progress(text: str) -> None:
     sys.stderr.write(f"  {text}\n")
 
 

@@ -4,20 +4,20 @@ import pytest
 from msgspec.structs import replace
 from numpy.testing import assert_allclose
 
-from bench.misbehaviour import TOWNS, Outcome, Tally, kept, rate_below
+from bench.misbehaviour import TOWNS, Outcome, Tally, rate_below, stored_story
 
 SMALL = replace(TOWNS["school"], cars=2, span_s=1.0)
 
 
-def test_a_kept_city_reads_back_as_it_was_told(tmp_path):
-    told = kept(SMALL, 1, None, own_eye=False)
-    assert kept(SMALL, 1, tmp_path, own_eye=False) == told
+def test_a_stored_city_reads_back_unchanged(tmp_path):
+    story = stored_story(SMALL, 1, None, own_eye=False)
+    assert stored_story(SMALL, 1, tmp_path, own_eye=False) == story
     (path,) = tmp_path.iterdir()
     written = path.stat().st_mtime_ns
-    assert kept(SMALL, 1, tmp_path, own_eye=False) == told
+    assert stored_story(SMALL, 1, tmp_path, own_eye=False) == story
     assert path.stat().st_mtime_ns == written
-    assert {frame.station for frame in told.frames} == {"n1", "n2"}
-    assert {track.vehicle for track in told.tracks} == {"n1", "n2"}
+    assert {frame.station for frame in story.frames} == {"n1", "n2"}
+    assert {track.vehicle for track in story.tracks} == {"n1", "n2"}
 
 
 @pytest.mark.parametrize(("count", "mean"), [(0, 2.9957), (1, 4.7439), (5, 10.513)])
