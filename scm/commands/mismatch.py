@@ -48,7 +48,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--budget-s",
         type=float,
         default=DEFAULT_S,
-        help="time for each car; the report says what is left unasked then [s] (%(default)g)",
+        help="time for each car; the report says what was not answered then [s] (%(default)g)",
     )
     parser.add_argument(
         "--strict",
@@ -132,7 +132,7 @@ def _of_cars(
         What to print, and why other cars could not be diagnosed.
     """
     from scm.mismatch.diagnose import write
-    from scm.mismatch.report.several_page import several_summary
+    from scm.mismatch.report.cars_page import several_summary
     from scm.mismatch.report.summary import summary
     from scm.mismatch.several.diagnose import diagnose_one, diagnose_several, write_all
 

@@ -103,7 +103,7 @@ def write_picture(found: Fit, deadband: float, path: Path) -> None:
     for number, panel in enumerate(panels):
         parts += _panel(*panel, WIDTH * number)
     svg = picture_svg(2.0 * WIDTH, HEIGHT + HEAD, parts, "what the calibration found")
-    path.write_text(Picture(name="", title="", said="", svg=svg).as_file(), encoding="utf-8")
+    path.write_text(Picture(name="", title="", caption="", svg=svg).as_file(), encoding="utf-8")
 
 
 def _panel(

@@ -1,7 +1,11 @@
 """What people see of a diagnosis: a page, the same as JSON, and the car file with what was found.
 
-write       all of it into one folder; as_json  the fixed fields; summary  the command line's lines
-car_file    the given car's file with the effects found, by estimates, toml_text and own_files
-page        one self-contained HTML page of first_screen and expert, in wording and advice
-drawings    its pictures, drawn by plot: floor_map, time_line, free_run_pictures, forest, bars ...
+write       all of it into one folder: findings and evidence go in, `record.Report` is made of them,
+            and every file is written from that
+record      the report as one record: sentences, cards and pictures, worked out once
+sentences   verdict, where and when, advice; wording: names, numbers, units; panels: first screen
+pictures    all SVGs, with residual_pictures, free_run_pictures and plot
+fields      `report.json` and `drawn.json`; page and html_text: `report.html`
+car_file    `car.toml` and its own effects, with toml_text; summary: the command's last lines
+cars_page   the page of several cars
 """

@@ -1,28 +1,34 @@
 """The given car's file with the effects found: `scm replay --car car.toml` and fleets load it.
 
-Comments stay, and what was not moved stays word for word. A number that was moved says by which
-recording, with its 90 % interval, and what stood there before.
+Comments stay, and so does every number that was not moved. A number that was moved states by which
+recording, its 90 % interval, and what the file stated before.
 """
 
+import inspect
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+
+from msgspec import structs
 
 from scm.errors import CarError
 from scm.mismatch.evidence import Evidence
-from scm.mismatch.findings import Diagnosis, Estimate
-from scm.mismatch.report.estimates import estimates_by_key
-from scm.mismatch.report.own_files import listed_terms, write_own_terms
+from scm.mismatch.findings import Diagnosis, Effect, Estimate
 from scm.mismatch.report.toml_text import number, quoted, set_entry, set_list
-from scm.vehicles.car import Car, Quantity, Value, load_car
-from scm.vehicles.sensor_fault import AppliedFault
+from scm.vehicles.car import Car, Quantity, Value, all_terms, load_car
+from scm.vehicles.describe_effects import all_effects, params_of
+from scm.vehicles.jit import plain
+from scm.vehicles.own_term import SUFFIX
+from scm.vehicles.sensor_fault import AppliedFault, all_sensor_faults
+from scm.vehicles.term import Term
 
+_SAME_SHARE = 0.01  # two numbers that differ by less than this share are one
 FILE = "car.toml"
 FOUND_DIGITS = 6  # of a number found: far more than any interval allows
 COMMENT = "found by scm mismatch"
-_INTERVAL_STDS = 3.29  # a 90 % interval of a normal belief, from end to end
+_INTERVAL_STDS = 3.29  # of a normal distribution, from end to end of a 90 % interval
 _Entries = Mapping[str, Mapping[str, object]]
 
 
@@ -42,21 +48,21 @@ def write_car(
     entries = dict(_entries(diagnosis, evidence, car, patched))
     path = folder / FILE
     path.write_text(_edited(car, patched, entries, evidence), encoding="utf-8")
-    if not _says(path, patched):
+    if not _loads_as(path, patched):
         path.write_text(_anew(patched, entries, evidence), encoding="utf-8")
         load_car(path)
     return [FILE, *own]
 
 
-def _says(path: Path, patched: Car) -> bool:
+def _loads_as(path: Path, patched: Car) -> bool:
     """Return whether the file loads as this car."""
     try:
         read = load_car(path)
     except CarError:
         return False
-    same = sorted(listed_terms(read)) == sorted(listed_terms(patched))
-    same = same and list(map(measure_entry, read.measures)) == list(
-        map(measure_entry, patched.measures)
+    same = sorted(term_names(read)) == sorted(term_names(patched))
+    same = same and list(map(_measure_entry, read.measures)) == list(
+        map(_measure_entry, patched.measures)
     )
     same = same and read.correlated == patched.correlated
     return same and all(
@@ -71,7 +77,7 @@ def _equal(a: Value, b: Value, rel_tol: float = 1e-8) -> bool:
     return a == b
 
 
-def measure_entry(fault: AppliedFault) -> str:
+def _measure_entry(fault: AppliedFault) -> str:
     """Return a fault as a car file's `measures` list names it."""
     where = f" on {', '.join(fault.channels)}" if fault.channels else ""
     return fault.kind.name + where
@@ -80,15 +86,15 @@ def measure_entry(fault: AppliedFault) -> str:
 def _entries(
     diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car
 ) -> Iterator[tuple[str, str]]:
-    """Yield key and new text of each number that the given car's file does not say."""
+    """Yield key and new text of each number that the given car's file does not state."""
     stands = _file_entries(car.path)
-    estimates = estimates_by_key(diagnosis, evidence, car, patched)
+    estimates = _estimates_by_key(diagnosis, evidence, car, patched)
     stds = {one.key: one.found_std for one in evidence.refitted}
     for key, quantity in patched.values.items():
         old = stands.get(key)
-        told = old is not None and _equal(_value_of(old), quantity.value)
-        silent = old is None and quantity.source.startswith(("default", "drive.layout"))
-        if not told and not silent:
+        is_stated = old is not None and _equal(_value_of(old), quantity.value)
+        is_default = old is None and quantity.source.startswith(("default", "drive.layout"))
+        if not is_stated and not is_default:
             moved = key not in car.values or car.values[key].value != quantity.value
             yield (
                 key,
@@ -160,9 +166,9 @@ def _edited(car: Car, patched: Car, entries: Mapping[str, str], evidence: Eviden
         return _anew(patched, entries, evidence)
     text = car.path.read_text(encoding="utf-8")
     data = tomllib.loads(text)
-    if listed_terms(load_car(car.path)) != listed_terms(patched):
-        text = set_list(text, "terms", listed_terms(patched), COMMENT)
-    measures = list(map(measure_entry, patched.measures))
+    if term_names(load_car(car.path)) != term_names(patched):
+        text = set_list(text, "terms", term_names(patched), COMMENT)
+    measures = list(map(_measure_entry, patched.measures))
     if data.get("measures", []) != measures:
         text = set_list(text, "measures", measures, COMMENT)
     for key, entry in entries.items():
@@ -195,16 +201,16 @@ def _anew(patched: Car, entries: Mapping[str, str], evidence: Evidence | None) -
     lines = [f"name = {quoted(patched.name)}"]
     lines += [f"scale = {quoted(patched.scale)}"] if patched.scale else []
     for key, names in (
-        ("terms", listed_terms(patched)),
-        ("measures", list(map(measure_entry, patched.measures))),
+        ("terms", term_names(patched)),
+        ("measures", list(map(_measure_entry, patched.measures))),
     ):
         lines += [f"{key} = [", *(f"    {quoted(name)}," for name in names), "]"]
     sections: dict[str, list[str]] = {}
     for key, quantity in patched.values.items():
         section, _, name = key.partition(".")
         if key in entries or not quantity.source.startswith(("default", "drive.layout")):
-            plain = _inline(quantity.value, quantity.std, quantity.source)
-            sections.setdefault(section, []).append(f"{name} = {entries.get(key, plain)}")
+            same = _inline(quantity.value, quantity.std, quantity.source)
+            sections.setdefault(section, []).append(f"{name} = {entries.get(key, same)}")
     for section, rows in sections.items():
         lines += ["", f"[{section}]", *rows]
     head = "" if evidence is None else _headline(evidence)
@@ -213,10 +219,93 @@ def _anew(patched: Car, entries: Mapping[str, str], evidence: Evidence | None) -
 
 def _with_correlated(text: str, patched: Car) -> str:
     """Return a car file's text with the correlations of this car, in place of what it had."""
-    kept = re.sub(r"^\[\[correlated\]\][^\n]*\n(?:(?!\[).*\n?)*", "", text, flags=re.MULTILINE)
+    others = re.sub(r"^\[\[correlated\]\][^\n]*\n(?:(?!\[).*\n?)*", "", text, flags=re.MULTILINE)
     blocks = []
     for group in patched.correlated:
         rows = ",\n".join(f"    [{', '.join(f'{v:g}' for v in row)}]" for row in group.matrix)
         names = ", ".join(quoted(name) for name in group.numbers)
         blocks.append(f"\n[[correlated]]\nnumbers = [{names}]\nmatrix = [\n{rows},\n]\n")
-    return kept.rstrip() + "\n" + "".join(blocks)
+    return others.rstrip() + "\n" + "".join(blocks)
+
+
+def _estimates_by_key(
+    diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car
+) -> dict[str, Estimate]:
+    """Return every estimate by the `section.key` at which a car file holds its number."""
+    found = {one.key: one.found for one in evidence.refitted}
+    for effect in diagnosis.effects:
+        for key, estimate in _of_effect(effect, car, patched):
+            found[key] = _in_place(estimate, key, car, patched)
+    return found
+
+
+def _of_effect(effect: Effect, car: Car, patched: Car) -> Iterator[tuple[str, Estimate]]:
+    measure = all_sensor_faults().get(effect.name)
+    if measure and measure.stands_for and measure not in [f.kind for f in patched.measures]:
+        share = effect.parameters.get(measure.params[0].reported)
+        if share is not None and car.has(measure.stands_for):
+            yield measure.stands_for, _times(share, car.value(measure.stands_for))
+        return
+    known = all_effects()
+    own = [param for term in _own_terms(patched) for param in params_of(term)]
+    for param in params_of(known[effect.name]) if effect.name in known else own:
+        if param.reported in effect.parameters:
+            yield param.key, effect.parameters[param.reported]
+
+
+def _in_place(estimate: Estimate, key: str, car: Car, patched: Car) -> Estimate:
+    """Return an estimate of what is added to a car's own number as one of the sum."""
+    if not (car.has(key) and patched.has(key)):
+        return estimate
+    given, now = car.value(key), patched.value(key)
+    near = _SAME_SHARE * abs(now)
+    if abs(now - estimate.value) <= near or abs(now - given - estimate.value) > near:
+        return estimate
+    return structs.replace(
+        estimate,
+        value=estimate.value + given,
+        low=estimate.low + given,
+        high=estimate.high + given,
+    )
+
+
+def _times(share: Estimate, number: float) -> Estimate:
+    return structs.replace(
+        share, value=share.value * number, low=share.low * number, high=share.high * number
+    )
+
+
+def term_names(car: Car) -> list[str]:
+    """Return what a car file's `terms` holds for this car, in its order."""
+    return [
+        term.name if term.name in all_terms() else term.name + SUFFIX for term in _heads(car.terms)
+    ]
+
+
+def _heads(terms: Sequence[Term]) -> list[Term]:
+    """Return the effects without the further terms that come with them."""
+    further = {part.name for term in terms for part in term.also}
+    return [term for term in terms if term.name not in further]
+
+
+def _own_terms(car: Car) -> list[Term]:
+    """Return the car's effects that the library does not have."""
+    return [term for term in _heads(car.terms) if term.name not in all_terms()]
+
+
+def write_own_terms(car: Car, folder: Path) -> list[str]:
+    """Write the file of each of the car's own effects, and return the names.
+
+    Raises:
+        CarError: when an effect was never read from a file, so that none can be written.
+    """
+    written = []
+    for term in _own_terms(car):
+        source = inspect.getsourcefile(plain(term.law))
+        if source is None or Path(source).stem != term.name:
+            msg = f"{term.name}: expected an effect read from its file, got one from {source}"
+            raise CarError(msg)
+        path, text = folder / (term.name + SUFFIX), Path(source).read_text(encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
+        written.append(path.name)
+    return written

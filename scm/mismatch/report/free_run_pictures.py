@@ -21,12 +21,13 @@ from scm.mismatch.report.plot import (
     span_of,
     text,
 )
-from scm.mismatch.report.wording import quantities
+from scm.mismatch.report.wording import quantities, quantity
 
-WINDOWS = 8
-_SIDE = 200.0
+_MAX_WINDOWS = 40
+_SIDE, _GROWTH = 200.0, 70.0  # of a window's floor, and height of its error below [px]
 _WIDTH, _HEIGHT = 440.0, 270.0
-_MOST_POINTS = 120
+_MAX_POINTS = 60
+_SEEN = {"fit": "the fit saw it", "choose": "an effect was chosen by it", "confirm": "unseen"}
 
 
 def position_error(runs: FreeRuns, side: Mapping[str, Floats]) -> Floats:
@@ -34,28 +35,29 @@ def position_error(runs: FreeRuns, side: Mapping[str, Floats]) -> Floats:
     return np.hypot(side["x"] - runs.measured["x"], side["y"] - runs.measured["y"])
 
 
-def yaw_error(runs: FreeRuns, side: Mapping[str, Floats]) -> Floats:
+def _yaw_error(runs: FreeRuns, side: Mapping[str, Floats]) -> Floats:
     """Return the absolute difference in yaw [rad], (windows, times)."""
     apart = side["yaw"] - runs.measured["yaw"]
     return np.abs(np.arctan2(np.sin(apart), np.cos(apart)))
 
 
-def unseen(runs: FreeRuns) -> Bools:
-    """Return which windows the fit did not see: those to confirm, or all where none are."""
+def _unseen(runs: FreeRuns) -> Bools:
+    """Return which windows the fit did not see: those to confirm, or all if there are none."""
     confirm = np.array([part == "confirm" for part in runs.part], dtype=np.bool_)
     return confirm if confirm.any() else np.ones(len(runs.part), dtype=np.bool_)
 
 
 def window_pictures(runs: FreeRuns | None) -> list[Picture]:
-    """Return unseen windows on the floor, from the worst before to the best, in even steps."""
+    """Return windows on the floor: unseen ones first, each kind from the worst before to the best.
+
+    Of more windows than are drawn, some in even steps.
+    """
     if runs is None or not len(runs.start_s):
         return []
-    error = position_error(runs, runs.before)
-    rows = np.flatnonzero(unseen(runs))
-    final = np.array([_last_known(error[row]) for row in rows])
-    rows, final = rows[np.isfinite(final)], final[np.isfinite(final)]
-    order = rows[np.argsort(-final, kind="stable")]
-    chosen = np.unique(np.linspace(0, len(order) - 1, min(WINDOWS, len(order))).astype(int))
+    error, unseen = position_error(runs, runs.before), _unseen(runs)
+    final = np.array([_last_known(row) for row in error])
+    order = [row for row in np.lexsort((-final, ~unseen)) if np.isfinite(final[row])]
+    chosen = np.unique(np.linspace(0, len(order) - 1, min(_MAX_WINDOWS, len(order))).astype(int))
     return [_window(runs, int(order[i]), number) for number, i in enumerate(chosen, start=1)]
 
 
@@ -65,9 +67,9 @@ def _last_known(values: Floats) -> float:
 
 
 def _window(runs: FreeRuns, row: int, number: int) -> Picture:
-    keep = slice(None, None, max(1, len(runs.t_s) // _MOST_POINTS))
+    times = slice(None, None, max(1, len(runs.t_s) // _MAX_POINTS))
     sides = {
-        kind: (side["x"][row][keep], side["y"][row][keep])
+        kind: (side["x"][row][times], side["y"][row][times])
         for kind, side in (
             ("measured", runs.measured),
             ("before", runs.before),
@@ -79,23 +81,28 @@ def _window(runs: FreeRuns, row: int, number: int) -> Picture:
             span_of(*(x for x, _ in sides.values())),
             span_of(*(y for _, y in sides.values())),
             (_SIDE, _SIDE),
-            margins=(10.0, 10.0, 46.0, 28.0),
+            margins=(10.0, 10.0, 62.0, 28.0),
         )
     )
     parts = [line(room, x, y, kind) for kind, (x, y) in sides.items()]
     parts += [*_start(room, *sides["measured"]), *scale_bar(room)]
-    before, after = (
-        _last_known(position_error(runs, side)[row]) for side in (runs.before, runs.after)
-    )
-    parts += [text(10, 18, f"from {runs.start_s[row]:.1f} s", kind="title")]
-    was, now = quantities((before, after), "m")
-    parts += [text(10, 35, f"{was} \N{RIGHTWARDS ARROW} {now}")]
-    return Picture(
-        name=f"free_run_{number}",
-        title="",
-        said="",
-        svg=picture_svg(_SIDE, _SIDE, parts, f"Free run from {runs.start_s[row]:.1f} s"),
-    )
+    errors = {
+        kind: position_error(runs, side)[row]
+        for kind, side in (("before", runs.before), ("after", runs.after))
+    }
+    was, now = quantities([_last_known(error) for error in errors.values()], "m")
+    words = f"from {runs.start_s[row]:.1f} s"
+    parts += [text(10, 18, words, kind="title"), text(10, 35, _SEEN[runs.part[row]])]
+    parts += [text(10, 52, f"{was} \N{RIGHTWARDS ARROW} {now}", kind="strong")]
+    below = frame(
+        (0.0, float(runs.t_s[-1])), span_of(*errors.values(), through_zero=True),
+        (_SIDE, _GROWTH), (0.0, _SIDE), (10.0, 10.0, 8.0, 22.0),
+    )  # fmt: skip
+    parts += [element("path", d=f"M10 {below.bottom:.1f}H{below.right:.1f}", class_="zero")]
+    parts += [line(below, runs.t_s[times], error[times], kind) for kind, error in errors.items()]
+    parts += [text(10, _SIDE + _GROWTH - 6, f"error over {quantity(float(runs.t_s[-1]), 's')}")]
+    svg = picture_svg(_SIDE, _SIDE + _GROWTH, parts, f"Free run {words}")
+    return Picture(name=f"free_run_{number}", title="", caption="", svg=svg)
 
 
 def _start(room: Frame, x: Floats, y: Floats) -> Iterator[str]:
@@ -109,11 +116,11 @@ def error_pictures(runs: FreeRuns | None) -> list[Picture]:
     """Return how position and yaw error of unseen windows grow with time."""
     if runs is None or not len(runs.start_s) or len(runs.t_s) < 2:
         return []
-    rows = unseen(runs)
+    rows = _unseen(runs)
     found = []
     for name, title, unit, factor, error in (
         ("error_position", "Position error", "cm", 100.0, position_error),
-        ("error_yaw", "Heading error", "°", 180.0 / np.pi, yaw_error),
+        ("error_yaw", "Heading error", "°", 180.0 / np.pi, _yaw_error),
     ):
         before, after = (
             _spread(factor * error(runs, side)[rows]) for side in (runs.before, runs.after)
@@ -151,7 +158,7 @@ def _growth(
     return Picture(
         name=name,
         title=f"{title} of free runs",
-        said="Windows that the fit did not see. Lines: half of the windows lie below; areas: "
+        caption="Windows that the fit did not see. Lines: half of the windows lie below; areas: "
         "from the best tenth of the windows to the worst tenth.",
         svg=picture_svg(_WIDTH, _HEIGHT, parts, f"{title} of free runs"),
     )

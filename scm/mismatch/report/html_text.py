@@ -8,19 +8,21 @@ from scm.mismatch.report.plot import Picture
 
 _CODE = re.compile(r"`([^`<>]+)`")
 _KEY = re.compile(r"\w+\.[\w.*]+")  # such as `body.mass_kg`, which may be parted at its joints
+_SCROLLS = ("scroll", "windows", "wide")
 _JOINT = re.compile(r"([._])(?=\w)")
 _BEFORE_UNIT = re.compile(r"(\d) (?=(?:%|[mcμ]?m|m?s|k?g|N|rad|m/s)\b|%)")
 
 
-def tag(name: str, said: str, kind: str = "") -> str:
-    """Return one element around a text; a line is one of the page, `so` is what to type."""
-    lines = _BEFORE_UNIT.sub("\\1&nbsp;", escape(said)).replace("\n", "<br>")
+def tag(name: str, text: str, kind: str = "") -> str:
+    """Return one element around a text; lines stay lines, and `this` is what to type."""
+    lines = _BEFORE_UNIT.sub("\\1&nbsp;", escape(text)).replace("\n", "<br>")
     return around(name, _CODE.sub(r"<code>\1</code>", lines), kind)
 
 
 def around(name: str, inner: str, kind: str = "") -> str:
-    """Return one element around HTML that is safe already."""
+    """Return one element around HTML that is safe already; what scrolls can get the focus."""
     kinds = f' class="{kind}"' if kind else ""
+    kinds += ' tabindex="0"' if kind.partition(" ")[0] in _SCROLLS else ""
     return f"<{name}{kinds}>{inner}</{name}>"
 
 
@@ -29,17 +31,19 @@ def figure(picture: Picture | None) -> str:
     if picture is None:
         return ""
     title = tag("h3", picture.title) if picture.title else ""
-    said = tag("figcaption", picture.said) if picture.said else ""
-    kind = "wide" if picture.wide else ""
-    return around("figure", title + around("div", picture.svg, "canvas") + said, kind)
+    caption = tag("figcaption", picture.caption) if picture.caption else ""
+    return around(
+        "figure",
+        title + around("div", picture.svg, "wide canvas" if picture.wide else "canvas") + caption,
+    )
 
 
-def section(anchor: str, title: str, *inner: str) -> str:
+def section(name: str, title: str, *inner: str) -> str:
     """Return a section; nothing where it would be empty."""
     body = "".join(inner)
     if not body:
         return ""
-    return f'<section id="{anchor}">{tag("h2", title)}{body}</section>\n'
+    return f'<section id="{name}">{tag("h2", title)}{body}</section>\n'
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:

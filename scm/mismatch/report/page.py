@@ -1,17 +1,37 @@
-"""The page: one HTML file that asks nobody for anything, and needs no script to be read."""
+"""The page: one HTML file that loads nothing, and needs no script to be read."""
 
+import math
+import platform
+from collections.abc import Iterable, Sequence
 from html import escape
+from importlib.metadata import version
 from pathlib import Path
 
-from scm.mismatch.evidence import Evidence
-from scm.mismatch.findings import Diagnosis
-from scm.mismatch.report.drawings import Drawings
-from scm.mismatch.report.expert import expert_sections
-from scm.mismatch.report.first_screen import first_screen
-from scm.mismatch.report.html_text import around, tag
+import scm
+from scm.data_quality.problem import MOST_NAMED, DataProblem
+from scm.mismatch.evidence import RefittedParameter
+from scm.mismatch.findings import Diagnosis, Fit
+from scm.mismatch.report.html_text import around, figure, section, table, tag
+from scm.mismatch.report.panels import Panel
 from scm.mismatch.report.plot import colours_css
-from scm.mismatch.report.verdict_text import verdict_sentence
+from scm.mismatch.report.record import Report
+from scm.mismatch.report.sentences import alike, sensors, spans
+from scm.mismatch.report.wording import (
+    capital,
+    interval,
+    joined,
+    name_of,
+    percent,
+    pretty,
+    quantities,
+    quantity,
+    short,
+    title_of,
+    unit_text,
+)
 from scm.vehicles.car import Car
+from scm.vehicles.describe_effects import all_effects, neutral_of, params_of
+from scm.vehicles.param import LogNormal, Normal, Param
 
 _CHAPTERS = {
     "where": "where",
@@ -19,24 +39,53 @@ _CHAPTERS = {
     "curves": "the effect",
     "runs": "free runs",
     "numbers": "numbers",
-    "tried": "what was tried, rivals",
+    "tried": "what was tried",
     "data": "the recording",
     "reading": "how to read this",
     "inputs": "inputs",
 }
+_READING = (
+    ("Free run", "The simulator starts from where the car was and then gets only the recorded "
+     "commands. The error is how far it deviates."),
+    ("Three parts", "The recording is cut into blocks. Some fit the numbers, others choose the "
+     "effect, and the rest only confirm: errors there are honest."),
+    ("Measurement noise", "How far even a perfect simulator would deviate from the recording, "
+     "because poses are measured with noise and a window starts from such a pose."),
+    ("90 %", "An interval or area that contains the true value nine times out of ten."),
+    ("Nominal parameters", "Mass, stall torque and the like may move within the standard deviation "
+     "that the car file states. A number that is a little off is not missing physics, and is never "
+     "called so."),
+    ("Gain and chance", "How much better an effect explains the recording, and how much the "
+     "luckiest of all effects tried would gain by chance alone."),
+    ("Undecided", "Two effects explain the recording equally well. More of the same drive does "
+     "not help; the drive that is named does."),
+)  # fmt: skip
+_PART_NAMES = {
+    "confirm": "the part that only confirms",
+    "choose": "the part that chooses the effect",
+    "fit": "the part that fits the numbers",
+}
+_NEGLIGIBLE = 1e-4  # of a parameter's standard deviation; less is written as zero
+_ERROR_NAMES = {
+    "yaw": "heading",
+    "gyro": "yaw rate, gyro",
+    "wheel": "distance, wheels",
+    "accel_x": "forward acceleration, IMU",
+    "accel_y": "sideways acceleration, IMU",
+}
+_ERROR_UNITS = {"m": "m", "rad": "rad", "mps": "m/s", "s": "s"}
+_SIDES = (
+    '<input type="radio" name="side" id="show-before" checked>'
+    '<label for="show-before">Before</label>'
+    '<input type="radio" name="side" id="show-after"><label for="show-after">After</label>'
+)
 
 
-def page_html(
-    diagnosis: Diagnosis,
-    evidence: Evidence,
-    drawings: Drawings,
-    cars: tuple[Car, Car],
-    use: str,
-) -> str:
-    """Return the page; `cars` are the given one and the patched one, `use` what to do with it."""
-    below = expert_sections(diagnosis, evidence, drawings, cars)
-    body = first_screen(diagnosis, evidence) + tag("p", use, "use") + _links(below) + below
-    return document(f"{evidence.vehicle}: {verdict_sentence(diagnosis)}", body)
+def page_html(report: Report, use: str) -> str:
+    """Return the page; `use` says what to do with the files beside it."""
+    below = _sections(report)
+    body = first_screen(report) + tag("p", use, "use") + _links(below) + below
+    return document(f"{report.evidence.vehicle}: {report.sentence}", body)
 
 
 def document(title: str, body: str) -> str:
@@ -50,11 +99,226 @@ def document(title: str, body: str) -> str:
     )
 
 
+def first_screen(report: Report) -> str:
+    """Return what, where, how sure, how much better, and what to do."""
+    diagnosis, evidence = report.diagnosis, report.evidence
+    kind = str(diagnosis.verdict) if report.can_judge else "unable"
+    recordings = "recordings" if len(evidence.recordings) > 1 else "recording"
+    where = f"Car {evidence.vehicle}, {recordings} {joined(evidence.recordings) or 'unnamed'}"
+    head = tag("p", where, "inputs") + tag("h1", report.sentence)
+    head += "".join(tag("p", text) for text in (report.named, report.better) if text)
+    bars, picture = "", report.pictures.better
+    if picture and diagnosis.fit:
+        title = f"Position error after {quantity(diagnosis.fit.horizon_s, 's')}, on unseen parts"
+        bars = around("div", tag("h2", title) + around("div", picture.svg, "canvas"), "bars")
+    other = report.other_problems
+    link = '<a href="#data">Details below.</a>'
+    return (
+        around("header", around("div", head, "words") + bars, f"verdict {kind}")
+        + around("div", "".join(map(panel_html, report.panels)), "cards")
+        + (around("p", tag("span", other) + link, "corrected") if other else "")
+    )
+
+
+def panel_html(panel: Panel) -> str:
+    """Return one card: what it is about, its title, and facts by name; empty ones are left out."""
+    facts = "".join(tag("dt", name) + tag("dd", text) for name, text in panel.rows if text)
+    head = tag("p", panel.label, "label") + tag("h2", panel.title)
+    return around("article", head + around("dl", facts), f"card {panel.kind}")
+
+
 def _links(below: str) -> str:
     """Return links to the sections that there are."""
     links = [
-        f'<a href="#{anchor}">{words}</a>'
-        for anchor, words in _CHAPTERS.items()
-        if f'<section id="{anchor}">' in below
+        f'<a href="#{name}">{words}</a>'
+        for name, words in _CHAPTERS.items()
+        if f'<section id="{name}">' in below
     ]
     return around("nav", tag("span", "For experts:") + "".join(links))
+
+
+def _sections(report: Report) -> str:
+    """Return what an expert needs to check the verdict."""
+    diagnosis, evidence, pictures = report.diagnosis, report.evidence, report.pictures
+    return "".join((
+        section("where", "Where on the floor", _maps(report)),
+        section("when", "When", figure(pictures.time_line)),
+        section("curves", "The effect as a curve", _grid(map(figure, pictures.curves))),
+        section("runs", "Free runs, before and after",
+                _fit_table(diagnosis.fit), _grid(map(figure, pictures.errors)), _windows(report)),
+        section("numbers", "Numbers", _parameter_table(diagnosis),
+                _beside(figure(pictures.numbers), _refitted_table(evidence.refitted, report.given)),
+                "".join(tag("p", pretty(text)) for text in evidence.widened)),
+        section("tried", "What was tried, and what ruled alternatives out",
+                _beside(figure(pictures.tried), _alternatives_table(diagnosis))),
+        section("data", "The recording itself",
+                _data_table(diagnosis.data, evidence.recordings)),
+        section("reading", "How to read this page",
+                around("dl", "".join(tag("dt", a) + tag("dd", b) for a, b in _READING))),
+        section("inputs", "Inputs and versions", _inputs(report)),
+    ))  # fmt: skip
+
+
+def _grid(figures: Iterable[str]) -> str:
+    inner = "".join(figures)
+    return around("div", inner, "grid") if inner else ""
+
+
+def _beside(picture: str, rows: str) -> str:
+    """Return a picture and a table side by side where there is room."""
+    return around("div", picture + rows, "grid beside") if picture or rows else ""
+
+
+def _maps(report: Report) -> str:
+    if not report.pictures.maps:
+        return ""
+    boxes = any(found.where for found in report.diagnosis.located)
+    text = (
+        "The car's path on the floor, seen from above. Grey and thin: the simulator is right "
+        "there, within noise. Blue or orange and wide: something else acts on the car. Where the "
+        "car passed several times, the strongest is on top."
+        f"{' Boxes: where the error was found.' if boxes else ''}"
+    )
+    return tag("p", text) + _SIDES + _grid(map(figure, report.pictures.maps))
+
+
+def _windows(report: Report) -> str:
+    windows = report.pictures.windows
+    if not windows:
+        return ""
+    text = (
+        "From the window where the simulator was worst to the one where it was best, first those "
+        "that the fit did not see: wide grey line the recording, dashed line before, full line "
+        "after; the dot is the start. Below each, how the position error grows."
+    )
+    head = tag("h3", f"{len(windows)} windows on the floor") + tag("p", text)
+    strip = "".join(map(figure, windows))
+    return head + around("div", strip, "windows")
+
+
+def _fit_table(fit: Fit | None) -> str:
+    if fit is None:
+        return ""
+    rows: list[tuple[str, ...]] = []
+    for name, words in _PART_NAMES.items():
+        part = getattr(fit, name)
+        rows.append((f"{capital(words)}: {part.windows} windows",))
+        for key in part.before:
+            title, unit = _error_name(key)
+            sides = (part.before, part.after, part.noise_floor)
+            known = [side.get(key, math.nan) for side in sides]
+            shown = zip(quantities(known, unit), sides, strict=True)
+            values = [value if key in side else "" for value, side in shown]
+            rows.append((title, *values))
+    head = ("error", "before", "after", "noise alone")
+    text = f"Root mean squares at the end of free runs of {quantity(fit.horizon_s, 's')}."
+    return tag("p", text) + table(head, rows, (1, 2, 3)) if rows else ""
+
+
+def _error_name(key: str) -> tuple[str, str]:
+    """Return the words and the unit of an error such as `position_m`."""
+    stem, _, unit = key.rpartition("_")
+    if unit not in _ERROR_UNITS:
+        return key, "1"
+    return _ERROR_NAMES.get(stem, stem.replace("_", " ")), _ERROR_UNITS[unit]
+
+
+def _parameter_table(diagnosis: Diagnosis) -> str:
+    rows = []
+    for effect in diagnosis.effects:
+        known = all_effects().get(effect.name)
+        params = {param.reported: param for param in (params_of(known) if known else ())}
+        neutral = neutral_of(known) if known else {}
+        for name, estimate in effect.parameters.items():
+            param = params.get(name)
+            without = neutral.get(param.name) if param else None
+            rows.append((
+                capital(title_of(effect.name)), name_of(name, estimate.unit), interval(estimate),
+                "" if without is None else f"{short(without)} {unit_text(estimate.unit)}".rstrip(),
+                _prior(param) if param else "",
+            ))  # fmt: skip
+    head = ("effect", "number", "found, with 90 % interval", "without the effect",
+            "before any recording")  # fmt: skip
+    return table(head, rows)
+
+
+def _prior(param: Param) -> str:
+    """Return what is assumed of a parameter before any recording."""
+    low, high = map(short, param.bounds)
+    bounds = f"{low} to {high} {unit_text(param.unit)}".rstrip()
+    if isinstance(param.prior, Normal):
+        return f"{short(param.prior.mean)} ± {short(param.prior.std)}, within {bounds}"
+    if isinstance(param.prior, LogNormal):
+        return f"about {short(param.prior.median)}, within {bounds}"
+    return bounds
+
+
+def _refitted_table(refitted: Sequence[RefittedParameter], car: Car) -> str:
+    bounds = {param.key: param.bounds for term in car.terms for param in params_of(term)}
+    rows = [_refitted_row(one, bounds.get(one.key, (-math.inf, math.inf))) for one in refitted]
+    return table(("nominal parameter", "car file", "found (90 %)"), rows, (1, 2))
+
+
+def _refitted_row(one: RefittedParameter, bounds: tuple[float, float]) -> tuple[str, str, str]:
+    """Return a parameter's row; what is far below its own standard deviation is zero."""
+    least, most = bounds
+    ends = (one.found.value, max(one.found.low, least), min(one.found.high, most))
+    value, low, high = (0.0 if abs(v) < _NEGLIGIBLE * one.given_std else v for v in ends)
+    given = f"{short(one.given)} ± {short(one.given_std)}"
+    return one.key, given, f"{short(value)} ({short(low)} to {short(high)})"
+
+
+def _alternatives_table(diagnosis: Diagnosis) -> str:
+    rows = [
+        (
+            capital(title_of(effect.name)),
+            title_of(one.name),
+            percent(one.probability),
+            one.ruled_out_by,
+        )
+        for effect in diagnosis.effects
+        for one in effect.alternatives
+    ]
+    return table(("found", "alternative", "probability", "ruled out by"), rows, (2,))
+
+
+def _data_table(problems: Sequence[DataProblem], recordings: Sequence[str]) -> str:
+    head = ("sensor", "problem", "what", "when", "corrected", "record instead")
+    rows = [
+        _data_row(problem, named)
+        for problem, _, named in alike(problems, recordings, by_channel=True)
+    ]
+    nothing = tag("p", "The sensors were compared with each other; no problem was found.")
+    return table(head, rows) or nothing
+
+
+def _data_row(problem: DataProblem, recordings: Sequence[str]) -> tuple[str, ...]:
+    every = joined(recordings)
+    if len(recordings) > MOST_NAMED:
+        every = f"{len(recordings)} recordings"
+    when = spans(problem.when_s) if problem.when_s else "all the time"
+    return (
+        sensors([problem.channel]),
+        problem.name.replace("_", " "),
+        f"{every}: {problem.text}" if every else problem.text,
+        when,
+        problem.corrected or "left as it is",
+        problem.record_instead,
+    )
+
+
+def _inputs(report: Report) -> str:
+    given, patched = report.given, report.patched
+    new = [term.name for term in patched.terms if term not in given.terms]
+    old = [fault.kind for fault in given.measures]
+    new += [f.kind.name for f in patched.measures if f.kind not in old]
+    rows = [
+        ("recordings", ", ".join(report.evidence.recordings)),
+        ("car file", str(given.path)),
+        ("new in car.toml", ", ".join(new) or "nothing"),
+        ("runtime", f"{report.diagnosis.runtime_s:.1f} s"),
+        ("scm", scm.__version__),
+        ("Python, NumPy, Numba", ", ".join((platform.python_version(), version("numpy"),
+                                            version("numba")))),
+    ]  # fmt: skip
+    return table(("what", "which"), rows)

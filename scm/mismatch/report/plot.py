@@ -20,9 +20,9 @@ from scm.vehicles.manual.line_svg import Axis, equally_scaled
 MARGINS = (62.0, 14.0, 30.0, 40.0)  # left, right, top, bottom
 TEXT_PX = 7.6  # width of a letter at the pictures' size of text
 BAND_STDS = 1.645  # on either side: 90 %
-_FEWEST_SPAN = 1e-9
-_FEWEST_TICKS = 3
-_SMALLEST_FLOOR_M = 0.05
+_MIN_SPAN = 1e-9
+_MIN_TICKS = 3
+_MIN_FLOOR_M = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,14 +31,15 @@ class Picture:
 
     Attributes:
         name: Its file's, without `.svg`.
-        title: Above it; `said`: below it, what to see. Both are plain text.
+        title: Above it, plain text.
+        caption: Below it, what to see, plain text.
         svg: Without its colours; see `as_file`.
         wide: It needs the page's whole width.
     """
 
     name: str
     title: str
-    said: str
+    caption: str
     svg: str
     wide: bool = False
 
@@ -83,11 +84,24 @@ class Frame:
         return self.up.start
 
 
-def picture_svg(width: float, height: float, parts: Sequence[str], label: str) -> str:
-    """Return the whole SVG; `label` is read out to those who do not see it."""
+def picture_svg(
+    width: float, height: float, parts: Sequence[str], label: str, axes: Frame | None = None
+) -> str:
+    """Return the whole SVG.
+
+    Args:
+        width: Of the view box, as `height`.
+        height: In pixels.
+        parts: Elements.
+        label: Read out to people who do not see the picture.
+        axes: Written down for pages that mark a moment in the picture; None: nothing to mark.
+    """
+    data = ""
+    for name, axis in (("across", axes.across), ("up", axes.up)) if axes else ():
+        data += f' data-{name}="{axis.low:.6g} {axis.high:.6g} {axis.start:g} {axis.length:g}"'
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
-        f'class="scm" role="img" aria-label="{escape(label)}">'
+        f'class="scm" role="img" aria-label="{escape(label)}"{data}>'
     )
     return head + "\n".join(parts) + "</svg>"
 
@@ -109,7 +123,7 @@ def frame(
 
 def _ticked(axis: Axis) -> Axis:
     """Return the axis with at least three ticks, so that its scale can be read."""
-    while len(list(axis.ticks())) < _FEWEST_TICKS:
+    while len(list(axis.ticks())) < _MIN_TICKS:
         axis = replace(axis, wanted=axis.wanted + 1)
     return axis
 
@@ -118,8 +132,8 @@ def on_a_floor(plain: Frame) -> Frame:
     """Return these axes with a metre as long on both, wider where that needs it."""
     across, up = equally_scaled(plain.across, plain.up)
     middle = 0.5 * (across.low + across.high)
-    if across.high - across.low < _SMALLEST_FLOOR_M:
-        half = 0.5 * _SMALLEST_FLOOR_M
+    if across.high - across.low < _MIN_FLOOR_M:
+        half = 0.5 * _MIN_FLOOR_M
         across, up = equally_scaled(replace(across, low=middle - half, high=middle + half), up)
     return Frame(across, up)
 
@@ -127,8 +141,8 @@ def on_a_floor(plain: Frame) -> Frame:
 def _opened(span: tuple[float, float]) -> tuple[float, float]:
     """Return a span that is finite and not empty."""
     low, high = (value if math.isfinite(value) else 0.0 for value in span)
-    room = max(_FEWEST_SPAN, 0.05 * abs(low))
-    return (low, high) if high - low > _FEWEST_SPAN else (low - room, low + room)
+    room = max(_MIN_SPAN, 0.05 * abs(low))
+    return (low, high) if high - low > _MIN_SPAN else (low - room, low + room)
 
 
 def span_of(*arrays: Floats, room: float = 0.06, through_zero: bool = False) -> tuple[float, float]:
@@ -178,12 +192,12 @@ def tick_text(value: float, step: float) -> str:
     return f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}")
 
 
-def text(x: float, y: float, said: str, anchor: str = "start", kind: str = "") -> str:
+def text(x: float, y: float, words: str, align: str = "start", kind: str = "") -> str:
     """Return a text; `kind` is its class."""
     at = f'x="{x:.1f}" y="{y:.1f}"'
     kinds = f' class="{kind}"' if kind else ""
-    place = f' text-anchor="{anchor}"' if anchor != "start" else ""
-    return f"<text {at}{place}{kinds}>{escape(said)}</text>"
+    place = f' text-anchor="{align}"' if align != "start" else ""
+    return f"<text {at}{place}{kinds}>{escape(words)}</text>"
 
 
 def line(of: Frame, x: Floats, y: Floats, kind: str) -> str:

@@ -6,17 +6,13 @@ from pathlib import Path
 
 from scm.data_quality.problem import DataProblem
 from scm.mismatch.findings import Diagnosis, Effect
-from scm.mismatch.report.first_screen import name_of
-from scm.mismatch.report.places import sensors
-from scm.mismatch.report.verdict_text import can_judge, processor_said, verdict_sentence
-from scm.mismatch.report.wording import (
-    interval,
-    percent,
-    pretty,
-    quantities,
-    quantity,
-    title_of,
+from scm.mismatch.report.sentences import (
+    can_judge,
+    processor_sentence,
+    sensors,
+    verdict_sentence,
 )
+from scm.mismatch.report.wording import amounts, percent, pretty, quantities, quantity, title_of
 from scm.mismatch.report.write import PAGE
 
 
@@ -24,9 +20,9 @@ def summary(diagnosis: Diagnosis, out: Path, retuned_m: float | None = None) -> 
     """Return the verdict, each effect, how much better, and where the page is.
 
     Args:
-        diagnosis: To be told.
+        diagnosis: What was found.
         out: Folder of the report.
-        retuned_m: Error of the car with its own numbers refitted alone; None: not said.
+        retuned_m: Error of the car with its own numbers refitted alone; None: not mentioned.
     """
     return "\n".join(_lines(diagnosis, out, retuned_m))
 
@@ -41,8 +37,8 @@ def _lines(diagnosis: Diagnosis, out: Path, retuned_m: float | None) -> Iterator
         yield f"  undecided: {' or '.join(map(title_of, question.between))}"
         yield f"    drive this: {question.drive_this}"
     for left in diagnosis.unanswered:
-        yield f"  left unasked: {left.text}"
-    if busy := processor_said(diagnosis):
+        yield f"  not answered: {left.text}"
+    if busy := processor_sentence(diagnosis):
         yield f"  {busy}"
     yield from _problems(diagnosis.data)
     yield from _better(diagnosis, retuned_m)
@@ -55,9 +51,9 @@ def _problems(problems: Sequence[DataProblem]) -> Iterator[str]:
     for problem in problems:
         key = (problem.text, problem.corrected, problem.record_instead)
         alike.setdefault(key, []).append(problem.channel)
-    for (said, corrected, instead), channels in alike.items():
+    for (text, corrected, instead), channels in alike.items():
         where = ", ".join(filter(None, ("recording", _sensors(channels))))
-        yield f"  {where}: {said}{f' ({corrected})' if corrected else ''}"
+        yield f"  {where}: {text}{f' ({corrected})' if corrected else ''}"
         if instead:
             yield f"    record instead: {instead}"
 
@@ -68,8 +64,7 @@ def _sensors(channels: Sequence[str]) -> str:
 
 
 def _numbers(effect: Effect) -> str:
-    listed = [f"{name_of(n, e.unit)} {interval(e)}" for n, e in effect.parameters.items()]
-    return effect.formula or "; ".join(listed)
+    return effect.formula or "; ".join(amounts(effect.parameters))
 
 
 def _better(diagnosis: Diagnosis, retuned_m: float | None) -> Iterator[str]:

@@ -40,7 +40,7 @@ def set_entry(text: str, section: str, key: str, entry: str) -> str:
 
 
 def set_list(text: str, key: str, names: Sequence[str], comment: str) -> str:
-    """Return the text with a list of names on top: kept ones stay, missing ones get a line."""
+    """Return the text with a list of names on top: missing ones get a line of their own."""
     found = re.search(rf"^{re.escape(key)}[ \t]*=[ \t]*(?=\[)", text, re.MULTILINE)
     if found is None:
         return _new_list(text, key, names, comment)
@@ -65,10 +65,10 @@ def _strings(body: str) -> list[tuple[str, int]]:
 
 def _with_last_comma(body: str) -> str:
     """Return the inside of a list so that more may follow."""
-    listed = _strings(body)
-    if not listed:
+    entries = _strings(body)
+    if not entries:
         return body.rstrip()
-    end = listed[-1][1]
+    end = entries[-1][1]
     closed = re.sub(r"#[^\n]*", "", body[end:]).strip().startswith(",")
     return (body if closed else f"{body[:end]},{body[end:]}").rstrip()
 
@@ -77,8 +77,8 @@ def _new_list(text: str, key: str, names: Sequence[str], comment: str) -> str:
     """Return the text with a list before its first section, where TOML wants it."""
     section = re.search(r"^[ \t]*\[", text, re.MULTILINE)
     at = section.start() if section else len(text)
-    listed = ", ".join(map(quoted, names))
-    return f"{text[:at].rstrip()}\n{key} = [{listed}]  # {comment}\n\n{text[at:]}"
+    entries = ", ".join(map(quoted, names))
+    return f"{text[:at].rstrip()}\n{key} = [{entries}]  # {comment}\n\n{text[at:]}"
 
 
 def end_of_value(text: str, start: int) -> int:

@@ -1,8 +1,8 @@
-"""Names, numbers and doubts in the words of the report."""
+"""Names, numbers and probabilities as a report writes them."""
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from scm.mismatch.findings import Effect, Estimate
 from scm.vehicles.describe_effects import all_effects
@@ -62,15 +62,15 @@ def quantities(values: Sequence[float], unit: str) -> list[str]:
     name, factor = next((name, per) for least, name, per in scales if largest >= least)
     space = "" if name == "°" else " "
     decimals = _decimals(largest * factor, 3)
-    said = []
+    texts = []
     for value in values:
         if not math.isfinite(value):
-            said.append("unknown")
+            texts.append("unknown")
             continue
         number = f"{value * factor:.{max(decimals, _decimals(value * factor, 2))}f}"
         number = number if math.log10(largest * factor or 1.0) < _MOST_DIGITS else f"{value:.3g}"
-        said.append(f"{number.replace('-', MINUS)}{space}{name}".rstrip())
-    return said
+        texts.append(f"{number.replace('-', MINUS)}{space}{name}".rstrip())
+    return texts
 
 
 def _decimals(value: float, digits: int) -> int:
@@ -91,10 +91,10 @@ def short(value: float) -> str:
     return text.replace("-", MINUS)
 
 
-def pretty(said: str) -> str:
+def pretty(text: str) -> str:
     """Return a sentence with units and signs as they are printed."""
-    said = said.replace("^2", "²").replace("^3", "³")
-    return _NEGATIVE.sub(f"\\1{MINUS}", said)
+    text = text.replace("^2", "²").replace("^3", "³")
+    return _NEGATIVE.sub(f"\\1{MINUS}", text)
 
 
 def interval(estimate: Estimate) -> str:
@@ -134,12 +134,25 @@ def percent(share: float) -> str:
 
 def sureness(effect: Effect) -> str:
     """Return how sure an effect is, and what else it might be."""
-    words = next((said for least, said in _SURE if effect.probability >= least), "Possible")
-    said = f"{words}: {percent(effect.probability)}"
+    words = next((words for least, words in _SURE if effect.probability >= least), "Possible")
+    text = f"{words}: {percent(effect.probability)}"
     if effect.alternatives:
-        best = max(effect.alternatives, key=lambda rival: rival.probability)
-        said += f". Next best is {title_of(best.name)}, {percent(best.probability)}"
-    return said + "."
+        best = max(effect.alternatives, key=lambda one: one.probability)
+        text += f". Next best is {title_of(best.name)}, {percent(best.probability)}"
+    return text + "."
+
+
+def name_of(name: str, unit: str) -> str:
+    """Return a parameter's name in words, without the unit that follows its value."""
+    suffix = "_" + unit.replace("*", "").replace("/", "").replace("^", "").lower()
+    ends = (suffix, "_mps2", "_rad_s", "_per_min") if unit != "1" else ()
+    stem = next((name.removesuffix(end) for end in ends if name.endswith(end)), name)
+    return stem.replace("_", " ")
+
+
+def amounts(parameters: Mapping[str, Estimate]) -> list[str]:
+    """Return each parameter with its value and interval."""
+    return [f"{name_of(name, e.unit)} {interval(e)}" for name, e in parameters.items()]
 
 
 def joined(names: Sequence[str], word: str = "and") -> str:

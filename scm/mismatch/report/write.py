@@ -1,6 +1,6 @@
 """Writes a report: `report.html`, `report.json`, `car.toml` and `pictures/` of one diagnosis.
 
-`drawn.json` holds what the pictures draw and the words beside them, for pages that draw themselves.
+`drawn.json` holds what the pictures draw and the sentences beside them, for other programs.
 """
 
 from pathlib import Path
@@ -8,13 +8,10 @@ from pathlib import Path
 from scm.errors import CarError
 from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Diagnosis
-from scm.mismatch.report.as_drawn import drawn_text
-from scm.mismatch.report.as_json import json_text
-from scm.mismatch.report.car_file import FILE, given_text, write_car
-from scm.mismatch.report.drawings import draw
-from scm.mismatch.report.own_files import write_own_terms
+from scm.mismatch.report.car_file import FILE, given_text, write_car, write_own_terms
+from scm.mismatch.report.fields import drawn_text, json_text
 from scm.mismatch.report.page import page_html
-from scm.mismatch.report.shown_time import on_clock, since_start
+from scm.mismatch.report.record import make_report, on_clock
 from scm.vehicles.car import Car
 
 PAGE, FIELDS, DRAWN, PICTURES = "report.html", "report.json", "drawn.json", "pictures"
@@ -24,7 +21,7 @@ GIVEN, WINDOWS = "given.toml", "windows.csv"
 def write_report(
     diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car, out: Path, check: str = ""
 ) -> None:
-    """Write everything into the folder `out`, which is made where it is missing.
+    """Write everything into the folder `out`, which is made if it is missing.
 
     Args:
         diagnosis: What was found.
@@ -33,31 +30,26 @@ def write_report(
         patched: The same with the effects found. An effect outside the library is one of its own,
             read from a file that is still there; the file is copied beside `car.toml`.
         out: Pictures of an earlier report there are removed.
-        check: The command that works out the report's figures again; empty: none is printed.
+        check: The command that computes the report's figures again; empty: none is printed.
     """
     pictures = out / PICTURES
     pictures.mkdir(parents=True, exist_ok=True)
     for old in pictures.glob("*.svg"):
         old.unlink()
-    (out / FIELDS).write_text(json_text(on_clock(diagnosis, evidence)), encoding="utf-8")
-    use = _written_car(diagnosis, evidence, car, patched, out)
+    use = _write_car(diagnosis, evidence, car, patched, out)
     _write_windows(evidence, car, out)
     if check and diagnosis.fit is not None:
-        use += f". These figures are of that file; to work them out again: `{check}`"
-    diagnosis, evidence, start_s = since_start(diagnosis, evidence)
-    drawn = drawn_text(diagnosis, evidence, start_s)
-    (out / DRAWN).write_text(drawn, encoding="utf-8")
-    drawings = draw(diagnosis, evidence, start_s)
-    for picture in drawings.all():
+        use += f". These figures are of that file; to compute them again: `{check}`"
+    report = make_report(diagnosis, evidence, car, patched)
+    (out / FIELDS).write_text(json_text(on_clock(diagnosis, evidence)), encoding="utf-8")
+    (out / DRAWN).write_text(drawn_text(report), encoding="utf-8")
+    for picture in report.pictures.all():
         (pictures / f"{picture.name}.svg").write_text(picture.as_file(), encoding="utf-8")
-    page = page_html(diagnosis, evidence, drawings, (car, patched), use)
-    (out / PAGE).write_text(page, encoding="utf-8")
+    (out / PAGE).write_text(page_html(report, use), encoding="utf-8")
 
 
-def _written_car(
-    diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car, out: Path
-) -> str:
-    """Write the car file, and return what to do with it; a report is worth more than its file."""
+def _write_car(diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car, out: Path) -> str:
+    """Write the car file, and return what to do with it; without it there is still a report."""
     try:
         files = write_car(diagnosis, evidence, car, patched, out)
     except CarError as error:
@@ -74,7 +66,7 @@ def _written_car(
 
 
 def _write_windows(evidence: Evidence, car: Car, out: Path) -> None:
-    """Write the car as given and when each window starts, so that anybody can drive them again."""
+    """Write the car as given and when each window starts, to simulate them again."""
     (out / GIVEN).write_text(given_text(car), encoding="utf-8")
     write_own_terms(car, out)
     runs = evidence.free_runs

@@ -12,7 +12,7 @@ from scm.errors import RecordingError, ScmError
 from scm.mismatch.budget import DEFAULT_S, Budget
 from scm.mismatch.diagnose import Found, diagnose_car, told, write
 from scm.mismatch.findings import Effect, Undecided, Verdict
-from scm.mismatch.report.several_page import write_several
+from scm.mismatch.report.cars_page import write_several
 from scm.mismatch.select.alternatives import TIE
 from scm.mismatch.several.findings import Common, Sight
 from scm.mismatch.several.shared_effects import CAUSES, compared

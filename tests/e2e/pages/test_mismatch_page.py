@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from scm.fleet import LockstepLink
 from scm.maps.load import load_map
-from scm.mismatch.report.several_page import write_several
+from scm.mismatch.report.cars_page import write_several
 from scm.mismatch.report.write import write_report
 from scm.play import play, write_recording
 from scm.runtime.lockstep import Lockstep
@@ -83,7 +83,7 @@ def searching(running, shelf, tmp_path_factory):
 
 @pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_the_report_can_be_looked_at(look, shelf, size, theme):
-    look("/mismatch/two-effects", "mismatch", size, theme, ready=".runs svg path.curve.after")
+    look("/mismatch/two-effects", "mismatch", size, theme, ready="#runs svg path.band-after")
 
 
 def test_the_list_finds_a_report_and_opens_it(look, shelf, searching):
@@ -96,7 +96,7 @@ def test_the_list_finds_a_report_and_opens_it(look, shelf, searching):
     page.fill("input[type=search]", "healthy")
     page.wait_for_function("() => document.querySelectorAll('.reports .cards > li').length === 1")
     page.click(".reports .cards a")
-    page.wait_for_selector(".head .sentence >> text=Nothing beyond noise")
+    page.wait_for_selector("h1 >> text=Nothing beyond noise")
     assert page.url.endswith("/mismatch/healthy")
 
 
@@ -121,40 +121,32 @@ def test_cars_of_one_search_tell_what_they_share_and_lead_to_each_other(visit, s
     assert page.url.endswith("/mismatch/fleet.n2")
 
 
-def test_map_and_time_line_show_the_same_moment(visit, shelf):
+def test_maps_and_time_line_show_the_same_moment(visit, shelf):
     page = visit("/mismatch/two-effects").page
-    page.wait_for_selector(".time-line")
-    page.locator(".time-line").hover(position={"x": 200, "y": 120})
-    page.wait_for_selector(".time-line .cursor", state="attached")
-    before = page.get_attribute(".floor .moment", "cx")
+    page.locator("#when svg").hover(position={"x": 300, "y": 120})
+    page.wait_for_selector("#when svg path.moment", state="attached")
+    dot = page.locator("#where svg circle.moment").first
+    before = dot.get_attribute("cx")
     page.focus("input[aria-label='Moment of the recording']")
     for _ in range(30):
         page.keyboard.press("ArrowRight")
-    assert page.get_attribute(".floor .moment", "cx") != before
-    assert " s at x " in page.inner_text(".where-when .said")
-    page.click("button:has-text('yaw moment')")
-    assert "yaw moment" in page.inner_text(".where-when .said")
-    assert page.locator(".floor .place").count() == 1
-    assert page.locator(".time-line .span").count() == 4
+    assert dot.get_attribute("cx") != before
+    told = page.inner_text("p.moment")
+    assert " s at x " in told
+    assert "yaw moment" in told
+    page.locator("#where svg").first.hover(position={"x": 100, "y": 100})
+    assert page.inner_text("p.moment") != told
+    page.check("#show-after")
+    assert page.locator("#where .side-after").first.is_visible()
+    assert not page.locator("#where .side-before").first.is_visible()
 
 
-def test_windows_of_free_runs_are_chosen_by_keyboard(visit, shelf):
-    page = visit("/mismatch/two-effects").page
-    window = page.locator("input[aria-label=Window]")
-    first = int(window.input_value())
-    told = page.inner_text(".runs .legend-line")
-    assert "no fit has seen it" in told
-    window.press("Home")
-    assert page.inner_text(".runs .legend-line").startswith("Window 1 of 30")
-    page.click("button:has-text('Worst unseen window')")
-    assert int(window.input_value()) == first
-
-
-def test_rivals_and_files_are_told(visit, shelf, running):
+def test_alternatives_and_files_can_be_read(visit, shelf, running):
     visited = visit("/mismatch/two-effects")
     page = visited.page
-    page.locator("summary", has_text="ruled out").first.click()
-    page.wait_for_selector(".rivals >> text=The error does not grow with time.")
+    page.wait_for_selector("#tried >> text=The error does not grow with time.")
+    page.click("nav a:has-text('free runs')")
+    assert page.url.endswith("/mismatch/two-effects")
     with page.expect_download() as saved:
         page.click("a.button:has-text('report.json')")
     assert saved.value.suggested_filename == "two-effects-report.json"
@@ -175,11 +167,11 @@ def test_a_suggested_drive_is_sent_to_a_car_and_stopped(visit, shelf, running):
     visited = visit("/mismatch/undecided")
     page = visited.page
     page.wait_for_selector(".drive select")
-    asked = page.locator(".question h2").all_inner_texts()
+    asked = page.locator(".panel.question h2").all_inner_texts()
     assert [text.removeprefix("Undecided").strip() for text in asked] == [
         "Motor gain or payload?", "Motor gain or aero drag?",
     ]  # fmt: skip
-    page.wait_for_selector(".question dd code:text-is('scm play')")
+    page.wait_for_selector(".card.question dd code:text-is('scm play')")
     page.select_option(".drive select", "n2")
     page.click("button:has-text('Drive this with n2')")
     page.keyboard.press("Escape")
@@ -248,6 +240,6 @@ def test_a_real_search_ends_in_a_report_that_can_be_read(visit, shelf, running, 
     assert row["state"] == "done", row
     assert row["result"].startswith("/mismatch/turns-")
     page = visit(row["result"]).page
-    page.wait_for_selector(".head .sentence")
-    page.wait_for_selector(".runs svg path.curve.after")
+    page.wait_for_selector(".sheet h1")
+    page.wait_for_selector("#runs svg path.band-after")
     assert "nigel" in page.inner_text(".head .facts")

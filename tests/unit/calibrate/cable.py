@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from scm.clock import NS_PER_MS
-from scm.mismatch.report.own_files import listed_terms
+from scm.mismatch.report.car_file import term_names
 from scm.mismatch.report.toml_text import set_entry, set_list
 from scm.vehicles.car import load_car
 from tests.unit.calibrate.rig import LIMITS, START, STEP_NS, T0, Eye, Hidden
@@ -68,7 +68,7 @@ class Emulated:
     def write(self, path):
         """Write its car file, the dead-band left out: the emulator has it as an argument."""
         car = load_car("nigel")
-        text = set_list(car.path.read_text(), "terms", listed_terms(car.with_terms(TERMS)), "mine")
+        text = set_list(car.path.read_text(), "terms", term_names(car.with_terms(TERMS)), "mine")
         own = (("steering", "trim_rad", self.trim), ("steering", "gain", self.gain),
                ("drive", "gain", self.drive), ("steering", "rate_rad_s", self.rate))  # fmt: skip
         for section, name, value in own:

@@ -13,7 +13,7 @@ from scm.mismatch.diagnose import diagnose_car
 from scm.mismatch.discovery.decide import Lawful, _Best, _Settled
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.report.first_screen import cards_of
+from scm.mismatch.report.panels import panels_of
 from scm.mismatch.select.many_effects import ManyEffectsSearch
 from scm.mismatch.select.search import Search
 from scm.records.mismatch import BUDGET_S
@@ -250,7 +250,7 @@ def test_a_diagnosis_without_time_is_fitted_and_judged_and_says_what_it_left(no_
     assert no_time.evidence.tried == ()
     assert found.effects == ()
     assert names(found.unasked) == ["effects", "laws"]
-    (card,) = (c for c in cards_of(found, no_time.evidence) if c.title == "Time ran out")
+    (card,) = (c for c in panels_of(found, no_time.evidence) if c.title == "Time ran out")
     assert "Laws outside the library were not sought: the budget of 0 s ended." in card.rows[0][1]
 
 

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from scm.mismatch.findings import Estimate
-from scm.mismatch.report.as_json import json_text, plain
-from scm.mismatch.report.shown_time import on_clock
+from scm.mismatch.report.fields import json_text, plain
+from scm.mismatch.report.record import on_clock
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_up_findings import replace
 

@@ -3,7 +3,7 @@
 import pytest
 
 from scm.mismatch.findings import Estimate
-from scm.mismatch.report.places import sensors
+from scm.mismatch.report.sentences import sensors
 from scm.mismatch.report.wording import interval, pretty, quantities, short
 
 

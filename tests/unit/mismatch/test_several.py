@@ -11,7 +11,7 @@ import pytest
 from scm.__main__ import main
 from scm.commands import mismatch
 from scm.mismatch.findings import Estimate, Undecided, Verdict
-from scm.mismatch.report.several_page import several_html, several_summary, write_several
+from scm.mismatch.report.cars_page import several_html, several_summary, write_several
 from scm.mismatch.several.diagnose import _is_settled, cars_of
 from scm.mismatch.several.findings import CarSight, Cause, Common, Sight
 from scm.mismatch.several.verdict import all_alike, conclusion

@@ -51,31 +51,6 @@ export function ends(lists, through = null) {
   return low <= high ? [low, high] : [0, 1];
 }
 
-/** Path data through points; a gap where either number is unknown. */
-export function line(xs, ys, x, y) {
-  let data = "";
-  let pen = "M";
-  for (let i = 0; i < xs.length; i++) {
-    if (xs[i] === null || ys[i] === null || ys[i] === undefined) {
-      pen = "M";
-      continue;
-    }
-    data += `${pen}${x(xs[i]).toFixed(1)} ${y(ys[i]).toFixed(1)}`;
-    pen = "L";
-  }
-  return data;
-}
-
-/** Path data of the area between two lines. */
-export function area(xs, low, high, x, y) {
-  const kept = xs.map((_, i) => i).filter((i) => low[i] !== null && high[i] !== null);
-  if (!kept.length) return "";
-  const point = (i, side) => `${x(xs[i]).toFixed(1)} ${y(side[i]).toFixed(1)}`;
-  const there = kept.map((i) => point(i, high)).join("L");
-  const back = kept.toReversed().map((i) => point(i, low)).join("L");
-  return `M${there}L${back}Z`;
-}
-
 /** Grid lines with their numbers, and what the axes are. */
 export function Grid({ x, y, box, across, up, countX = 6, countY = 4, write = String }) {
   const { left, right, top, bottom } = box;

@@ -8,30 +8,24 @@ import { go } from "scm/shell/router.js";
 import { city, useTopics, world } from "scm/shell/store.js";
 import { DriveFloor, leavesFloor } from "scm/pages/mismatch/drive_floor.js";
 import { useFetched } from "scm/pages/mismatch/fetched.js";
-import { Facts } from "scm/pages/mismatch/effects.js";
 import { Bar, isActive, useJobs } from "scm/pages/mismatch/jobs.js";
 import { ends, Grid, scale, useWidth } from "scm/pages/mismatch/plot.js";
 import { short } from "scm/pages/mismatch/words.js";
 
-export const isQuestion = (card, drawn) => card.kind === "question" && card.label === "Undecided" && drawn.questions.length > 0;
-
-/** @param number of the question: cards of questions stand in their order */
+/** @param number of the question: drives stand in their order */
 export function Question({ question, number, report, onDriven }) {
-  const told = report.drawn.questions[number];
-  const card = report.drawn.cards.filter((one) => isQuestion(one, report.drawn))[number];
-  const rows = (card?.rows ?? [["Do this", question.drive_this]]).map(([name, said]) => [name, said]);
-  const drive = report.drives.includes(told.folder) ? told.folder : null;
+  const { titles, folder } = report.drawn.questions[number];
+  const drive = report.drives.includes(folder) ? folder : null;
+  const title = report.drawn.cards.filter((card) => card.label === "Undecided")[number]?.title ?? titles.join(" or ");
   return html`
-    <section class="panel question" aria-label="Undecided: ${told.titles.join(" or ")}">
+    <section class="panel question" aria-label="Undecided: ${titles.join(" or ")}">
       <div class="panel-head">
-        <h2><span class="label">Undecided</span>${card?.title ?? `${told.titles.join(" or ")}?`}</h2>
+        <h2><span class="label">Undecided</span>${title}</h2>
       </div>
-      <div class="two">
-        <${Facts} rows=${rows} />
-        ${drive
-          ? html`<${Drive} report=${report} drive=${drive} onDriven=${onDriven} />`
-          : html`<p class="empty">No drive on this floor would tell them apart.</p>`}
-      </div>
+      <p>${question.drive_this}</p>
+      ${drive
+        ? html`<${Drive} report=${report} drive=${drive} onDriven=${onDriven} />`
+        : html`<p class="empty">No drive on this floor would tell them apart.</p>`}
     </section>
   `;
 }

@@ -1,13 +1,11 @@
-/** One report as a page: what, where, when, how much, how sure, how much better, and what to drive next. */
+/** One report: its page `report.html`, and what the city can do about it. */
+import { useEffect, useRef, useState } from "preact/hooks";
+import { placed } from "scm/shared/base.js";
 import { html } from "scm/shared/html.js";
-import { Curves } from "scm/pages/mismatch/curves.js";
-import { EffectCard, PlainCard, TogetherCard } from "scm/pages/mismatch/effects.js";
 import { useFetched } from "scm/pages/mismatch/fetched.js";
-import { FreeRuns } from "scm/pages/mismatch/free_runs.js";
-import { Files, Head } from "scm/pages/mismatch/head.js";
-import { FitTable, OwnNumbers, Tried } from "scm/pages/mismatch/numbers.js";
-import { isQuestion, Question } from "scm/pages/mismatch/question.js";
-import { WhereWhen } from "scm/pages/mismatch/where_when.js";
+import { Head } from "scm/pages/mismatch/head.js";
+import { linkMoments } from "scm/pages/mismatch/moments.js";
+import { Question } from "scm/pages/mismatch/question.js";
 
 export function Report({ name }) {
   const { body, error, again } = useFetched(`/mismatch/reports/${encodeURIComponent(name)}`);
@@ -21,61 +19,69 @@ export function Report({ name }) {
     `;
   }
   if (!body) return html`<p class="empty">Reading the report …</p>`;
-  if (!body.drawn || !body.report) return html`<${Bare} report=${body} />`;
-  return html`<${Whole} report=${body} again=${again} />`;
-}
-
-function Whole({ report, again }) {
-  const { report: fields, drawn } = report;
-  const effects = drawn.cards.filter((card) => card.kind === "effect").slice(0, fields.effects.length);
-  const others = drawn.cards.filter((card) => !effects.includes(card) && !isQuestion(card, drawn));
-  const found = new Set(fields.effects.map((effect) => effect.name));
+  const questions = body.drawn && body.report ? body.report.undecided : [];
   return html`
     <div class="report">
-      <${Head} report=${report} />
-      ${drawn.residuals.length > 0 && html`<${WhereWhen} drawn=${drawn} />`}
-      <div class="cards">
-        ${effects.map(
-          (card, i) => html`<${EffectCard} key=${i} card=${card} index=${i} report=${fields} drawn=${drawn} />`,
+      <${Head} report=${body} />
+      <${Sheet} report=${body}>
+        ${body.together && html`<${Together} name=${name} together=${body.together} />`}
+        ${questions.map(
+          (question, i) => html`<${Question} key=${i} question=${question} number=${i} report=${body} onDriven=${again} />`,
         )}
-        ${others.map((card, i) => html`<${PlainCard} key=${i} card=${card} />`)}
-        ${report.together && html`<${TogetherCard} name=${report.row.name} together=${report.together} />`}
-      </div>
-      ${fields.undecided.map(
-        (question, i) => html`
-          <${Question}
-            key=${i}
-            question=${question}
-            number=${i}
-            report=${report}
-            onDriven=${again}
-          />
-        `,
-      )}
-      ${drawn.free_runs && html`<${FreeRuns} runs=${drawn.free_runs} />`}
-      <div class="columns">
-        <div>
-          ${fields.fit && html`<${FitTable} fit=${fields.fit} />`}
-          <${Curves} curves=${drawn.curves} effects=${drawn.effects} />
-        </div>
-        <div>
-          <${OwnNumbers} numbers=${drawn.numbers} />
-          <${Tried} tried=${drawn.tried} found=${found} />
-        </div>
-      </div>
-      ${drawn.other_problems && html`<p class="hint">${drawn.other_problems}</p>`}
+      <//>
     </div>
   `;
 }
 
-/** A report that nothing can be drawn of: of an older version, or damaged. */
-function Bare({ report }) {
+/** The report's own page, in its own style; children stand below its first screen. */
+function Sheet({ report, children }) {
+  const ref = useRef(null);
+  const [error, setError] = useState("");
+  const address = `/api/v1/mismatch/reports/${encodeURIComponent(report.row.name)}/files/report.html`;
+  useEffect(() => {
+    const quit = new AbortController();
+    fetch(placed(address), { signal: quit.signal })
+      .then((response) => (response.ok ? response.text() : Promise.reject(new Error("its page is missing"))))
+      .then((text) => show(ref.current, text, report.drawn))
+      .catch((reason) => quit.signal.aborted || setError(reason.message));
+    return () => quit.abort();
+  }, [address]);
+  if (error) return html`<p class="panel" role="alert">The report cannot be drawn: ${error}.</p>`;
+  return html`<div class="sheet" ref=${ref}><div class="below">${children}</div></div>`;
+}
+
+function show(host, text, drawn) {
+  const within = (tag) => text.split(`<${tag}>`)[1]?.split(`</${tag}>`)[0] ?? "";
+  const style = new CSSStyleSheet();
+  style.replaceSync(within("style"));
+  const root = host.shadowRoot ?? host.attachShadow({ mode: "open" });
+  root.adoptedStyleSheets = [style];
+  const page = new DOMParser().parseFromString(`<main>${within("main")}</main>`, "text/html");
+  page.querySelectorAll("script, iframe, object, embed, form").forEach((one) => one.remove()); // it has none
+  root.replaceChildren(page.querySelector("main"));
+  const below = document.createElement("slot");
+  (root.querySelector(".cards") ?? root.querySelector("main")).after(below);
+  for (const link of root.querySelectorAll('a[href^="#"]')) {
+    link.addEventListener("click", (event) => {
+      event.preventDefault(); // an address within a shadow tree is none of the document's
+      root.querySelector(link.getAttribute("href"))?.scrollIntoView();
+    });
+  }
+  if (drawn) linkMoments(root, drawn);
+}
+
+/** What the cars of one search share, and the way to each one's report. */
+function Together({ name, together }) {
+  const others = together.cars.filter((car) => car !== name);
   return html`
-    <section class="panel">
-      <p class="trail"><a href="/mismatch">Mismatch</a> / ${report.row.name}</p>
-      <h2>This report cannot be drawn</h2>
-      <p>It was written by an older version, or its files are damaged. What there is can be downloaded.</p>
-      <${Files} report=${report} />
-    </section>
+    <article class="panel card" data-kind="together">
+      <p class="label">Together with the other cars</p>
+      <h2>${together.said}</h2>
+      ${together.conclusions.map((text) => html`<p key=${text}>${text}</p>`)}
+      <p>
+        Their reports:
+        ${others.map((car, i) => html`${i ? ", " : " "}<a key=${car} href="/mismatch/${car}">${car.split(".")[1]}</a>`)}
+      </p>
+    </article>
   `;
 }

@@ -1,34 +1,37 @@
 """The page of several cars: each car's verdict with its report, and what they have in common."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
+from scm.maps.svg import element
 from scm.mismatch.findings import Diagnosis, Estimate
-from scm.mismatch.report.advice import advice_of
-from scm.mismatch.report.as_json import plain
-from scm.mismatch.report.first_screen import card, name_of
-from scm.mismatch.report.html_text import around, section, table, tag
-from scm.mismatch.report.page import document
-from scm.mismatch.report.several_picture import seen_picture
+from scm.mismatch.report.fields import plain
+from scm.mismatch.report.html_text import around, figure, section, table, tag
+from scm.mismatch.report.page import document, panel_html
+from scm.mismatch.report.panels import Panel
+from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
+from scm.mismatch.report.sentences import advice_of, can_judge, count, verdict_sentence
 from scm.mismatch.report.summary import summary
-from scm.mismatch.report.verdict_text import can_judge, count, verdict_sentence
 from scm.mismatch.report.wording import (
+    amounts,
     capital,
-    interval,
     joined,
+    name_of,
     pretty,
     quantities,
     quantity,
     title_of,
+    unit_text,
 )
 from scm.mismatch.report.write import PAGE
 from scm.mismatch.several.findings import CarSight, Cause, Common, Sight
 
 CARS, POSITION = "cars.json", "position_m"
-_SAYS: Mapping[Sight, str] = {
+_ANSWERS: Mapping[Sight, str] = {
     Sight.SEES: "sees it",
     Sight.ADDS: "too weak alone, adds to the others",
     Sight.CANNOT_TELL: "cannot tell",
@@ -38,9 +41,11 @@ _LABELS: Mapping[Cause, str] = {
     Cause.CAMERA: "The camera", Cause.TAGS: "Tags and camera", Cause.FLOOR: "The floor",
 }  # fmt: skip
 _NOTHING = (
-    "No car's report names anything that an overhead camera or a floor does to every car, and "
-    "their drives taken together show none either."
+    "No car's report contains an effect that an overhead camera or a floor has on every car, and "
+    "their drives together show none either."
 )
+_WIDTH, _ROW, _MAX_LABEL = 440.0, 25.0, 200.0  # [px]
+_MAX_SPREADS = 6.0  # shown of an interval, in spreads of the cars' values
 
 
 def write_several(
@@ -100,8 +105,8 @@ def several_html(
     head += "".join(tag("p", f"Not diagnosed: {why}") for why in failed)
     kind = "mismatch" if common or any(one.effects for one in cars.values()) else "none"
     body = around("header", around("div", head, "words"), f"verdict {kind}")
-    body += around("div", "".join(_car_card(*one) for one in cars.items()), "cards")
-    shared = [_common_card(one, cars) for one in common]
+    body += around("div", "".join(_car_html(*one) for one in cars.items()), "cards")
+    shared = [_shared_effect(one, cars) for one in common]
     body += around("div", "".join(shared), "cards") if shared else ""
     body += "".join(_seen(one) for one in common)
     return document(f"{joined(list(cars))}: {sentence}", body)
@@ -129,11 +134,11 @@ def several_summary(cars: Mapping[str, Diagnosis], common: Sequence[Common], out
     lines = [line for name, one in cars.items() for line in (f"{name}:", summary(one, out / name))]
     lines.append(common_sentence(common))
     for one in common:
-        lines += [f"  {one.name}  {_amounts(one.parameters, '; ')}", f"    {one.conclusion}"]
+        lines += [f"  {one.name}  {'; '.join(amounts(one.parameters))}", f"    {one.conclusion}"]
     return "\n".join([*lines, f"  {out / PAGE}"])
 
 
-def _car_card(name: str, diagnosis: Diagnosis) -> str:
+def _car_html(name: str, diagnosis: Diagnosis) -> str:
     """Return a car's verdict with a link to its report."""
     kind = "effect" if diagnosis.effects else "clear"
     kind = "question" if diagnosis.undecided else kind
@@ -154,49 +159,88 @@ def _errors(diagnosis: Diagnosis) -> str:
     return tag("p", f"{what}: {before} before, {after} after.")
 
 
-def _common_card(common: Common, cars: Mapping[str, Diagnosis]) -> str:
+def _shared_effect(common: Common, cars: Mapping[str, Diagnosis]) -> str:
     effects = [e for one in cars.values() for e in one.effects if e.name == common.name]
     rows = [
         ("What", pretty(common.said)),
-        ("How much", _amounts(common.parameters, "\n")),
-        ("Whose", common.conclusion),
+        ("How much", "\n".join(amounts(common.parameters))),
+        ("Cause", common.conclusion),
         ("What to do", advice_of(effects[0]) if effects else ""),
     ]
     label = _LABELS[common.cause] if common.shared else "One car's own"
-    label = label if common.shared or _is_told(common) else "Whose is open"
-    return card("effect", label, capital(title_of(common.name)), rows)
-
-
-def _is_told(common: Common) -> bool:
-    return any(c.sight is Sight.OTHERWISE for c in common.cars)
-
-
-def _amounts(parameters: Mapping[str, Estimate], mark: str) -> str:
-    return mark.join(f"{name_of(n, e.unit)} {interval(e)}" for n, e in parameters.items())
+    is_contradicted = any(c.sight is Sight.OTHERWISE for c in common.cars)
+    label = label if common.shared or is_contradicted else "Cause undecided"
+    return panel_html(Panel("effect", label, capital(title_of(common.name)), rows))
 
 
 def _seen(common: Common) -> str:
-    """Return what each car's recordings say of an effect, for experts."""
+    """Return what each car's recordings show of an effect, for experts."""
     rows = [_row(one) for one in common.cars]
-    head = ("Car", "Its own value", "Says", "Found alone", "Gains", "Needed", "Misses")
+    head = ("Car", "Its own value", "Result", "Found alone", "Gains", "Needed", "Misses")
     words = (
         "Gains: what the shared value explains of the car's recordings, in squared standard "
-        "deviations; needed: what its numbers cost, for nobody searched for them there. Misses: "
-        f"squared deviation of the car's own value from the others'; {count(_knobs(common))} "
-        "would be usual."
+        "deviations; needed: the complexity penalty of its numbers. Misses: "
+        "squared deviation of the car's own value from the others'; "
+        f"{count(len(common.parameters))} would be usual."
     )
-    picture = seen_picture(common)
+    pictures = "".join(
+        figure(_picture(common, name, shared)) for name, shared in common.parameters.items()
+    )
     title = f"Who sees {title_of(common.name)}"
     body = table(head, rows, (4, 5, 6)) + tag("p", words, "use")
-    return section(f"seen-{common.name.replace(' ', '-')}", title, picture, body)
+    return section(
+        f"seen-{common.name.replace(' ', '-')}", title, around("div", pictures, "grid"), body
+    )
 
 
 def _row(one: CarSight) -> tuple[str, ...]:
     alone = "yes" if one.alone else "no"
     numbers = (f"{value:.0f}" for value in (one.gain, one.needed))
-    own = _amounts(one.own, "\n")
-    return one.car, own, _SAYS[one.sight], alone, *numbers, f"{one.misses:.1f}"
+    own = "\n".join(amounts(one.own))
+    return one.car, own, _ANSWERS[one.sight], alone, *numbers, f"{one.misses:.1f}"
 
 
-def _knobs(common: Common) -> int:
-    return len(common.parameters)
+def _picture(common: Common, name: str, shared: Estimate) -> Picture | None:
+    rows = [(one.car, one.own[name]) for one in common.cars if name in one.own]
+    if not all(math.isfinite(v) for _, e in rows for v in (e.value, e.low, e.high)):
+        return None
+    low, high = _span([shared, *(e for _, e in rows)])
+    left = min(_MAX_LABEL, 14.0 + TEXT_PX * max(len(car) for car, _ in rows))
+    height = 30.0 + _ROW * len(rows) + 44.0
+    room = frame((low, high), (0.0, 1.0), (_WIDTH, height), margins=(left, 14, 26, 44))
+
+    def at(value: float) -> float:
+        return room.across.at(min(high, max(low, value)))
+
+    begin, end = at(shared.low), at(shared.high)
+    parts = [
+        element("rect", x=begin, y=room.top, width=max(end - begin, 1.0),
+                height=room.bottom - room.top, class_="prior-core")
+    ]  # fmt: skip
+    parts += ticks_across(room)
+    for i, (car, own) in enumerate(rows):
+        y = 40.0 + _ROW * i
+        across = f"M{at(own.low):.1f} {y:.1f}H{at(own.high):.1f}"
+        parts += [text(left - 8, y + 4, car, "end", "title")]
+        parts += [element("path", d=across, class_="whisker")]
+        parts += [element("circle", cx=f"{at(own.value):.1f}", cy=f"{y:.1f}", r="5", class_="dot")]
+    unit = f" [{unit_text(shared.unit)}]" if unit_text(shared.unit) else ""
+    words = f"{name_of(name, shared.unit)}{unit}"
+    parts += [text(room.right, height - 8, words, "end", "title")]
+    area = "what the cars share" if common.shared else "what the one car shows that sees it"
+    return Picture(
+        name=f"{common.name}_{name}", title="",
+        caption=f"Dots: each car's own value, with 90 % intervals. Area: {area}.",
+        svg=picture_svg(_WIDTH, height, parts, f"{common.name}: {name} by car"),
+    )  # fmt: skip
+
+
+def _span(every: Sequence[Estimate]) -> tuple[float, float]:
+    """Return a span that shows all values, and of intervals as much as is worth it."""
+    values = [e.value for e in every]
+    widths = sorted(e.high - e.low for e in every)
+    wide = max(max(values) - min(values), widths[0], 1e-6)
+    low = max(min(e.low for e in every), min(values) - _MAX_SPREADS * wide)
+    high = min(max(e.high for e in every), max(values) + _MAX_SPREADS * wide)
+    margin = 0.08 * (high - low)
+    return low - margin, high + margin

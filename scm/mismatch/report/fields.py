@@ -1,7 +1,7 @@
-"""What a report draws and says, as data: for a page that draws it itself and lets people ask.
+"""A report as JSON: `report.json` holds the findings, `drawn.json` what its pictures draw.
 
-Words are those of the report's own page. Times are those that the page shows: since the start where
-the recording's clock counts from 1970. Long arrays are thinned, and numbers rounded.
+What is not a finite number is null. In `drawn.json` times are those that the page shows, long
+arrays are thinned, and numbers rounded.
 """
 
 import json
@@ -9,72 +9,84 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.evidence import Evidence, FreeRuns, Residual
+from scm.mismatch.evidence import FreeRuns, Residual
 from scm.mismatch.experiment.folders import folders_of
 from scm.mismatch.findings import Diagnosis, Effect
-from scm.mismatch.report.as_json import plain
-from scm.mismatch.report.drawings import strength
-from scm.mismatch.report.first_screen import better_said, cards_of, name_of
-from scm.mismatch.report.problems import other_problems_said
-from scm.mismatch.report.verdict_text import all_named, can_judge, verdict_sentence
-from scm.mismatch.report.wording import capital, interval, title_of
+from scm.mismatch.report.record import Report
+from scm.mismatch.report.wording import capital, interval, name_of, title_of
 from scm.vehicles.describe_effects import all_effects, neutral_of, params_of
 
-_MOST_RESIDUALS, _MOST_POINTS, _MOST_TIMES = 6, 1500, 40
+_MAX_RESIDUALS, _MAX_POINTS, _MAX_TIMES = 6, 1500, 40
 _DIGITS = 5
 _MILLI = 3  # decimals of metres and radians of free runs
 
 
-def drawn_text(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> str:
-    """Return the text of `drawn.json`; `start_s` was taken off all times already."""
-    return json.dumps(drawn(diagnosis, evidence, start_s), ensure_ascii=False, allow_nan=False)
+def json_text(diagnosis: Diagnosis) -> str:
+    """Return the text of `report.json`."""
+    return json.dumps(plain(diagnosis), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def drawn(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> dict[str, Any]:
-    """Return lists, mappings, text, and finite numbers or None; the README of the fields is here.
+def plain(value: Any) -> Any:
+    """Return a value as lists, mappings, text, and finite numbers or None."""
+    return msgspec.json.decode(msgspec.json.encode(value, enc_hook=_of_numpy))
 
-    `effects` and `questions` stand in the order of the report's; `cards` are its first screen.
+
+def drawn_text(report: Report) -> str:
+    """Return the text of `drawn.json`."""
+    return json.dumps(drawn(report), ensure_ascii=False, allow_nan=False)
+
+
+def drawn(report: Report) -> dict[str, Any]:
+    """Return the fields of `drawn.json`; this function is their documentation.
+
+    `effects` and `questions` are in the order of the report's; `cards` are its first screen.
     `residuals` come strongest first, `free_runs` as (windows, times).
     """
-    residuals = sorted(evidence.residuals, key=strength, reverse=True)[:_MOST_RESIDUALS]
-    runs = evidence.free_runs
+    diagnosis, evidence, runs = report.diagnosis, report.evidence, report.evidence.free_runs
+    folders = folders_of(diagnosis.undecided)
     return {
         "vehicle": evidence.vehicle,
         "recordings": list(evidence.recordings),
-        "start_s": start_s,
-        "said": verdict_sentence(diagnosis),
-        "named": all_named(diagnosis.effects),
-        "better": better_said(diagnosis, evidence.retuned_m),
-        "can_judge": can_judge(diagnosis),
+        "start_s": report.start_s,
+        "said": report.sentence,
+        "named": report.named,
+        "better": report.better,
+        "can_judge": report.can_judge,
         "retuned_m": plain(evidence.retuned_m),
         "cards": [
-            {"kind": card.kind, "label": card.label, "title": card.title,
-             "rows": [list(row) for row in card.rows if row[1]]}
-            for card in cards_of(diagnosis, evidence)
+            {"kind": panel.kind, "label": panel.label, "title": panel.title,
+             "rows": [list(row) for row in panel.rows if row[1]]}
+            for panel in report.panels
         ],
-        "other_problems": other_problems_said(diagnosis, evidence),
+        "other_problems": report.other_problems,
         "effects": [_effect(effect) for effect in diagnosis.effects],
         "questions": [
             {"titles": [capital(title_of(name)) for name in question.between], "folder": folder}
-            for question, folder in zip(
-                diagnosis.undecided, folders_of(diagnosis.undecided), strict=True
-            )
+            for question, folder in zip(diagnosis.undecided, folders, strict=True)
         ],
         "located": plain(diagnosis.located),
         "data": plain(diagnosis.data),
-        "residuals": [_residual(residual) for residual in residuals],
+        "residuals": [_residual(residual) for residual in evidence.residuals[:_MAX_RESIDUALS]],
         "free_runs": None if runs is None or not len(runs.start_s) else _runs(runs),
         "curves": [_rounded(plain(curve)) for curve in evidence.curves],
-        "numbers": [_rounded(plain(ordinary)) for ordinary in evidence.refitted],
+        "numbers": [_rounded(plain(number)) for number in evidence.refitted],
         "tried": [
             {"name": one.name, "title": capital(title_of(one.name)), **_rounded(
                 {"gain": one.gain, "needed": one.needed})}
             for one in sorted(evidence.tried, key=lambda one: -one.gain)
         ],
     }  # fmt: skip
+
+
+def _of_numpy(value: Any) -> Any:
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    msg = f"{type(value)} has no form in JSON"
+    raise NotImplementedError(msg)
 
 
 def _effect(effect: Effect) -> dict[str, Any]:
@@ -95,29 +107,29 @@ def _effect(effect: Effect) -> dict[str, Any]:
             }
             for name, estimate in effect.parameters.items()
         ],
-        "rivals": [capital(title_of(rival.name)) for rival in effect.alternatives],
+        "rivals": [capital(title_of(one.name)) for one in effect.alternatives],
     }
 
 
 def _residual(residual: Residual) -> dict[str, Any]:
-    keep = slice(None, None, max(1, math.ceil(len(residual.t_s) / _MOST_POINTS)))
+    rows = slice(None, None, max(1, math.ceil(len(residual.t_s) / _MAX_POINTS)))
     arrays = {
-        name: [_round(v) for v in getattr(residual, name)[keep].tolist()]
+        name: [_round(v) for v in getattr(residual, name)[rows].tolist()]
         for name in ("t_s", "x_m", "y_m", "before", "after", "std")
     }
     return {"channel": residual.channel, "unit": residual.unit, **arrays}
 
 
 def _runs(runs: FreeRuns) -> dict[str, Any]:
-    keep = slice(None, None, max(1, math.ceil(len(runs.t_s) / _MOST_TIMES)))
+    times = slice(None, None, max(1, math.ceil(len(runs.t_s) / _MAX_TIMES)))
 
     def side(of: Mapping[str, Floats]) -> dict[str, Any]:
-        return {name: _milli(of[name][:, keep]) for name in ("x", "y", "yaw")}
+        return {name: _milli(of[name][:, times]) for name in ("x", "y", "yaw")}
 
     return {
         "part": list(runs.part),
         "start_s": _milli(runs.start_s),
-        "t_s": _milli(runs.t_s[keep]),
+        "t_s": _milli(runs.t_s[times]),
         "measured": side(runs.measured),
         "before": side(runs.before),
         "after": side(runs.after),
@@ -125,13 +137,7 @@ def _runs(runs: FreeRuns) -> dict[str, Any]:
 
 
 def _milli(values: Floats) -> Any:
-    return _finite(np.round(values, _MILLI).tolist())
-
-
-def _finite(values: Any) -> Any:
-    if isinstance(values, list):
-        return [_finite(value) for value in values]
-    return values if math.isfinite(values) else None
+    return plain(np.round(values, _MILLI))
 
 
 def _rounded(fields: Any) -> Any:
