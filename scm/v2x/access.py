@@ -1,11 +1,10 @@
-"""Who may do what at the router: Zenoh's access control, made from the fleet file.
+"""Access control at the router: Zenoh's rules, generated from the fleet file.
 
-What was learnt about Zenoh 1.10 and is kept to here: the router must be allowed to tell a station
-who subscribes and who serves (`declare_*` on egress, broad, for it is matched by inclusion), else
-a declared publisher falls silent after a while; a request for kept events reaches its cache on a
-broad key, so `query` on egress is broad too; and an advanced publisher and its subscribers meet on
-keys below `<key>/@adv`. None of the three tells a station anything: it gets only what it may ask
-for, and may only ask for what its rights name.
+Three facts of Zenoh 1.10 shape the rules. The router must be allowed to declare subscribers and
+services to a station (`declare_*` on egress, broad, since it is matched by inclusion), or a
+declared publisher stops sending after a while. A query for cached events reaches its cache on a
+broad key, so `query` on egress is broad too. An advanced publisher and its subscribers use keys
+below `<key>/@adv`. None of this reveals data: a station receives only what its rights allow.
 """
 
 import ipaddress
@@ -36,19 +35,19 @@ CITY_PARTS = (
 )
 
 SCRIPT = "script"
-"""Who a script is that the dashboard runs: an operator, however much the server itself may do."""
+"""Station of scripts that the dashboard runs: an operator, whatever the server itself may do."""
 
 _Rule = dict[str, object]
 
 
 @dataclass(frozen=True, slots=True)
 class Guard:
-    """How a city that runs on this machine keeps its router.
+    """The router's access settings of a city on this machine.
 
     Attributes:
         listen: The router's endpoint.
-        connect: The one that the city's own stations reach it by.
-        settings: For `Router`; None: everybody on this machine may enter.
+        connect: The endpoint for the city's own stations.
+        settings: For `Router`; None: everybody on this machine may connect.
         files: Credentials of the city's own stations.
     """
 
@@ -58,33 +57,33 @@ class Guard:
     files: Mapping[str, Path] = field(default_factory=dict)
 
     def arguments(self, station: str) -> tuple[str, ...]:
-        """Return what the program of a station has to be given."""
+        """Return the command-line arguments for a station's program."""
         return ("--credentials", str(self.files[station])) if station in self.files else ()
 
     def credentials(self, station: str) -> Credentials | None:
-        """Return who a station in this process is."""
+        """Return the credentials of a station in this process."""
         return read_credentials(self.files[station], station) if station in self.files else None
 
 
 def guard_of(
     fleet_file: Path | None, city: str, listen: str, stations: Mapping[str, str], now: datetime
 ) -> Guard:
-    """Return the guard of a city with a fleet file, or with none.
+    """Return the access settings of a city, with or without a fleet file.
 
     Args:
-        fleet_file: None: everybody on this machine may enter.
+        fleet_file: None: everybody on this machine may connect.
         city: Chunk of all keys.
         listen: The router's endpoint, with a port.
-        stations: The city's own (name -> role), see `own_stations`; added where missing.
+        stations: The city's own (name -> role), see `own_stations`; missing ones are added.
         now: For certificates.
 
     Raises:
-        AccessError: when the file is wrong, or does not suit the endpoint.
+        AccessError: when the file is invalid or does not suit the endpoint.
     """
     if fleet_file is None:
         return Guard(listen, listen)
     fleet = load_fleet(fleet_file)
-    settings_first = router_settings(fleet, city, listen)  # refuse before anything is written
+    settings_first = router_settings(fleet, city, listen)  # raises before anything is written
     files = credentials_of(fleet, stations, now)
     settings = {**settings_first, "access_control": access_control(fleet, city)}
     connect = listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
@@ -92,22 +91,22 @@ def guard_of(
 
 
 def own_stations(eyes: Iterable[str], agents: Iterable[str]) -> dict[str, str]:
-    """Return the stations that a whole city starts itself, with their roles."""
+    """Return the stations that a city starts itself, with their roles."""
     parts, cars = dict.fromkeys((*CITY_PARTS, *eyes), "part"), dict.fromkeys(agents, "vehicle")
     return parts | {SCRIPT: "operator"} | cars
 
 
 def router_settings(fleet: Fleet, city: str, listen: str) -> dict[str, object]:
-    """Return what a fleet adds to the configuration of the router of a city.
+    """Return what a fleet adds to the configuration of a city's router.
 
     Args:
-        fleet: Whose stations may enter.
+        fleet: The fleet whose stations may connect.
         city: Chunk of all keys.
         listen: The router's endpoint.
 
     Raises:
-        AccessError: when the endpoint does not suit the fleet: passwords go over the wire as they
-            are, so for them it must be of this machine; certificates need `tls/...`.
+        AccessError: when the endpoint does not suit the fleet. Passwords travel in plain text, so
+            they need an endpoint of this machine; certificates need `tls/...`.
     """
     is_tls = listen.startswith("tls/")
     if fleet.auth == "mtls" and not is_tls:
@@ -130,7 +129,7 @@ def is_local(endpoint: str) -> bool:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether only this machine can reach what is bound to `host`."""
+    """Return whether only this machine can reach an address bound to `host`."""
     if host == "localhost":
         return True
     try:
@@ -140,7 +139,7 @@ def is_loopback(host: str) -> bool:
 
 
 def credentials_of(fleet: Fleet, stations: Mapping[str, str], now: datetime) -> dict[str, Path]:
-    """Return the credentials files of a city's own stations (name -> role), made where missing."""
+    """Return the credentials files of a city's own stations (name -> role); create missing ones."""
     complete(fleet, stations, now)
     return {name: fleet.credentials(name) for name in stations}
 
@@ -161,7 +160,7 @@ def _transport(fleet: Fleet) -> dict[str, object]:
 
 
 def access_control(fleet: Fleet, city: str) -> dict[str, object]:
-    """Return Zenoh's `access_control`: everything is denied but what the fleet's roles may do."""
+    """Return Zenoh's `access_control`: deny everything except what the fleet's roles allow."""
     everyone = [member.name for member in fleet.members.values()]
     rules = [_declarations(city)]
     policies: list[dict[str, object]] = [{"rules": [rules[0]["id"]], "subjects": everyone}]
@@ -181,7 +180,7 @@ def access_control(fleet: Fleet, city: str) -> dict[str, object]:
 
 
 def _declarations(city: str) -> _Rule:
-    """Return the rule by which the router tells every station who listens and who asks."""
+    """Return the rule that lets the router declare subscribers and queries to every station."""
     city_keys = prefix(city)
     keys = [
         *(city_keys + key for key in ("**", "v/*/@camera/*", "eye/*/@preview", "eye/*/@picture")),

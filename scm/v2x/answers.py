@@ -1,8 +1,8 @@
-"""Answers by request id: whoever asks again gets the stored one, and the effect happens once.
+"""Stored answers by request id: a repeated request gets the stored answer, so its effect is once.
 
-An answer is kept for `KEPT_NS`, and at the very least for `SURE_NS`: when there is no room without
-forgetting a younger one, new requests are refused until there is. A request id belongs to one
-request: with another content it is refused, also while the first one is still being worked on.
+An answer is stored for `RETENTION_NS`, at least for `MIN_RETENTION_NS`: if the cache is full of
+younger answers, new requests are refused. A request id belongs to one request: with other content
+it is refused, even while the first one is still being processed.
 """
 
 import hashlib
@@ -27,11 +27,11 @@ TRANSIENT = ("offline", "timeout")
 
 
 class StoredAnswer(msgspec.Struct, kw_only=True, frozen=True):
-    """An answer as it is stored.
+    """A stored answer.
 
     Attributes:
         t_ns: When the request arrived.
-        asked: Digest of the request, its id included, its trace not.
+        digest: Of the request with its id, without its trace; `asked` in the store.
         refused: Whether the reply is a `Refused`.
         reply: The reply as JSON.
     """
@@ -44,21 +44,21 @@ class StoredAnswer(msgspec.Struct, kw_only=True, frozen=True):
 
 @dataclass(slots=True)
 class _Waiting:
-    """A request under way, and all who asked it."""
+    """A request in progress, and all copies of it."""
 
     digest: str
     items: list[Incoming] = field(default_factory=list)
 
 
 class AnswerCache:
-    """The answers of one station.
+    """The stored answers of one station.
 
     Args:
         stored: Answers of earlier runs, by key.
-        most: How many are kept at most.
+        most: Maximum number of stored answers.
 
     Attributes:
-        forgotten: Keys that a store need not hold any more; whoever takes them empties the list.
+        dropped: Keys that can be deleted from a store; the reader empties the list.
     """
 
     def __init__(
@@ -71,11 +71,11 @@ class AnswerCache:
         self.dropped = [key for key, _ in by_age[:-most]]
 
     def check(self, item: Incoming, closed: str = "") -> Answer | Literal["do", "wait"]:
-        """Return what a request that came in meets: an answer, an order to do it, or a wait.
+        """Return a request's stored answer, or whether to do it now or to wait for a running one.
 
         Args:
             item: The request.
-            closed: Why nothing new can be done now; empty: it can.
+            closed: Why no new requests are accepted now; empty: they are.
         """
         request = _request(item)
         if not request.request_id:
@@ -90,16 +90,16 @@ class AnswerCache:
         if known is not None:
             return _again(item, known, digest)
         if not closed and not self._has_room(item.t_ns):
-            closed = f"{len(self._answers)} answers are kept already: ask again later"
+            closed = f"{len(self._answers)} answers are stored already: try again later"
         if closed:
             return _no(item, "offline", closed)
         self._waiting[key] = _Waiting(digest, [item])
         return "do"
 
     def record(self, answer: Answer) -> tuple[str, StoredAnswer] | None:
-        """Return what is to be stored of an answer, with its key; None: nothing.
+        """Return an answer's key and stored form, or None if it is not stored.
 
-        That something cannot be done just now is not stored: asked again, it may be done.
+        Refusals for a temporary reason are not stored, so that a repeated request can succeed.
         """
         request, reply = _request(answer.to), answer.reply
         if not request.request_id or (isinstance(reply, Refused) and reply.code in TRANSIENT):
@@ -112,9 +112,9 @@ class AnswerCache:
         )
 
     def complete(self, answer: Answer) -> list[Answer]:
-        """Keep an answer that is safe; return it for everybody who waits for it.
+        """Store an answer and return it for every copy of its request.
 
-        A second answer to the same request changes nothing.
+        A second answer to the same request is ignored.
         """
         request = _request(answer.to)
         if not request.request_id:
@@ -147,7 +147,7 @@ class AnswerCache:
 
 
 def _again(item: Incoming, known: StoredAnswer | _Waiting, digest: str) -> Answer | Literal["wait"]:
-    """Return what a request meets whose id came before."""
+    """Return the result for a request whose id is known."""
     request = _request(item)
     if known.digest != digest:
         detail = f"request_id: {request.request_id!r} was used for another request already"
@@ -160,7 +160,7 @@ def _again(item: Incoming, known: StoredAnswer | _Waiting, digest: str) -> Answe
 
 
 def key_of(request: Request) -> str:
-    """Return under what key the answer to a request is stored: safe, short, whatever its id is."""
+    """Return the key of a request's answer: short and valid for any request id."""
     digest = hashlib.blake2b(request.request_id.encode(), digest_size=16).hexdigest()
     return f"{type(request).__name__}/{digest}"
 
@@ -178,7 +178,7 @@ def _reply(request: Request, stored: StoredAnswer) -> Message:
     kind = Refused if stored.refused else request.REPLY
     try:
         return decode(kind, bytes(stored.reply))
-    except MessageError as cause:  # stored by another version: it was done, and stays done
+    except MessageError as cause:  # stored by another version: the request was done
         detail = f"request_id: {request.request_id!r} was answered already; {cause}"
         return Refused(code="invalid", detail=detail)
 

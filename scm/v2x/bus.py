@@ -1,9 +1,9 @@
-"""The bus contract: publish, subscribe, ask, answer, and know who is there.
+"""The bus contract: publish, subscribe, request, answer, and presence.
 
-Two buses keep it: `ZenohBus` between processes and machines, `MemoryBus` inside one. The same
-contract test runs over both. Nothing here calls back into a part: what arrives waits in a bounded
-`Mailbox` until its owner drains it, the oldest dropped (and counted) when it is full. Whoever
-subscribes to what it publishes itself receives it too.
+`ZenohBus` implements it between processes and machines, `MemoryBus` inside one process; the same
+contract test covers both. The bus never calls back into a part: arrivals wait in a bounded
+`Mailbox` until its owner drains it; when it is full the oldest are dropped and counted. A station
+that subscribes to its own messages receives them too.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,8 +23,8 @@ class Bus(Protocol):
 
     Attributes:
         city: Whose keys are used.
-        station: The name this connection is known by.
-        session: Which run of the station this is: no two connections ever share it.
+        station: The name of this connection.
+        session: Unique id of this connection.
         rejected: How many arrivals were dropped because they could not be read.
     """
 
@@ -34,7 +34,7 @@ class Bus(Protocol):
 
     @property
     def connected(self) -> bool:
-        """Whether the city can be reached now; what is published meanwhile is dropped."""
+        """Whether the city is reachable now; messages published while it is not are dropped."""
         ...
 
     @property
@@ -43,14 +43,14 @@ class Bus(Protocol):
         ...
 
     def publish(self, message: Message) -> None:
-        """Send a message on its own key; never blocks for a slow receiver."""
+        """Send a message on its own key; never blocks on a slow receiver."""
         ...
 
     def subscribe(self, kind: type[Message], where: Mapping[str, str], mailbox: Mailbox) -> None:
-        """Bring messages of a class into a mailbox until the bus is closed.
+        """Deliver messages of a class to a mailbox until the bus is closed.
 
-        Of an EVENT the last ones of each sender that is still there come first. `Presence` tells
-        of everybody who is there already, then who comes and goes.
+        For an EVENT the last ones of each sender that is still present come first. For `Presence`
+        all present stations come first, then arrivals and departures.
         """
         ...
 
@@ -60,38 +60,38 @@ class Bus(Protocol):
         kind: type[Message] | None = None,
         where: Mapping[str, str] | None = None,
     ) -> None:
-        """Bring everything that is published in the city into a mailbox, unread.
+        """Deliver everything that is published in the city to a mailbox, undecoded.
 
-        Messages whose key has a verbatim chunk (`@camera`) come only to those who name their
-        class: `kind` asks for one class alone, `where` for some of it.
+        Messages whose key has a verbatim chunk (`@camera`) are delivered only if `kind` names their
+        class; `where` selects some of that class.
         """
         ...
 
     def unsubscribe(self, mailbox: Mailbox) -> None:
-        """Bring nothing more into a mailbox; what waits in it stays."""
+        """Stop delivery to a mailbox; its contents stay."""
         ...
 
     def is_wanted(self, kind: type[Message], where: Mapping[str, str]) -> bool:
         """Return whether anybody subscribes to messages of a class; cheap enough for each step.
 
-        Key parts left out of `where` match everything: it is true if any of them is wanted.
+        Key parts left out of `where` match everything.
         """
         ...
 
     def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:
-        """Bring requests of a class into a mailbox; each waits there for its `answer`."""
+        """Deliver requests of a class to a mailbox; each needs an `answer`."""
         ...
 
     def answer(self, answer: Answer) -> None:
-        """Reply to a request that came from `serve`; a second answer to the same is ignored."""
+        """Reply to a request from `serve`; a second answer to the same request is ignored."""
         ...
 
     def call(self, call: Call, on_reply: Callable[[Incoming], None]) -> None:
-        """Ask, and hand the reply (or a `Refused`) to `on_reply` later; never blocks.
+        """Send a request and pass the reply (or a `Refused`) to `on_reply` later; never blocks.
 
-        Of several servers the first that does not refuse is heard; if all do, the last one with
-        another reason than `not_found`. `on_reply` runs once, perhaps on a thread of the bus: it
-        may only fill a mailbox or set an event.
+        Of several services the first that does not refuse counts; if all refuse, the last one with
+        another reason than `not_found`. `on_reply` runs once, maybe on a thread of the bus: it may
+        only fill a mailbox or set an event.
         """
         ...
 
@@ -114,10 +114,10 @@ class Bus(Protocol):
 
 
 def check_reply(answer: Answer) -> None:
-    """Refuse to send a reply of a class that the request does not promise.
+    """Check that a reply has the class that its request declares.
 
     Raises:
-        MessageError: naming both.
+        MessageError: when it has not.
     """
     request, reply = answer.to.message, answer.reply
     if not isinstance(request, Request):
@@ -132,19 +132,19 @@ def check_reply(answer: Answer) -> None:
 
 
 def no_server(request: Request, key: str) -> Refused:
-    """Return the refusal of a request that nobody serves."""
+    """Return the refusal of a request without a service."""
     detail = f"{request.server} is not running, or cannot be reached"
     return Refused(code="offline", detail=detail, asked=_describe(request, key))
 
 
 def no_link(request: Request, key: str) -> Refused:
-    """Return the refusal of a request that cannot even leave."""
+    """Return the refusal of a request that cannot be sent."""
     detail = "the city cannot be reached: there is no connection to its router"
     return Refused(code="offline", detail=detail, asked=_describe(request, key))
 
 
 def more_informative(before: Refused | None, now: Refused) -> Refused:
-    """Return which of two refusals to tell: whoever knows the thing says more than who does not."""
+    """Return the more informative of two refusals: any other reason beats `not_found`."""
     return before if before is not None and now.code == "not_found" else now
 
 

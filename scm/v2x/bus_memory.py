@@ -1,8 +1,8 @@
 """The bus inside one process: the same contract without a network, in a fixed order.
 
-Every message is written to bytes and read back, as on a wire: nobody can change what another one
-holds, and what would not survive the wire does not survive here. With a stepped clock everything
-that happens is a function of the order of calls, so a run can be repeated bit for bit.
+Every message is encoded and decoded as on a network, so stations share no objects and nothing
+passes that could not be sent. With a stepped clock the result depends only on the order of calls,
+so runs repeat bit for bit.
 """
 
 import heapq
@@ -31,7 +31,7 @@ OnReply = Callable[[Incoming], None]
 
 @dataclass(eq=False)
 class _Subscription:
-    """Who wants what: `deliver` puts one arrival into the wisher's mailbox."""
+    """One subscription: `deliver` puts an arrival into the subscriber's mailbox."""
 
     owner: "MemoryBus"
     expression: str
@@ -49,7 +49,7 @@ class _Service:
 
 @dataclass(eq=False)
 class _PendingCall:
-    """A call under way: settled by the first real reply, by a refusal when all refuse, or time."""
+    """An open call: finished by the first reply, by a refusal when all refuse, or by timeout."""
 
     by: "MemoryBus"
     call: Call
@@ -76,11 +76,11 @@ class _PendingCall:
 
 
 class MemoryNetwork:
-    """What connects the memory buses of one process.
+    """Connects the memory buses of one process.
 
     Args:
         clock: The time.
-        faults: What goes wrong on the way; None: nothing.
+        faults: Simulated network faults; None: none.
     """
 
     def __init__(self, clock: Clock, faults: Faults | None = None) -> None:
@@ -106,7 +106,7 @@ class MemoryNetwork:
         return bus
 
     def expire(self) -> None:
-        """Bring what was late until now, and refuse every call that has waited for too long."""
+        """Deliver delayed items that are due, and refuse calls that have timed out."""
         while self._delayed and self._delayed[0][0] <= self.clock.now_ns():
             with self.lock:
                 heapq.heappop(self._delayed)[2]()
@@ -122,7 +122,7 @@ class MemoryNetwork:
     def transmit(
         self, sender: "MemoryBus", receiver: "MemoryBus", deliver_now: Callable[[], None]
     ) -> None:
-        """Bring something from one station to another, as the faults will have it."""
+        """Deliver something from one station to another, subject to the faults."""
         if self.faults is None or sender is receiver:
             deliver_now()
             return
@@ -135,11 +135,11 @@ class MemoryNetwork:
                 deliver_now()
 
     def route(self, sample: RawSample, sender: "MemoryBus | None" = None) -> None:
-        """Deliver a sample to everybody who wishes it, in the order they wished.
+        """Deliver a sample to all its subscribers, in the order of their subscriptions.
 
         Args:
             sample: What is sent.
-            sender: Whose; None: it reaches everybody, whatever the faults.
+            sender: Its station; None: it is delivered without faults.
         """
         with self.lock:
             subscriptions = self._routes.get(sample.key)
@@ -159,12 +159,12 @@ class MemoryNetwork:
             subscription.deliver(replace(sample, t_ns=self.clock.now_ns()))
 
     def deliver_request(self, service: _Service, pending: _PendingCall, sample: RawSample) -> None:
-        """Bring a request to who offered to answer it, if it is still there."""
+        """Deliver a request to a service if that is still connected."""
         if service.owner.connected:
             service.deliver(pending, replace(sample, t_ns=self.clock.now_ns()))
 
     def add_subscription(self, subscription: _Subscription) -> None:
-        """Remember a wish, and deliver what others kept for late joiners."""
+        """Add a subscription and deliver what others retain for late joiners."""
         with self.lock:
             self.subscriptions.append(subscription)
             self._forget_routes()
@@ -175,13 +175,13 @@ class MemoryNetwork:
                     subscription.deliver(replace(sample, t_ns=now_ns))
 
     def remove_subscriptions(self, mailbox: Mailbox) -> None:
-        """Forget what was to come into a mailbox."""
+        """Remove the subscriptions of a mailbox."""
         with self.lock:
             self.subscriptions = [w for w in self.subscriptions if w.mailbox is not mailbox]
             self._forget_routes()
 
     def has_subscriber(self, expression: str) -> bool:
-        """Return whether anybody wishes something that matches."""
+        """Return whether any subscription matches an expression."""
         with self.lock:
             known = self._matched.get(expression)
             if known is None:
@@ -193,12 +193,12 @@ class MemoryNetwork:
             return known
 
     def _forget_routes(self) -> None:
-        """Find out anew who subscribes to what, since that has changed."""
+        """Clear cached routes after a change of subscriptions."""
         self._routes.clear()
         self._matched.clear()
 
     def leave(self, bus: "MemoryBus") -> None:
-        """Forget a bus and everything it wished, offered, kept and asked."""
+        """Remove a bus with its subscriptions, services, retained messages and calls."""
         with self.lock:
             self.buses.remove(bus)
             self.subscriptions = [w for w in self.subscriptions if w.owner is not bus]
@@ -259,7 +259,7 @@ class MemoryBus:
         return self._retained_count
 
     def retained(self, expression: str) -> list[tuple[tuple[int, int], RawSample]]:
-        """Return what this station keeps for late joiners: ((time, order), sample)."""
+        """Return what this station retains for late joiners: ((time, order), sample)."""
         return [
             ((sample.t_ns, order), sample)
             for key, samples in self._retained.items()
@@ -268,7 +268,7 @@ class MemoryBus:
         ]
 
     def subscribe(self, kind: type[Message], where: Mapping[str, str], mailbox: Mailbox) -> None:
-        """Bring messages of a class into a mailbox until the bus is closed."""
+        """Deliver messages of a class to a mailbox until the bus is closed."""
         self._check_open()
 
         read = self._reader.read_once if mailbox.once else self._reader.read
@@ -289,7 +289,7 @@ class MemoryBus:
         kind: type[Message] | None = None,
         where: Mapping[str, str] | None = None,
     ) -> None:
-        """Bring everything that is published, or one class of it, into a mailbox, unread."""
+        """Deliver everything that is published, or one class of it, to a mailbox, undecoded."""
         self._check_open()
 
         def deliver(sample: RawSample) -> None:
@@ -304,7 +304,7 @@ class MemoryBus:
         )
 
     def unsubscribe(self, mailbox: Mailbox) -> None:
-        """Bring nothing more into a mailbox; what waits in it stays."""
+        """Stop delivery to a mailbox; its contents stay."""
         self._check_open()
         self._network.remove_subscriptions(mailbox)
 
@@ -314,7 +314,7 @@ class MemoryBus:
         return self._network.has_subscriber(selector(self.city, kind, where))
 
     def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:
-        """Bring requests of a class into a mailbox; each waits there for its `answer`."""
+        """Deliver requests of a class to a mailbox; each needs an `answer`."""
         self._check_open()
 
         def deliver(pending: _PendingCall, sample: RawSample) -> None:
@@ -332,7 +332,7 @@ class MemoryBus:
             self._network.services.append(service)
 
     def answer(self, answer: Answer) -> None:
-        """Reply to a request that came from `serve`; a second answer to the same is ignored."""
+        """Reply to a request from `serve`; a second answer to the same request is ignored."""
         self._check_open()
         check_reply(answer)
         pending = self._to_answer.pop(answer.to, None)
@@ -345,7 +345,7 @@ class MemoryBus:
                 )
 
     def call(self, call: Call, on_reply: OnReply) -> None:
-        """Ask, and hand the reply (or a `Refused`) to `on_reply` later; never blocks."""
+        """Send a request and pass the reply (or a `Refused`) to `on_reply` later; never blocks."""
         self._check_open()
         self._network.expire()
         key = key_of(self.city, call.request)

@@ -1,9 +1,9 @@
 """The bus between processes and machines: one Zenoh client session, always closed.
 
-What was learnt about zenoh-python 1.10 and is kept to here: callbacks run directly on Zenoh's
-threads (`indirect=False`; with the default, a process that dies without closing hangs for ever),
-they only note the bytes and the time, and nothing is ever asked from within one. Publications
-never wait for a slow receiver. An empty result of a query is a failure, never an answer.
+Rules for zenoh-python 1.10: callbacks run directly on Zenoh's threads (`indirect=False`; with the
+default, a process that dies without closing hangs for ever), they only store bytes and time, and
+never send a query. Publications never wait for a slow receiver. An empty result of a query is a
+failure, never an answer.
 """
 
 import logging
@@ -41,7 +41,7 @@ MAX_OPEN_REQUESTS = 1024
 REQUERY_EVERY = timedelta(seconds=1)
 REQUERY_ALL_EVERY = timedelta(seconds=5)
 _TIMEOUT = b"Timeout"
-_FLOOD = "more than is read of one key in a second"
+_FLOOD = "more than is read from one key in a second"
 
 _log = logging.getLogger(__name__)
 
@@ -55,11 +55,11 @@ class _Publisher(Protocol):
 class ZenohBus:
     """One station's connection to the router of its city; see `scm.v2x.bus.Bus`.
 
-    Opening waits up to `connect_timeout_s` for the router. `credentials` say who the station is,
-    where the router asks.
+    Opening waits up to `connect_timeout_s` for the router. `credentials` authenticate the station
+    where the router requires it.
 
     Raises:
-        LinkError: when there is no router at the endpoint, or it lets the station not in.
+        LinkError: when there is no router at the endpoint, or it rejects the station.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class ZenohBus:
 
     @property
     def connected(self) -> bool:
-        """Whether the router can be reached now; what is published meanwhile is dropped."""
+        """Whether the router is reachable now; messages published while it is not are dropped."""
         return self._connected and not self._closed
 
     @property
@@ -104,9 +104,9 @@ class ZenohBus:
         return self._reader.rejected
 
     def publish(self, message: Message) -> None:
-        """Send a message on its own key; never blocks for a slow receiver.
+        """Send a message on its own key; never blocks on a slow receiver.
 
-        While disconnected only an EVENT is kept, for when the connection is back.
+        While disconnected only EVENTs are retained until the connection is back.
         """
         self._check_open()
         if self._signed is not None:
@@ -131,7 +131,7 @@ class ZenohBus:
             return publisher
 
     def subscribe(self, kind: type[Message], where: Mapping[str, str], mailbox: Mailbox) -> None:
-        """Bring messages of a class into a mailbox until the bus is closed."""
+        """Deliver messages of a class to a mailbox until the bus is closed."""
         self._check_open()
         expression = selector(self.city, kind, where)
         if kind.DELIVERY is Delivery.PRESENCE:
@@ -155,7 +155,7 @@ class ZenohBus:
             self._subscribers.append((mailbox, subscriber))
 
     def unsubscribe(self, mailbox: Mailbox) -> None:
-        """Bring nothing more into a mailbox; what waits in it stays."""
+        """Stop delivery to a mailbox; its contents stay."""
         self._check_open()
         with self._lock:
             ended = [thing for box, thing in self._subscribers if box is mailbox]
@@ -165,8 +165,7 @@ class ZenohBus:
     def is_wanted(self, kind: type[Message], where: Mapping[str, str]) -> bool:
         """Return whether anybody subscribes to messages of a class.
 
-        Zenoh tells it to whoever has declared to publish there: asking for `*` first keeps the
-        number of declarations small.
+        Zenoh reports it to declared publishers: checking `*` first keeps their number small.
         """
         self._check_open()
         expression = selector(self.city, kind, where)
@@ -175,7 +174,7 @@ class ZenohBus:
             if probe is None:
                 probe = self._matching[expression] = self._session.declare_publisher(expression)
                 self._declared.append(probe)
-        # The stubs say bool; it is an object that is always true.
+        # The stubs declare a bool; it is an object that is always true.
         status: Any = probe.matching_status
         return bool(status.matching)
 
@@ -204,7 +203,7 @@ class ZenohBus:
         kind: type[Message] | None = None,
         where: Mapping[str, str] | None = None,
     ) -> None:
-        """Bring everything that is published, or one class of it, into a mailbox, unread."""
+        """Deliver everything that is published, or one class of it, to a mailbox, undecoded."""
         self._check_open()
 
         def on_sample(key: str, body: bytes, attachment: bytes | None, t_ns: int) -> None:
@@ -221,7 +220,7 @@ class ZenohBus:
         self._declare(declare_event_subscriber(self._session, expression, callback, None, again))
 
     def serve(self, kind: type[Request], where: Mapping[str, str], mailbox: Mailbox) -> None:
-        """Bring requests of a class into a mailbox; each waits there for its `answer`."""
+        """Deliver requests of a class to a mailbox; each needs an `answer`."""
         self._check_open()
 
         gate = FloodGate()
@@ -259,7 +258,7 @@ class ZenohBus:
         return incoming
 
     def answer(self, answer: Answer) -> None:
-        """Reply to a request that came from `serve`; a second answer to the same is ignored."""
+        """Reply to a request from `serve`; a second answer to the same request is ignored."""
         self._check_open()
         check_reply(answer)
         with self._lock:
@@ -280,7 +279,7 @@ class ZenohBus:
             query.drop()  # type: ignore[no-untyped-call]
 
     def call(self, call: Call, on_reply: Callable[[Incoming], None]) -> None:
-        """Ask, and hand the reply (or a `Refused`) to `on_reply` later; never blocks."""
+        """Send a request and pass the reply (or a `Refused`) to `on_reply` later; never blocks."""
         self._check_open()
         key = key_of(self.city, call.request)
         pending = _PendingCall(call, on_reply, key, self._clock)
@@ -371,7 +370,7 @@ class ZenohBus:
 
 
 class _PendingCall:
-    """A call under way: settled by the first real reply, or at its end by a refusal."""
+    """An open call: finished by the first reply, or at its end by a refusal."""
 
     def __init__(
         self, call: Call, on_reply: Callable[[Incoming], None], key: str, clock: Clock
@@ -455,10 +454,10 @@ def _open(
 
 
 def requery_interval(kind: type[Message] | None, every: timedelta) -> timedelta | None:
-    """Return how often a subscriber asks for events it may have lost; None: it need not.
+    """Return how often a subscriber queries for events that it may have lost; None: never.
 
-    What comes at a rate shows a gap by its next sample. To ask each of a thousand cars for its trip
-    all the same filled both cores of a small machine for half a second, every time.
+    Periodic messages show a gap by their next sample. Querying each of a thousand cars for its trip
+    would keep both cores of a small machine busy for half a second each time.
     """
     return None if kind is not None and kind.RATE_HZ is not None else every
 
@@ -471,8 +470,8 @@ def _declare_publisher(session: zenoh.Session, kind: type[Message], key: str) ->
         priority = zenoh.Priority.REAL_TIME
     else:
         priority = zenoh.Priority.DATA if is_bulk(kind) else zenoh.Priority.DATA_HIGH
-    # Express sends each message alone. For commands only: a burst of 60 express states lost 10 to
-    # 40 % on a busy machine and took ten times as long; batched, none was lost or later.
+    # Express sends each message in its own batch. Only for commands: of a burst of 60 express
+    # states a busy machine lost 10 to 40 % and took ten times as long; batched, it lost none.
     return session.declare_publisher(
         key,
         priority=priority,

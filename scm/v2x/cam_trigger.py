@@ -1,11 +1,11 @@
-"""When a car owes the air a CAM: the generation rules, applied to the enlarged city.
+"""When a car sends a CAM: the generation rules, applied to the enlarged city.
 
     send if T >= T_min and (heading moved > 4 deg, position > 4 m or speed > 0.5 m/s since the last)
     or   if T >= T_gen                                        100 ms = T_min <= T_gen <= T_max = 1 s
 
-A send for motion sets T_gen to the interval it came after; three sends in a row without motion
-set it back to T_max. 4 m and 0.5 m/s are 0.286 m and 0.036 m/s on the table. Where a busy channel
-wants a longer gap between two frames, that gap (T_GenCam_DCC) stands in the place of T_min.
+A CAM sent for motion sets T_gen to the interval since the last one; three CAMs in a row without
+motion reset it to T_max. 4 m and 0.5 m/s are 0.286 m and 0.036 m/s on the table. If congestion
+control requires a longer gap between two frames, that gap (T_GenCam_DCC) replaces T_min.
 Source: EN 302 637-2 v1.4.1, 6.1.3 (same rule in TS 103 900 v2.2.1, 6.1.3).
 """
 
@@ -25,7 +25,7 @@ SPEED_MPS = 0.5 / SCALE
 
 
 class CamTrigger:
-    """The rule for one car; ask it at least every 100 ms."""
+    """The rule for one car; call `due` at least every 100 ms."""
 
     def __init__(self) -> None:
         self._sent: VehicleState | None = None
@@ -34,9 +34,9 @@ class CamTrigger:
         self._quiet = 0
 
     def due(self, state: VehicleState, now_ns: int, gap_ns: int = 0) -> bool:
-        """Return whether a CAM must go now; if so, it counts as sent.
+        """Return whether a CAM must be sent now; if so, it counts as sent.
 
-        `gap_ns` is the least time between two that congestion control allows.
+        `gap_ns` is the minimum gap of congestion control.
         """
         if self._sent is None:
             return self._send(state, now_ns)

@@ -1,6 +1,6 @@
-"""Certificates of a fleet: its own small authority, one certificate a station, one of the router.
+"""Certificates of a fleet: its own authority, one certificate per station, one for the router.
 
-ECDSA on P-256. A certificate is good for one purpose: a station's cannot pose as a router.
+ECDSA on P-256. A certificate has one purpose: a station's is not valid for a router.
 """
 
 import ipaddress
@@ -29,7 +29,7 @@ class Pair:
 
 
 def make_authority(name: str, now: datetime) -> Pair:
-    """Return a new authority that signs itself."""
+    """Return a new self-signed authority."""
     key = ec.generate_private_key(ec.SECP256R1())
     builder = (
         _builder(name, name, key, now, AUTHORITY_DAYS)
@@ -40,19 +40,19 @@ def make_authority(name: str, now: datetime) -> Pair:
 
 
 def issue_station(authority: Pair, name: str, now: datetime, days: int = STATION_DAYS) -> Pair:
-    """Return a station's certificate: `name` is its common name, by which the router knows it."""
+    """Return a station's certificate; the router identifies it by the common name `name`."""
     return _issue(authority, name, now, days, ExtendedKeyUsageOID.CLIENT_AUTH, ())
 
 
 def issue_router(
     authority: Pair, hosts: Sequence[str], now: datetime, days: int = STATION_DAYS
 ) -> Pair:
-    """Return the router's certificate, good at the addresses that stations reach it by."""
+    """Return the router's certificate, valid for the addresses that stations connect to."""
     return _issue(authority, "router", now, days, ExtendedKeyUsageOID.SERVER_AUTH, hosts)
 
 
 def expiry_of(pem: str) -> datetime:
-    """Return when a certificate ends, UTC."""
+    """Return when a certificate expires, UTC."""
     return x509.load_pem_x509_certificate(pem.encode()).not_valid_after_utc
 
 

@@ -1,7 +1,7 @@
-"""How long a frame holds the channel, and how seldom a car may speak on a busy one.
+"""Channel load and congestion control: air time of a frame, and the gap between two frames.
 
     air time  = 40 us + 8 us * ceil((16 + 8 bytes + 6) / (8 us * rate))        IEEE 802.11, 10 MHz
-    busy ratio = time of all frames heard / 100 ms                             CBR
+    busy ratio = time of all frames received / 100 ms                          CBR
     state goes up one step at once when the ratio exceeds its limit, down one when the ratio has
     stayed below the limit of the state below for five seconds
 
@@ -9,7 +9,7 @@
     ratio up to   0.30     0.40      0.50      0.65         1
     gap [ms]       50       100       200       250       1000      frames of at most 0.5 ms
 
-The rule for CAMs takes the gap as T_GenCam_DCC. Source: TS 102 687 v1.2.1, 5.3 and annex A (the
+The CAM rules use the gap as T_GenCam_DCC. Source: TS 102 687 v1.2.1, 5.3 and annex A (the
 table), v1.1.1 (up and down times); EN 302 637-2, 6.1.3.
 """
 
@@ -28,7 +28,7 @@ LIMITS: Floats = np.array([0.30, 0.40, 0.50, ACTIVE_3_LIMIT, np.inf])
 GAPS_NS: Ints = np.array([50, 100, 200, 250, 1000]) * NS_PER_MS
 
 BYTES = {"cam": 50, "cpm": 120, "denm": 50, "mapem": 210, "spatem": 44, "srem": 45, "ssem": 350}
-"""UPER of each kind as a small city says it, rounded; a CPM's is a guess: it has no UPER here."""
+"""Typical UPER size of each kind in a small city; that of a CPM, which has no UPER, is a guess."""
 # MAC 30, LLC 8, GeoNetworking 4 + 8 + 28, BTP 4, and a signature with the certificate's digest.
 OVERHEAD_BYTES = 82 + 96
 
@@ -37,7 +37,7 @@ _SPREAD = 0.618034
 
 
 def air_time(kind: str, data_rate_mbps: float) -> float:
-    """Return how long a frame of a kind holds the channel [s]; 0 on an endless one."""
+    """Return the air time of a frame [s]; 0 on a channel of unlimited rate."""
     if data_rate_mbps <= 0.0:
         return 0.0
     bits = 16 + 8 * (BYTES[kind] + OVERHEAD_BYTES) + 6
@@ -45,12 +45,12 @@ def air_time(kind: str, data_rate_mbps: float) -> float:
 
 
 def load_loss(offered: Floats, hidden_share: float) -> Floats:
-    """Return what share of frames a busy channel loses at each place.
+    """Return the share of frames lost to a busy channel at each place.
 
-        1 - exp(-2 h c) min(1, 1 / c)      c: offered load, h: share that senders do not hear
+        1 - exp(-2 h c) min(1, 1 / c)      c: offered load, h: share of hidden senders
 
-    Frames of senders that do not hear each other collide as in pure ALOHA (Abramson 1970); what is
-    offered beyond the channel's capacity is never sent.
+    Frames of senders that do not receive each other collide as in pure ALOHA (Abramson 1970); load
+    beyond the channel's capacity is never sent.
     """
     fits = np.minimum(1.0, 1.0 / np.maximum(offered, 1e-9))
     lost: Floats = 1.0 - np.exp(-2.0 * hidden_share * offered) * fits
@@ -58,13 +58,13 @@ def load_loss(offered: Floats, hidden_share: float) -> Floats:
 
 
 class ReactiveControl:
-    """The states of some stations; tell it the busy ratio of every window.
+    """Congestion control of some stations; update it with the busy ratio of every window.
 
-    Stations wait for 4 to 6 s before they speak more, each for its own time: else all would at
-    once, and be silent at once.
+    Each station waits for its own time of 4 to 6 s before it sends more often; otherwise all would
+    switch at once and oscillate.
 
     Attributes:
-        gap_ns: (n,) the least time between two frames of each.
+        gap_ns: (n,) minimum time between two frames of each.
     """
 
     def __init__(self, count: int) -> None:
@@ -75,7 +75,7 @@ class ReactiveControl:
         self.gap_ns: Ints = GAPS_NS[self._state]
 
     def update(self, ratio: Floats, now_ns: int) -> None:
-        """Take the busy ratio (n,) of the window that ends now."""
+        """Update with the busy ratio (n,) of the window that ends now."""
         state = self._state
         up = ratio > LIMITS[state]
         below = LIMITS[np.maximum(state - 1, 0)]
@@ -87,14 +87,14 @@ class ReactiveControl:
 
 
 class StationControl:
-    """The gap of one station on its own: by the busy ratio that it is told, else by what it hears.
+    """Congestion control of one station: by a reported busy ratio, or by the frames it receives.
 
-    What it hears is less than what is on the air: frames that got lost, and kinds that it does not
-    listen to, are not in it.
+    Received frames underestimate the load: lost frames and kinds that it does not subscribe to are
+    missing.
 
     Args:
-        data_rate_mbps: Of the channel; 0: endless, it is never busy.
-        is_on: Whether it is to be obeyed; else the gap is 0.
+        data_rate_mbps: Of the channel; 0: unlimited, it is never busy.
+        is_on: Whether congestion control is active; otherwise the gap is 0.
     """
 
     def __init__(self, data_rate_mbps: float, *, is_on: bool) -> None:
@@ -105,16 +105,16 @@ class StationControl:
         self._reported: tuple[float, int] | None = None
 
     def set_ratio(self, ratio: float, now_ns: int) -> None:
-        """Take the busy ratio where the station is, as somebody measured it."""
+        """Set the busy ratio measured at the station's place."""
         self._reported = ratio, now_ns
 
     def add_frame(self, kind: str, now_ns: int) -> None:
-        """Take a frame of a kind that is on the air now, also one of its own."""
+        """Add a received or sent frame to the channel load."""
         self._update(now_ns)
         self._air_s += air_time(kind, self._rate_mbps)
 
     def gap_ns(self, now_ns: int) -> int:
-        """Return the least time between two frames [ns]."""
+        """Return the minimum time between two frames [ns]."""
         if self._control is None:
             return 0
         self._update(now_ns)

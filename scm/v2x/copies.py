@@ -1,7 +1,7 @@
-"""Copies of one message on several keys: a frame of the air reaches many receivers.
+"""Copies of one message on several keys: one radio frame for many receivers.
 
-They differ in the first variable part of their key, which is their first field too, and are
-the same byte for byte after it. Who wants such a message once need not read it seven times.
+Copies differ only in the first variable part of their key, which is also their first field. A
+subscriber that wants such a message once reads it once.
 """
 
 from functools import lru_cache
@@ -10,36 +10,36 @@ from scm.v2x.key import names_in
 from scm.v2x.message import Message
 
 MIN_REMEMBERED = 2048
-"""As many are remembered at least, twice as many at most: two seconds of a thousand cars."""
+"""At least this many are remembered, at most twice as many: two seconds of a thousand cars."""
 
 
 class Copies:
-    """What was read lately of messages that come in copies."""
+    """The contents of recently read messages."""
 
     def __init__(self) -> None:
         self._new: set[bytes] = set()
         self._old: set[bytes] = set()
 
     def has(self, content: bytes) -> bool:
-        """Return whether the same was read before, on whichever key."""
+        """Return whether the same content was read before, on any key."""
         return content in self._new or content in self._old
 
     def add(self, content: bytes) -> None:
-        """Remember what was read."""
+        """Remember content that was read."""
         if len(self._new) >= MIN_REMEMBERED:
             self._new, self._old = set(), self._new
         self._new.add(content)
 
 
 def content_of(kind: type[Message], key: str, body: bytes) -> bytes | None:
-    """Return what all copies of a message share; None: it does not begin as its key says."""
+    """Return the content that all copies share, or None if the body does not match its key."""
     head, cut = _head(kind, key)
     return body[cut:] if head and body.startswith(head) else None
 
 
 @lru_cache(maxsize=65536)
 def _head(kind: type[Message], key: str) -> tuple[bytes, int]:
-    """Return how the text of a message on a key begins, and where the part of one copy ends."""
+    """Return the prefix of messages on a key, and the length of the part that differs."""
     names = names_in(kind, key)
     if names is None:
         return b"", 0

@@ -1,8 +1,8 @@
-"""The credentials file of one station: who it is, and how it proves it to the router.
+"""The credentials file of one station: its identity, and how it authenticates at the router.
 
-One TOML file, readable by its owner alone, to be copied to the computer that the station runs on.
-It holds either a password, or a certificate with its private key and the authority that the
-router's own certificate comes from.
+One TOML file, readable only by its owner, to be copied to the computer of the station. It holds
+either a password, or a certificate with its private key and the authority of the router's
+certificate.
 """
 
 import base64
@@ -21,16 +21,16 @@ OTHERS = stat.S_IRWXG | stat.S_IRWXO
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Credentials:
-    """What a station shows to the router.
+    """The credentials of one station.
 
     Attributes:
         station: Its name on the bus.
         role: Its role in the fleet file.
-        user: Name that goes with the password; empty with a certificate.
+        user: User name of the password; empty with a certificate.
         password: Empty with a certificate.
         certificate, private_key, authority: PEM; empty with a password.
-        ticket, ticket_key: What it signs on the air with, base64 and PEM; empty: it sends nothing.
-        air_authority: What others' tickets have to come from, base64; empty: nobody signs.
+        ticket, ticket_key: For signing V2X messages, base64 and PEM; empty: it sends none.
+        air_authority: Issuer of all tickets, base64; empty: messages are not signed.
     """
 
     station: str
@@ -66,10 +66,10 @@ def read_credentials(path: Path, station: str | None = None) -> Credentials:
 
     Args:
         path: Of the file.
-        station: Whose it has to be; None: anybody's.
+        station: Expected station; None: any.
 
     Raises:
-        AccessError: when it cannot be read, can be read by others, is not complete, or is of
+        AccessError: when it cannot be read, is readable by others, is incomplete, or belongs to
             another station.
     """
     try:
@@ -111,13 +111,13 @@ def _checked(path: Path, values: Mapping[str, object]) -> Credentials:
 
 
 def write_credentials(path: Path, credentials: Credentials) -> None:
-    """Write a credentials file over whatever was there."""
+    """Write a credentials file; replace an existing one."""
     lines = [f"{name} = {_toml(value)}" for name, value in asdict(credentials).items() if value]
     write_secret(path, "\n".join(lines) + "\n")
 
 
 def write_secret(path: Path, text: str) -> None:
-    """Write a file that only its owner can read, at once or not at all.
+    """Write a file that only its owner can read, atomically.
 
     Raises:
         AccessError: when it cannot be written.

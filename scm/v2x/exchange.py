@@ -1,4 +1,4 @@
-"""What passes between a part and its bus: things that come in, calls, and answers."""
+"""What a part exchanges with its bus: incoming items, calls, answers, and state to persist."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from scm.v2x.message import Message, Request
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Call:
-    """Ask a request of whoever serves it; the reply comes to a later inbox with `call` set."""
+    """Send a request; the reply comes in a later inbox with `call` set."""
 
     request: Request
     timeout_s: float = 2.0
@@ -18,10 +18,10 @@ class Call:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Incoming:
-    """One thing that reached a part: a message, a request to answer, or the reply to a call.
+    """One item that reached a part: a message, a request to answer, or the reply to a call.
 
     Attributes:
-        message: What arrived. For a reply: the reply, or a `Refused` when the call failed.
+        message: The message, request, or reply (a `Refused` when the call failed).
         t_ns: When it reached this process, on this process's own clock [ns].
         call: The `Call` this answers; None for messages and requests.
     """
@@ -33,10 +33,10 @@ class Incoming:
 
 @dataclass(frozen=True, slots=True)
 class RawSample:
-    """One message as it travelled, unread: for whoever records or relays everything.
+    """One undecoded message, for recording or relaying everything.
 
     Attributes:
-        key: The whole key it was sent on.
+        key: The whole key.
         body: JSON, or the raw payload of a bulk message.
         attachment: The JSON header of a bulk message; else None.
         t_ns: When it reached this process, on this process's own clock [ns].
@@ -50,7 +50,7 @@ class RawSample:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """The reply to a request that came in."""
+    """The reply to an incoming request."""
 
     to: Incoming
     reply: Message
@@ -58,14 +58,14 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Keep:
-    """State that must outlive the process: stored before any answer of the same step leaves.
+    """State that must outlive the process: stored before any answer of the same step is sent.
 
-    A runner without a store passes over it.
+    A runner without a store ignores it.
 
     Attributes:
-        table: Where.
-        key: Under what name, beside what is there of other parts.
-        value: The record; None: forget it.
+        table: Table of the store.
+        key: Key of the record, within the part's own.
+        value: The record; None: delete it.
     """
 
     table: Table

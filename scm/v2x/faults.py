@@ -1,8 +1,7 @@
-"""Faults of a network, planned by a seed: for the bus in memory, to be repeated bit for bit.
+"""Network faults from a seed, for the memory bus: repeatable bit for bit.
 
-What is sent may be lost, doubled, or come late; what comes late is overtaken by what was sent
-after it. Two sides of a partition hear nothing of each other. Who is there (`Presence`), and what
-is kept for late joiners, is told all the same.
+Messages may be lost, duplicated, delayed or reordered. The two sides of a partition receive nothing
+from each other. `Presence` and retained messages are always delivered.
 """
 
 import random
@@ -14,10 +13,10 @@ from scm.clock import nanoseconds
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultRates:
-    """How likely each fault is, between 0 and 1.
+    """The probability of each fault, 0 to 1.
 
     Attributes:
-        late_s: The longest delay of what comes late [s].
+        late_s: The longest delay [s].
     """
 
     drop: float = 0.0
@@ -27,10 +26,10 @@ class FaultRates:
 
 
 class Faults:
-    """Decides over each thing that goes from one station to another.
+    """Decides the fate of each message between two stations.
 
     Attributes:
-        weather: In force now.
+        rates: In force now.
     """
 
     def __init__(self, seed: int, rates: FaultRates | None = None) -> None:
@@ -39,11 +38,11 @@ class Faults:
         self._partitioned: frozenset[str] = frozenset()
 
     def partition(self, stations: Iterable[str]) -> None:
-        """Part these stations from all others; nobody: the network is whole again."""
+        """Separate these stations from all others; an empty list ends the partition."""
         self._partitioned = frozenset(stations)
 
     def delays(self, sender: str, receiver: str) -> tuple[int, ...]:
-        """Return when copies of one thing arrive after it was sent [ns]; nothing: it is lost."""
+        """Return the delays of all copies of one message [ns]; empty: it is lost."""
         if (sender in self._partitioned) != (receiver in self._partitioned):
             return ()
         rng, rates = self._rng, self.rates

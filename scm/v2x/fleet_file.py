@@ -1,9 +1,9 @@
-"""The fleet file: which stations a city knows and what each is, in TOML, without any secret.
+"""The fleet file: the stations of a city and their roles, in TOML, without secrets.
 
-Secrets lie in the folder beside it (`fleet.toml` -> `fleet.secrets/`): one credentials file a
-station, and what the router needs, which is a list of passwords or an authority with its key. Each
-time a station is given new credentials its number goes up, and the router knows only the newest: a
-stolen file ends with the next `scm fleet add` of its owner and a restart of the router.
+Secrets are in the folder beside it (`fleet.toml` -> `fleet.secrets/`): one credentials file per
+station, and the router's list of passwords or authority with its key. New credentials increase a
+station's number, and the router accepts only the newest: a stolen file becomes invalid with the
+next `scm fleet add` and a restart of the router.
 """
 
 import re
@@ -36,7 +36,7 @@ _HEAD = (
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One station: its name, its role, and how often it was given credentials."""
+    """One station: its name, its role, and how many credentials it was issued."""
 
     name: str
     role: str
@@ -44,20 +44,20 @@ class Member:
 
     @property
     def identity(self) -> str:
-        """The user name or common name that the router knows it by."""
+        """The user name or common name by which the router identifies it."""
         return f"{self.name}.{self.issued}"
 
 
 @dataclass(slots=True)
 class Fleet:
-    """Who may enter.
+    """The stations of a city.
 
     Attributes:
         path: Of the file.
-        auth: How all of its stations prove who they are.
-        hosts: Addresses that stations reach the router by; its certificate names them.
+        auth: How its stations authenticate.
+        hosts: Addresses of the router, named in its certificate.
         members: By name.
-        issued: How many credentials each name was ever given, also of those who were removed.
+        issued: Number of credentials ever issued to each name, removed ones included.
     """
 
     path: Path
@@ -68,7 +68,7 @@ class Fleet:
 
     @property
     def folder(self) -> Path:
-        """Where its secrets lie."""
+        """The folder of its secrets."""
         return self.path.with_suffix(".secrets")
 
     @property
@@ -81,7 +81,7 @@ class Fleet:
         return self.folder / f"{name}.toml"
 
     def pem(self, name: str) -> Path:
-        """Return the place of `authority.crt`, `authority.key`, `router.crt` or `router.key`."""
+        """Return the path of `authority.crt`, `authority.key`, `router.crt` or `router.key`."""
         return self.folder / name
 
 
@@ -89,7 +89,7 @@ def load_fleet(path: Path) -> Fleet:
     """Read a fleet file.
 
     Raises:
-        AccessError: when it cannot be read or says what makes no sense.
+        AccessError: when it cannot be read or is invalid.
     """
     try:
         values = tomllib.loads(path.read_text("utf-8"))
@@ -119,7 +119,7 @@ def load_fleet(path: Path) -> Fleet:
 
 
 def save_fleet(fleet: Fleet) -> None:
-    """Write a fleet file over whatever was there."""
+    """Write a fleet file; replace an existing one."""
     hosts = ", ".join(f'"{host}"' for host in fleet.hosts)
     lines = [_HEAD, f'auth = "{fleet.auth}"', f"hosts = [{hosts}]", ""]
     for member in sorted(fleet.members.values(), key=lambda member: member.name):
@@ -132,11 +132,11 @@ def save_fleet(fleet: Fleet) -> None:
 
 
 def add(fleet: Fleet, name: str, role: str, now: datetime) -> Credentials:
-    """Let a station in, or give one new credentials; write all files and return what it got.
+    """Add a station or issue new credentials; write all files and return the credentials.
 
     Raises:
         AccessError: when the role is unknown, or files cannot be written.
-        MessageError: when the name may not stand in a key.
+        MessageError: when the name is not valid in a key.
     """
     rights_of(role, check_name(name, "station"))
     member = Member(name, role, fleet.issued.get(name, 0) + 1)
@@ -152,10 +152,10 @@ def add(fleet: Fleet, name: str, role: str, now: datetime) -> Credentials:
 
 
 def remove(fleet: Fleet, name: str) -> None:
-    """Let a station in no more, once the router was started again.
+    """Remove a station, with effect from the router's next start.
 
     Raises:
-        AccessError: when the file does not know it.
+        AccessError: when there is no such station.
     """
     if name not in fleet.members:
         close = nearest(name, list(fleet.members))
@@ -169,7 +169,7 @@ def remove(fleet: Fleet, name: str) -> None:
 
 
 def complete(fleet: Fleet, stations: Mapping[str, str], now: datetime) -> None:
-    """Give a city's own stations (name -> role) what they lack, and renew what ends soon."""
+    """Issue missing credentials of a city's own stations (name -> role); renew expiring ones."""
     for name, role in stations.items():
         if _lacks_credentials(fleet, name, now):
             add(fleet, name, role, now)
@@ -177,10 +177,10 @@ def complete(fleet: Fleet, stations: Mapping[str, str], now: datetime) -> None:
 
 
 def check_hosts(hosts: Iterable[str]) -> None:
-    """Refuse what is no address and no host's name: it goes into a file and a certificate.
+    """Check that all hosts are addresses or host names.
 
     Raises:
-        AccessError: naming the first one.
+        AccessError: naming the first invalid one.
     """
     for host in hosts:
         if not _HOST.fullmatch(host):
@@ -189,7 +189,7 @@ def check_hosts(hosts: Iterable[str]) -> None:
 
 
 def name_hosts(fleet: Fleet, hosts: Iterable[str], now: datetime) -> None:
-    """Make the router's certificate good at more addresses, and renew it when it ends soon."""
+    """Add addresses to the router's certificate, and renew it when it expires soon."""
     all_hosts = (*fleet.hosts, *(host for host in hosts if host not in fleet.hosts))
     is_new = all_hosts != fleet.hosts
     fleet.hosts = all_hosts
@@ -231,12 +231,12 @@ def _ends_soon(certificate: str, now: datetime) -> bool:
 
 
 def sends_cams(role: str, name: str) -> bool:
-    """Return whether a station sends CAMs: a car, or the world for those it hosts."""
+    """Return whether a station sends CAMs: a car, or the world for the cars that it hosts."""
     return role == "vehicle" or (role, name) == ("part", "world")
 
 
 def _with_ticket(fleet: Fleet, made: Credentials, now: datetime) -> Credentials:
-    """Return credentials with what a station needs on the air."""
+    """Return credentials with what a station needs for signed V2X messages."""
     from scm.v2x.tickets import air_authority, issue_ticket  # noqa: PLC0415  slow to load
 
     if not sends_cams(made.role, made.station):
@@ -282,7 +282,7 @@ def _authority(fleet: Fleet, now: datetime) -> "Pair":
 
 
 def _write_users(fleet: Fleet, new: Mapping[str, str]) -> None:
-    """Write the router's passwords: Zenoh reads them in plain."""
+    """Write the router's passwords, which Zenoh reads in plain text."""
     lines = fleet.users.read_text().splitlines() if fleet.users.is_file() else []
     known = dict(line.split(":", 1) for line in lines) | dict(new)
     current = [member.identity for member in fleet.members.values()]

@@ -1,21 +1,21 @@
-"""How much of one key a reader takes in: what is beyond is dropped and counted, unread.
+"""Rate limit per key: messages beyond it are dropped and counted without decoding.
 
-Whoever says too much on a key is heard less on that key; everything else that the same connection
-brings is read as before. No part of ours comes near the limits.
+It affects only the key that is flooded, not other keys of the same connection. The city's own parts
+stay far below the limits.
 """
 
 from scm.clock import NS_PER_S
 
 MESSAGES_A_SECOND = 2000
 BYTES_A_SECOND = 200_000_000
-"""Of one key: raw 4K pictures eight times a second."""
+"""Per key: raw 4K pictures at 8 Hz."""
 
 
 class FloodGate:
-    """Counts what comes on each key, second by second.
+    """Counts the messages on each key, second by second.
 
     Attributes:
-        dropped: How many were not let through since the start.
+        dropped: Number of messages dropped since the start.
     """
 
     def __init__(self) -> None:
@@ -25,7 +25,7 @@ class FloodGate:
         self._bytes: dict[str, int] = {}
 
     def admits(self, key: str, size: int, now_ns: int) -> bool:
-        """Return whether to read what came on a key, of so many bytes."""
+        """Return whether to read a message of so many bytes on a key."""
         if not 0 <= now_ns - self._began_ns < NS_PER_S:
             self._began_ns = now_ns
             self._count.clear()

@@ -1,7 +1,7 @@
-"""Which messages hold an integer of more than 64 bits.
+"""Detect messages with an integer of more than 64 bits.
 
-A float, an array, another language could not hold it. Only fields that their class leaves open are
-looked at: four numbers of a car's state, where a search of its text reads all of 570 bytes.
+Floats, arrays and other languages cannot hold it. Only fields without bounds in their class are
+checked: four numbers of a car's state, instead of all 570 bytes of its text.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ def _check_of(kind: type[msgspec.Struct]) -> Check | None:
 
 
 def _check(info: inspect.Type) -> Check | None:
-    """Return what to ask of values of a type; None: they can hold no long integer."""
+    """Return the check for values of a type, or None if they cannot hold a long integer."""
     info = info.type if isinstance(info, inspect.Metadata) else info
     match info:
         case inspect.IntType():
@@ -78,7 +78,7 @@ def _of_each(check: Check | None) -> Check | None:
 
 
 def _of_union(info: inspect.UnionType) -> Check:
-    """Return a check that looks at structs and integers; anything else is gone through whole."""
+    """Return a check for structs and integers; other values are searched completely."""
     checks: dict[type, Check | None] = {int: _is_short, type(None): None, float: None, str: None}
     for one in info.types:
         plain = one.type if isinstance(one, inspect.Metadata) else one

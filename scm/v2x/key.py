@@ -1,8 +1,8 @@
 """Build and parse key expressions: `scm/@v1/<city>/<KEY of the message>`.
 
-A chunk that begins with `@` is verbatim: no `*` and no `**` stands for it, only itself does. `@v1`
-is the major version of the key space; `v/n1/@camera/front` holds pictures that nobody gets who
-does not ask for them by name, not even a recorder of everything.
+A chunk that begins with `@` is verbatim: `*` and `**` do not match it. `@v1` is the major version
+of the key space; pictures on `v/n1/@camera/front` go only to those who subscribe to them by name,
+not even to a recorder of everything.
 """
 
 import re
@@ -18,10 +18,10 @@ _CHUNK = re.compile(r"[a-z0-9_-]{1,32}")
 
 
 def check_name(name: str, what: str) -> str:
-    """Return the name of a vehicle, station, city ... if it may stand in a key.
+    """Return the name of a vehicle, station, city ... if it is valid in a key.
 
     Raises:
-        MessageError: when it may not.
+        MessageError: when it is not.
     """
     if not _CHUNK.fullmatch(name):
         msg = f"{what}: got {name!r}, expected 1 to 32 of a-z 0-9 _ -"
@@ -31,7 +31,7 @@ def check_name(name: str, what: str) -> str:
 
 @lru_cache(maxsize=65536)
 def is_name(name: str) -> bool:
-    """Return whether a vehicle, station, city ... of this name may stand in a key."""
+    """Return whether the name of a vehicle, station, city ... is valid in a key."""
     return _CHUNK.fullmatch(name) is not None
 
 
@@ -47,21 +47,21 @@ def _places(kind: type[Message]) -> tuple[tuple[int, str], ...]:
 
 
 def prefix(city: str) -> str:
-    """Return the part of the key that all messages of a city share, with the closing slash."""
+    """Return the key prefix of a city's messages, with the closing slash."""
     return f"scm/{VERSION}/{check_name(city, 'city')}/"
 
 
 def key_of(city: str, message: Message) -> str:
-    """Return the concrete key a message is sent on.
+    """Return the key of a message.
 
     Raises:
-        MessageError: when a field that stands in the key is not a valid name.
+        MessageError: when a field used in the key is not a valid name.
     """
     return _key(city, type(message), names_of(message))
 
 
 def names_of(message: Message) -> tuple[str, ...]:
-    """Return what a message says for the variable chunks of its key, in order, unchecked."""
+    """Return a message's values for the variable chunks of its key, in order, unchecked."""
     return tuple([str(getattr(message, name)) for _, name in _places(type(message))])
 
 
@@ -74,10 +74,10 @@ def _key(city: str, kind: type[Message], values: tuple[str, ...]) -> str:
 
 
 def selector(city: str, kind: type[Message], where: Mapping[str, str]) -> str:
-    """Return the key expression that matches a class of messages, `*` where `where` is silent.
+    """Return the key expression of a class of messages; `*` for chunks that `where` leaves out.
 
     Raises:
-        MessageError: when `where` names what is no part of the key, or holds no valid name.
+        MessageError: when `where` names an unknown chunk or an invalid name.
     """
     known = variables(kind)
     unknown = sorted(set(where) - set(known))
@@ -110,15 +110,14 @@ def parse(city: str, kind: type[Message], key: str) -> dict[str, str]:
 
 
 def agrees(key: str, message: Message) -> bool:
-    """Return whether a message says the same names inside as the key it came on.
+    """Return whether a message has the same names as the key it came on.
 
-    No message agrees with a key of wildcards, which a query may come on, nor of what is no name:
-    whoever answered under it, or told of it, could not.
+    No message agrees with a key with wildcards (as a query may have) or with invalid names.
     """
     names = names_in(type(message), key)
     if names is None:
         return False
-    for field, name in names:  # noqa: SIM110  asked of each message: `all` takes twice as long
+    for field, name in names:  # noqa: SIM110  runs for each message: `all` takes twice as long
         if getattr(message, field) != name:
             return False
     return True
@@ -126,7 +125,7 @@ def agrees(key: str, message: Message) -> bool:
 
 @lru_cache(maxsize=65536)
 def names_in(kind: type[Message], key: str) -> tuple[tuple[str, str], ...] | None:
-    """Return the fields that stand in a key with what it says of them; None: it is no such key."""
+    """Return the fields and values in a key, or None if it is no key of this class."""
     chunks, own = key.split("/", 3)[-1].split("/"), kind.KEY.split("/")
     if len(chunks) != len(own):
         return None
@@ -157,5 +156,5 @@ def intersects(one: str, other: str) -> bool:
 
 
 def _meet(one: str, other: str) -> bool:
-    """Return whether two chunks can be the same: equal, or one `*` and the other not verbatim."""
+    """Return whether two chunks intersect: equal, or one is `*` and the other is not verbatim."""
     return one == other or (one == "*" and other[:1] != "@") or (other == "*" and one[:1] != "@")

@@ -1,7 +1,7 @@
-"""Bounded queues between the bus and their one reader: drop oldest, count drops.
+"""Bounded queues between the bus and one reader: drop oldest, count drops.
 
-What is costly to make of the arriving bytes is made only when the reader takes it, on the
-reader's thread; what was dropped by then is never made at all.
+Arriving bytes are decoded when the reader pops them, on the reader's thread; dropped items are
+never decoded.
 """
 
 import itertools
@@ -21,7 +21,7 @@ class Queue(Generic[T]):
     """A bounded queue; `put` from any thread, `drain` from one.
 
     Attributes:
-        dropped: How many items had to make room for newer ones.
+        dropped: Number of items dropped for newer ones.
     """
 
     def __init__(self, depth: int, wake: threading.Event | None = None) -> None:
@@ -35,7 +35,7 @@ class Queue(Generic[T]):
         self.put_later(lambda: item)
 
     def put_later(self, make: Callable[[], T | None]) -> None:
-        """Add an item to be made when it is taken; None then counts as nothing."""
+        """Add an item that `make` builds when it is popped; None is skipped."""
         with self._lock:
             if len(self._items) == self._items.maxlen:
                 self.dropped += 1
@@ -44,7 +44,7 @@ class Queue(Generic[T]):
             self._wake.set()
 
     def pop_all(self) -> list[tuple[int, Callable[[], T | None]]]:
-        """Return and forget everything that waits, unmade, each with its order of arrival."""
+        """Remove and return all waiting items, unbuilt, each with its order of arrival."""
         if not self._items:
             return []
         with self._lock:
@@ -53,7 +53,7 @@ class Queue(Generic[T]):
         return items
 
     def drain(self) -> list[T]:
-        """Return and forget everything that waits, oldest first."""
+        """Remove and return all waiting items, oldest first."""
         return [item for _, make in self.pop_all() if (item := make()) is not None]
 
 
@@ -61,12 +61,12 @@ class Mailbox(Queue[Incoming]):
     """A queue of messages, requests and replies.
 
     Args:
-        depth: How many may wait.
-        wake: Set whenever one is added.
-        keep: Which ones are wanted; others take no room. All are then made as they arrive, on the
+        depth: Maximum number of waiting items.
+        wake: Set whenever an item is added.
+        keep: Filter; other items are not queued. All items are then decoded on arrival, on the
             bus's thread.
-        once: Of copies that differ in the first variable part of their key alone, a frame of the
-            air and its receivers, only the first is read.
+        once: Read only the first of copies that differ just in the first variable part of their
+            key: one radio frame for several receivers.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Mailbox(Queue[Incoming]):
         self.once = once
 
     def put_later(self, make: Callable[[], Incoming | None]) -> None:
-        """Add an item to be made when it is taken, or made now if not all are wanted."""
+        """Add an item that is built when it is popped, or now if there is a filter."""
         if self._keep is None:
             super().put_later(make)
             return
@@ -92,7 +92,7 @@ class Mailbox(Queue[Incoming]):
 
 
 class RawMailbox(Queue[RawSample]):
-    """A queue of unread samples."""
+    """A queue of undecoded samples."""
 
 
 def drain_all(boxes: Iterable[Mailbox | RawMailbox]) -> list[Incoming | RawSample]:

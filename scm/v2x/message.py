@@ -1,4 +1,4 @@
-"""What every message is: a typed record that knows its key, its rate and how it should travel."""
+"""The base of all messages: a typed record with its key, rate and delivery."""
 
 from enum import Enum
 from functools import lru_cache
@@ -11,13 +11,13 @@ from scm.v2x.integers import are_short
 
 
 class Delivery(Enum):
-    """How a message should travel, named for what the receiver needs.
+    """How a message is delivered.
 
-    STREAM: only the newest matters; a late one may be dropped (vehicle state, frames).
-    COMMAND: only the newest matters and it overtakes everything else (drive commands).
+    STREAM: only the newest matters; late ones may be dropped (vehicle state, frames).
+    COMMAND: only the newest matters, with priority over all others (drive commands).
     EVENT: each one matters; late joiners get the last ones (events, map, monitor).
-    RPC: asked and answered once.
-    PRESENCE: made by the bus itself when a station comes or goes.
+    RPC: request and answer.
+    PRESENCE: sent by the bus itself when a station connects or disconnects.
     """
 
     STREAM = "stream"
@@ -28,18 +28,18 @@ class Delivery(Enum):
 
 
 class Message(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """Base of all messages. Fields end in their unit; `t_ns` is when it was true at the sender.
+    """Base of all messages. Fields end in their unit; `t_ns` is the sender's time of validity.
 
-    A field named `payload` holds raw bytes: it travels as the body and everything else as a small
-    JSON attachment. New fields need defaults: old bytes must still decode.
+    A field named `payload` holds raw bytes: it is sent as the body and everything else as a small
+    JSON attachment. New fields need defaults, so that old bytes still decode.
 
-    No message holds itself, so the collector of cycles need not know of any (`gc=False`): to make
-    one takes half of the time, and nobody walks over the thousand that wait.
+    Messages contain no cycles, so the garbage collector does not track them (`gc=False`): creating
+    one takes half the time.
 
     Attributes:
         KEY: Below `scm/@v1/<city>/`; `{field}` chunks are fields of the message.
-        RATE_HZ: How often it is meant to be sent; None when it is sent on occasion.
-        DELIVERY: How it should travel.
+        RATE_HZ: Nominal rate; None: sent on occasion.
+        DELIVERY: How it is delivered.
         KEEP: With EVENT, how many last messages a late joiner gets.
     """
 
@@ -50,16 +50,15 @@ class Message(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
 
 class Request(Message, kw_only=True, frozen=True):
-    """Base of messages that are asked and answered; `REPLY` is the class of the answer.
+    """Base of requests; `REPLY` is the class of the answer.
 
     Attributes:
-        request_id: Same id, same effect, once: a retry gets the stored answer. Empty: not retried.
-        trace_id: W3C trace id of what led to it, a click perhaps; whoever does it notes that. It
-            makes no difference to what is asked. Empty: nobody traces it.
-        actor: Who sends it, for the audit log: a station, a program, the owner of an API key. It
-            makes no difference to what is asked either. Empty: the request does not say.
+        request_id: One effect per id: a retry gets the stored answer. Empty: not retried.
+        trace_id: W3C trace id of its cause, such as a click; for logs only. Empty: not traced.
+        actor: Who sends it, for the audit log only: a station, a program, the owner of an API key.
+            Empty: unknown.
         SERVER: Who answers it, for people; `{field}` words are fields of the message.
-        HAS_EFFECT: Whether it changes anything: what does not is in no audit log.
+        HAS_EFFECT: Whether it changes anything; only such requests are in the audit log.
     """
 
     DELIVERY: ClassVar[Delivery] = Delivery.RPC
@@ -79,12 +78,12 @@ class Request(Message, kw_only=True, frozen=True):
 
 
 class Refused(Message, kw_only=True, frozen=True):
-    """The answer to a request that could not be done, in words (RFC 9457: type, title, detail).
+    """The answer to a request that could not be fulfilled (RFC 9457: type, title, detail).
 
     Attributes:
-        code: A short machine word: `timeout`, `not_found`, `owned`, `invalid`, `offline`.
-        detail: One sentence for a person: what, where, got, expected.
-        asked: Where nobody answered: the request and its key on the bus, for engineers.
+        code: Machine-readable: `timeout`, `not_found`, `owned`, `invalid`, `offline`.
+        detail: One sentence for people: what, where, got, expected.
+        asked: If nobody answered: the request and its key on the bus, for engineers.
     """
 
     KEY: ClassVar[str] = "refused"
@@ -121,7 +120,7 @@ def encode(message: Message) -> tuple[bytes, bytes | None]:
 
 
 def decode(kind: type[M], body: bytes, attachment: bytes | None = None) -> M:
-    """Read a message back.
+    """Decode a message.
 
     Raises:
         MessageError: naming the class, the field and what was expected there.

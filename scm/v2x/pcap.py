@@ -1,10 +1,10 @@
-"""V2X frames as a capture file: what a sniffer beside an ITS-G5 road would have written.
+"""V2X frames as a capture file, as written by a sniffer beside an ITS-G5 road.
 
     Ethernet (0x8947) | GeoNetworking basic 4, common 8, single-hop broadcast 28 | BTP-B 4 | message
 
-Addresses are made of station ids. Nothing is signed, so the basic header says that a common header
-follows. Layout: EN 302 636-4-1 v1.4.1, 9 (GeoNetworking), EN 302 636-5-1 v2.2.1, 7 (BTP); the
-capture: the classic file format of libpcap, here with nanoseconds.
+Addresses are derived from station ids. Frames are unsigned, so the basic header announces a common
+header. Layout: EN 302 636-4-1 v1.4.1, 9 (GeoNetworking), EN 302 636-5-1 v2.2.1, 7 (BTP); capture
+file: the classic format of libpcap with nanoseconds.
 """
 
 import struct
@@ -50,7 +50,7 @@ _LOCAL = 0x02  # an address that no manufacturer gave
 
 
 class Position(NamedTuple):
-    """A station's own position as GeoNetworking tells it.
+    """A station's own position in GeoNetworking.
 
     Attributes:
         station_id: 32 bits.
@@ -73,8 +73,8 @@ def frame_of(kind: str, payload: bytes, position: Position, t_ns: int) -> bytes:
     Args:
         kind: Its message_type, one of `PORTS`.
         payload: Its UPER.
-        position: Of the station that sends it.
-        t_ns: When it is sent.
+        position: Of the sending station.
+        t_ns: Time of sending.
     """
     address = bytes((_LOCAL, 0)) + position.station_id.to_bytes(4, "big")
     btp = struct.pack(">HH", PORTS[kind], 0) + payload
@@ -103,23 +103,23 @@ def frame_of(kind: str, payload: bytes, position: Position, t_ns: int) -> bytes:
 
 
 def _accurate_speed(speed: int) -> int:
-    """Return a speed as 15 bits with the position's accuracy bit above them, as a signed word."""
+    """Return a 15-bit speed with the position's accuracy bit above it, as a signed word."""
     bits = max(-SPEED_MOST, min(SPEED_MOST, speed)) & 0x7FFF | 0x8000
     return bits - 0x1_0000
 
 
 class Positions:
-    """Where stations are, as far as their own messages told so far; (0, 0) until then.
+    """The last known positions of stations from their own messages; (0, 0) before the first.
 
-    GeoNetworking has no code for an unknown place, speed or heading: a place that a message does
-    not tell leaves the last known one, a speed or heading is 0.
+    GeoNetworking has no code for unknown values: a message without a position leaves the last known
+    one; an unknown speed or heading is 0.
     """
 
     def __init__(self) -> None:
         self._known: dict[int, Position] = {}
 
     def of(self, body: Body) -> Position:
-        """Return where the sender of a message is, and remember what the message says of it."""
+        """Update and return the position of a message's sender."""
         station = body.station_id
         position = _position_in(body)
         if position is not None and place_of(position.latitude, position.longitude) is not None:
@@ -128,7 +128,7 @@ class Positions:
 
 
 def _position_in(body: Body) -> Position | None:
-    """Return what a message says of its own sender's place."""
+    """Return the sender's position in a message, or None."""
     if isinstance(body, CamBody):
         place, motion = body.position, body.motion
         speed, backward = number_of(motion.speed, "value"), number_of(motion, "drive_direction")
@@ -157,7 +157,7 @@ def _position_in(body: Body) -> Position | None:
 
 
 def write_capture(stream: BinaryIO, frames: Iterable[tuple[int, bytes]]) -> int:
-    """Write frames with their times [ns since 1970] as a capture; return how many they were."""
+    """Write frames with their times [ns since 1970] as a capture; return their number."""
     stream.write(struct.pack("<IHHiIII", _MAGIC_NS, 2, 4, 0, 0, _SNAP, _ETHERNET_LINK))
     count = 0
     for t_ns, frame in frames:

@@ -1,7 +1,7 @@
-"""A signal plan that a person made, as it is stored, proven and shown: for one junction as it is.
+"""A user-made signal plan of one junction, as it is stored, proven and shown.
 
-What is proven is the stages together with the junction's times and conflicts: its `digest`. When
-the junction changes, or one stage does, or what stages mean, the proof is one of something else.
+The proof covers the stages with the junction's times and conflicts, identified by `digest`. When
+the junction, a stage or the meaning of stages changes, the proof no longer applies.
 """
 
 import hashlib
@@ -12,16 +12,16 @@ from scm.records.signal_plans import PlanProof, SignalPhase, SignalStage
 from scm.v2x.messages.signal_site import SignalSite
 
 MEANING = 2
-"""Of stages, and of what the search proves of them; 1: all went red between two stages."""
+"""Version of the meaning of stages and their proof; in version 1 all went red between stages."""
 
 
 class PlanFile(msgspec.Struct, kw_only=True, frozen=True):
-    """A plan with the junction that it is for.
+    """A plan with its junction.
 
     Attributes:
         phases, conflicts: Of the junction when the plan was made.
-        offset_s: When its cycle begins, see `PlanRequest`; no part of what is proven.
-        by: Who saved it; `reason` why, `saved_ns` when.
+        offset_s: When its cycle begins, see `PlanRequest`; not part of the proof.
+        by: Who saved it; `reason` is why, `saved_ns` when.
     """
 
     junction: str
@@ -38,7 +38,7 @@ class PlanFile(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def digest(self) -> str:
-        """Name of what a proof of it proves."""
+        """Identifies what a proof of this plan covers."""
         times = [(p.group, p.min_green_s, p.yellow_s, p.red_clear_s) for p in self.phases]
         proven_parts = [MEANING, self.junction, self.stages, times, self.conflicts]
         proven = msgspec.json.encode(proven_parts)
@@ -46,12 +46,12 @@ class PlanFile(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def is_proven(self) -> bool:
-        """Whether its proof is of what it says."""
+        """Whether its proof covers its present content."""
         return self.proof is not None and self.proof.digest == self.digest
 
 
 def fits(file: PlanFile, site: SignalSite) -> bool:
-    """Return whether a plan was made for a junction as it is now."""
+    """Return whether a plan fits the present state of a junction."""
     return (
         file.junction == site.junction
         and file.phases == site.phases

@@ -1,6 +1,6 @@
-"""Turn arriving bytes into messages; what cannot be read is dropped, counted and logged.
+"""Decode arriving bytes; invalid messages are dropped, counted and logged.
 
-The log says so at most once a second, however much rubbish arrives.
+There is at most one log entry per second.
 """
 
 import logging
@@ -21,14 +21,14 @@ Check = Callable[[Message, int], None]
 
 
 class Reader:
-    """Reads what arrives at one bus.
+    """Decodes the arrivals of one bus.
 
     Args:
-        clock: For how often the log says so.
-        check: Refuses, with a `ScmError`, what can be read and must not be believed.
+        clock: For the rate of log entries.
+        check: Raises a `ScmError` for decodable messages that must not be trusted.
 
     Attributes:
-        rejected: How many arrivals could not be read, or came on a key that is not theirs.
+        rejected: Number of arrivals that could not be decoded or came on a wrong key.
     """
 
     def __init__(self, clock: Clock, check: Check | None = None) -> None:
@@ -41,7 +41,7 @@ class Reader:
     def read(
         self, kind: type[Message], key: str, body: bytes, attachment: bytes | None, t_ns: int
     ) -> Incoming | None:
-        """Return what arrived, or None when it had to be dropped."""
+        """Return the decoded item, or None when it was dropped."""
         try:
             message = decode(kind, body, attachment)
         except MessageError as cause:
@@ -61,9 +61,9 @@ class Reader:
     def read_once(
         self, kind: type[Message], key: str, body: bytes, attachment: bytes | None, t_ns: int
     ) -> Incoming | None:
-        """Return what arrived; None also for a copy of what was read before.
+        """Return the decoded item, or None for a copy of an earlier one.
 
-        What had to be dropped leaves no trace: it can keep nothing from being heard.
+        Dropped items are not remembered, so they cannot suppress valid ones.
         """
         content = content_of(kind, key, body)
         if content is not None and self._copies.has(content):
@@ -74,7 +74,7 @@ class Reader:
         return incoming
 
     def reject(self, key: str, reason: str) -> None:
-        """Count something that could not be read."""
+        """Count and log a rejected item."""
         self.rejected += 1
         now_ns = self._clock.now_ns()
         if self._quiet_until_ns is None or now_ns >= self._quiet_until_ns:

@@ -1,8 +1,8 @@
-"""Ask until there is an answer: the same request, with the same id, again and again.
+"""Retry a request with the same id until there is an answer.
 
-A reply that does not come tells nothing: the request, its answer or the server may be lost. Because
-the id stays the same and servers keep their answers, asking again is safe: what the request does
-is done once. `Asking` is the rule alone, for parts and stepped clocks; `ask` waits over a live
+Without a reply it is unknown whether the request, its answer or the server was lost. Since the id
+stays the same and servers store their answers, a retry is safe: the effect happens once.
+`RetriedRequest` is the rule alone, for parts and stepped clocks; `send_request` blocks on a live
 bus, for scripts and web requests.
 """
 
@@ -24,24 +24,24 @@ RETRIED_CODES = ("timeout", "offline")
 
 
 def with_id(request: Request) -> Request:
-    """Return the request with an id that no other one has, unless it has one."""
+    """Return the request with a unique id, unless it already has an id."""
     if request.request_id:
         return request
     return msgspec.structs.replace(request, request_id=uuid.uuid4().hex)
 
 
 class RetriedRequest:
-    """One request on its way to its answer.
+    """One request with its retries.
 
     Args:
-        request: What is asked; it needs an id if asking twice would do it twice.
-        now_ns: The time.
-        deadline_s: For how long it is asked again.
-        try_s: How long one try waits for its reply.
+        request: The request; it needs an id if a repetition would repeat its effect.
+        now_ns: The present time.
+        deadline_s: For how long it is retried.
+        try_s: Timeout of one try.
 
     Attributes:
-        reply: The answer, or a `Refused` when the deadline is over; None: not yet.
-        tries: How often it was asked.
+        reply: The answer, or a `Refused` after the deadline; None: not yet.
+        tries: Number of tries so far.
     """
 
     def __init__(
@@ -58,11 +58,11 @@ class RetriedRequest:
 
     @property
     def next_ns(self) -> int | None:
-        """When to ask next; None: a try is under way, or it is over."""
+        """Time of the next try; None: a try is in progress, or there is a reply."""
         return None if self.reply is not None else self._next_ns
 
     def due(self, now_ns: int) -> Call | None:
-        """Return what is to be asked now, if anything."""
+        """Return the call that is due now, or None."""
         if self.next_ns is None or now_ns < self.next_ns:
             return None
         self.tries += 1
@@ -71,7 +71,7 @@ class RetriedRequest:
         return Call(self.request, min(self._try_s, left_s) if self.tries > 1 else self._try_s)
 
     def receive(self, reply: Incoming) -> None:
-        """Take the reply to a try; what is no answer leads to another one while there is time."""
+        """Handle the reply to a try; a timeout or `offline` leads to another try in time."""
         message = reply.message
         if not isinstance(message, Refused) or message.code not in RETRIED_CODES:
             self.reply = message
@@ -100,9 +100,9 @@ def send_request(
     try_s: float = DEFAULT_TRY_S,
     clock: Clock | None = None,
 ) -> Message:
-    """Return the reply, or a `Refused` when it was refused or nobody answered in time.
+    """Send a request, retry it until the deadline, and return the reply or a `Refused`.
 
-    It is asked again until the deadline, under one id: an effect happens once.
+    All tries have one id, so the effect happens once.
     """
     clock, never = clock or WallClock(), threading.Event()
     pending = RetriedRequest(with_id(request), clock.now_ns(), deadline_s, try_s)

@@ -1,8 +1,8 @@
-"""What each role of station may say, hear, ask and serve: the one table of who may do what.
+"""What each role may publish, subscribe to, request and serve: the only table of rights.
 
-A line is a key below `scm/@v1/<city>/` with Zenoh's `*` and `**`; `{me}` stands for the station's
-own name. Whatever is not here is denied. The same tests hold the table against what every part of
-a running city really does, so a new message that is left out here fails before it is missed.
+Entries are keys below `scm/@v1/<city>/` with Zenoh's `*` and `**`; `{me}` is the station's own
+name. Everything else is denied. Tests compare the table with what the parts of a running city do,
+so a new message that is missing here fails a test.
 """
 
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ class Rights:
     """Keys below the city's prefix.
 
     Attributes:
-        says: What it publishes.
-        hears: What it subscribes to; presence too.
-        asks: Whom it sends requests.
-        serves: Which requests it answers.
+        publishes: Messages that it publishes.
+        subscribes: Messages that it subscribes to, presence included.
+        requests: Requests that it sends.
+        services: Requests that it answers.
     """
 
     publishes: tuple[str, ...] = ()
@@ -50,7 +50,7 @@ class Rights:
         )
 
 
-# `**` stands for no chunk that begins with @: pictures have to be named.
+# `**` does not match chunks that begin with @: pictures have to be named.
 EVERYTHING = ("**", "v/*/@camera/*", "eye/*/@preview", "eye/*/@picture")
 EVERY_REQUEST = (
     "v/*/lease",
@@ -71,8 +71,8 @@ _EVERYBODY = Rights(
 _WATCHES = Rights(subscribes=EVERYTHING)
 
 _OF_ROLE: dict[str, Rights] = {
-    # Not `v/{me}/**`: what others tell a car (commands, contacts) it cannot tell itself; nor may
-    # it send what only roadside units send (SPATEM, MAPEM, SSEM).
+    # Not `v/{me}/**`: a car cannot send itself what others send it (commands, contacts), nor what
+    # only roadside units send (SPATEM, MAPEM, SSEM).
     "vehicle": Rights(
         publishes=(
             "v/{me}/state",
@@ -105,7 +105,7 @@ _OF_ROLE: dict[str, Rights] = {
     "operator": _WATCHES + Rights(requests=EVERY_REQUEST),
     "driver": _WATCHES + Rights(publishes=("v/*/cmd/drive",), requests=EVERY_REQUEST),
     "camera": Rights(publishes=("eye/{me}/@picture",)),
-    # Of no vehicle's name: the car that it emulates is another station, and knows less.
+    # Not under the vehicle's name: the emulated car is another station with fewer rights.
     "emulator": Rights(
         publishes=("v/*/emulated",), subscribes=("world/def", "world/snapshot", "v/*/emulated")
     ),
@@ -200,5 +200,5 @@ def rights_of(role: str, name: str) -> Rights:
 
 
 def presence_of(role: str, name: str) -> str:
-    """Return the key on which a station may say that it is there."""
+    """Return the presence key of a station."""
     return _PRESENCE.get(role, _CLIENT).replace("{me}", name)

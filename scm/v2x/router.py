@@ -1,7 +1,7 @@
-"""The city's switchboard: a Zenoh router inside this process.
+"""The city's Zenoh router, inside this process.
 
-It routes without Python's help, but shares its process only with what is idle: a busy loop beside
-it delays everybody.
+It needs no Python to route, but must not share its process with a busy loop, which would delay all
+messages.
 """
 
 import os
@@ -19,24 +19,23 @@ from scm.v2x.access import is_local
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
-# The thread that watches all links also writes to them: one wake-up less for each message. It is
-# not the one that reads, since that may wait for a slow listener. Zenoh takes it once a process.
+# The thread that watches all links also writes to them: one wake-up less per message. It does not
+# read, since reading may wait for a slow listener. Zenoh reads this setting once per process.
 THREADS = "(acc: (handover: tx))"
 
 
 class Router:
-    """A router that listens from `with` on until its end.
+    """A router that listens inside its `with` block.
 
     Args:
         listen: The endpoint.
-        access: Who may enter and do what, from `access.router_settings`; None: everybody on this
-            machine.
+        access: Access rules from `access.router_settings`; None: everybody on this machine.
 
     Attributes:
-        listen: The endpoint, also the one that stations connect to.
+        listen: The endpoint that stations connect to.
 
     Raises:
-        AccessError: when other computers could reach it, and everybody might enter.
+        AccessError: when other computers could reach it without access rules.
     """
 
     def __init__(
@@ -81,7 +80,7 @@ class Router:
 
 @contextmanager
 def _environment(name: str, value: str) -> Iterator[None]:
-    """Hold a variable of the environment at a value, unless the user has set it."""
+    """Set an environment variable for a while, unless the user has set it."""
     if name in os.environ:
         yield
         return
@@ -93,7 +92,7 @@ def _environment(name: str, value: str) -> Iterator[None]:
 
 
 def free_endpoint() -> str:
-    """Return an endpoint of this machine at which nobody listens now."""
+    """Return a free endpoint of this machine."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

@@ -1,8 +1,9 @@
-"""CAMs keep their sender's signature through a guarded city, from its antenna to every reader.
+"""Signed CAMs: each keeps its sender's signature from the antenna to every reader.
 
-The bus signs what its station says, and refuses what it hears unsigned, changed, old, again, or
-signed by another: parts know nothing of it. A car signs with its own ticket, the world with its
-own for all cars that it hosts. Signed is a hash of station, time and body as JSON.
+The bus signs the CAMs of its station and rejects received ones that are unsigned, changed, old,
+repeated, or signed by another station; parts are not involved. A car signs with its own ticket, the
+world with its own for all cars that it hosts. The signature covers a hash of station, time and body
+as JSON.
 """
 
 import base64
@@ -20,7 +21,7 @@ from scm.v2x.signing import CAM, Signer, Ticket, Verifier
 from scm.v2x.tickets import certificate_of, read_ticket
 
 WORLD_STATION = "world"
-"""Who signs for the cars that it simulates itself."""
+"""The station that signs for hosted cars."""
 
 _encoder = msgspec.json.Encoder()
 
@@ -29,7 +30,7 @@ class SignedCams:
     """Signs and checks the CAMs of one station.
 
     Raises:
-        AccessError: when the credentials' ticket or authority makes no sense.
+        AccessError: when the credentials' ticket or authority is invalid.
     """
 
     def __init__(self, credentials: Credentials) -> None:
@@ -41,7 +42,7 @@ class SignedCams:
         self._newest_ns: dict[tuple[str, str], int] = {}
 
     def signed(self, message: Message, now_ns: int) -> Message:
-        """Return a CAM with our signature; anything else, and what others signed, as it is."""
+        """Return a CAM with our signature; other messages and signed CAMs unchanged."""
         if not isinstance(message, CamTx | CamRx) or message.signed or self._ticket is None:
             return message
         last = self._last.get(message.station)
@@ -57,10 +58,10 @@ class SignedCams:
         return base64.b64encode(signer.sign(_hash(cam), CAM, now_ns)).decode()
 
     def check(self, message: Message, now_ns: int) -> None:
-        """Refuse a CAM that its station did not sign just now.
+        """Check that a CAM was signed recently by its station.
 
         Raises:
-            AccessError: saying why.
+            AccessError: when it was not, with the reason.
             MessageError: when the signature cannot be read.
         """
         if not isinstance(message, CamTx | CamRx):

@@ -1,8 +1,8 @@
 """The bytes of signed messages: IEEE 1609.2 data and certificates, in canonical OER.
 
-Only the profile that we send is written and read: ECDSA on P-256, SHA-256, explicit certificates,
-a payload inside. Its shape is fixed, so each field has its place, and nothing else gets past
-the reader. Tests hold every byte against pycrate, which has the whole standard.
+Only our own profile is written and read: ECDSA on P-256, SHA-256, explicit certificates, a payload
+inside. Its layout is fixed and the reader rejects everything else. Tests compare every byte with
+pycrate, which implements the whole standard.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ VERSION = 3
 DIGEST_BYTES = 8
 NUMBER_BYTES = 32
 
-# Preambles of optional fields, and tags of the choices that we make.
+# Preambles of optional fields, and tags of the choices in our profile.
 _SIGNED_DATA = bytes([VERSION, 0x81, 0x00])  # version, signedData, hash sha256
 _TBS_START = bytes([0x40, VERSION, 0x80])  # its payload: data, version, unsecuredData
 _WITH_TIME, _WITH_TIME_AND_PLACE = 0x40, 0x50
@@ -34,14 +34,14 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
-    """What a certificate says.
+    """The content of a certificate.
 
     Attributes:
-        issuer: Digest of the issuer's certificate; None: it signs itself.
+        issuer: Digest of the issuer's certificate; None: self-signed.
         name: Of the station, or of the authority.
-        start_s: From when on it is good, TAI seconds since 2004.
-        hours: For how long.
-        psids: Which kinds of message it may sign; none: it issues certificates.
+        start_s: Start of validity, TAI seconds since 2004.
+        hours: Duration of validity.
+        psids: Kinds of message it may sign; empty: it issues certificates.
         key: Public key.
     """
 
@@ -80,7 +80,7 @@ class Certificate:
 
 
 class ByteReader:
-    """Takes bytes from the front."""
+    """Reads bytes from the front."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -100,10 +100,10 @@ class ByteReader:
         return found
 
     def expect(self, wanted: bytes) -> None:
-        """Take bytes that have to be these.
+        """Read bytes and compare them with the expected ones.
 
         Raises:
-            MessageError: when they are others.
+            MessageError: when they differ.
         """
         begun = self.at
         found = self.read(len(wanted))
@@ -120,19 +120,19 @@ class ByteReader:
         return int.from_bytes(self.read(count), "big")
 
     def length(self) -> int:
-        """Return a length: one byte, or how many bytes it takes and then they."""
+        """Return a length: one byte, or the number of its bytes followed by them."""
         first = self.byte()
         return first if first < 0x80 else self.number(first & 0x7F)
 
     def since(self, start: int) -> bytes:
-        """Return what was taken since a place."""
+        """Return the bytes read since a position."""
         return self._data[start : self.at]
 
     def end(self) -> None:
-        """Refuse anything that is left.
+        """Check that nothing is left.
 
         Raises:
-            MessageError: when something is.
+            MessageError: when there are more bytes.
         """
         left = len(self._data) - self.at
         if left:
@@ -141,7 +141,7 @@ class ByteReader:
 
 
 class ReadCertificate(NamedTuple):
-    """A certificate as it came, with what its signature covers."""
+    """A received certificate, with the bytes that its signature covers."""
 
     content: Certificate
     raw: bytes
@@ -150,15 +150,15 @@ class ReadCertificate(NamedTuple):
 
 
 class SignedMessage(NamedTuple):
-    """A signed message as it came.
+    """A received signed message.
 
     Attributes:
-        payload: What was signed, mostly UPER.
+        payload: The signed content, mostly UPER.
         psid: Kind of message: 36 CAM, 37 DENM.
-        time_us: When it was made, TAI microseconds since 2004.
-        to_be_signed: What the signature covers, with the signer.
-        digest: Of the signer's certificate, where only that came.
-        certificate: The signer's, where it came whole.
+        time_us: Time of generation, TAI microseconds since 2004.
+        to_be_signed: Bytes that the signature covers, together with the signer.
+        digest: Of the signer's certificate, if only the digest was sent.
+        certificate: The signer's, if the whole one was sent.
         signature: r and s.
     """
 
@@ -174,7 +174,7 @@ class SignedMessage(NamedTuple):
 def to_be_signed(
     payload: bytes, psid: int, time_us: int, place: tuple[int, int, int] | None = None
 ) -> bytes:
-    """Return what is signed of a message.
+    """Return the bytes of a message that are signed.
 
     `place` is latitude and longitude [1e-7 degree] and elevation [0.1 m above -409.6 m].
     """
@@ -194,7 +194,7 @@ def to_be_signed(
 
 
 def write_message(tbs: bytes, signer: bytes, signature: bytes) -> bytes:
-    """Return a signed message; `signer` is a digest of 8 bytes, or a whole certificate."""
+    """Return a signed message; `signer` is an 8-byte digest or a whole certificate."""
     if len(signer) == DIGEST_BYTES:
         who = bytes([_BY_DIGEST]) + signer
     else:
@@ -203,10 +203,10 @@ def write_message(tbs: bytes, signer: bytes, signature: bytes) -> bytes:
 
 
 def read_message(data: bytes) -> SignedMessage:
-    """Read a signed message.
+    """Decode a signed message.
 
     Raises:
-        MessageError: when it is none, or none of our profile.
+        MessageError: when it is invalid or not of our profile.
     """
     reader = ByteReader(data)
     reader.expect(_SIGNED_DATA)
@@ -241,10 +241,10 @@ def _read_signer(reader: ByteReader) -> tuple[bytes | None, ReadCertificate | No
 
 
 def read_certificate(data: bytes) -> ReadCertificate:
-    """Read a certificate.
+    """Decode a certificate.
 
     Raises:
-        MessageError: when it is none, or none of our profile.
+        MessageError: when it is invalid or not of our profile.
     """
     reader = ByteReader(data)
     found = _read_certificate(reader)

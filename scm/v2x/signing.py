@@ -1,8 +1,8 @@
-"""Sign what goes on the air and verify what comes from there, as IEEE 1609.2 has it.
+"""Sign and verify V2X messages after IEEE 1609.2.
 
-A station signs with a ticket of the city's own authority: the whole certificate once a second and
-whenever nobody can have heard it yet, its digest otherwise. Unlike on the road a ticket names its
-station: there are no pseudonyms here, and so no privacy.
+A station signs with a ticket of the city's own authority. It sends the whole certificate once a
+second, its digest otherwise. Unlike on real roads a ticket names its station: there are no
+pseudonyms, hence no privacy.
 """
 
 import hashlib
@@ -41,7 +41,7 @@ MAX_SIGNERS = 4096
 HOURS = 24 * 365
 
 _EPOCH_S = 1_072_915_200  # 2004-01-01 UTC, seconds since 1970
-_LEAP_S = 5  # TAI has gone ahead of UTC by so much since then
+_LEAP_S = 5  # leap seconds since then
 _ALGORITHM = ec.ECDSA(hashes.SHA256())
 
 
@@ -53,7 +53,7 @@ class Ticket(NamedTuple):
 
     @property
     def digest(self) -> bytes:
-        """What others call the certificate by."""
+        """The certificate's identifier in messages."""
         return digest_of(self.certificate)
 
 
@@ -63,7 +63,7 @@ def digest_of(certificate: bytes) -> bytes:
 
 
 def make_authority(name: str, now_ns: int, hours: int = HOURS) -> Ticket:
-    """Return a new authority, whose certificate signs itself."""
+    """Return a new authority with a self-signed certificate."""
     key = ec.generate_private_key(ec.SECP256R1())
     content = Certificate(
         issuer=None, name=name, start_s=_tai_us(now_ns) // 1_000_000, hours=hours, psids=(),
@@ -73,7 +73,7 @@ def make_authority(name: str, now_ns: int, hours: int = HOURS) -> Ticket:
 
 
 def starts_ns(content: Certificate) -> int:
-    """Return from when on a certificate is good, nanoseconds since 1970."""
+    """Return the start of a certificate's validity, nanoseconds since 1970."""
     return _unix_ns(content.start_s * 1_000_000)
 
 
@@ -81,7 +81,7 @@ def issue(
     authority: Ticket, station: str, now_ns: int, *, psids: tuple[int, ...] = (CAM, DENM),
     hours: int = 24,
 ) -> Ticket:  # fmt: skip
-    """Return a ticket under which a station may sign these kinds of message."""
+    """Return a ticket for a station to sign these kinds of message."""
     key = ec.generate_private_key(ec.SECP256R1())
     content = Certificate(
         issuer=authority.digest, name=station, start_s=_tai_us(now_ns) // 1_000_000, hours=hours,
@@ -102,9 +102,9 @@ class Signer:
     def sign(
         self, payload: bytes, psid: int, t_ns: int, place: tuple[int, int, int] | None = None
     ) -> bytes:
-        """Return a signed message of bytes that were made at `t_ns`.
+        """Return a signed message of a payload generated at `t_ns`.
 
-        `place` (latitude and longitude in 1e-7 degree, elevation) belongs to a DENM.
+        A DENM has a `place`: latitude and longitude in 1e-7 degree, elevation.
         """
         tbs = to_be_signed(payload, psid, _tai_us(t_ns), place)
         signature = _sign(self._ticket.key, tbs, self._ticket.certificate)
@@ -115,7 +115,7 @@ class Signer:
 
 
 class Verified(NamedTuple):
-    """What a message that was verified says, and who says it."""
+    """A verified message and its sender."""
 
     payload: bytes
     psid: int
@@ -125,7 +125,7 @@ class Verified(NamedTuple):
 
 @dataclass(frozen=True)
 class _Known:
-    """A certificate that was verified."""
+    """A verified certificate."""
 
     content: Certificate
     raw: bytes
@@ -140,7 +140,7 @@ class _Known:
 
 
 class Verifier:
-    """Verifies messages under one authority; remembers the certificates that it has seen."""
+    """Verifies messages under one authority; stores verified certificates."""
 
     def __init__(self, authority: bytes) -> None:
         found = read_certificate(authority)
@@ -151,11 +151,11 @@ class Verifier:
         self._known: OrderedDict[bytes, _Known] = OrderedDict()
 
     def verify(self, data: bytes, now_ns: int) -> Verified:
-        """Return what a message says and who says it.
+        """Return the payload and sender of a message.
 
         Raises:
-            MessageError: when it cannot be read.
-            AccessError: when its signer is not known (yet), may not say it, or did not.
+            MessageError: when it cannot be decoded.
+            AccessError: when its signer is unknown or not permitted, or the signature is invalid.
         """
         message = read_message(data)
         if message.certificate is not None:
@@ -210,7 +210,7 @@ def _sign(key: ec.EllipticCurvePrivateKey, tbs: bytes, signer: bytes) -> bytes:
 
 
 def _check(key: ec.EllipticCurvePublicKey, tbs: bytes, signer_hash: bytes, rs: bytes) -> None:
-    """Refuse a signature (r and s) that is not the key's."""
+    """Raise AccessError if a signature (r and s) is not the key's."""
     r = int.from_bytes(rs[:NUMBER_BYTES], "big")
     s = int.from_bytes(rs[NUMBER_BYTES:], "big")
     try:

@@ -1,31 +1,31 @@
-"""Keep the Python state of a thread that is not Python's own, from one callback to the next.
+"""Keep the Python thread state of Zenoh's threads from one callback to the next.
 
-CPython makes a thread state, with a stack of its own, when a thread that it did not start comes in,
-and throws it away when the thread leaves: 8 us of the 11 us that the shortest callback of Zenoh
-cost. Whoever comes in once more than he leaves keeps his.
+CPython creates a thread state, with its own stack, when a foreign thread enters, and deletes it
+when the thread leaves: 8 us of the 11 us of Zenoh's shortest callback. One extra
+`PyGILState_Ensure` per thread keeps the state.
 """
 
 import ctypes
 import threading
 
 MAX_THREADS = 64
-"""Threads of one process: what is kept for one outlives it (some 20 kB)."""
+"""Per process: a pinned state outlives its thread (some 20 kB)."""
 
 
 class ThreadStates:
-    """The states kept in this process.
+    """The pinned thread states of this process.
 
     Attributes:
-        kept: Of how many threads.
+        pinned: Number of threads.
     """
 
     def __init__(self) -> None:
         self.pinned = 0
         self._lock = threading.Lock()
-        self._own = threading.local()  # lives in the thread's state: gone if that is not kept
+        self._own = threading.local()  # lives in the thread's state
 
     def pin(self) -> None:
-        """Keep the state of the calling thread; costs next to nothing when it is kept already."""
+        """Pin the state of the calling thread; costs almost nothing if it is pinned already."""
         if getattr(self._own, "is_pinned", False):
             return
         with self._lock:

@@ -1,7 +1,7 @@
-"""The tickets that a fleet's stations sign on the air with, as text in files.
+"""The tickets with which a fleet's stations sign V2X messages, as text in files.
 
-The fleet's authority for the air lies with its other secrets. It is another one than that of TLS:
-IEEE 1609.2 has certificates of its own form.
+The authority for tickets is stored with the fleet's other secrets. It is separate from that of TLS,
+since IEEE 1609.2 has its own certificate format.
 """
 
 import base64
@@ -20,13 +20,13 @@ from scm.v2x.signed_data import read_certificate
 from scm.v2x.signing import CAM, DENM, HOURS, Ticket, issue, make_authority, starts_ns
 
 AUTHORITY_HOURS = 65_535
-"""The longest that a certificate can be good for: seven years and a half."""
+"""The longest validity of a certificate: seven and a half years."""
 EARLY = timedelta(hours=1)
-"""From when on a ticket is good before it is made: clocks of cars differ."""
+"""How long before its creation a ticket is valid, since clocks of cars differ."""
 
 
 class TicketText(NamedTuple):
-    """A ticket as a credentials file holds it: base64, PEM, and base64 of the authority's."""
+    """A ticket in a credentials file: base64, PEM, and the authority's certificate as base64."""
 
     ticket: str
     key: str
@@ -34,7 +34,7 @@ class TicketText(NamedTuple):
 
 
 def issue_ticket(folder: Path, station: str, now: datetime) -> TicketText:
-    """Return a new ticket of the authority in a fleet's folder, which is made when there is none.
+    """Return a new ticket of the authority in a fleet's folder; create a missing authority.
 
     Raises:
         AccessError: when the authority's files cannot be read or written.
@@ -67,7 +67,7 @@ def read_ticket(ticket: str, key: str) -> Ticket:
 
 
 def certificate_of(text: str) -> bytes:
-    """Return the bytes of a certificate that is written as base64.
+    """Return the bytes of a base64 certificate.
 
     Raises:
         AccessError: when it is none.
@@ -82,7 +82,7 @@ def certificate_of(text: str) -> bytes:
 
 
 def ticket_ends(ticket: str) -> datetime:
-    """Return until when a ticket is good.
+    """Return when a ticket expires.
 
     Raises:
         AccessError: when it is none.

@@ -1,8 +1,8 @@
-"""What a step must leave behind before its answers may go: one transaction of a store.
+"""Write-ahead storage: a step's state is stored in one transaction before its answers are sent.
 
-`Keeper` writes at once; `KeeperBehind` writes on a thread, so that a slow disk or a server that is
-away never keeps a part from its next step: only the answers wait. What could not be written is
-written again, the same, until it is; meanwhile `stuck` says why.
+`DirectWriter` writes at once. `BackgroundWriter` writes on a thread, so that a slow disk or an
+unreachable server never delays a part's next step: only the answers wait. A failed write is retried
+until it succeeds; meanwhile `stuck` gives the reason.
 """
 
 import logging
@@ -29,12 +29,12 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
-    """What one step leaves behind.
+    """What one step stores.
 
     Attributes:
-        values: Table, key and value; None forgets it.
+        values: Table, key and value; None deletes it.
         deeds: For the audit log.
-        answers: What may leave when all that is stored.
+        answers: To be sent when all of it is stored.
     """
 
     values: Sequence[tuple[Table, str, bytes | None]]
@@ -43,7 +43,7 @@ class Batch:
 
 
 class BatchStore(Protocol):
-    """Stores batches in order, each whole or not at all."""
+    """Stores batches in order, each in one transaction."""
 
     def stored_answers(self) -> dict[str, StoredAnswer]:
         """Return the answers of earlier runs, by key."""
@@ -54,24 +54,24 @@ class BatchStore(Protocol):
         ...
 
     def written(self) -> list[Batch]:
-        """Return the batches that are safe, and were not returned before, in order."""
+        """Return the newly stored batches, in order."""
         ...
 
     @property
     def stuck(self) -> str:
-        """Why nothing can be stored now; empty: it can."""
+        """Why nothing can be stored now; empty: storing works."""
         ...
 
     def close(self) -> None:
-        """Try for a moment to store what waits; the store itself stays open."""
+        """Try for a moment to store waiting batches; the store itself stays open."""
         ...
 
 
 class _Writer:
-    """Writes batches of one run of one station, and knows whether it has done so already.
+    """Writes batches of one run of one station, each exactly once.
 
-    A server may lose the line just when it commits. The mark written with the batches tells at the
-    next attempt whether they are there: an audit log would show a second copy.
+    The connection to a server may break during a commit. A mark written with the batches shows at
+    the next attempt whether they were stored, so that the audit log has no second copy.
     """
 
     def __init__(self, store: Repository, station: str, session: str) -> None:
@@ -125,7 +125,7 @@ class _Writer:
 
 
 class DirectWriter:
-    """Stores at once, in the caller's step; see `Keeps`."""
+    """Stores at once, in the caller's step; see `BatchStore`."""
 
     def __init__(self, store: Repository, station: str, session: str) -> None:
         self._writer = _Writer(store, station, session)
@@ -142,7 +142,7 @@ class DirectWriter:
         self._waiting.append(batch)
 
     def written(self) -> list[Batch]:
-        """Return the batches that are safe, and were not returned before, in order."""
+        """Return the newly stored batches, in order."""
         while self._under_way or self._waiting:
             if not self._under_way:
                 self._under_way, self._waiting = self._waiting, []
@@ -155,7 +155,7 @@ class DirectWriter:
 
     @property
     def stuck(self) -> str:
-        """Why nothing can be stored now; empty: it can."""
+        """Why nothing can be stored now; empty: storing works."""
         return self._writer.stuck
 
     def close(self) -> None:
@@ -163,7 +163,7 @@ class DirectWriter:
 
 
 class BackgroundWriter:
-    """Stores on a thread of its own, everything that waits in one transaction; see `Keeps`."""
+    """Stores on a thread of its own, everything that waits in one transaction; see `BatchStore`."""
 
     def __init__(self, store: Repository, station: str, session: str) -> None:
         self._writer = _Writer(store, station, session)
@@ -183,7 +183,7 @@ class BackgroundWriter:
         self._waiting.put(batch)
 
     def written(self) -> list[Batch]:
-        """Return the batches that are safe, and were not returned before, in order."""
+        """Return the newly stored batches, in order."""
         if self._failure is not None:
             raise self._failure
         safe: list[Batch] = []
@@ -193,7 +193,7 @@ class BackgroundWriter:
 
     @property
     def stuck(self) -> str:
-        """Why nothing can be stored now; empty: it can."""
+        """Why nothing can be stored now; empty: storing works."""
         return self._writer.stuck
 
     def close(self) -> None:

@@ -1,10 +1,9 @@
-"""Threads that never push another aside: they wake when a processor is free, or at the next turn.
+"""Threads that do not preempt others: they run when a processor is free, or at the next slice.
 
-A part sends a burst of messages each step. Every one wakes a thread of Zenoh, which on a busy
-machine takes the processor from the very loop that sends: 400 states were put aside 250 times and
-took 24 ms instead of 5. Linux asks a thread of the class SCHED_BATCH to wait for the end of the
-running one's turn (a few milliseconds) and lets it start at once where a processor idles; the share
-of the processor it gets is the same (sched(7)).
+A part sends a burst of messages each step. Each wakes a thread of Zenoh, which on a busy machine
+preempts the sending loop: 400 states were interrupted 250 times and took 24 ms instead of 5. Linux
+lets a thread of class SCHED_BATCH wait for the end of the running slice (a few milliseconds) and
+start at once on an idle processor; its share of the processor is the same (sched(7)).
 """
 
 import contextlib
@@ -15,10 +14,10 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def yielding() -> Iterator[None]:
-    """Make every thread that is started within, and those they start, a yielding one.
+    """Start threads inside the block, and threads that they start, with class SCHED_BATCH.
 
-    The caller's own thread is as before afterwards. Nothing happens on systems other than Linux,
-    or where the caller was given a class of its own (`chrt`).
+    The caller's own class is restored afterwards. Does nothing on systems other than Linux, or if
+    the caller has a class of its own (`chrt`).
     """
     if sys.platform != "linux" or os.sched_getscheduler(0) != os.SCHED_OTHER:
         yield

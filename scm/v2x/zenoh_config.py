@@ -1,7 +1,7 @@
-"""How Zenoh is set up here, as JSON text: for a station of a city, and for the city's router.
+"""The configuration of Zenoh as JSON text, for a station and for the city's router.
 
-Nothing is ever searched for on the network: a station knows its router's endpoint. Shared memory
-is off (its start races under load), and a silent neighbour is given up after one second, not ten.
+There is no discovery on the network: a station knows its router's endpoint. Shared memory is off
+(its start races under load), and a silent peer is dropped after one second, not ten.
 """
 
 import json
@@ -13,10 +13,10 @@ RETRY_FIRST_MS = 100
 RETRY_MOST_MS = 500
 
 LARGEST_BYTES = 32 << 20
-"""Of one message: a raw 4K picture. Zenoh's own is 1 GiB, and a thousand of them may wait."""
+"""Of one message: a raw 4K picture. Zenoh's default is 1 GiB, and a thousand may be queued."""
 
-# Batches that may wait to be sent, by priority, before messages are dropped. Zenoh's own 2 is soon
-# full of commands, which are each sent in a batch of their own.
+# Batches that may wait for sending, by priority, before messages are dropped. Zenoh's default 2 is
+# soon full of commands, which each have their own batch.
 BURST = {"real_time": 16, "data_high": 16, "data": 16}
 
 
@@ -25,7 +25,7 @@ def client(
 ) -> str:
     """Return the configuration of a station that reaches its city through one endpoint.
 
-    `transport` says who it is, as `Credentials.client_settings` does.
+    `transport` holds its credentials, see `Credentials.client_settings`.
     """
     return json.dumps(
         _with(
@@ -51,14 +51,14 @@ def client(
 def router(listen: str, access: Mapping[str, Any] | None = None) -> str:
     """Return the configuration of the router of a city that listens at one endpoint.
 
-    `access` says who may enter and do what, as `access.router_settings` does; None: everybody.
+    `access` holds the access rules, see `access.router_settings`; None: everybody.
     """
     own = {"mode": "router", "listen": {"endpoints": [listen]}}
     return json.dumps(_with(_with(_both(), own), access or {}))
 
 
 def _with(settings: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings with others laid over them, level by level."""
+    """Return settings merged with others, level by level."""
     laid = dict(settings)
     for name, value in more.items():
         below = laid.get(name)
@@ -85,5 +85,5 @@ def _both() -> dict[str, Any]:
 
 
 def reason(cause: Exception) -> str:
-    """Return what Zenoh says went wrong, without where in its own sources that was."""
+    """Return Zenoh's error text without the place in its sources."""
     return str(cause).partition(" at /")[0]

@@ -1,4 +1,4 @@
-"""Events over Zenoh, kept for late joiners: all that touches the part of it marked unstable."""
+"""Cached events over Zenoh for late joiners: everything that uses its unstable API."""
 
 from datetime import timedelta
 from typing import Any
@@ -8,7 +8,7 @@ from zenoh import ext
 
 
 def declare_event_publisher(session: zenoh.Session, key: str, keep: int) -> Any:
-    """Return a publisher that keeps its last samples for late joiners and those who lost some."""
+    """Return a publisher that caches its last samples for late joiners and lost samples."""
     return ext.declare_advanced_publisher(
         session,
         key,
@@ -26,13 +26,13 @@ def declare_event_subscriber(
     keep: int | None,
     again: timedelta | None,
 ) -> Any:
-    """Return a subscriber that gets what was kept first, and asks for what it lost.
+    """Return a subscriber that gets cached samples first, and queries for lost ones.
 
-    A gap shows at the next sample. What comes at no fixed rate is asked for every `again`, because
-    heartbeats do not do it: after a router's restart those of 1.10.2 arrive and nobody asks. Each
-    sender is asked in turn, which 200 of them feel (a third of a core at 1 s).
+    A gap shows at the next sample. Samples without a fixed rate are queried every `again`, because
+    heartbeats do not suffice: after a router's restart those of 1.10.2 arrive without a query. Each
+    sender is queried in turn, which costs a third of a core for 200 senders at 1 s.
     """
-    # The stubs want both arguments, and seconds; the library wants one alone, and a timedelta.
+    # The stubs require both arguments, in seconds; the library wants one of them, a timedelta.
     facts: dict[str, Any] = {"periodic_queries": again} if again else {"heartbeat": True}
     recovery = ext.RecoveryConfig(**facts)
     return ext.declare_advanced_subscriber(

@@ -1,1 +1,1 @@
-"""ETSI messages: their records in the units of the standards, and the way from and to ours."""
+"""ETSI messages: records in the units of the standards, and conversion from and to our own."""

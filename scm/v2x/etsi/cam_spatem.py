@@ -1,9 +1,9 @@
 """ETSI facility messages, CAM and SPATEM, as JSON records in the units of the standards.
 
 A 1:14 car is far below the resolution and the trigger thresholds of the standards (1e-7 degree is
-15 cm of the full-scale city, and a 4 m step is longer than the map). So the V2X layer speaks of the
+15 cm of the full-scale city, and a 4 m step is longer than the map). So the V2X layer uses an
 enlarged city: lengths, speeds and accelerations times `SCALE`, time unchanged, positions as
-degrees from a reference point. Every field then means what the standard says.
+degrees from a reference point. Every field then has its meaning in the standard.
 
 A body is, name by name, the `message` of the open JSON schemas of Orange's its-client (cam 2.4.0,
 spatem 2.0.0); `scm.v2x.etsi.json_form` puts their envelope around it.
@@ -56,7 +56,7 @@ PHASE_STATES = (
     "protected-clearance",
     "caution-Conflicting-Traffic",
 )
-"""SAE J2735 MovementPhaseState; the place in the list is the number on the air."""
+"""SAE J2735 MovementPhaseState; the index is the number in the message."""
 STATUS_BITS = (
     "manualControlIsEnabled",
     "stopTimeIsActivated",
@@ -76,9 +76,9 @@ STATUS_BITS = (
 """IntersectionStatusObject, first bit first; two more are reserved."""
 
 TIME_CONFIDENCES = (21, 36, 47, 56, 62, 68, 73, 77, 81, 85, 88, 91, 94, 96, 98, 100)
-"""SAE J2735 TimeIntervalConfidence in percent; the place in the list is the number on the air."""
+"""SAE J2735 TimeIntervalConfidence in percent; the index is the number in the message."""
 
-# A value beyond the standard's range is refused when read: it comes from the air.
+# Values beyond the standard's range are rejected on decoding: they come from outside.
 _TimeMark = Annotated[
     int,
     coded(0, TIME_MARK_UNKNOWN, unavailable=TIME_MARK_UNKNOWN, out_of_range=(TIME_MARK_FAR,)),
@@ -116,14 +116,14 @@ class YawRate(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
 
 class BasicContainer(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """Who and where: the middle of the front bumper."""
+    """Station type, and position of the middle of the front bumper."""
 
     station_type: StationType = PASSENGER_CAR
     reference_position: ReferencePosition
 
 
 class VehicleHighFrequency(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """How a car moves.
+    """The motion of a car.
 
     Attributes:
         drive_direction: 0 forward, 1 backward, 2 unknown.
@@ -187,17 +187,17 @@ class CamBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
 
     @property
     def position(self) -> ReferencePosition:
-        """Where the middle of the front bumper is."""
+        """Position of the middle of the front bumper."""
         return self.basic_container.reference_position
 
     @property
     def motion(self) -> VehicleHighFrequency:
-        """How the car moves."""
+        """The motion of the car."""
         return self.high_frequency_container.basic_vehicle_container_high_frequency
 
     @property
     def slow(self) -> VehicleLowFrequency | None:
-        """Role, lights and path, where they are told."""
+        """Role, lights and path, or None if the CAM has none."""
         container = self.low_frequency_container
         return None if container is None else container.basic_vehicle_container_low_frequency
 
@@ -205,7 +205,7 @@ class CamBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
 class Timing(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """When a phase ends: 0.1 s within the hour, 36000 far, 36001 unknown.
 
-    `confidence` in `likely_time` is its place in `TIME_CONFIDENCES`.
+    `confidence` of `likely_time` is an index into `TIME_CONFIDENCES`.
     """
 
     min_end_time: _TimeMark
@@ -216,7 +216,7 @@ class Timing(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
 
 
 class MovementEvent(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """What a group shows now, by its place in `PHASE_STATES`."""
+    """What a group shows now, as an index into `PHASE_STATES`."""
 
     event_state: Annotated[int, coded(0, 9, unavailable=0)]
     timing: Timing | None = None
@@ -255,7 +255,7 @@ class MovementState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=Tru
 
     @property
     def confidence(self) -> float | None:
-        """How sure `likely_time` is, a share of 1; None: it is not told."""
+        """Confidence of `likely_time`, 0 to 1, or None."""
         timing = self.state_time_speed[0].timing
         value = None if timing is None else timing.confidence
         return None if value is None else TIME_CONFIDENCES[value] / 100.0
@@ -280,7 +280,7 @@ class IntersectionState(msgspec.Struct, kw_only=True, frozen=True, omit_defaults
 
 
 class SpatemBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """A SPATEM; a roadside unit of ours tells of one junction, and of others' we read the first."""
+    """A SPATEM; our roadside units send one junction, of others' messages we read the first."""
 
     protocol_version: Byte
     station_id: StationId

@@ -1,7 +1,7 @@
-"""Which values of an ETSI field are no number: the codes "unavailable" and "out of range".
+"""The values of an ETSI field that are no numbers: the codes "unavailable" and "out of range".
 
-Each integer of the seven messages is declared with `coded`, its codes beside its range, and every
-reader takes it with `number_of`. So the definitions are the one table; `codes_in` lists it.
+Each integer of the seven messages is declared with `coded`, its codes beside its range, and read
+with `number_of`. So the definitions are the only table; `codes_in` lists it.
 
 Codes after TS 102 894-2 v1.3.1 and v2.3.1 (common data dictionary) and SAE J2735 in TS 103 301.
 """
@@ -17,11 +17,11 @@ _KEY = "etsi_codes"
 
 
 class Codes(NamedTuple):
-    """The values of one field that are no number.
+    """The values of one field that are no numbers.
 
     Attributes:
-        unavailable: The sender does not know it; reserved values count as such.
-        out_of_range: The quantity lies beyond what the field can express.
+        unavailable: Unknown to the sender; reserved values count as such.
+        out_of_range: The quantity exceeds the field's range.
     """
 
     unavailable: Sequence[int] = ()
@@ -31,7 +31,7 @@ class Codes(NamedTuple):
 def coded(
     low: int, high: int, *, unavailable: int | range | None = None, out_of_range: Sequence[int] = ()
 ) -> Meta:
-    """Return the declaration of an integer field: its range, and which of its values are codes."""
+    """Return the declaration of an integer field: its range and its codes."""
     none = (unavailable,) if isinstance(unavailable, int) else unavailable or ()
     return Meta(ge=low, le=high, extra={_KEY: Codes(none, out_of_range)})
 
@@ -47,7 +47,7 @@ def codes_of(record: type[msgspec.Struct]) -> Mapping[str, Codes]:
 
 
 def number_of(record: msgspec.Struct, field: str) -> int | None:
-    """Return the number that a field holds; None where it is absent or holds a code.
+    """Return the number in a field, or None if it is absent or a code.
 
     Raises:
         KeyError: when the record's definition declares no such field with `coded`.
@@ -57,24 +57,24 @@ def number_of(record: msgspec.Struct, field: str) -> int | None:
 
 
 def scaled(record: msgspec.Struct, field: str, unit: float) -> float | None:
-    """Return a field's number times its unit; None where it is absent or holds a code."""
+    """Return a field's number times its unit, or None if it is absent or a code."""
     number = number_of(record, field)
     return None if number is None else number * unit
 
 
 def number_in(record: type[msgspec.Struct], field: str, value: int | None) -> int | None:
-    """Return a value of a field of a record as `number_of` does."""
+    """Return a value of a record's field as `number_of` does."""
     codes = codes_of(record)[field]
     return None if value in codes.unavailable or value in codes.out_of_range else value
 
 
 def is_out_of_range(record: msgspec.Struct, field: str) -> bool:
-    """Return whether a field says that its quantity lies beyond what it can express."""
+    """Return whether a field holds the code "out of range"."""
     return getattr(record, field) in codes_of(type(record))[field].out_of_range
 
 
 def codes_in(record: type[msgspec.Struct], path: str = "") -> Iterator[tuple[str, Codes | None]]:
-    """Yield (path, codes) of every integer within a record; None: it is not declared by `coded`."""
+    """Yield (path, codes) of every integer in a record; None: it is not declared with `coded`."""
     for field in inspect.type_info(record).fields:  # type: ignore[attr-defined]
         yield from _within(field.type, f"{path}.{field.name}".lstrip("."))
 

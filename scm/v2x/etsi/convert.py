@@ -4,9 +4,9 @@
     heading  = 90 deg - yaw          clockwise from north, north = map +y
     mark     = 0.1 s within the hour of UTC; 36000 is beyond it, 36001 is unknown
 
-Promises are rounded to the honest side: a minimum end down, a maximum end up. What does not fit a
-field is written as the field's code for that, its largest value in most; what is not known as its
-own unknown value. What is read is a number or None: `scm.v2x.etsi.codes` has the codes.
+Times are rounded to the safe side: a minimum end down, a maximum end up. Values beyond a field's
+range are written as its code for that, in most fields the largest value; unknown values as the
+field's "unavailable". Reading returns a number or None: `scm.v2x.etsi.codes` has the codes.
 Field sets and values: EN 302 637-2 v1.4.1 with TS 102 894-2, TS 103 301 with SAE J2735.
 """
 
@@ -63,7 +63,7 @@ CURVATURE_MAX, CURVATURE_MIN, CURVATURE_UNKNOWN = 1022, -1023, 1023
 YAW_RATE_MAX = 32766
 MAX_LATITUDE, MAX_LONGITUDE = 900_000_000, 1_800_000_000
 ASSUMED_LENGTH_M, ASSUMED_WIDTH_M = 0.30, 0.175
-"""Of a Nigel: what a receiver takes that must have a size where a CAM tells none."""
+"""A Nigel's size, which receivers assume if a CAM has none."""
 REVISIONS = 128
 
 _ITS_EPOCH_MS = 1_072_915_200_000
@@ -105,9 +105,8 @@ _STATUS_LENGTH = 16
 class CamView(NamedTuple):
     """A CAM in metric units of the table: position of the front bumper's middle, map frame.
 
-    None: the CAM does not say, or that it is beyond the field's range. Without a latitude or a
-    longitude there is neither `x_m` nor `y_m`. `speed_mps` is negative in reverse, and None where
-    the CAM does not say which way a car moves.
+    None: unavailable or out of range. Without a latitude or a longitude both `x_m` and `y_m` are
+    None. `speed_mps` is negative in reverse, and None if the direction is unknown.
     """
 
     station_id: int
@@ -121,12 +120,12 @@ class CamView(NamedTuple):
 
     @property
     def place(self) -> tuple[float, float] | None:
-        """Return x and y [m]; None: the CAM does not say where the car is."""
+        """Return x and y [m], or None if the CAM has no position."""
         return None if self.x_m is None or self.y_m is None else (self.x_m, self.y_m)
 
 
 class SignalState(NamedTuple):
-    """What a SPATEM says of one group; seconds count from the body's own time stamp."""
+    """One group in a SPATEM; seconds count from the message's time stamp."""
 
     colour: Colour
     min_end_s: float | None
@@ -155,7 +154,7 @@ def its_ms(t_ns: int) -> int:
 
 
 def its_time(t_ns: int) -> int:
-    """Return `its_ms` as it is written on the air; a clock before 2004 counts up to the wrap."""
+    """Return `its_ms` as sent in messages; a clock before 2004 counts up to the wrap."""
     return its_ms(t_ns) % _ITS_TIMES
 
 
@@ -172,7 +171,7 @@ def generated_ns(body: CamBody, near_ns: int) -> int:
 
 
 def heading_of(yaw: float) -> int:
-    """Return 0.1 degree clockwise from north of a yaw [rad], never 3600."""
+    """Return a yaw [rad] as 0.1 degree clockwise from north, never 3600."""
     return round((90.0 - math.degrees(yaw)) * 10.0) % 3600
 
 
@@ -184,7 +183,7 @@ def _curvature(state: VehicleState) -> int:
 
 
 def position_of(x_m: float, y_m: float) -> ReferencePosition:
-    """Return a place of the map as a place on the earth; unavailable beyond its poles and dates."""
+    """Return a place of the map as a position on the earth; unavailable beyond its range."""
     latitude, longitude = latitude_of(y_m), longitude_of(x_m)
     if abs(latitude) > MAX_LATITUDE or abs(longitude) > MAX_LONGITUDE:
         latitude, longitude = UNKNOWN_POSITION
@@ -202,7 +201,7 @@ def longitude_of(x_m: float) -> int:
 
 
 def place_of(latitude: int, longitude: int) -> tuple[float, float] | None:
-    """Return map x and y [m] of a place on the earth; None: either is unavailable."""
+    """Return map x and y [m] of a position on the earth, or None if either is unavailable."""
     if (
         number_in(ReferencePosition, "latitude", latitude) is None
         or number_in(ReferencePosition, "longitude", longitude) is None
@@ -255,7 +254,7 @@ def cam_of(
 
 
 def _speed_mps(motion: VehicleHighFrequency) -> float | None:
-    """Return the signed speed of the table; None: size or direction is not known."""
+    """Return the signed speed of the table, or None if size or direction is unknown."""
     speed = scaled(motion.speed, "value", 0.01 / SCALE)
     backward = number_of(motion, "drive_direction")
     if not speed or backward is None:
@@ -303,7 +302,7 @@ def _movement(group: SignalGroup, number: int, spat: Spat) -> MovementState:
 
 
 def _confidence(group: SignalGroup) -> int | None:
-    """Return the highest class that promises no more than the group does; None: it tells none."""
+    """Return the highest class that does not exceed the group's confidence, or None."""
     if group.likely_confidence is None:
         return None
     percent = group.likely_confidence * 100.0
@@ -347,7 +346,7 @@ def _bits(names: tuple[str, ...]) -> str:
 
 
 def _until_s(field: str, of: MovementState, state: IntersectionState) -> float | None:
-    """Return for how long from a SPATEM's own time stamp until a time mark of a group [s]."""
+    """Return the time from a SPATEM's time stamp to a time mark of a group [s], or None."""
     timing = of.state_time_speed[0].timing
     mark = None if timing is None else number_of(timing, field)
     minute, millisecond = number_of(state, "moy"), number_of(state, "timestamp")
@@ -359,10 +358,10 @@ def _until_s(field: str, of: MovementState, state: IntersectionState) -> float |
 
 
 def colours_of(body: SpatemBody) -> dict[int, SignalState]:
-    """Return what a SPATEM says of each group number: colour, and seconds to its ends.
+    """Return the state of each group number in a SPATEM: colour, and seconds to its ends.
 
-    Only a protected movement is green. Every state that we do not know counts as dark. A group
-    whose number is not told is left out.
+    Only a protected movement is green. Unknown states count as dark. Groups without a number are
+    left out.
     """
     return {
         state.signal_group: _signal_state(state, body.intersections[0])

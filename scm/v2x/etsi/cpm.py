@@ -1,6 +1,6 @@
 """The ETSI collective perception message (CPM) as JSON records, in the units of the standard.
 
-As in `scm.v2x.etsi.cam_spatem` it speaks of the enlarged city: lengths and speeds times `SCALE`,
+As in `scm.v2x.etsi.cam_spatem` it uses the enlarged city: lengths and speeds times `SCALE`,
 time as it is. Names and ranges are those of the open JSON schema of Orange's its-client, cpm 2.1.1,
 after TS 103 324 v2.1.1 with TS 102 894-2. Objects stand east (x) and north (y) of the reference
 position; map x is east and map y is north.
@@ -68,7 +68,7 @@ class Dimension(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Position(msgspec.Struct, kw_only=True, frozen=True):
-    """Where an object is: the middle of its outline on the ground."""
+    """Position of an object: the centre of its outline on the ground."""
 
     x_coordinate: Coordinate
     y_coordinate: Coordinate
@@ -82,7 +82,7 @@ class CartesianVelocity(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Velocity(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """The standard's choice between two forms; None: the polar one, which is not read here."""
+    """The standard's choice of two forms; None: the polar one, which is not supported."""
 
     cartesian_velocity: CartesianVelocity | None = None
 
@@ -107,12 +107,12 @@ class Classification(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class PerceivedObject(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """One car that was seen; of what other people's stations see, all but the place may be None.
+    """One perceived car; from other stations everything but the position may be None.
 
     Attributes:
-        measurement_delta_time: From the reference time to when this was true [ms].
+        measurement_delta_time: From the reference time to the measurement [ms].
         object_id: Its tag's id.
-        sensor_id_list: Which cameras saw it; None: none of late.
+        sensor_id_list: Cameras that saw it; None: none recently.
     """
 
     measurement_delta_time: _Span
@@ -128,7 +128,7 @@ class PerceivedObject(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=T
 
 
 class ManagementContainer(msgspec.Struct, kw_only=True, frozen=True):
-    """When and where: reference_time counts ITS milliseconds since 2004."""
+    """Time and position: reference_time counts ITS milliseconds since 2004."""
 
     reference_time: ItsTime
     reference_position: ReferencePosition
@@ -143,7 +143,7 @@ class SensorInformation(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class CpmBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """What a roadside unit perceives; containers without anything in them are left out."""
+    """What a roadside unit perceives; empty containers are left out."""
 
     protocol_version: Byte
     station_id: StationId

@@ -1,7 +1,7 @@
 """The ETSI decentralised environmental notification (DENM) as JSON records, enlarged city.
 
-A body is the `message` of its-client's JSON schema denm 2.3.0. What we never send is not here: the
-à la carte container, the zone of an event, linked events.
+A body is the `message` of its-client's JSON schema denm 2.3.0. Left out because we never send it:
+the à la carte container, the zone of an event, linked events.
 Field sets and units: EN 302 637-3 v1.3.1, TS 103 831 v2.2.1.
 """
 
@@ -40,7 +40,7 @@ MAX_TRACES = 7
 
 
 class ActionId(msgspec.Struct, kw_only=True, frozen=True):
-    """One event for ever: who told of it first, and its count of events."""
+    """Permanent id of an event: the station that first reported it, and its sequence number."""
 
     originating_station_id: StationId
     sequence_number: Word
@@ -62,7 +62,7 @@ class EventEllipse(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class EventPosition(msgspec.Struct, kw_only=True, frozen=True):
-    """Where it happened: 1e-7 degree of the enlarged city."""
+    """Position of the event: 1e-7 degree of the enlarged city."""
 
     latitude: Latitude
     longitude: Longitude
@@ -71,12 +71,12 @@ class EventPosition(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class DenmManagement(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """Which event, where, and for how long.
+    """Id, position and validity of an event.
 
     Attributes:
-        detection_time, reference_time: ITS milliseconds since 2004; the second is new with every
-            update, and a repetition keeps it.
-        termination: 0 cancelled by who told of it, 1 denied by somebody else.
+        detection_time, reference_time: ITS milliseconds since 2004; updates change the second,
+            repetitions do not.
+        termination: 0 cancelled by its originator, 1 negated by another station.
         awareness_distance: A class: 0 within 50 m, 1 100 m, 2 200 m, 3 500 m, 4 1 km ...
         relevance_traffic_direction: 0 all, 1 upstream, 2 downstream, 3 opposite.
         validity_duration: Seconds from the detection.
@@ -97,14 +97,14 @@ class DenmManagement(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=Tr
 
 
 class CauseCode(msgspec.Struct, kw_only=True, frozen=True):
-    """What happened: 94 a stationary vehicle, 92 after a crash, 99 a dangerous situation ..."""
+    """Cause: 94 a stationary vehicle, 92 after a crash, 99 a dangerous situation ..."""
 
     cause: Byte
     subcause: Annotated[int, coded(0, 255, unavailable=0)] = 0
 
 
 class DenmSituation(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """What it is; information_quality: 0 unknown, 1 lowest, 7 highest."""
+    """Type of the event; information_quality: 0 unknown, 1 lowest, 7 highest."""
 
     information_quality: Annotated[int, coded(0, 7, unavailable=0)]
     event_type: CauseCode
@@ -112,13 +112,13 @@ class DenmSituation(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=Tru
 
 
 class Trace(msgspec.Struct, kw_only=True, frozen=True):
-    """A way that led to the event, newest point first."""
+    """A path that led to the event, newest point first."""
 
     path: Annotated[tuple[PathPoint, ...], Meta(max_length=40)] = ()
 
 
 class DenmLocation(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """How the event moves, and on which ways one comes to it."""
+    """Motion of the event, and the paths that lead to it."""
 
     event_speed: Speed | None = None
     event_position_heading: Heading | None = None

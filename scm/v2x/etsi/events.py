@@ -1,14 +1,14 @@
-"""Warnings on the air: who sends a DENM how often, what ends it, and what a receiver believes.
+"""Warnings: when a DENM is sent and ended, and how a receiver handles it.
 
-    trigger   new action id, detected now; sent at once and again every interval
+    trigger   new action id, detected now; sent at once and repeated every interval
     update    same action id, later reference time, by the station that triggered it
-    cancel    the same with termination 0; then nothing of it for ever
-    negate    somebody else's event is over: its action id with termination 1
-    valid     for validity_duration from the detection; whoever sent it then falls silent
+    cancel    the same with termination 0; the action id is never used again
+    negate    another station's event is over: its action id with termination 1
+    valid     for validity_duration from the detection; then its sender stops
 
-A receiver takes of one action id only what has a later reference time than it knows; what has the
-same is a repetition. Nobody can undo a termination. A negation counts only of an event that the
-receiver knows. Terminations are sent until the event would have ended by itself.
+A receiver accepts of one action id only later reference times than the last; an equal one is a
+repetition. A termination is final. A negation counts only for an event that the receiver knows.
+Terminations are sent until the event would have expired.
 Source: EN 302 637-3 v1.3.1, 6 and 8.
 """
 
@@ -39,14 +39,14 @@ from scm.v2x.messages.vehicle_state import VehicleState
 
 ACCIDENT, STATIONARY_VEHICLE, DANGEROUS_SITUATION = 2, 94, 99
 MULTI_VEHICLE_ACCIDENT, EMERGENCY_BRAKE = 1, 1
-HARD_BRAKING_MPS2 = 2.0  # four times what drivers find comfortable; where they stop for a light 1.2
+HARD_BRAKING_MPS2 = 2.0  # four times comfortable braking; drivers stop for a signal with 1.2
 MIN_BRAKING_MPS = 0.05
 BRAKING_EVERY_NS = 5 * NS_PER_S
 COUNTS = 65_536
 MAX_EVENTS = 4096
 STANDSTILL_MPS = 0.02
 STANDING_NS = 2 * NS_PER_S
-RENEW_NS = 15 * NS_PER_S  # half of what a stationary vehicle's warning is valid for
+RENEW_NS = 15 * NS_PER_S  # half the validity of a stationary vehicle's warning
 HIT_EVERY_NS = 10 * NS_PER_S
 WALL = "wall"
 
@@ -54,16 +54,16 @@ Reception = Literal["new", "update", "repetition", "ended", "ignored"]
 
 
 class Event(NamedTuple):
-    """What a warning says.
+    """The content of a warning.
 
     Attributes:
         cause, subcause: Of TS 102 894-2.
-        x_m, y_m: Where, map frame.
-        quality: 1 a guess to 7 certain.
-        valid_s: For how long it is true unless it is told again.
+        x_m, y_m: Position, map frame.
+        quality: From 1, a guess, to 7, certain.
+        valid_s: Validity without an update.
         interval_ms: Between repetitions.
-        awareness: How far it matters, a class: 0 within 50 m of the enlarged city, 1 100 m ...
-        yaw_rad, speed_mps: Of what it is about, where it moves.
+        awareness: Class of its range: 0 within 50 m of the enlarged city, 1 100 m ...
+        yaw_rad, speed_mps: Of the event, if it moves.
     """
 
     cause: int
@@ -87,17 +87,17 @@ class _Sent:
 
 
 class DenmSender:
-    """The warnings of one station; ask `due` as often as the shortest interval wants."""
+    """The warnings of one station; call `due` at the shortest interval."""
 
     def __init__(self, station: str, station_type: int = PASSENGER_CAR, first: int = 0) -> None:
-        """Take the station's name and the number of its first event."""
+        """Start with the station's name and the number of its first event."""
         self._station = station_id(station)
         self._station_type = station_type
         self._count = first
         self._sent: dict[ActionId, _Sent] = {}
 
     def trigger(self, event: Event, now_ns: int) -> ActionId:
-        """Begin to warn of something; return the name of the warning."""
+        """Start a warning; return its action id."""
         action = ActionId(
             originating_station_id=self._station, sequence_number=self._count % COUNTS
         )
@@ -106,25 +106,25 @@ class DenmSender:
         return action
 
     def update(self, action: ActionId, event: Event, now_ns: int) -> None:
-        """Say something newer of an event of one's own, which is detected anew.
+        """Update an own event, which counts as detected now.
 
         Raises:
-            MessageError: when it is not known any more, or somebody else's.
+            MessageError: when it has expired or belongs to another station.
         """
         self._own(action)
         self._send(self._body(action, event, now_ns), event, now_ns)
 
     def cancel(self, action: ActionId, now_ns: int) -> None:
-        """Say that an event of one's own is over.
+        """Cancel an own event.
 
         Raises:
-            MessageError: when it is not known any more, or somebody else's.
+            MessageError: when it has expired or belongs to another station.
         """
         sent = self._own(action)
         self._end(sent.body, CANCELLATION, sent.interval_ns, sent.ends_ns, now_ns)
 
     def negate(self, received: DenmBody, now_ns: int) -> None:
-        """Say that somebody else's event, heard as `heard`, is over."""
+        """Negate another station's event, received as `received`."""
         management = received.management_container
         interval_ns = (management.transmission_interval or 1000) * NS_PER_MS
         self._end(received, NEGATION, interval_ns, now_ns + _left_ns(received, now_ns), now_ns)
@@ -135,7 +135,7 @@ class DenmSender:
         return bool(self._sent)
 
     def due(self, now_ns: int) -> list[DenmBody]:
-        """Return what has to be sent now; it counts as sent."""
+        """Return the DENMs that are due; they count as sent."""
         self._sent = {name: sent for name, sent in self._sent.items() if sent.ends_ns > now_ns}
         bodies = []
         for sent in self._sent.values():
@@ -208,13 +208,13 @@ class DenmSender:
 
 
 class DenmReceiver:
-    """What a receiver knows of events around it; beyond 4096 the one that ends first is lost."""
+    """The events that a receiver knows; beyond 4096 the one that ends first is dropped."""
 
     def __init__(self) -> None:
         self._known: dict[ActionId, tuple[DenmBody, int]] = {}
 
     def receive(self, body: DenmBody, now_ns: int) -> Reception:
-        """Take a DENM that arrived now; return what it was to this receiver."""
+        """Handle a DENM that arrived now; return what it was to this receiver."""
         management = body.management_container
         action, known = management.action_id, self._known.get(management.action_id)
         left_ns = _left_ns(body, now_ns)
@@ -235,7 +235,7 @@ class DenmReceiver:
         return "new" if known is None else "update"
 
     def events(self, now_ns: int) -> tuple[DenmBody, ...]:
-        """Return the events that last, in the order in which they were first heard."""
+        """Return the valid events, in the order of their first reception."""
         self._forget(now_ns)
         return tuple(
             body
@@ -250,7 +250,7 @@ class DenmReceiver:
 
 
 def _may_send(body: DenmBody, *, is_known: bool) -> bool:
-    """Return whether a station may say this: its own events, or that another's is over."""
+    """Return whether the sender may send this: an own event, or a negation of another's."""
     management = body.management_container
     if management.termination == NEGATION:
         return is_known and body.station_id != management.action_id.originating_station_id
@@ -258,14 +258,14 @@ def _may_send(body: DenmBody, *, is_known: bool) -> bool:
 
 
 def _left_ns(body: DenmBody, now_ns: int) -> int:
-    """Return for how long a DENM that is heard now is still valid [ns]."""
+    """Return the remaining validity of a DENM received now [ns]."""
     management = body.management_container
     age_ns = (its_time(now_ns) - management.detection_time) * NS_PER_MS
     return management.validity_duration * NS_PER_S - age_ns
 
 
 def accident(contact: Contact, state: VehicleState) -> Event:
-    """Return what a car warns of that was hit: an accident where it stands."""
+    """Return the warning of a car that was hit: an accident at its place."""
     others = [name for name in contact.against if name != WALL]
     return Event(
         cause=ACCIDENT,
@@ -279,7 +279,7 @@ def accident(contact: Contact, state: VehicleState) -> Event:
 
 
 def stationary(state: VehicleState) -> Event:
-    """Return what a car warns of that stands though it should drive."""
+    """Return the warning of a car that stands though it should drive."""
     return Event(
         cause=STATIONARY_VEHICLE,
         x_m=state.x_m,
@@ -291,7 +291,7 @@ def stationary(state: VehicleState) -> Event:
 
 
 def hard_braking(state: VehicleState) -> Event:
-    """Return what a car warns of that brakes as hard as nobody does without need."""
+    """Return the warning of a car that brakes hard."""
     return Event(
         cause=DANGEROUS_SITUATION,
         subcause=EMERGENCY_BRAKE,
@@ -306,15 +306,15 @@ def hard_braking(state: VehicleState) -> Event:
 
 
 def city_stop(x_m: float, y_m: float) -> Event:
-    """Return what a roadside station at a place warns of while the whole city is stopped."""
+    """Return the warning of a roadside station while the whole city is stopped."""
     return Event(cause=DANGEROUS_SITUATION, x_m=x_m, y_m=y_m, awareness=4, quality=7)
 
 
 class CarWarnings:
-    """When a car warns: of a hit or of hard braking at once, and while it stands and should not.
+    """The warnings of one car: hits and hard braking at once, and standing where it should not.
 
-    It should not stand when its guard holds or stops it (`mode`), unless whoever asks knows better;
-    waiting at a red light is no event.
+    By default it should not stand when its guard holds or stops it (`mode`). Waiting at a red
+    signal is no event.
     """
 
     def __init__(self, vehicle: str) -> None:
@@ -326,7 +326,7 @@ class CarWarnings:
 
     @property
     def is_busy(self) -> bool:
-        """Whether it warns of something, or is about to: it must be asked again."""
+        """Whether it warns of something or is about to: `step` must be called again."""
         return self._sender.is_busy or self._since_ns is not None
 
     def step(
@@ -337,14 +337,14 @@ class CarWarnings:
         is_stranded: bool | None = None,
         has_braked: bool | None = None,
     ) -> list[DenmBody]:
-        """Return the DENMs that go out now; ask at every report of the car.
+        """Return the DENMs that are due; call it at every report of the car.
 
         Args:
             state: Of the car now.
-            contacts: What hit it since the last time.
-            is_stranded: Whether it stands where it should not; None: as its guard's mode says.
-            has_braked: Whether it has braked hard since the last time; None: as `state` says, which
-                a small car outruns: it stands within a tenth of a second.
+            contacts: New contacts since the last call.
+            is_stranded: Whether it stands where it should not; None: by its guard's mode.
+            has_braked: Whether it braked hard since the last call; None: by `state`, which may miss
+                it, since a small car stops within a tenth of a second.
         """
         now_ns = state.t_ns
         for contact in contacts:

@@ -1,10 +1,10 @@
-"""ETSI messages in the envelope of Orange's its-client, the form in which they travel by MQTT.
+"""ETSI messages in the envelope of Orange's its-client, as used over MQTT.
 
     {"message_type": "cam", "source_uuid": "scm_n1", "timestamp": ms since 1970,
      "version": "2.4.0", "message": {...the body...}}
 
-SPATEM and MAPEM also say where they come from (`origin`). The schemas allow timestamps of the
-years 2018 to 2027 alone: a city on a stepped clock from 1970 makes envelopes that they refuse.
+SPATEM and MAPEM also have an `origin`. The schemas allow only timestamps of the years 2018 to
+2027: envelopes of a city on a stepped clock from 1970 are invalid.
 """
 
 from typing import Any, NamedTuple
@@ -25,7 +25,7 @@ ORIGIN = "self"
 
 
 class Kind(NamedTuple):
-    """One kind of message: its body's class, its schema's version, whether it tells its origin."""
+    """One kind of message: its body's class, its schema's version, whether it has an origin."""
 
     body: type[Body]
     version: str
@@ -46,7 +46,7 @@ _TYPES = {kind.body: name for name, kind in KINDS.items()}
 
 
 class Envelope(NamedTuple):
-    """A message with who sent it and when [ms since 1970]."""
+    """A message with its source and time of sending [ms since 1970]."""
 
     source: str
     timestamp_ms: int
@@ -67,7 +67,7 @@ def type_of(body: Body) -> str:
 
 
 def wrap(body: Body, station: str, t_ns: int) -> bytes:
-    """Return a body in its envelope, one line of JSON without the line's end."""
+    """Return a body in its envelope, one line of JSON without a newline."""
     name = type_of(body)
     kind = KINDS[name]
     envelope: dict[str, Any] = {"message_type": name}
@@ -81,11 +81,10 @@ def wrap(body: Body, station: str, t_ns: int) -> bytes:
 
 
 def unwrap(line: bytes) -> Envelope:
-    """Read an envelope back, ours or another tool's.
+    """Decode an envelope, ours or another tool's.
 
     Raises:
-        MessageError: for bytes that are none, a type or a version we do not know, or a body that
-            does not keep to its ranges.
+        MessageError: for invalid bytes, an unknown type or version, or a body out of its ranges.
     """
     try:
         raw = msgspec.json.decode(line, type=_Raw)

@@ -1,7 +1,7 @@
 """The ETSI map of a junction (MAPEM) as JSON records, enlarged city.
 
-A body is the `message` of its-client's JSON schema mapem 2.0.0; of its kinds of lanes we have the
-one for vehicles. `scm.v2x.etsi.topology` makes it from a map file.
+A body is the `message` of its-client's JSON schema mapem 2.0.0, restricted to vehicle lanes.
+`scm.v2x.etsi.topology` builds it from a map file.
 Field sets and units: TS 103 301 with SAE J2735.
 """
 
@@ -31,7 +31,7 @@ FARTHEST_CM = 32_767
 MAX_LANE_WIDTH_CM = 32_767
 
 DIRECTIONS = ("ingressPath", "egressPath")
-"""LaneDirection, first bit first; so are `SHARED` and `VEHICLE_LANE`."""
+"""LaneDirection, first bit first; likewise `SHARED` and `VEHICLE_LANE`."""
 SHARED = (
     "overlappingLaneDescriptionProvided",
     "multipleLanesTreatedAsOneLane",
@@ -127,14 +127,14 @@ class SpeedLimit(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class NodeXy(msgspec.Struct, kw_only=True, frozen=True):
-    """From the node before, the first from the reference point: 0.01 m east and north."""
+    """Offset from the previous node (first: the reference point): 0.01 m east and north."""
 
     x: _Offset
     y: _Offset
 
 
 class NodeDelta(msgspec.Struct, kw_only=True, frozen=True):
-    """The standard's choice between offsets and places on the earth; offsets."""
+    """The standard's choice of offsets or positions on the earth; only offsets here."""
 
     node_xy: NodeXy
 
@@ -146,19 +146,19 @@ class Node(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class NodeList(msgspec.Struct, kw_only=True, frozen=True):
-    """A lane's centre line, from the stop line outwards whichever way cars drive."""
+    """A lane's centre line, from the stop line outwards in either driving direction."""
 
     nodes: Annotated[tuple[Node, ...], Meta(min_length=2, max_length=MAX_NODES)]
 
 
 class LaneType(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """The standard's choice between kinds of lanes; None: none for vehicles, a crosswalk say."""
+    """The standard's choice of lane types; None: not for vehicles, such as a crosswalk."""
 
     vehicle: Annotated[tuple[_VehicleLane, ...], Meta(max_length=8)] | None = None
 
 
 class LaneAttributes(msgspec.Struct, kw_only=True, frozen=True):
-    """Which way cars drive, and who else may use the lane."""
+    """Driving direction, and who else may use the lane."""
 
     directional_use: Annotated[
         tuple[Literal["ingressPath", "egressPath"], ...], Meta(min_length=1, max_length=2)
@@ -175,7 +175,7 @@ class ConnectingLane(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=Tr
 
 
 class Connection(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """A way over the junction, and the SPATEM group that releases it."""
+    """A path over the junction, and the SPATEM group that releases it."""
 
     connecting_lane: ConnectingLane
     signal_group: SignalGroupId | None = None

@@ -1,7 +1,7 @@
 """Data elements that several ETSI messages share, as JSON records in the units of the standards.
 
-A field that the standard leaves out when it is absent is None here and missing in the JSON.
-Records that have such fields write no default at all, so everything required there must be given.
+Optional fields of the standard are None here and missing in the JSON when absent. Records with such
+fields write no defaults, so all their required fields must be given.
 Names and ranges: the open JSON schemas of Orange's its-client, after TS 102 894-2 and SAE J2735.
 """
 
@@ -56,7 +56,7 @@ Name = Annotated[str, Meta(min_length=1, max_length=63)]
 
 
 class Ellipse(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """How sure a position is: 0.01 m, 4095 unknown; 0.1 degree, 3601 unknown."""
+    """Confidence of a position: 0.01 m, 4095 unknown; 0.1 degree, 3601 unknown."""
 
     semi_major: SemiAxis = NO_ELLIPSE
     semi_minor: SemiAxis = NO_ELLIPSE
@@ -105,14 +105,14 @@ class DeltaPosition(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
 
 class PathPoint(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """Where a car was; path_delta_time: 0.01 s from here to the point before it in the list."""
+    """A past position; path_delta_time: 0.01 s from here to the previous point in the list."""
 
     path_position: DeltaPosition
     path_delta_time: Annotated[int, coded(1, 65_535)] | None = None
 
 
 class IntersectionId(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """A junction's number; region None: a number of this city's own."""
+    """A junction's number; region None: numbers of this city."""
 
     id: Word
     region: Word | None = None

@@ -1,7 +1,7 @@
-"""What changes slowly in a car's CAMs: role, lights and path, in one CAM every 500 ms at most.
+"""The low-frequency container of a car's CAMs: role, lights and path, every 500 ms at most.
 
-The path is where earlier such CAMs were sent, at least 4 m of the enlarged city apart and not more
-than 200 m back. Source: EN 302 637-2 v1.4.1, 6.1.3 and annex B.
+The path consists of places of earlier such CAMs, at least 4 m of the enlarged city apart and at
+most 200 m back. Source: EN 302 637-2 v1.4.1, 6.1.3 and annex B.
 """
 
 import math
@@ -26,7 +26,7 @@ _TIME_STEP_NS = 10 * NS_PER_MS
 _MAX_TIME = 65_535
 
 ROLE_NUMBERS = {"default": 0, "publicTransport": 1, "emergency": 6, "safetyCar": 7, "taxi": 12}
-"""VehicleRole by name, those that cars of a city may have."""
+"""Supported VehicleRoles by name."""
 
 
 class _At(NamedTuple):
@@ -39,13 +39,13 @@ class LowFrequencySender:
     """The low-frequency container of one car."""
 
     def __init__(self, role: str = "default") -> None:
-        """Take the car's role, one of `ROLE_NUMBERS`."""
+        """Start with the car's role, one of `ROLE_NUMBERS`."""
         self._role = ROLE_NUMBERS[role]
         self._path: deque[_At] = deque(maxlen=MAX_POINTS)
         self._sent_ns: int | None = None
 
     def due(self, state: VehicleState, front_m: float) -> LowFrequencyContainer | None:
-        """Return what a CAM that goes out now should hold; None: not yet again.
+        """Return the container for a CAM that is sent now, or None if it is not due.
 
         Args:
             state: The car's, at the CAM's time.

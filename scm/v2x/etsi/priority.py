@@ -1,4 +1,4 @@
-"""Asking a junction for priority (SREM) and being told of it (SSEM), as JSON records.
+"""Requests for priority at a junction (SREM) and their status (SSEM), as JSON records.
 
 A body is the `message` of its-client's JSON schemas srem 2.0.1 and ssem 2.0.1; units of the
 enlarged city. Field sets and units: TS 103 301 with SAE J2735.
@@ -36,7 +36,7 @@ STATUSES = (
     "maxPresence",
     "reserviceLocked",
 )
-"""SAE J2735 PrioritizationResponseStatus; the place in the list is the number on the air."""
+"""SAE J2735 PrioritizationResponseStatus; the index is the number in the message."""
 ROLES = (
     "basicVehicle",
     "publicTransport",
@@ -69,7 +69,7 @@ _Role = Annotated[int, coded(0, 23, unavailable=8)]
 
 
 class AccessPoint(msgspec.Struct, kw_only=True, frozen=True):
-    """Where into or out of a junction. The schema wants all three; 0 is unknown."""
+    """A way into or out of a junction. The schema requires all three; 0 is unknown."""
 
     lane: LaneId = 0
     approach: ApproachId = 0
@@ -77,7 +77,7 @@ class AccessPoint(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SignalRequestRecord(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """One wish; request_type: 1 new, 2 update, 3 cancellation."""
+    """One request; request_type: 1 new, 2 update, 3 cancellation."""
 
     id: IntersectionId
     request_id: Byte
@@ -87,7 +87,7 @@ class SignalRequestRecord(msgspec.Struct, kw_only=True, frozen=True, omit_defaul
 
 
 class RequestPackage(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """A wish and when the car will be there: minute of the year, ms of the minute, ms it takes."""
+    """A request and the car's arrival: minute of the year, ms of the minute, duration in ms."""
 
     request: SignalRequestRecord
     minute: MinuteOfYear | None = None
@@ -96,7 +96,7 @@ class RequestPackage(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=Tr
 
 
 class RequestorType(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """By its place in `ROLES`; request: importance, 1 least to 14 most."""
+    """Role as an index into `ROLES`; request: importance, 1 lowest to 14 highest."""
 
     role: _Role
     request: Annotated[int, coded(0, 15, unavailable=0)] | None = None
@@ -110,7 +110,7 @@ class TransmissionAndSpeed(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class RequestorPosition(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """Where the car is; heading 0.0125 degree clockwise from north."""
+    """Position of the car; heading 0.0125 degree clockwise from north."""
 
     position: Position3d
     heading: Annotated[int, coded(0, NO_ANGLE_J2735, unavailable=NO_ANGLE_J2735)] | None = None
@@ -118,7 +118,7 @@ class RequestorPosition(msgspec.Struct, kw_only=True, frozen=True, omit_defaults
 
 
 class Requestor(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """Who asks; id: the station id of its CAMs."""
+    """The requesting station; id: the station id of its CAMs."""
 
     id: StationId
     type: RequestorType | None = None
@@ -139,7 +139,7 @@ class SremBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
 
 
 class Requester(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """Whose request an SSEM speaks of: station, its request id, its SREM's sequence number."""
+    """The request that an SSEM answers: station, request id, sequence number of its SREM."""
 
     id: StationId
     request: Byte
@@ -148,7 +148,7 @@ class Requester(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
 
 
 class SignalStatusPackage(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """What becomes of one request; status by its place in `STATUSES`."""
+    """Status of one request, as an index into `STATUSES`."""
 
     requester: Requester | None = None
     inbound_on: AccessPoint
@@ -160,7 +160,7 @@ class SignalStatusPackage(msgspec.Struct, kw_only=True, frozen=True, omit_defaul
 
 
 class SignalStatusRecord(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """One junction; sequence_number: new whenever the rest is."""
+    """One junction; sequence_number: changes with the content."""
 
     sequence_number: Revision
     id: IntersectionId

@@ -1,7 +1,7 @@
-"""Between a wish for priority at a junction and the records on the air: SREM there, SSEM back.
+"""Convert priority requests at a junction to SREM, and their status to SSEM, and back.
 
 Lanes are numbered as in the junction's MAPEM (`scm.v2x.etsi.topology`). Times are minute of the
-year and millisecond of the minute, UTC; they are read as those nearest to the receiver's clock.
+year and millisecond of the minute, UTC; a receiver reads the time nearest to its clock.
 """
 
 import math
@@ -49,16 +49,16 @@ _STANDSTILL_MPS = 0.02
 
 
 class PriorityRequest(NamedTuple):
-    """A wish for priority.
+    """A request for priority.
 
     Attributes:
         station_id: Of the car, as in its CAMs.
-        number: The car's own number of this wish, 0 to 255; an update or a cancellation keeps it.
+        number: The car's number of this request, 0 to 255; updates and cancellations keep it.
         junction: The junction's number.
-        lane_in, lane_out: Numbers of MAPEM; None: not told.
+        lane_in, lane_out: Numbers of MAPEM; None: unknown.
         role: One of `ROLES`.
-        arrives_ns: When the car expects to be at the stop line; None: not told.
-        lasts_s: For how long after that; None: not told.
+        arrives_ns: Expected arrival at the stop line; None: unknown.
+        lasts_s: Duration after that; None: unknown.
         sequence: Counts the car's SREMs.
     """
 
@@ -75,18 +75,18 @@ class PriorityRequest(NamedTuple):
 
 
 class PriorityAnswer(NamedTuple):
-    """What becomes of a wish: one of `STATUSES`."""
+    """The status of a request: one of `STATUSES`."""
 
     request: PriorityRequest
     status: str
 
 
 def srem_of(request: PriorityRequest, state: VehicleState) -> SremBody:
-    """Return the SREM by which a car asks; the car of the state is the wish's.
+    """Return the SREM of a request; the state is that of the requesting car.
 
     Raises:
-        KeyError: for a verb that there is not.
-        ValueError: for a role that there is not.
+        KeyError: for an unknown verb.
+        ValueError: for an unknown role.
     """
     minute, millisecond = moment_of(state.t_ns)
     arrives = None if request.arrives_ns is None else moment_of(request.arrives_ns)
@@ -134,7 +134,7 @@ def _requestor(request: PriorityRequest, state: VehicleState) -> Requestor:
 
 
 def requests_of(body: SremBody, near_ns: int) -> tuple[PriorityRequest, ...]:
-    """Return the wishes of an SREM that arrived about `near_ns`; reserved types are left out."""
+    """Return the requests of an SREM that arrived about `near_ns`; reserved types are left out."""
     kind = body.requestor.type
     return tuple(
         PriorityRequest(
@@ -159,7 +159,7 @@ def requests_of(body: SremBody, near_ns: int) -> tuple[PriorityRequest, ...]:
 
 
 def _moment_ns(minute: int | None, second: int | None, near_ns: int) -> int | None:
-    """Return the time nearest to `near_ns` that has this minute of the year."""
+    """Return the time nearest to `near_ns` with this minute of the year."""
     if minute is None or second is None:
         return None
     year = datetime.fromtimestamp(near_ns // NS_PER_S, UTC).year
@@ -173,11 +173,11 @@ def _moment_ns(minute: int | None, second: int | None, near_ns: int) -> int | No
 def ssem_of(
     junction: Junction, answers: Sequence[PriorityAnswer], sequence: int, t_ns: int
 ) -> SsemBody:
-    """Return the SSEM by which a junction's roadside station tells what becomes of wishes.
+    """Return the SSEM with the status of requests, sent by a junction's roadside station.
 
     Args:
-        junction: Whose lights they are.
-        answers: One or more, the first 32 are told.
+        junction: The junction.
+        answers: One or more; the first 32 are sent.
         sequence: Counts changes of the answers.
         t_ns: When it is sent.
     """
@@ -216,7 +216,7 @@ def _package(answer: PriorityAnswer) -> SignalStatusPackage:
 
 
 def answers_of(body: SsemBody, station: int) -> dict[tuple[int, int], str]:
-    """Return what an SSEM says to one station: (junction's number, wish's number) to its status."""
+    """Return an SSEM's content for one station: (junction, request number) to status."""
     return {
         (record.id.id, package.requester.request): STATUSES[package.status]
         for record in body.status

@@ -1,8 +1,8 @@
-"""The lanes of a junction as MAPEM tells them, made from a map file.
+"""The lanes of a junction for MAPEM, built from a map file.
 
-Lanes that lead in are numbered from 1 in the order of the signal groups and their stop lines, then
-those that lead out. SREM and SSEM name lanes by these numbers. A node list runs from the stop line
-outwards in steps of at most a tenth of a metre of the table, as far as a list may be long.
+Lanes in are numbered from 1 in the order of the signal groups and their stop lines, then the lanes
+out. SREM and SSEM refer to lanes by these numbers. A node list runs from the stop line outwards in
+steps of 0.1 m of the table, up to its maximum length.
 """
 
 import math
@@ -52,7 +52,7 @@ _MANOEUVRE_BITS = 12
 
 
 class Stretch(NamedTuple):
-    """A lane of the map from `near_m`, its place at the junction, to `far_m`, away from it."""
+    """A lane of the map from `near_m` at the junction to `far_m` away from it."""
 
     lane: str
     near_m: float
@@ -60,7 +60,7 @@ class Stretch(NamedTuple):
 
 
 class Way(NamedTuple):
-    """A way over the junction: numbers of the lanes in and out, and of the signal group."""
+    """A path over the junction: numbers of the lanes in and out, and of the signal group."""
 
     lane_in: int
     lane_out: int
@@ -68,7 +68,7 @@ class Way(NamedTuple):
 
 
 class Topology(NamedTuple):
-    """The numbered lanes of one junction; `group_in` has the group's name of each lane in."""
+    """The numbered lanes of one junction; `group_in` has the group name of each lane in."""
 
     lanes_in: tuple[Stretch, ...]
     group_in: tuple[str, ...]
@@ -76,15 +76,15 @@ class Topology(NamedTuple):
     ways: tuple[Way, ...]
 
     def lane_in(self, group: str) -> int | None:
-        """Return the number of the first lane in that a group releases; None: no such group."""
+        """Return the number of the first lane in that a group releases, or None."""
         return self.group_in.index(group) + 1 if group in self.group_in else None
 
     def group_of(self, lane: int) -> str | None:
-        """Return which group releases a lane by its number; None: none leads in by that number."""
+        """Return the group that releases a lane in, or None if there is no such lane."""
         return self.group_in[lane - 1] if 1 <= lane <= len(self.group_in) else None
 
     def lane_out(self, name: str) -> int | None:
-        """Return the number of the lane out that lies on a lane of the map; None: none does."""
+        """Return the number of the lane out on a lane of the map, or None."""
         numbers = (n for n, out in enumerate(self.lanes_out, len(self.lanes_in) + 1))
         return next(
             (n for n, out in zip(numbers, self.lanes_out, strict=True) if out.lane == name), None
@@ -92,7 +92,7 @@ class Topology(NamedTuple):
 
 
 def topology_of(roads: Roads, junction: Junction) -> Topology:
-    """Return the numbered lanes of a junction and the ways between them."""
+    """Return the numbered lanes of a junction and the paths between them."""
     lanes_in: list[Stretch] = []
     group_in: list[str] = []
     leads: list[tuple[int, int, list[Stretch]]] = []
@@ -117,7 +117,7 @@ def topology_of(roads: Roads, junction: Junction) -> Topology:
 
 
 def _ends(roads: Roads, start: str, over: str, to_m: float) -> Iterator[Stretch]:
-    """Yield where one comes out who enters from lane `start` and crosses on lane `over`."""
+    """Yield the lanes out of a path that enters from lane `start` and crosses on lane `over`."""
     if over != start and over not in roads.successors(start):
         return
     length = roads.length_of(over)
@@ -132,7 +132,7 @@ def mapem_of(roads: Roads, junction: Junction) -> MapemBody:
     """Return the MAPEM of a junction, sent by its roadside station, without a time.
 
     Raises:
-        MapError: when the junction has too many lanes, or reaches too far for a node list.
+        MapError: when the junction has too many lanes, or is too large for a node list.
     """
     topology = topology_of(roads, junction)
     stretches = (*topology.lanes_in, *topology.lanes_out)
@@ -165,7 +165,7 @@ def mapem_of(roads: Roads, junction: Junction) -> MapemBody:
 
 
 def mapem_at(body: MapemBody, t_ns: int) -> MapemBody:
-    """Return a MAPEM as it is sent at a time."""
+    """Return a MAPEM with the time of sending."""
     return replace(body, timestamp=moment_of(t_ns)[0])
 
 
@@ -222,7 +222,7 @@ def _either(turns: list[str]) -> str:
 
 
 def _nodes(roads: Roads, stretch: Stretch, middle: tuple[float, float]) -> tuple[Node, ...]:
-    """Return the points of a stretch, rounded where they are so that no error adds up."""
+    """Return the points of a stretch, each rounded at its place so that errors do not add up."""
     line = roads.lane(stretch.lane)
     length = stretch.far_m - stretch.near_m
     steps = min(MAX_NODES - 1, max(1, math.ceil(abs(length) / NODE_M)))

@@ -1,5 +1,5 @@
-"""Genuine UPER of ETSI messages, as on the air of real roads: optional extra `scm[v2x]`.
+"""Standard UPER of ETSI messages, as used on real roads: optional extra `scm[v2x]`.
 
-`codec.py` encodes and decodes; one file a message says how its record maps to the ASN.1 value.
-pycrate compiled the ASN.1; it has no CPM (TS 103 324), so a CPM stays JSON here.
+`codec.py` encodes and decodes; one file per message maps its record to the ASN.1 value. pycrate
+compiled the ASN.1; it has no CPM (TS 103 324), so a CPM stays JSON here.
 """

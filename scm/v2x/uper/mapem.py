@@ -38,7 +38,7 @@ class _NodeXy:
 
 
 class _LaneType:
-    """A lane for vehicles; of any other kind the record says nothing."""
+    """A vehicle lane; records have no other kind."""
 
     _flags = Flags(VEHICLE_LANE)
 

@@ -161,7 +161,7 @@ def header_of(record: Mapping[str, Any], message_id: int) -> dict[str, int]:
 
 
 def read_header(value: Mapping[str, Any]) -> dict[str, int]:
-    """Return what the record says of the header."""
+    """Return a record's header fields."""
     header = value["header"]
     return {"protocol_version": header["protocolVersion"], "station_id": header["stationID"]}
 
@@ -197,7 +197,7 @@ POSITION_3D = Fields(("latitude", "lat"), ("longitude", "long"), ("elevation", "
 
 
 class _AccessPoint:
-    """One of three in ASN.1, all three in the record: what is not told is 0 there."""
+    """One of three in ASN.1, all three in the record: missing ones are 0."""
 
     def to_asn(self, record: Mapping[str, int]) -> tuple[str, int]:
         value = next((name for name in ("lane", "approach", "connection") if record[name]), "lane")
