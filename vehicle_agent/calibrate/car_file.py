@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 from scm.errors import CarError
-from scm.mismatch.report.own_files import listed_terms
+from scm.mismatch.report.car_file import term_names
 from scm.mismatch.report.toml_text import number, quoted, set_entry, set_list
 from scm.vehicles.car import Car, load_car
 from vehicle_agent.calibrate.fit import TERMS, WIDE, Fit
@@ -27,7 +27,7 @@ def write_car(car: Car, found: Fit, path: Path, drive: str, tag_id: int | None =
     Raises:
         CarError: when the file cannot be written so that it loads again.
     """
-    names = listed_terms(car.with_terms((*TERMS, *DELAYING)))
+    names = term_names(car.with_terms((*TERMS, *DELAYING)))
     text = set_list(car.path.read_text(encoding="utf-8"), "terms", names, COMMENT)
     for key, one in found.numbers.items():
         section, _, name = key.partition(".")
