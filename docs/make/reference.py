@@ -1,9 +1,11 @@
-"""Sphinx directives that write the reference pages from the code: commands and messages."""
+"""Sphinx directives that write the reference pages from the code."""
 
 import argparse
 import importlib
 import inspect
-from typing import Any
+import re
+from collections.abc import Sequence
+from typing import Any, TypeVar
 
 import msgspec
 from docutils import nodes
@@ -14,7 +16,9 @@ from scm.client import Client
 from scm.registry import names
 from scm.v2x.message import Message, Request
 
-MESSAGES = "scm.v2x.messages"
+MESSAGES, RECORDS = "scm.v2x.messages", "scm.records"
+
+S = TypeVar("S", bound=msgspec.Struct)
 
 
 class CommandHelp(SphinxDirective):
@@ -42,9 +46,16 @@ class Messages(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Return what stands in place of the directive."""
-        text = "\n\n".join(
-            _message(kind) for kind in sorted(_kinds(), key=lambda one: one.__name__)
-        )
+        text = "\n\n".join(map(_message, _defined_in(MESSAGES, Message)))
+        return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+
+class Records(SphinxDirective):
+    """Writes each record of the web interface and the client with its fields."""
+
+    def run(self) -> list[nodes.Node]:
+        """Return what stands in place of the directive."""
+        text = "\n\n".join(map(_struct, _defined_in(RECORDS, msgspec.Struct)))
         return self.parse_text_to_nodes(text, allow_section_headings=True)
 
 
@@ -63,37 +74,50 @@ class ClientNouns(SphinxDirective):
         return self.parse_text_to_nodes(text, allow_section_headings=True)
 
 
-def _kinds() -> set[type[Message]]:
-    modules = (importlib.import_module(f"{MESSAGES}.{name}") for name in names(MESSAGES))
-    return {
+def _defined_in(package: str, base: type[S]) -> list[type[S]]:
+    """Return the classes of a kind that a package's modules define, by name."""
+    modules = (importlib.import_module(f"{package}.{name}") for name in names(package))
+    found = {
         kind
         for module in modules
         for kind in vars(module).values()
-        if inspect.isclass(kind)
-        and issubclass(kind, Message)
-        and kind.__module__ == module.__name__
+        if inspect.isclass(kind) and issubclass(kind, base) and kind.__module__ == module.__name__
     }
+    return sorted(found, key=lambda kind: kind.__name__)
 
 
 def _message(kind: type[Message]) -> str:
-    definitions = msgspec.json.schema(kind)["$defs"]
-    schema = definitions[kind.__name__]
-    about, _, attributes = (inspect.getdoc(kind) or "").partition("Attributes:")
-    lines = [f"## {kind.__name__}", about.strip()]
-    if kind.KEY:
-        rate = f", {kind.RATE_HZ:g} Hz" if kind.RATE_HZ else ""
-        lines.append(f"Key `{kind.KEY}`, delivery `{kind.DELIVERY.value}`{rate}.")
+    rate = f", {kind.RATE_HZ:g} Hz" if kind.RATE_HZ else ""
+    facts = [f"Key `{kind.KEY}`, delivery `{kind.DELIVERY.value}`{rate}."] if kind.KEY else []
     if issubclass(kind, Request):
-        lines.append(f"Reply: `{kind.REPLY.__name__}`.")
+        facts.append(f"Reply: `{kind.REPLY.__name__}`.")
+    return _struct(kind, facts)
+
+
+def _struct(kind: type[msgspec.Struct], facts: Sequence[str] = ()) -> str:
+    """Return a section about a record: what it is, and a table of its fields."""
+    about, _, attributes = (inspect.getdoc(kind) or "").partition("Attributes:")
+    schema = msgspec.json.schema(kind)["$defs"][kind.__name__]
+    meanings = _meanings(attributes)
     rows = [
-        f"| `{name}` | {_type(field)} | {'' if name in schema['required'] else 'optional'} |"
-        for name, field in schema["properties"].items()
+        f"| `{name}` | {_type(field)} | {_cell(field.get('description', meanings.get(name, '')))} |"
+        for name, field in schema.get("properties", {}).items()
     ]
-    if rows:
-        lines.append("\n".join(("| field | type | |", "|---|---|---|", *rows)))
-    if attributes.strip():
-        lines.append(f"```text\n{inspect.cleandoc(attributes)}\n```")
-    return "\n\n".join(lines)
+    table = "\n".join(("| field | type | meaning |", "|---|---|---|", *rows)) if rows else ""
+    return "\n\n".join((f"## {kind.__name__}", about.strip(), *facts, table))
+
+
+def _meanings(attributes: str) -> dict[str, str]:
+    """Return what a docstring's `Attributes:` says of each field."""
+    found: dict[str, str] = {}
+    for entry in re.split(r"\n(?=\w)", inspect.cleandoc(attributes)):
+        names, _, meaning = entry.partition(":")
+        found |= {name.strip(): " ".join(meaning.split()) for name in names.split(",")}
+    return found
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
 
 
 def _type(field: dict[str, Any]) -> str:
@@ -101,7 +125,7 @@ def _type(field: dict[str, Any]) -> str:
     if "anyOf" in field:
         return " or ".join(_type(one) for one in field["anyOf"])
     if "$ref" in field:
-        return field["$ref"].rpartition("/")[2]
+        return f"{field['$ref'].rpartition('/')[2]}"
     if "enum" in field:
         return ", ".join(f"`{one}`" for one in field["enum"])
     if field.get("type") == "array":
@@ -113,5 +137,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("command-help", CommandHelp)
     app.add_directive("messages", Messages)
+    app.add_directive("records", Records)
     app.add_directive("client-nouns", ClientNouns)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
