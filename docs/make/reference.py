@@ -30,9 +30,9 @@ class CommandHelp(SphinxDirective):
         """Return what stands in place of the directive."""
         program = importlib.import_module(f"{self.arguments[0]}.__main__").build_parser()
         choices = next(one.choices for one in program._actions if one.dest == "command")  # noqa: SLF001
-        parsers = {program.prog: program, **choices}
-        blocks = [f"```text\n{_help(parser)}```" for parser in parsers.values()]
-        return self.parse_text_to_nodes("\n\n".join(blocks))
+        parsers = [program, *choices.values()]
+        blocks = [f"### {parser.prog}\n\n```text\n{_help(parser)}```" for parser in parsers]
+        return self.parse_text_to_nodes("\n\n".join(blocks), allow_section_headings=True)
 
 
 def _help(parser: argparse.ArgumentParser) -> str:
