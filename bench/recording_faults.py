@@ -291,7 +291,7 @@ def errors_of(path: Path) -> tuple[np.ndarray, str]:
     car = load_car(recording.vehicle)
     prepared = prepare(recording, car)
     text = " ".join(
-        [*prepared.account, *(f"{p.name} {p.said} {p.corrected}" for p in prepared.problems)]
+        [*prepared.account, *(f"{p.name} {p.text} {p.corrected}" for p in prepared.problems)]
     )
     runs, failures = [], []
     for part in prepared.recordings:

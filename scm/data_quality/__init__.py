@@ -1,9 +1,10 @@
 """Sensors against each other, before any physics is blamed: what the data itself gets wrong.
 
-`prepare` is the one door: it screens rows (`screen`: `stamps`, `spikes`, `counters`, by the car's
-`limits`), asks every question (`check`), undoes gross faults (`corrected`) and cuts (`stretches`).
-`rows`, `stuck`, `driven` and `other_car` look at the file; `gross`, `clocks` and `mend*` at what
-spoils everything else; `turning`, `travel`, `pushing` and `sideways` compare two sensors each, on
-a `track` and through `whitened`; `suspect` says which fault would explain it. May import recording,
-vehicles.
+`prepare` is the entry point. It screens rows (`timestamps`, `bursts`, `spikes`, `encoder_counts`,
+within the car's `physical_limits`), runs every `check`, applies `repairs` of gross faults
+(`unit_errors`, `clock_offsets`, `pair_repairs`, `command_units`, `clipped_channels`) and cuts the
+recording into `stretches`. `row_spacing`, `frozen_channels`, `commands` and `other_car` look at the
+file; `sensor_pairs` compares two sensors each (`heading`, `distance`, `accelerometer`) along the
+`pose_track`, through a `whitened_fit`; `suspected_faults` names the fault that would explain a
+difference. Results are in `problem` and `quality`. May import recording, vehicles.
 """

@@ -10,7 +10,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.data_quality.problem import DataProblem
-from scm.data_quality.stamps import HELD, Table, problem, tables_of, usual_step
+from scm.data_quality.timestamps import HELD, Table, problem, tables_of, usual_step
 from scm.recording.read import Recording
 
 TOGETHER = 0.2  # of the usual step, as which rows are handed over together at most
@@ -84,7 +84,7 @@ def _together(t: Floats, usual_s: float) -> Bools:
 
 
 def _are_late(recording: Recording, table: Table, even: Floats, *, usual: bool) -> bool:
-    """Say whether rows of one moment are late, by the motion that they show.
+    """Return whether rows of one moment are late, by the motion that they show.
 
     Copies of a row are not, nor is what is sent: it holds from when it is sent.
 
@@ -105,9 +105,9 @@ def _are_late(recording: Recording, table: Table, even: Floats, *, usual: bool) 
         if at_once.any() and not at_once.all():
             change = np.diff(values) != 0.0
             changing.append((float(change[at_once].mean()), float(change[~at_once].mean())))
-        calm = ~np.convolve(moved, np.ones(5), mode="same").astype(np.bool_)
+        undisturbed = ~np.convolve(moved, np.ones(5), mode="same").astype(np.bool_)
         before, after = (_bends(stamps, values, moved) for stamps in (t, spread_t))
-        noise = 0.0 if usual else _bends(t, values, calm)
+        noise = 0.0 if usual else _bends(t, values, undisturbed)
         if before > INFORMS * noise:
             left.append((after - noise) / (before - noise))
     if not any(together >= CHANGING * apart for together, apart in changing):

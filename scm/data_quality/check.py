@@ -1,31 +1,42 @@
-"""Ask a recording's sensors about each other, before any model of the car."""
+"""Compares a recording's sensors with each other, before any model of the car."""
 
-from scm.data_quality.compared import compare_all, no_witnesses
-from scm.data_quality.conclusion import no_verdict
-from scm.data_quality.corrected import forward_speed
-from scm.data_quality.driven import command_problems
-from scm.data_quality.mend import (
-    Mending,
-    mend_heading,
-    mend_unsigned,
+from collections.abc import Iterable, Sequence
+
+from scm.data_quality.clipped_channels import clipped_rows, wrapped_rows
+from scm.data_quality.command_units import repair_command_units
+from scm.data_quality.commands import command_problems
+from scm.data_quality.distance import distance_sensors, uncounted
+from scm.data_quality.frozen_channels import frozen_problems, standing_problem, stands
+from scm.data_quality.other_car import ANOTHER, OTHER_CAR, other_car
+from scm.data_quality.pair_repairs import repair_pairs
+from scm.data_quality.pose_track import POSE, clean, track
+from scm.data_quality.problem import DataProblem, Span
+from scm.data_quality.quality import Quality, Relation, Suspicion, Usable
+from scm.data_quality.repairs import (
+    GYROS,
+    Repairs,
+    forward_speed,
+    repair_heading,
+    repair_unsigned_speed,
 )
-from scm.data_quality.mend_commands import mend_commands
-from scm.data_quality.mend_pairs import mend_pairs
-from scm.data_quality.mirrored import mirrored
-from scm.data_quality.other_car import other_car
-from scm.data_quality.rows import row_problems
-from scm.data_quality.standing import standing_problem, stands
-from scm.data_quality.stuck import stuck_problems
-from scm.data_quality.suspect import from_repairs
-from scm.data_quality.suspicion import Quality, Relation, Suspicion
-from scm.data_quality.track import track
-from scm.data_quality.unmeasured import clipped_rows, wrapped_rows
-from scm.data_quality.usable import usable
-from scm.data_quality.way import uncounted, ways
+from scm.data_quality.row_spacing import gaps_of, row_problems
+from scm.data_quality.sensor_pairs import compare_all, no_witnesses
+from scm.data_quality.suspected_faults import from_repairs
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
+from scm.vehicles.drive_channel import drive_name
 
 SLOWEST_WITNESS_S = 0.3  # poses that come later do not see a car stop
+SHORTEST_SPAN_S = 0.5
+SHORTEST_DRIVE_S = 5.0
+COMMANDS = ("command.throttle", "command.steering")
+UNUSABLE = ("frozen", "jump")
+MOST = 3
+WORDS = {"imu.gyro_z": "gyro", "encoder.*": "encoders", "imu.accel_x": "accelerometer"}
+RECORD = (
+    "One drive of 60 s or more: poses at 20 Hz or more, throttle and steering as they are sent to "
+    "the car, with starts, stops, both turns and several speeds."
+)
 
 
 def check(recording: Recording, car: Car | None = None) -> Quality:
@@ -35,22 +46,22 @@ def check(recording: Recording, car: Car | None = None) -> Quality:
         recording: Screened row by row; it is not changed, see `corrected.corrected`.
         car: Gives wheel radius, counts a turn and track; without it wheels are not compared.
     """
-    state = Mending(recording)
+    state = Repairs(recording)
     problems = list(row_problems(recording))
-    problems += mend_heading(state)
-    problems += mend_unsigned(state)
+    problems += repair_heading(state)
+    problems += repair_unsigned_speed(state)
     problems += [*wrapped_rows(state), *clipped_rows(state)]
-    problems += mend_pairs(state, car)
-    problems += mend_commands(state, car)
+    problems += repair_pairs(state, car)
+    problems += repair_command_units(state, car)
     now = state.recording
-    poses, found = track(now), ways(now, car)
+    poses, found = track(now), distance_sensors(now, car)
     if poses is not None and stands(poses, found):
         problems.append(standing_problem())
         poses = None
     movement = forward_speed(poses)
     sees_stops = poses is not None and poses.period_s < SLOWEST_WITNESS_S
     clipped = [span for p in problems if p.name == "clipped" for span in p.when_s or ()]
-    problems += stuck_problems(now, found, movement if sees_stops else None, clipped)
+    problems += frozen_problems(now, found, movement if sees_stops else None, clipped)
     not_own = no_witnesses(problems)
     found = [way for way in found if not not_own.intersection((*way.channels, way.name))]
     problems += command_problems(now, movement, poses, car)
@@ -80,3 +91,117 @@ def check(recording: Recording, car: Car | None = None) -> Quality:
         repairs=tuple(state.repairs),
         relations=tuple(relations),
     )
+
+
+def mirrored(problems: Iterable[DataProblem]) -> DataProblem | None:
+    """Return that time runs backwards, where both gyro and throttle had to be turned round.
+
+    Stamps that count down make a car drive backwards at positive throttle and turn against its
+    gyro, while its encoders, which go back too, agree with its way.
+    """
+    turned = {problem.channel for problem in problems if problem.name == "sign"}
+    if "command.throttle" not in turned or not turned.intersection(GYROS):
+        return None
+    return DataProblem(
+        channel="*",
+        name="time_backwards",
+        text="Gyro and throttle both have the wrong sign against the motion, as in a recording "
+        "that runs backwards in time: causes would come after what they cause.",
+        record_instead="Write stamps that count up, and rows as they come.",
+    )
+
+
+def usable(recording: Recording, problems: Iterable[DataProblem], car: Car | None = None) -> Usable:
+    """Return the usable spans of each channel, and what keeps the recording from being used.
+
+    Args:
+        recording: After repair.
+        problems: Found in it.
+        car: Says what drives it; None takes a throttle for granted.
+    """
+    known = list(problems)
+    driver = drive_name(recording, car) if car else COMMANDS[0]
+    spans: dict[str, tuple[Span, ...]] = {}
+    for name, channel in recording.channels.items():
+        t = clean(channel).t
+        if len(t) < 2:
+            spans[name] = ()
+            continue
+        bad = list(gaps_of(t, name.startswith("command.")))
+        for problem in known:
+            if problem.name in UNUSABLE and problem.when_s and _concerns(problem.channel, name):
+                bad += problem.when_s
+        spans[name] = _between((float(t[0]), float(t[-1])), bad)
+    return Usable(spans=spans, lacks=tuple(_lacks(spans, known, driver)))
+
+
+def _concerns(pattern: str, name: str) -> bool:
+    return pattern in (name, "*") or (pattern.endswith(".*") and name.startswith(pattern[:-1]))
+
+
+def _between(whole: Span, bad: Iterable[Span]) -> tuple[Span, ...]:
+    """Return what of a span is left between bad ones."""
+    start, left = whole[0], []
+    for begin, end in sorted(bad):
+        if begin - start >= SHORTEST_SPAN_S:
+            left.append((start, begin))
+        start = max(start, end)
+    if whole[1] - start >= SHORTEST_SPAN_S:
+        left.append((start, whole[1]))
+    return tuple(left)
+
+
+def _lacks(
+    spans: dict[str, tuple[Span, ...]], problems: list[DataProblem], driver: str
+) -> Iterable[str]:
+    driven = (driver, COMMANDS[1])
+    missing = [name for name in (*driven, *POSE) if not spans.get(name)]
+    if missing:
+        yield f"missing: {', '.join(missing)}"
+        return
+    if any(p.name == "time_backwards" and p.channel == "*" for p in problems):
+        yield "time runs backwards"
+    if any(p.name == "standing" for p in problems):
+        yield "the car does not move"
+    if any(p.name == "other_car" for p in problems):
+        yield OTHER_CAR
+    unrelated = [p.channel for p in problems if p.name == "without_effect"]
+    if unrelated:
+        yield f"commands without effect: {', '.join(unrelated)}"
+    pose = sum(end - start for start, end in spans["pose.x"])
+    if pose < SHORTEST_DRIVE_S:
+        yield f"only {pose:.1f} s of poses without gaps; {SHORTEST_DRIVE_S:.0f} s are needed"
+    together = [spans[name] for name in (*driven, *POSE)]
+    start = max(part[0][0] for part in together)
+    end = min(part[-1][1] for part in together)
+    if end - start < SHORTEST_DRIVE_S <= pose:
+        yield f"poses and commands overlap for {max(0.0, end - start):.1f} s only"
+
+
+def no_verdict(
+    lacks: Sequence[str], relations: Sequence[Relation], suspicions: Sequence[Suspicion]
+) -> DataProblem:
+    """Return why there is no verdict, what the sensors say nevertheless, and what to record.
+
+    Args:
+        lacks: What keeps the recording from being driven again.
+        relations: Sensors that were held against each other.
+        suspicions: What that made suspicious, most certain first.
+    """
+    return DataProblem(
+        channel="*",
+        name="no_verdict",
+        text=f"The car cannot be judged: {'; '.join(lacks)}. {_still(relations, suspicions)}",
+        record_instead=ANOTHER if list(lacks) == [OTHER_CAR] else RECORD,
+    )
+
+
+def _still(relations: Sequence[Relation], suspicions: Sequence[Suspicion]) -> str:
+    others = [relation.pair[1] for relation in relations if not relation.pair[1].startswith("pose")]
+    if not others:
+        return "No other sensor shows the poses' motion for long enough to be held against them."
+    named = ", ".join(dict.fromkeys(WORDS.get(name, name) for name in others))
+    sentences = list(dict.fromkeys(s.text for s in suspicions if s.text and not s.repaired))
+    if not sentences:
+        return f"What can still be said: the poses agree with {named}."
+    return f"What can still be said: {' '.join(sentences[:MOST])}"

@@ -1,21 +1,22 @@
-"""Whether a recording can be of the car whose file was given: speed, turning circle, wheels."""
+"""Whether another car was driven than the car file describes: its speed, steering and wheels."""
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scm.arrays import Floats
-from scm.data_quality.conclusion import ANOTHER
+from scm.data_quality.pose_track import Series, Track, clean, grid, held, long_gaps
 from scm.data_quality.problem import DataProblem
-from scm.data_quality.steered import STEP_S, WIDTH_S, Steered, steered
-from scm.data_quality.suspicion import Relation
-from scm.data_quality.track import Series, Track, clean, grid, held, long_gaps
+from scm.data_quality.quality import Relation
 from scm.geometry import Pose2
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
 
+OTHER_CAR = "the car file is another car's"
+ANOTHER = "Nothing: give the file of the car that was driven."
 TOO_FAST = 1.4
 TOO_SLOW = 0.3
 TURNS = (0.55, 1.8)
@@ -26,13 +27,63 @@ ROLLS = (0.7, 1.4)
 FOLLOWS = 0.7
 THROTTLES: Floats = np.linspace(0.0, 1.0, 11)
 STEERINGS: Floats = np.linspace(-1.0, 1.0, 21)
-SETTLED_S, STEERED_S = 8.0, 3.0
+STEADY_S, STEERED_S = 8.0, 3.0
 UNSURE_THROTTLE = 0.1
-LEAST_ASKED = 0.05  # of the top speed
+LEAST_SHARE_OF_TOP = 0.05  # of the top speed
+WIDTH_S = 0.3
+STEP_S = 0.05
+QUIET_MPS2 = 1.5
+LATE_S = 0.15
+SHORTEST_S = 5.0
+STRAIGHT_RAD_S = 0.02
+LEAST_SWING = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class Steered:
+    """How turning follows steering.
+
+    Attributes:
+        correlation: Correlation, negative where the car turns the other way.
+        gain: Curvature driven over that of an angle of one unit of the command, times the
+            wheelbase [rad a unit]; a small-angle figure.
+        swing: From right to left of the command where this was seen, its outermost twentieths left
+            out.
+    """
+
+    correlation: float
+    gain: float
+    swing: float
+
+
+def steered(recording: Recording, car: Car, movement: Series, poses: Track) -> Steered | None:
+    """Return how turning follows steering; None where the drive does not show it."""
+    if "command.steering" not in recording.channels or not car.has("body.wheelbase_m"):
+        return None
+    steering = clean(recording.channels["command.steering"])
+    if len(steering.t) < 20:
+        return None
+    on = grid(poses.t[0], poses.t[-1], STEP_S, WIDTH_S, long_gaps(poses.t))
+    if len(on.t) < SHORTEST_S / STEP_S:
+        return None
+    speed, rate = on.smooth(movement), on.smooth(Series(poses.t, poses.yaw), 1)
+    wheels = on.smooth_even(held(steering, on.t - LATE_S))
+    expected = speed * wheels / car.value("body.wheelbase_m")
+    fast = np.percentile(np.abs(speed), 90)
+    rows = (np.abs(speed) > 0.3 * fast) & (np.abs(speed * rate) < QUIET_MPS2)
+    if rows.sum() < SHORTEST_S / STEP_S or rate[rows].std() < STRAIGHT_RAD_S:
+        return None
+    a, b = expected[rows] - expected[rows].mean(), rate[rows] - rate[rows].mean()
+    both, own = float((a * b).sum()), float((a * a).sum())
+    swing = float(np.ptp(np.percentile(steering.values, (5, 95))))
+    if own <= 0.0 or swing < LEAST_SWING * float(np.abs(steering.values).max()):
+        return None
+    seen = float(np.ptp(np.percentile(wheels[rows], (5, 95))))
+    return Steered(both / math.sqrt(own * float((b * b).sum())), both / own, seen)
+
+
+@dataclass(frozen=True, slots=True)
+class SteadySpeed:
     """Which speed throttles ask for in the end.
 
     Attributes:
@@ -44,7 +95,7 @@ class Asked:
 
     @property
     def bent(self) -> bool:
-        """Say whether a little throttle may mean a lot of speed, or none."""
+        """Return whether a little throttle may mean a lot of speed, or none."""
         return len(self.throttle) > 2
 
     @property
@@ -87,7 +138,7 @@ def top_speed(car: Car) -> float | None:
     return car.value(keys[0]) * car.value(keys[1]) if all(car.has(k) for k in keys) else None
 
 
-def steady_speed(car: Car) -> Asked | None:
+def steady_speed(car: Car) -> SteadySpeed | None:
     """Return the speed that throttles lead to on a level floor, without loss if the file says so.
 
     None where a car is not driven by its throttle.
@@ -96,42 +147,44 @@ def steady_speed(car: Car) -> Asked | None:
         return None
     top = top_speed(car)
     if top is not None:
-        return Asked(np.array([0.0, 1.0]), np.array([0.0, top]))
+        return SteadySpeed(np.array([0.0, 1.0]), np.array([0.0, top]))
     fleet = Fleet(car, len(THROTTLES))
     for _ in THROTTLES:
         fleet.add(Pose2(0.0, 0.0, 0.0))
-    throttle = np.tile(THROTTLES, (round(SETTLED_S / STEP_S), 1))
+    throttle = np.tile(THROTTLES, (round(STEADY_S / STEP_S), 1))
     reached = fleet.rollout(throttle, np.zeros_like(throttle), STEP_S, ("speed",))["speed"][-1]
-    return Asked(THROTTLES, np.maximum.accumulate(reached))
+    return SteadySpeed(THROTTLES, np.maximum.accumulate(reached))
 
 
 def _speed(recording: Recording, car: Car, movement: Series) -> str:
-    asked = steady_speed(car)
-    if asked is None:
+    steady = steady_speed(car)
+    if steady is None:
         return ""
-    top = asked.top
+    top = steady.top
     fast = float(np.percentile(np.abs(movement.values), 98))
     if fast > TOO_FAST * top:
         metres = ", or its positions are not in metres" if fast > 20.0 * top else ""
         return f"it drives {fast:.2f} m/s, the car file's car at most {top:.2f} m/s{metres}"
-    share = share_of_asked(recording, movement, asked)
+    share = share_of_expected_speed(recording, movement, steady)
     if share is None or share > TOO_SLOW:
         return ""
     return f"it drives {100.0 * share:.0f} % of the speed that the throttle asks of the file's car"
 
 
-def share_of_asked(recording: Recording, movement: Series, wanted: Asked) -> float | None:
+def share_of_expected_speed(
+    recording: Recording, movement: Series, wanted: SteadySpeed
+) -> float | None:
     """Return steady speed over the one that the throttle asks for; None where nothing is steady."""
     throttle = recording.channels.get("command.throttle")
     if throttle is None or len(clean(throttle).t) < 2:
         return None
     on = grid(movement.t[0], movement.t[-1], STEP_S, WIDTH_S, long_gaps(movement.t))
-    asked = np.abs(on.smooth_even(held(clean(throttle), on.t)))
+    throttles = np.abs(on.smooth_even(held(clean(throttle), on.t)))
     speed, push = np.abs(on.smooth(movement)), np.abs(on.smooth(movement, 1))
     fast = float(np.percentile(speed, 98))
-    steady = (asked > 0.3) & (push < 0.1 * fast) & (speed > 0.3 * fast)
-    full = wanted.at(np.maximum(asked - UNSURE_THROTTLE, 0.0) if wanted.bent else asked)
-    steady &= full > LEAST_ASKED * wanted.top
+    steady = (throttles > 0.3) & (push < 0.1 * fast) & (speed > 0.3 * fast)
+    full = wanted.at(np.maximum(throttles - UNSURE_THROTTLE, 0.0) if wanted.bent else throttles)
+    steady &= full > LEAST_SHARE_OF_TOP * wanted.top
     return float(np.median(speed[steady] / full[steady])) if steady.sum() * STEP_S > 3.0 else None
 
 
@@ -145,8 +198,8 @@ def _turning(
     found = steered_in_wheel_angles(recording, car, movement, poses)
     if found is None:
         return None, 0.0
-    odd = found.alike >= FOLLOWS and not TURNS[0] < found.gain < TURNS[1]
-    lost_rad = found.swing * abs(1.0 - found.gain) if found.alike > CLOSELY else 0.0
+    odd = found.correlation >= FOLLOWS and not TURNS[0] < found.gain < TURNS[1]
+    lost_rad = found.swing * abs(1.0 - found.gain) if found.correlation > CLOSELY else 0.0
     return (found.gain if odd else None), lost_rad
 
 
@@ -160,7 +213,7 @@ def steered_in_wheel_angles(
     found = steered(recording, car, movement, poses)
     if found is None:
         return None
-    return Steered(found.alike, found.gain / unit, found.swing * unit)
+    return Steered(found.correlation, found.gain / unit, found.swing * unit)
 
 
 def _in_wheel_angles(recording: Recording, car: Car) -> tuple[Recording, float]:
@@ -176,8 +229,10 @@ def _in_wheel_angles(recording: Recording, car: Car) -> tuple[Recording, float]:
     fleet = Fleet(car, len(STEERINGS))
     for _ in STEERINGS:
         fleet.add(Pose2(0.0, 0.0, 0.0))
-    asked = np.tile(STEERINGS, (round(STEERED_S / STEP_S), 1))
-    turned = fleet.rollout(np.zeros_like(asked), asked, STEP_S, ("steer_angle",))["steer_angle"]
+    steerings = np.tile(STEERINGS, (round(STEERED_S / STEP_S), 1))
+    turned = fleet.rollout(np.zeros_like(steerings), steerings, STEP_S, ("steer_angle",))[
+        "steer_angle"
+    ]
     values = np.interp(steering.values, STEERINGS, turned[-1])
     changed = replace(steering, values=values, dimension="angle")
     return replace(recording, channels={**recording.channels, "command.steering": changed}), 1.0

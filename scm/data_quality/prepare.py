@@ -1,16 +1,29 @@
-"""A recording as tools compare it with a car: screened row by row, cut at gaps, repaired."""
+"""A recording as it is compared with a car: screened row by row, repaired, cut at gaps."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
+from scm.data_quality.bursts import without_bursts
 from scm.data_quality.check import check
-from scm.data_quality.corrected import corrected
-from scm.data_quality.problem import DataProblem, folded
-from scm.data_quality.rows import called
-from scm.data_quality.screen import screen
-from scm.data_quality.stamps import Table, count_of, tables_of
+from scm.data_quality.encoder_counts import repaired_counters
+from scm.data_quality.physical_limits import limits_of
+from scm.data_quality.problem import DataProblem, Span, folded
+from scm.data_quality.quality import Quality
+from scm.data_quality.repairs import corrected
+from scm.data_quality.row_spacing import called
+from scm.data_quality.spikes import without_spikes
 from scm.data_quality.stretches import stretches
-from scm.data_quality.suspicion import Quality
+from scm.data_quality.timestamps import (
+    Table,
+    count_of,
+    in_order,
+    in_seconds,
+    tables_of,
+    with_numbers,
+    without_repeats,
+    without_strays,
+)
 from scm.errors import RecordingError
 from scm.recording.columns import LeftOut
 from scm.recording.read import Recording
@@ -18,7 +31,7 @@ from scm.vehicles.car import Car
 
 REPAIRS = ("unit", "sign", "clock", "clipped", "wrapped", "assumed")
 UNCHANGED = ("not_finite", "assumed")  # a cell without a number is no row that was changed
-MOST_LISTED = 10  # reasons: whoever reads more has the wrong file
+MOST_REASONS = 10  # lines of an account; more of them mean the wrong file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,9 +110,47 @@ def lines_left_out(left_out: Iterable[LeftOut]) -> tuple[str, ...]:
     for one in left_out:
         alike.setdefault((one.file, one.why), []).append(one)
     lines = []
-    for (file, why), some in list(alike.items())[:MOST_LISTED]:
+    for (file, why), some in list(alike.items())[:MOST_REASONS]:
         first = ", ".join(str(one.line) for one in some[:3])
         more = f" and {len(some) - 3} more" if len(some) > 3 else ""
         lines.append(f"{file}: lines {first}{more}: {why}" if len(some) > 1 else str(some[0]))
-    rest = sum(map(len, list(alike.values())[MOST_LISTED:]))
+    rest = sum(map(len, list(alike.values())[MOST_REASONS:]))
     return (*lines, f"and {rest} more lines that are no rows") if rest else tuple(lines)
+
+
+@dataclass(frozen=True, slots=True)
+class Screened:
+    """A recording whose rows are in order.
+
+    Attributes:
+        problems: Everything that was done to its rows.
+        jumps: Spans over which its poses jump.
+    """
+
+    recording: Recording
+    problems: tuple[DataProblem, ...]
+    jumps: tuple[Span, ...]
+
+
+def screen(recording: Recording, car: Car) -> Screened:
+    """Return a recording with its rows in order, each possible for its car.
+
+    Args:
+        recording: As it was read; it is not changed.
+        car: Says how fast it can go and turn.
+    """
+    limits = limits_of(car)
+    now, problems = with_numbers(recording)
+    for step in (
+        partial(in_seconds, limits=limits),
+        without_strays,
+        in_order,
+        without_bursts,
+        without_repeats,
+    ):
+        now, found = step(now)
+        problems += found
+    now, found, jumps = without_spikes(now, limits)
+    problems += found
+    now, found = repaired_counters(now, limits)
+    return Screened(now, (*problems, *found), jumps)

@@ -8,11 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.limits import GENEROUS, Limits
+from scm.data_quality.physical_limits import GENEROUS, Limits
 from scm.data_quality.problem import DataProblem, Span
-from scm.data_quality.stamps import left_out, problem, rows_named, times, usual_step
+from scm.data_quality.timestamps import left_out, problem, rows_named, times, usual_step
 from scm.recording.read import Channel, Recording
 
 SHORT_S = 0.5  # what lies elsewhere for less is a row or a few, not a place where the car was
@@ -211,13 +212,13 @@ def _screened_pose(
     half = 0.5 * np.maximum(t[2:] - t[:-2], 2.0 * period)
     bound = rate * half if turns else np.minimum(rate * half, 0.5 * limits.acceleration * half**2)
     alone = single(t, off, np.maximum(bound, small))
-    kept = np.flatnonzero(~alone)
+    rows = np.flatnonzero(~alone)
     noise = NOISES * float(np.median(np.abs(step - np.median(step))))
     keep, jumps = chained(
-        t[kept], since[kept], period, lambda a, b: apart(kept[a], kept[b]), rate, noise + small
+        t[rows], since[rows], period, lambda a, b: apart(rows[a], rows[b]), rate, noise + small
     )
     whole = np.zeros(len(t), dtype=np.bool_)
-    whole[kept[keep]] = True
+    whole[rows[keep]] = True
     after = np.clip(np.searchsorted(np.flatnonzero(whole), np.flatnonzero(~whole)), 1, None)
     good = np.flatnonzero(whole)
     after = np.minimum(after, len(good) - 1)
@@ -258,7 +259,7 @@ def _spikes(names: Sequence[str], channel: Channel, out: Bools, far: str) -> Dat
         left_out(len(t)),
         "Check for reflections, swapped markers, and angles interpolated through half a turn.",
     ))  # fmt: skip
-    return replace(found, when_s=tuple((float(at), float(at)) for at in t[:50]))
+    return structs.replace(found, when_s=tuple((float(at), float(at)) for at in t[:50]))
 
 
 def _jumps(names: Sequence[str], spans: Sequence[Span]) -> DataProblem:
@@ -268,7 +269,7 @@ def _jumps(names: Sequence[str], spans: Sequence[Span]) -> DataProblem:
         "Cut there: each part is compared on its own.",
         "Check for reflections and swapped markers; record a car that is carried as two drives.",
     ))  # fmt: skip
-    return replace(found, when_s=tuple(spans[:50]))
+    return structs.replace(found, when_s=tuple(spans[:50]))
 
 
 def _too_large(name: str, channel: Channel, out: Bools, limit: float) -> DataProblem:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scm.arrays import Bools, Floats
+from scm.data_quality.pose_track import LONG_GAP_S, POSE, long_gaps
 from scm.data_quality.problem import DataProblem, Span
-from scm.data_quality.rows import called, tables
-from scm.data_quality.track import LONG_GAP_S, POSE, long_gaps
+from scm.data_quality.row_spacing import called, tables
 from scm.recording.read import Channel, Recording
 from scm.vehicles.car import Car
 from scm.vehicles.drive_channel import drive_name
@@ -33,7 +33,7 @@ class Stretches:
     problems: tuple[DataProblem, ...] = ()
 
     def explains(self, other: DataProblem) -> bool:
-        """Say whether another problem names nothing but the gaps at which this was cut."""
+        """Return whether another problem names nothing but the gaps at which this was cut."""
         cut = {gap for problem in self.problems for gap in problem.when_s or ()}
         spans = other.when_s or ()
         return other.name == "gap" and bool(cut) and all(_is_inside(span, cut) for span in spans)
@@ -102,7 +102,7 @@ def _leading(t: Floats, first: float) -> Bools:
 
 
 def _can_be_driven(part: Recording, needed: Sequence[str]) -> bool:
-    """Say whether poses and commands are there together for long enough."""
+    """Return whether poses and commands are there together for long enough."""
     if any(name not in part.channels for name in needed):
         return False
     times = [part.channels[name].t for name in needed]

@@ -12,10 +12,10 @@ from msgspec import structs
 from threadpoolctl import threadpool_limits
 
 from scm.clock import Clock, WallClock
+from scm.data_quality.pose_track import clean, recorded_s
 from scm.data_quality.prepare import Prepared, prepare
 from scm.data_quality.problem import DataProblem
-from scm.data_quality.suspicion import Quality
-from scm.data_quality.track import clean, recorded_s
+from scm.data_quality.quality import Quality
 from scm.errors import RecordingError, ScmError
 from scm.mismatch.budget import DEFAULT_S, Budget, Question
 from scm.mismatch.discovery.curves import discovered_curves

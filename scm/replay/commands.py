@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scm.arrays import Floats
-from scm.data_quality.corrected import forward_speed
-from scm.data_quality.track import Series, series, track
+from scm.data_quality.pose_track import Series, series, track
+from scm.data_quality.repairs import forward_speed
 from scm.errors import RecordingError
 from scm.recording.motion import forward
 from scm.recording.read import Channel, Recording

@@ -17,7 +17,7 @@ STANDARD = {
     "_slots_",  # of ctypes structures
 }
 PENDING = (
-    "scm/api", "scm/camera", "scm/client", "scm/data_quality",
+    "scm/api", "scm/camera", "scm/client",
     "scm/eye", "scm/maps", "scm/mismatch", "scm/play.py",
     "scm/play_watch.py", "scm/recorder", "scm/recording", "scm/records", "scm/replay",
     "scm/ros2", "scm/scenery", "scm/traffic",

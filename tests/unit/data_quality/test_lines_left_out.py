@@ -1,6 +1,6 @@
 """What was not read of a recording's files is reported, what is alike in one sentence."""
 
-from scm.data_quality.prepare import MOST_LISTED, lines_left_out
+from scm.data_quality.prepare import MOST_REASONS, lines_left_out
 from scm.recording.columns import LeftOut
 
 
@@ -16,5 +16,5 @@ def test_lines_that_are_alike_are_one_sentence():
 
 def test_a_file_of_something_else_is_not_listed_line_by_line():
     said = lines_left_out(LeftOut("a.csv", line, f"got '{line}'") for line in range(1, 201))
-    assert len(said) == MOST_LISTED + 1
+    assert len(said) == MOST_REASONS + 1
     assert said[-1] == "and 190 more lines that are no rows"

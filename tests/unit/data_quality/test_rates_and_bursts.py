@@ -8,9 +8,9 @@ import pytest
 
 from scm.data_quality.bursts import spread
 from scm.data_quality.check import check
-from scm.data_quality.corrected import corrected
+from scm.data_quality.pose_track import track
 from scm.data_quality.prepare import prepare
-from scm.data_quality.track import track
+from scm.data_quality.repairs import corrected
 from scm.recording.motion import Poses
 from scm.recording.read import Channel, Recording
 from scm.replay.drive import Drive

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from scm.arrays import Floats
-from scm.data_quality.prepare import prepare
-from scm.data_quality.screen import Screened, screen
+from scm.data_quality.prepare import Screened, prepare, screen
 from scm.errors import RecordingError
 from scm.recording.read import Channel, Recording, read_recordings
 from scm.vehicles.car import Car, load_car

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from scm.data_quality.check import check
-from scm.data_quality.suspicion import Suspicion
+from scm.data_quality.quality import Suspicion
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 from scm.vehicles.sensor_fault import AppliedFault, Series, all_sensor_faults, apply_faults
@@ -97,7 +97,7 @@ def test_no_fault_is_suspected_beside_the_true_one_and_its_twins(
 ) -> None:
     found = suspicions(name, values, seed)
     true = next(suspicion for suspicion in found if suspicion.name == name)
-    assert suspected(found) <= {name, *true.twins}
+    assert suspected(found) <= {name, *true.indistinguishable}
 
 
 def test_a_single_late_sensor_is_told_from_late_poses(drive: Drive, nigel: Car) -> None:

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scm.arrays import Floats
-from scm.data_quality.clocks import STEP_S, WIDTH_S, Lag, lag_between, size_where
+from scm.data_quality.clock_offsets import STEP_S, WIDTH_S, Lag, lag_between, size_where
+from scm.data_quality.pose_track import Series, Track, between_gaps_s, grid, inside, long_gaps
 from scm.data_quality.problem import Span
-from scm.data_quality.track import Series, Track, between_gaps_s, grid, inside, long_gaps
 from scm.recording.units import G
 
 DEGREES = math.degrees(1.0)
@@ -39,7 +39,7 @@ FACTORS: Mapping[str, Mapping[float, str]] = {
 NEAR = 0.08
 SHORTEST_S = 4.0
 MOST_POINTS = 20_000  # of a comparison: slower steps show a long drive as well
-ALIKE = 0.6
+RELATED = 0.6
 LEVEL, BETTER = 0.95, 0.05  # wheels that spin follow the car that badly
 UNLIKE = 0.35
 FAR_S = 0.2
@@ -65,9 +65,9 @@ class Pair:
     shift_s: float = 0.0
 
     @property
-    def alike(self) -> bool:
-        """Say whether both show the same motion."""
-        return abs(self.lag.alike) > ALIKE
+    def is_related(self) -> bool:
+        """Return whether both show the same motion."""
+        return abs(self.lag.correlation) > RELATED
 
     @property
     def factor(self) -> float:
@@ -84,8 +84,8 @@ class Pair:
     @property
     def far_s(self) -> float:
         """How far the first's clock is ahead [s]; 0 where a latency, or slip, may explain it."""
-        least, gain = (LEVEL, BETTER) if self.what == "speed" else (ALIKE, 0.0)
-        certain = self.lag.sure and abs(self.lag.alike) >= least
+        least, gain = (LEVEL, BETTER) if self.what == "speed" else (RELATED, 0.0)
+        certain = self.lag.sure and abs(self.lag.correlation) >= least
         if not self.shift_s and not (certain and self.lag.gain > gain):
             return 0.0
         total = self.lag.delay_s + self.shift_s
@@ -93,7 +93,7 @@ class Pair:
 
 
 @dataclass(frozen=True, slots=True)
-class Sensed:
+class MotionSignal:
     """One signal of the car's motion: its channels, and what it shows."""
 
     channels: tuple[str, ...]
@@ -102,7 +102,7 @@ class Sensed:
     order: int = field(default=0)
 
 
-def compare(first: Sensed, second: Sensed, clipped: Sequence[Span] = ()) -> Pair | None:
+def compare(first: MotionSignal, second: MotionSignal, clipped: Sequence[Span] = ()) -> Pair | None:
     """Hold two signals of one motion against each other; None where either hardly moves.
 
     Args:

@@ -9,8 +9,7 @@ import math
 import numpy as np
 
 from scm.arrays import Floats
-from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import (
+from scm.data_quality.pose_track import (
     Series,
     Track,
     between_gaps_s,
@@ -19,7 +18,8 @@ from scm.data_quality.track import (
     series,
     without_pauses,
 )
-from scm.data_quality.whitened import Fit, fit
+from scm.data_quality.quality import Measured, Relation
+from scm.data_quality.whitened_fit import Fit, fit
 from scm.recording.read import Recording
 
 WIDTH_S = 0.15

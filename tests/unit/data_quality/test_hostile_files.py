@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from scm.data_quality.check import check
-from scm.data_quality.corrected import corrected
 from scm.data_quality.prepare import prepare
-from scm.data_quality.suspicion import Quality
+from scm.data_quality.quality import Quality
+from scm.data_quality.repairs import corrected
 from scm.recording.read import Channel, Recording
 from scm.vehicles.car import Car, load_car
 

@@ -1,21 +1,22 @@
-"""Values of a recording: frozen, held, copied from another channel, coarse."""
+"""Channels that are frozen, copied, derived or coarse, and cars that do not move at all."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
 
 from scm.arrays import Floats
-from scm.data_quality.problem import DataProblem, Span
-from scm.data_quality.rows import called
-from scm.data_quality.track import (
+from scm.data_quality.distance import DistanceSensor
+from scm.data_quality.pose_track import (
     Series,
+    Track,
     clean,
     rows_a_value,
     runs,
     series,
 )
-from scm.data_quality.way import Way
+from scm.data_quality.problem import DataProblem, Span
+from scm.data_quality.row_spacing import called
 from scm.recording.read import Recording
 
 FROZEN_S = 1.0
@@ -26,10 +27,16 @@ COARSE = 0.02
 SAME = 0.999999
 DERIVED = 0.99995
 MOTION = ("pose.", "velocity.", "speed", "yaw_rate", "wheel_speed.", "encoder.", "imu.")
+LEAST_M = 0.05
+NOISES = 6.0
+COUNTED_M = 0.1
 
 
-def stuck_problems(
-    recording: Recording, found: list[Way], movement: Series | None, clipped: Collection[Span] = ()
+def frozen_problems(
+    recording: Recording,
+    found: list[DistanceSensor],
+    movement: Series | None,
+    clipped: Collection[Span] = (),
 ) -> Iterator[DataProblem]:
     """Yield channels whose values cannot be what a sensor of a moving car says.
 
@@ -72,7 +79,7 @@ def _held(recording: Recording) -> Iterator[DataProblem]:
 
 
 def _frozen(
-    recording: Recording, movement: Series | None, found: list[Way], coarse: set[str]
+    recording: Recording, movement: Series | None, found: list[DistanceSensor], coarse: set[str]
 ) -> Iterator[DataProblem]:
     """Yield channels that stand still while another sensor sees the car move."""
     counted = Series(found[0].distance.t, _speed(found[0].distance)) if found else None
@@ -192,3 +199,34 @@ def _coarse(recording: Recording) -> Iterator[DataProblem]:
                 text=f"Comes in steps of {step:.3g}, {100.0 * step / reach:.0f} % of its reach.",
                 record_instead="Record all digits that the sensor has.",
             )
+
+
+def moves(poses: Track) -> bool:
+    """Return whether the poses go anywhere, beyond their own noise."""
+    reach = np.hypot(_reach(poses.x), _reach(poses.y))
+    noise = np.hypot(_noise(poses.x), _noise(poses.y))
+    return bool(reach > LEAST_M + NOISES * noise)
+
+
+def stands(poses: Track, found: Iterable[DistanceSensor]) -> bool:
+    """Return whether neither the poses nor any other sensor see the car move."""
+    return not moves(poses) and all(np.ptp(way.distance.values) < COUNTED_M for way in found)
+
+
+def standing_problem() -> DataProblem:
+    """Return what to say of a recording in which nothing moves."""
+    return DataProblem(
+        channel="pose.*",
+        name="standing",
+        text="The car does not move in this recording.",
+        record_instead="Drive: straights, both turns, starts and stops.",
+    )
+
+
+def _reach(values: Floats) -> float:
+    low, high = np.percentile(values, (1, 99))
+    return float(high - low)
+
+
+def _noise(values: Floats) -> float:
+    return float(1.4826 * np.median(np.abs(np.diff(values))) / np.sqrt(2.0))

@@ -213,8 +213,8 @@ def fresh(channel: Series) -> Series:
 def track(recording: Recording) -> Track | None:
     """Return the poses at the rear axle without islands between jumps; None where too few."""
     found = track_with_jumps(recording)
-    kept = None if found is None else found.cut(_mainland(found))
-    return kept if kept is not None and len(kept.t) >= FEWEST else None
+    largest = None if found is None else found.cut(_mainland(found))
+    return largest if largest is not None and len(largest.t) >= FEWEST else None
 
 
 def track_with_jumps(recording: Recording) -> Track | None:

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from statistics import NormalDist
 
-from scm.data_quality.suspicion import Measured, Relation, Repair, Suspicion
-from scm.data_quality.way import Way
+from scm.data_quality.distance import DistanceSensor
+from scm.data_quality.quality import Measured, Relation, Repair, Suspicion
 
 FALSE_ALARM = 0.002
 CHECKS = 16
@@ -72,7 +72,7 @@ def from_clocks(found: Sequence[Relation]) -> Iterator[Suspicion]:
 
 
 def from_travel(
-    found: Relation, way: Way, wheelbase_m: float, push: Relation | None
+    found: Relation, way: DistanceSensor, wheelbase_m: float, push: Relation | None
 ) -> Iterator[Suspicion]:
     """Yield faults of scale, camera, marker and heading from positions against distance.
 
@@ -108,7 +108,7 @@ def from_sideways(found: Relation, wheelbase_m: float) -> Iterator[Suspicion]:
 
 
 def follows(push: Relation) -> bool:
-    """Say whether the accelerometer feels both ways what the pose does, give or take a half."""
+    """Return whether the accelerometer feels both ways what the pose does, give or take a half."""
     both = [push.numbers[name] for name in ("along", "across")]
     return all(1.0 / HALF < m.value < HALF and m.std < SURE * m.value for m in both)
 
@@ -180,13 +180,13 @@ def _late(name: str, late: Measured, found: Relation) -> Iterator[Suspicion]:
 
 
 def _slides(found: Relation) -> bool:
-    """Say whether only slip, or a scale, beyond belief makes the two agree: a poor comparison."""
+    """Return whether only an implausible slip or scale makes the two agree."""
     wild = any(abs(found.numbers[name].value) > WILD_SLIP for name in SLIPS)
     apart = abs(found.numbers["scale"].value - found.numbers["chord"].value)
     return wild or not apart < WILD_SCALE
 
 
-def _scale(found: Relation, way: Way, push: Relation | None) -> Iterator[Suspicion]:
+def _scale(found: Relation, way: DistanceSensor, push: Relation | None) -> Iterator[Suspicion]:
     """Yield what makes the pose's way longer or shorter than the one counted, likeliest first."""
     slip = SLIP_UNKNOWN * found.numbers["slip"].value
     chord = SLIP_UNKNOWN * (found.numbers["scale"].value - found.numbers["chord"].value)
@@ -213,7 +213,7 @@ def _scale(found: Relation, way: Way, push: Relation | None) -> Iterator[Suspici
             std={parameter: measured.std},
             sigma=abs(sigma),
             shown_by=found.pair,
-            twins=tuple(other for other in faults if other != name),
+            indistinguishable=tuple(other for other in faults if other != name),
             text=f"The pose goes {scale.value:.3f} m for every metre of {way.name}.",
         )
 
@@ -255,14 +255,14 @@ def _point(found: Relation, names: tuple[str, ...], wheelbase_m: float) -> Itera
         std={name: m.std for name, m in numbers.items()},
         sigma=sigma,
         shown_by=found.pair,
-        twins=("com_shift",),
+        indistinguishable=("com_shift",),
         text=f"The car turns as if the tracked point were off ({where}).",
     )
 
 
 def _one(
     name: str, channels: tuple[str, ...], parameter: str, measured: Measured, neutral: float,
-    found: Relation, text: str, twins: tuple[str, ...] = (),
+    found: Relation, text: str, indistinguishable: tuple[str, ...] = (),
 ) -> Iterator[Suspicion]:  # fmt: skip
     sigma = abs(measured.value - neutral) / measured.std
     if sigma > LIMIT:
@@ -273,7 +273,7 @@ def _one(
             std={parameter: measured.std},
             sigma=sigma,
             shown_by=found.pair,
-            twins=twins,
+            indistinguishable=indistinguishable,
             text=text,
         )
 

@@ -4,17 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scm.data_quality import suspect
-from scm.data_quality.gross import Sensed, compare
-from scm.data_quality.mend import GYROS
+from scm.data_quality import suspected_faults
+from scm.data_quality.accelerometer import push_of
+from scm.data_quality.distance import DistanceSensor, travel_against
+from scm.data_quality.heading import sideways_of, yaw_against
+from scm.data_quality.pose_track import FEWEST, Series, Track, series
 from scm.data_quality.problem import DataProblem
-from scm.data_quality.pushing import push_of
-from scm.data_quality.sideways import sideways_of
-from scm.data_quality.suspicion import Relation, Suspicion
-from scm.data_quality.track import FEWEST, Series, Track, series
-from scm.data_quality.travel import travel_against
-from scm.data_quality.turning import yaw_against
-from scm.data_quality.way import Way
+from scm.data_quality.quality import Relation, Suspicion
+from scm.data_quality.repairs import GYROS
+from scm.data_quality.unit_errors import MotionSignal, compare
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
@@ -27,7 +25,7 @@ def compare_all(
     recording: Recording,
     car: Car | None,
     poses: Track,
-    found: Sequence[Way],
+    found: Sequence[DistanceSensor],
     problems: Sequence[DataProblem],
 ) -> tuple[list[Relation], list[Suspicion]]:
     """Return all relations, and the faults that would explain those that are off.
@@ -40,7 +38,7 @@ def compare_all(
         problems: Found so far: copies are no witnesses, and frozen spans witness nothing.
     """
     not_own = no_witnesses(problems)
-    wheelbase = car.value("body.wheelbase_m") if car else suspect.DEFAULT_WHEELBASE_M
+    wheelbase = car.value("body.wheelbase_m") if car else suspected_faults.DEFAULT_WHEELBASE_M
     timed: list[Relation] = []
     suspicions: list[Suspicion] = []
     for name in GYROS:
@@ -48,7 +46,7 @@ def compare_all(
         gyro = None if rows is None else _turned(recording, rows, name)
         if gyro is not None:
             timed.append(gyro)
-            suspicions += suspect.from_gyro(gyro)
+            suspicions += suspected_faults.from_gyro(gyro)
     late = _late(timed[0]) if timed else (0.0, 0.0)
     clipped = {problem.channel for problem in problems if problem.name == "clipped"}
     push = None if clipped.intersection(ACCELEROMETER) else push_of(recording, poses, late)
@@ -57,17 +55,17 @@ def compare_all(
         travel = None if rows is None else travel_against(rows, way.distance, way.name, late)
         if travel is not None:
             timed.append(travel)
-            suspicions += suspect.from_travel(travel, way, wheelbase, push)
-    suspicions += suspect.from_clocks(timed)
+            suspicions += suspected_faults.from_travel(travel, way, wheelbase, push)
+    suspicions += suspected_faults.from_clocks(timed)
     relations = list(timed)
     sideways = None if found else sideways_of(poses)
     if sideways is not None:
         relations.append(sideways)
-        suspicions += suspect.from_sideways(sideways, wheelbase)
+        suspicions += suspected_faults.from_sideways(sideways, wheelbase)
     if push is not None:
         relations.append(push)
         turned = [s.values["offset"] for s in suspicions if s.name == "pose_heading"]
-        suspicions += suspect.from_push(push, turned[0] if turned else 0.0)
+        suspicions += suspected_faults.from_push(push, turned[0] if turned else 0.0)
     return relations, suspicions
 
 
@@ -98,9 +96,9 @@ def _turned(recording: Recording, poses: Track, name: str) -> Relation | None:
     gyro = series(recording, name)
     if gyro is None:
         return None
-    turn = Sensed(("pose.yaw",), "angular speed", Series(poses.t, poses.yaw), 1)
-    pair = compare(turn, Sensed((name,), "angular speed", gyro))
-    if pair is None or not pair.alike:
+    turn = MotionSignal(("pose.yaw",), "angular speed", Series(poses.t, poses.yaw), 1)
+    pair = compare(turn, MotionSignal((name,), "angular speed", gyro))
+    if pair is None or not pair.is_related:
         return None
     start = (pair.lag.delay_s + pair.shift_s, pair.lag.rate)
     return yaw_against(poses, gyro.integral(), name, start)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scm.data_quality.check import check
-from scm.data_quality.corrected import corrected
 from scm.data_quality.prepare import prepare
+from scm.data_quality.repairs import corrected
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from scm.data_quality.check import check
-from scm.data_quality.suspicion import Quality
+from scm.data_quality.quality import Quality
 from scm.recording.read import Recording, read_recordings
 from scm.vehicles.car import load_car
 
@@ -59,7 +59,7 @@ def test_a_concealed_fault_of_a_sensor_is_found(
 ) -> None:
     found = trial(case, part)
     (suspicion,) = [s for s in found.suspicions if s.name == name]
-    assert {s.name for s in found.suspicions} <= {name, *suspicion.twins}
+    assert {s.name for s in found.suspicions} <= {name, *suspicion.indistinguishable}
     for parameter, value in truth.items():
         off = suspicion.values[parameter] - value
         assert abs(off) < 3.0 * suspicion.std[parameter]
@@ -67,7 +67,7 @@ def test_a_concealed_fault_of_a_sensor_is_found(
 
 def test_a_shifted_centre_of_gravity_is_a_twin_of_a_shifted_marker() -> None:
     (suspicion,) = trial("20", "drive").suspicions
-    assert (suspicion.name, suspicion.twins) == ("pose_point", ("com_shift",))
+    assert (suspicion.name, suspicion.indistinguishable) == ("pose_point", ("com_shift",))
     assert suspicion.values["ahead"] == pytest.approx(0.0531, abs=0.007)
 
 

@@ -5,25 +5,23 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from scm.data_quality import gross
-from scm.data_quality.corrected import forward_speed
-from scm.data_quality.gross import Pair, Sensed, compare
-from scm.data_quality.mend import DESCRIBE, GYROS, Mending
+from scm.data_quality import unit_errors
+from scm.data_quality.accelerometer import push_of
+from scm.data_quality.distance import distance_sensors, travel_against
+from scm.data_quality.heading import yaw_against
 from scm.data_quality.other_car import (
     FOLLOWS,
-    share_of_asked,
+    share_of_expected_speed,
     steady_speed,
     steered_in_wheel_angles,
     top_speed,
 )
+from scm.data_quality.pose_track import Series, Track, series
 from scm.data_quality.problem import DataProblem
-from scm.data_quality.pushing import push_of
-from scm.data_quality.rows import called, tables
-from scm.data_quality.suspicion import Repair
-from scm.data_quality.track import Series, Track, series
-from scm.data_quality.travel import travel_against
-from scm.data_quality.turning import yaw_against
-from scm.data_quality.way import ways
+from scm.data_quality.quality import Repair
+from scm.data_quality.repairs import DESCRIBE, GYROS, Repairs, forward_speed
+from scm.data_quality.row_spacing import called, tables
+from scm.data_quality.unit_errors import MotionSignal, Pair, compare
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 
@@ -33,7 +31,7 @@ CERTAIN, LARGEST_LEAK = 12.0, 3.0
 BELIEVABLE = (0.03, 1.4)  # of the car's top speed
 
 
-def mend_pairs(now: Mending, car: Car | None) -> Iterator[DataProblem]:
+def repair_pairs(now: Repairs, car: Car | None) -> Iterator[DataProblem]:
     """Repair lengths, directions, units, signs and clocks, in this order."""
     pairs = _pairs(now, car)
     for step in (_lengths, _backwards, _sizes):
@@ -41,28 +39,31 @@ def mend_pairs(now: Mending, car: Car | None) -> Iterator[DataProblem]:
         yield from step(now, car, pairs)
         if len(now.repairs) > repaired:
             pairs = _pairs(now, car)
-    yield from _offsets(now, car, [pair for pair in pairs if pair.alike])
+    yield from _offsets(now, car, [pair for pair in pairs if pair.is_related])
     yield from _accelerometer(now)
 
 
-def _pairs(now: Mending, car: Car | None) -> list[Pair]:
+def _pairs(now: Repairs, car: Car | None) -> list[Pair]:
     """Return the pose's turning and speed, each against every sensor that knows it."""
     poses = now.poses
     movement = forward_speed(poses)
     if poses is None or movement is None:
         return []
-    turn = Sensed(POSE, "angular speed", Series(poses.t, poses.yaw), 1)
-    go = Sensed(POSE, "speed", movement)
-    found = [(turn, Sensed((name,), "angular speed", signal))
+    turn = MotionSignal(POSE, "angular speed", Series(poses.t, poses.yaw), 1)
+    go = MotionSignal(POSE, "speed", movement)
+    found = [(turn, MotionSignal((name,), "angular speed", signal))
              for name in GYROS if (signal := series(now.recording, name)) is not None]  # fmt: skip
-    found += [(go, Sensed(w.channels, "speed", w.distance, 1)) for w in ways(now.recording, car)]
+    found += [
+        (go, MotionSignal(w.channels, "speed", w.distance, 1))
+        for w in distance_sensors(now.recording, car)
+    ]
     pairs = (compare(first, second, now.left_out_s(second.channels)) for first, second in found)
     return [pair for pair in pairs if pair is not None]
 
 
-def _lengths(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
+def _lengths(now: Repairs, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
     """Blame the pose's metre where accelerometer or top speed say so, not only one way."""
-    going = [p for p in pairs if p.what == "speed" and p.alike]
+    going = [p for p in pairs if p.what == "speed" and p.is_related]
     movement, poses = forward_speed(now.poses), now.poses
     if movement is None or poses is None:
         return
@@ -84,28 +85,28 @@ def _lengths(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[D
 
 
 def _length_by_commands(
-    now: Mending, car: Car | None, movement: Series, poses: Track
+    now: Repairs, car: Car | None, movement: Series, poses: Track
 ) -> Iterator[DataProblem]:
     """Blame the pose's metre where only with another both speed and turning are as commanded.
 
     Another car would be faster too, but would turn as its own wheelbase lets it.
     """
-    asked = None if car is None else steady_speed(car)
-    if car is None or asked is None:
+    steady = None if car is None else steady_speed(car)
+    if car is None or steady is None:
         return
-    share = share_of_asked(now.recording, movement, asked)
+    share = share_of_expected_speed(now.recording, movement, steady)
     for length in LENGTHS:
         if share is None or abs(math.log(share * length)) > math.log(2.0):
             continue
         slower = Series(movement.t, length * movement.values)
         nearer = Track(poses.t, length * poses.x, length * poses.y, poses.yaw)
         turns = steered_in_wheel_angles(now.recording, car, slower, nearer)
-        if turns and turns.alike > FOLLOWS and abs(math.log(turns.gain)) < math.log(2.0):
+        if turns and turns.correlation > FOLLOWS and abs(math.log(turns.gain)) < math.log(2.0):
             yield _length(now, length, "its commands ask for")
             return
 
 
-def _length(now: Mending, length: float, than: str) -> DataProblem:
+def _length(now: Repairs, length: float, than: str) -> DataProblem:
     """Repair the pose's metre and say so."""
     now.repair(Repair(channels=("pose.x", "pose.y"), factor=length))
     return DataProblem(
@@ -118,26 +119,26 @@ def _length(now: Mending, length: float, than: str) -> DataProblem:
 
 
 def _only_then(top: float | None, fast: float, factor: float) -> bool:
-    """Say whether a speed is believable times the factor, and is not without."""
+    """Return whether a speed is believable times the factor, and is not without."""
     if top is None:
         return False
     low, high = BELIEVABLE[0] * top, BELIEVABLE[1] * top
     return not low < fast < high and low < fast * factor < high
 
 
-def _backwards(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
+def _backwards(now: Repairs, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
     """Turn a heading round that points to the back of the car."""
     poses, movement = now.poses, forward_speed(now.poses)
-    going = [p for p in pairs if p.what == "speed" and p.alike]
+    going = [p for p in pairs if p.what == "speed" and p.is_related]
     if poses is None or movement is None or any(p.factor > 0.0 for p in going):
         return
     push = push_of(now.recording, poses)
     known = [push.numbers[name] for name in ("along", "across")] if push else []
     against = [m for m in known if m.value < -4.0 * m.std]
-    asked = series(now.recording, "command.throttle")
-    throttle = 0.0 if asked is None else float(np.mean(asked.at(movement.t) * movement.values))
+    sent = series(now.recording, "command.throttle")
+    throttle = 0.0 if sent is None else float(np.mean(sent.at(movement.t) * movement.values))
     sizes = float(np.mean(np.abs(movement.values))) * (
-        1e-9 if asked is None else float(np.mean(np.abs(asked.values)))
+        1e-9 if sent is None else float(np.mean(np.abs(sent.values)))
     )
     driven_back = throttle < -0.3 * sizes
     if not (driven_back and (going or len(against) == 2)) and not (going and len(against) == 2):
@@ -152,21 +153,22 @@ def _backwards(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator
     )
 
 
-def _sizes(now: Mending, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
+def _sizes(now: Repairs, car: Car | None, pairs: Sequence[Pair]) -> Iterator[DataProblem]:
     """Blame the other sensor of each pair for its unit and sign."""
     del car
     for pair in pairs:
         yield from _size(now, pair)
 
 
-def _size(now: Mending, pair: Pair) -> Iterator[DataProblem]:
+def _size(now: Repairs, pair: Pair) -> Iterator[DataProblem]:
     at = called(pair.second)
-    if not pair.alike:
-        if abs(pair.lag.alike) < gross.UNLIKE:
+    if not pair.is_related:
+        if abs(pair.lag.correlation) < unit_errors.UNLIKE:
             yield DataProblem(
                 channel=at,
                 name="unrelated",
-                text=f"Does not follow the pose's {pair.what}: correlation {pair.lag.alike:.2f}.",
+                text=f"Does not follow the pose's {pair.what}: correlation "
+                f"{pair.lag.correlation:.2f}.",
                 record_instead="Check that all channels are of one drive.",
             )
         return
@@ -174,10 +176,10 @@ def _size(now: Mending, pair: Pair) -> Iterator[DataProblem]:
         yield _divided(now, pair.second, pair.factor, pair.what)
 
 
-def _divided(now: Mending, channels: tuple[str, ...], factor: float, what: str) -> DataProblem:
+def _divided(now: Repairs, channels: tuple[str, ...], factor: float, what: str) -> DataProblem:
     """Repair channels by a factor and say so."""
     now.repair(Repair(channels=channels, factor=1.0 / factor))
-    unit = gross.unit_of(factor, what)
+    unit = unit_errors.unit_of(factor, what)
     if channels[0].startswith("encoder.") != ("counts" in unit):
         unit = ""
     text = "Its sign is turned" if factor == -1.0 else f"Shows {factor:.4g} times the pose's {what}"
@@ -190,14 +192,14 @@ def _divided(now: Mending, channels: tuple[str, ...], factor: float, what: str) 
     )
 
 
-def _offsets(now: Mending, car: Car | None, pairs: list[Pair]) -> Iterator[DataProblem]:
+def _offsets(now: Repairs, car: Car | None, pairs: list[Pair]) -> Iterator[DataProblem]:
     """Bring clocks together that are far apart: the pose's where all say so, else the odd one's."""
     far = [pair for pair in pairs if pair.far_s]
     if not far:
         return
     spread = max(p.far_s for p in far) - min(p.far_s for p in far)
     moves: list[tuple[tuple[str, ...], float]]
-    if len(far) == len(pairs) and spread < gross.FAR_S:
+    if len(far) == len(pairs) and spread < unit_errors.FAR_S:
         names = tuple(n for n in now.recording.channels if n.startswith("pose."))
         best = min(far, key=lambda p: p.what)  # heading tells a clock better than speed
         moves = [(names, -_refined(now, best, car))]
@@ -222,7 +224,7 @@ def _offsets(now: Mending, car: Car | None, pairs: list[Pair]) -> Iterator[DataP
         )
 
 
-def _refined(now: Mending, pair: Pair, car: Car | None) -> float:
+def _refined(now: Repairs, pair: Pair, car: Car | None) -> float:
     """Return how far the pose's clock is ahead, from the heading where a gyro takes part [s]."""
     poses = now.poses
     found = None
@@ -232,11 +234,13 @@ def _refined(now: Mending, pair: Pair, car: Car | None) -> float:
             moved = Series(signal.t + pair.far_s, signal.values).integral()
             found = yaw_against(poses, moved, pair.second[0], (0.0, pair.lag.rate))
     elif poses is not None:
-        way = next(way for way in ways(now.recording, car) if way.channels == pair.second)
+        way = next(
+            way for way in distance_sensors(now.recording, car) if way.channels == pair.second
+        )
         moved = Series(way.distance.t + pair.far_s, way.distance.values)
         found = travel_against(poses, moved, way.name, (0.0, pair.lag.rate))
     left = found.numbers["delay"].value if found else 0.0
-    return pair.far_s + (left if abs(left) < 0.5 * gross.FAR_S else 0.0)
+    return pair.far_s + (left if abs(left) < 0.5 * unit_errors.FAR_S else 0.0)
 
 
 def _clocked_with(recording: Recording, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -246,7 +250,7 @@ def _clocked_with(recording: Recording, names: tuple[str, ...]) -> tuple[str, ..
     return names if shared else tuple(dict.fromkeys((*names, *table)))
 
 
-def _accelerometer(now: Mending) -> Iterator[DataProblem]:
+def _accelerometer(now: Repairs) -> Iterator[DataProblem]:
     poses = now.poses
     found = None if poses is None else push_of(now.recording, poses)
     if found is None:
@@ -255,8 +259,8 @@ def _accelerometer(now: Mending) -> Iterator[DataProblem]:
     for axis, name in (("x", "along"), ("y", "across")):
         scale = found.numbers[name]
         if abs(scale.value) > CERTAIN * scale.std and scale.leak < LARGEST_LEAK:
-            near = gross.nearest_factor(scale.value, "acceleration")
-            if near == -1.0 or gross.unit_of(near, "acceleration"):
+            near = unit_errors.nearest_factor(scale.value, "acceleration")
+            if near == -1.0 or unit_errors.unit_of(near, "acceleration"):
                 factors.setdefault(near, []).append(f"imu.accel_{axis}")
     for factor, names in factors.items():
         yield _divided(now, tuple(names), factor, "acceleration")

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.corrected import forward_speed
-from scm.data_quality.mend import GYROS, Mending
+from scm.data_quality.pose_track import Series, clean, grid, long_gaps, rows_a_value, runs
 from scm.data_quality.problem import DataProblem, Span
-from scm.data_quality.suspicion import Repair
-from scm.data_quality.track import Series, clean, grid, long_gaps, rows_a_value, runs
+from scm.data_quality.quality import Repair
+from scm.data_quality.repairs import GYROS, Repairs, forward_speed
 from scm.recording.units import DIMENSIONS, UNITS, G
 
 LIMITED = ("imu.", "yaw_rate", "speed", "velocity.", "wheel_speed.", "motor.current")
@@ -44,7 +43,7 @@ class _Limit:
     rows: Bools
 
 
-def clipped_rows(now: Mending) -> Iterator[DataProblem]:
+def clipped_rows(now: Repairs) -> Iterator[DataProblem]:
     """Leave out rows in which a sensor shows the end of its range, not what it measures.
 
     Until all is compared they stay: lines drawn over them would be worse.
@@ -73,7 +72,7 @@ def clipped_rows(now: Mending) -> Iterator[DataProblem]:
         )
 
 
-def wrapped_rows(now: Mending) -> Iterator[DataProblem]:
+def wrapped_rows(now: Repairs) -> Iterator[DataProblem]:
     """Leave out the spikes of a rate that somebody took from an angle in (-pi, pi]."""
     others = _others(now)
     for name in now.recording.channels:
@@ -100,7 +99,7 @@ def wrapped_rows(now: Mending) -> Iterator[DataProblem]:
         )
 
 
-def _others(now: Mending) -> Mapping[str, Series]:
+def _others(now: Repairs) -> Mapping[str, Series]:
     """Return what the poses show of each sensor's quantity, smoothed."""
     poses, forward = now.poses, forward_speed(now.poses)
     if poses is None or forward is None:
@@ -145,7 +144,7 @@ def _limit(channel: Series, sign: float, other: Series | None) -> _Limit | None:
 
 
 def _is_noisy(values: Floats, rows: Bools, limit: float, distinct: Floats) -> bool:
-    """Say whether a sensor's noise would change its last digit from row to row."""
+    """Return whether a sensor's noise would change its last digit from row to row."""
     third = np.abs(np.diff(values, 3))
     free = ~(rows[:-3] | rows[1:-2] | rows[2:-1] | rows[3:])
     if free.sum() < FEWEST:
@@ -158,7 +157,7 @@ def _is_noisy(values: Floats, rows: Bools, limit: float, distinct: Floats) -> bo
 def _goes_on(
     values: Floats, rows: Bools, limit: float, sign: float, t: Floats, other: Series | None
 ) -> bool:
-    """Say whether another sensor shows more, while this one stays at its limit."""
+    """Return whether another sensor shows more, while this one stays at its limit."""
     if other is None:
         return False
     seen = sign * other.at(t)
@@ -174,7 +173,7 @@ def _goes_on(
 
 
 def _is_cut(values: Floats, starts: Ints, ends: Ints) -> bool:
-    """Say whether values run into the limit and out of it at full slope, more than once."""
+    """Return whether values run into the limit and out of it at full slope, more than once."""
     inside = (starts >= 2) & (ends <= len(values) - 2)
     starts, ends = starts[inside], ends[inside]
     if len(starts) < 2:

@@ -10,7 +10,7 @@ import pytest
 from scm.arrays import Floats
 from scm.data_quality.check import check
 from scm.data_quality.prepare import Prepared, prepare
-from scm.data_quality.suspicion import Quality
+from scm.data_quality.quality import Quality
 from scm.recording.read import Recording
 from scm.vehicles.car import Car, load_car
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scm.arrays import Floats
-from scm.data_quality.whitened import fit
+from scm.data_quality.whitened_fit import fit
 
 ROWS = 800
 

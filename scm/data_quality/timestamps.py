@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.limits import Limits
+from scm.data_quality.physical_limits import Limits
 from scm.data_quality.problem import DataProblem
-from scm.data_quality.rows import called
+from scm.data_quality.row_spacing import called
 from scm.recording.read import Channel, Recording, Source
 from scm.recording.units import UNITS
 
@@ -57,7 +57,7 @@ class Table:
 
     @property
     def is_held(self) -> bool:
-        """Say whether none of its channels is measured, so that rows may come when they change."""
+        """Return whether no channel of it is measured: rows may come only when they change."""
         return all(name.startswith(HELD) for name in self.names)
 
     @property
@@ -265,7 +265,7 @@ def _strays(table: Table) -> Bools:
 
 
 def _is_stray(table: Table, rows: Floats, others: Floats, pause: float, *, between: bool) -> bool:
-    """Say whether a few rows belong nowhere: not to a hole of the others, nor beside them."""
+    """Return whether a few rows belong nowhere: not to a hole of the others, nor beside them."""
     to_ends = max(others[0] - rows[-1], rows[0] - others[-1])
     if to_ends > 0.0:
         far = pause
@@ -461,8 +461,8 @@ def rows_named(numbers: Ints) -> str:
     """Return `Row 7`, or `3 rows (7, 9, 12)`."""
     if len(numbers) == 1:
         return f"Row {numbers[0]}"
-    listed = ", ".join(str(number) for number in numbers[:5])
-    return f"{len(numbers)} rows ({listed}{', ...' if len(numbers) > 5 else ''})"
+    first = ", ".join(str(number) for number in numbers[:5])
+    return f"{len(numbers)} rows ({first}{', ...' if len(numbers) > 5 else ''})"
 
 
 def count_of(rows: int) -> str:

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from scm.arrays import Floats
+from scm.data_quality.pose_track import Grid, Series, Track, clean, grid, held, long_gaps
 from scm.data_quality.problem import DataProblem
-from scm.data_quality.track import Grid, Series, Track, clean, grid, held, long_gaps
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 from scm.vehicles.drive_channel import COMMANDED_SPEEDS
@@ -152,14 +152,14 @@ def _without_effect(recording: Recording, movement: Series, poses: Track) -> Ite
     speed, rate = on.smooth(movement), on.smooth(yaw, 1)
     steering, throttle = (_command(recording, n) for n in ("command.steering", "command.throttle"))
     if steering is not None:
-        asked = on.smooth_even(held(steering, on.t) * speed)
-        if not _follows(rate, asked, on, related):
+        expected = on.smooth_even(held(steering, on.t) * speed)
+        if not _follows(rate, expected, on, related):
             yield _unrelated("command.steering", "The car's turning does not follow its steering")
     if throttle is not None and _varied(speed) and not short:
-        asked = on.smooth_even(held(throttle, on.t))
-        lagged = _lagged(asked, 0.5, STEP_S)
+        expected = on.smooth_even(held(throttle, on.t))
+        lagged = _lagged(expected, 0.5, STEP_S)
         slope = on.smooth_even(speed, 1)
-        answers = ((speed, lagged), (slope, asked), (speed, asked))
+        answers = ((speed, lagged), (slope, expected), (speed, expected))
         if not any(_belongs(motion, signal, on) for motion, signal in answers):
             yield _unrelated("command.throttle", "The car's speed does not follow its throttle")
 
@@ -216,27 +216,27 @@ def _lagged(values: Floats, time_s: float, step_s: float) -> Floats:
     return np.convolve(padded, kernel / kernel.sum(), mode="valid")
 
 
-def _follows(motion: Floats, asked: Floats, on: Grid, related: float) -> bool:
-    """Say whether the motion follows within a second or two, better than at any other delay."""
-    if motion.std() < 1e-6 or asked.std() < 1e-6:
+def _follows(motion: Floats, expected: Floats, on: Grid, related: float) -> bool:
+    """Return whether the motion follows within a second or two, better than at any other delay."""
+    if motion.std() < 1e-6 or expected.std() < 1e-6:
         return True
-    near = best_alike(motion, asked, on, LATEST_S)
+    near = best_correlation(motion, expected, on, LATEST_S)
     return near > related
 
 
-def _belongs(motion: Floats, asked: Floats, on: Grid) -> bool:
-    """Say whether the motion follows clearly, or hardly and its quick changes better than others.
+def _belongs(motion: Floats, expected: Floats, on: Grid) -> bool:
+    """Return whether the motion follows clearly, or barely and best at this drive's quick changes.
 
     Two drives of one car, on like routes, are alike in what is slow.
     """
-    if min(motion.std(), asked.std()) < 1e-6 or _follows(motion, asked, on, CLEARLY):
+    if min(motion.std(), expected.std()) < 1e-6 or _follows(motion, expected, on, CLEARLY):
         return True
-    if not _follows(motion, asked, on, HARDLY):
+    if not _follows(motion, expected, on, HARDLY):
         return False
-    motion, asked = (_quick(values, on.step_s) for values in (motion, asked))
-    near, apart = best_alike(motion, asked, on, LATEST_S), round(APART_S / on.step_s)
-    others = range(apart, len(asked) - apart, 4)
-    far = [abs(float(np.corrcoef(motion, np.roll(asked, d))[0, 1])) for d in others]
+    motion, expected = (_quick(values, on.step_s) for values in (motion, expected))
+    near, apart = best_correlation(motion, expected, on, LATEST_S), round(APART_S / on.step_s)
+    others = range(apart, len(expected) - apart, 4)
+    far = [abs(float(np.corrcoef(motion, np.roll(expected, d))[0, 1])) for d in others]
     return near > CLOSELY or near > max(far, default=0.0)
 
 
@@ -247,10 +247,12 @@ def _quick(values: Floats, step_s: float) -> Floats:
     return np.asarray(values - np.convolve(padded, np.full(width, 1.0 / width), mode="valid"))
 
 
-def best_alike(motion: Floats, asked: Floats, on: Grid, latest_s: float) -> float:
+def best_correlation(motion: Floats, expected: Floats, on: Grid, latest_s: float) -> float:
     """Return the best correlation with delays of 0 to `latest_s`."""
     delays = range(0, round(latest_s / on.step_s) + 1, 2)
-    return max(abs(float(np.corrcoef(motion[d:], asked[: len(asked) - d])[0, 1])) for d in delays)
+    return max(
+        abs(float(np.corrcoef(motion[d:], expected[: len(expected) - d])[0, 1])) for d in delays
+    )
 
 
 def _unrelated(name: str, text: str) -> DataProblem:

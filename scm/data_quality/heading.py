@@ -1,18 +1,24 @@
-"""Heading of the pose against yaw as another sensor adds it up: gyro, or the wheels' difference."""
+"""The pose's heading: against yaw as another sensor integrates it, and against where it moves."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from scm.arrays import Floats
-from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Series, Track, cut_at_gaps, recorded_s
-from scm.data_quality.whitened import Fit, fit
+from scm.data_quality.pose_track import Series, Track, cut_at_gaps, grid, long_gaps, recorded_s
+from scm.data_quality.quality import Measured, Relation
+from scm.data_quality.whitened_fit import Fit, fit
 
 ROUNDS = 4
 SHORTEST_S = 10.0
 SHORTEST_DRIFT_S = 30.0
 MOST_ROWS = 5000
+WIDTH_S = 0.1
+STEP_S = 0.02
+FEWEST_ROWS = 40
+NAMES = ("heading", "ahead", "side_slip")
+QUIET_MPS2 = 3.0  # beyond, tyres slip more than in proportion
+SIDE_SLIP_STD = 0.02  # rad per m/s^2
 
 
 def yaw_against(
@@ -68,3 +74,36 @@ def _relation(pair: tuple[str, str], found: Fit, warp: Floats, rows: int) -> Rel
     if len(found.values) > 3:
         numbers["rate"] = Measured(float(warp[1]), float(std[3]), leak[3])
     return Relation(pair=pair, numbers=numbers, noise=found.noise, rows=rows)
+
+
+def sideways_of(poses: Track) -> Relation | None:
+    """Hold the heading of the pose against its direction of travel.
+
+    Returns:
+        `heading` [rad], by which the pose's yaw is turned, and `ahead` [m], where the tracked point
+        is; None where the car does not move enough.
+    """
+    width = max(WIDTH_S, 1.5 * poses.period_s)
+    if recorded_s(poses.t) < max(SHORTEST_S, 60.0 * width):
+        return None
+    on = grid(poses.t[0], poses.t[-1], STEP_S, width, long_gaps(poses.t))
+    yaw = on.smooth(Series(poses.t, poses.yaw))
+    rate = on.smooth(Series(poses.t, poses.yaw), 1)
+    vx, vy = (on.smooth(Series(poses.t, values), 1) for values in (poses.x, poses.y))
+    along = np.cos(yaw) * vx + np.sin(yaw) * vy
+    left = np.cos(yaw) * vy - np.sin(yaw) * vx
+    rows = on.inner(round(2.0 * width / STEP_S))
+    quiet = np.abs(along * rate)[rows] < QUIET_MPS2
+    if quiet.sum() < FEWEST_ROWS:
+        return None
+    columns = np.stack((-along, rate, along * along * rate), axis=1)[rows][quiet]
+    found = fit(
+        left[rows, None][quiet], columns[:, None, :], np.array([np.inf, np.inf, SIDE_SLIP_STD])
+    )
+    numbers = {
+        name: Measured(float(value), float(std), float(leak))
+        for name, value, std, leak in zip(NAMES, found.values, found.std, found.leak, strict=True)
+    }
+    return Relation(
+        pair=("pose.yaw", "pose.x"), numbers=numbers, noise=found.noise, rows=len(columns)
+    )

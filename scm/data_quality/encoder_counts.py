@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.limits import GENEROUS, Limits
+from scm.data_quality.physical_limits import GENEROUS, Limits
 from scm.data_quality.problem import DataProblem
 from scm.data_quality.spikes import chained, held_since, single
-from scm.data_quality.stamps import left_out, problem, rows_named, times, usual_step
+from scm.data_quality.timestamps import left_out, problem, rows_named, times, usual_step
 from scm.recording.read import Channel, Recording
 
 COUNTERS = ("encoder.left", "encoder.right")
@@ -140,15 +140,15 @@ def _glitches(channel: Channel, rate: float, slack: float) -> Bools:
 
     half = 0.5 * np.maximum(t[2:] - t[:-2], 2.0 * period)
     alone = single(t, off, rate * half + slack)
-    kept = np.flatnonzero(~alone)
+    rows = np.flatnonzero(~alone)
     held = held_since(t, values)
 
     def apart(a: Ints, b: Ints) -> Floats:
-        return np.abs(values[kept[b]] - values[kept[a]])
+        return np.abs(values[rows[b]] - values[rows[a]])
 
-    keep, _ = chained(t[kept], held[kept], period, apart, rate, slack)
+    keep, _ = chained(t[rows], held[rows], period, apart, rate, slack)
     out = np.ones(len(t), dtype=np.bool_)
-    out[kept[keep]] = False
+    out[rows[keep]] = False
     return out
 
 
@@ -177,11 +177,11 @@ def _joined(
         added[i + 1 :] += np.rint(on) - step[i]
     anew = [bool(abs(values[i + 1]) < 0.1 * abs(values[i])) for i in at]
     does = "Begins anew" if all(anew) else "Jumps"
-    listed = "; ".join(
+    first = "; ".join(
         f"row {channel.row_numbers[i + 1]} from {values[i]:.0f} to {values[i + 1]:.0f}"
         for i in at[:3]
     )
     return replace(channel, values=values + added), [problem((name,), "restart", (
-        f"{does} {times(len(at))}: {listed}.",
+        f"{does} {times(len(at))}: {first}.",
         "Joined: it counts on as fast as in the rows around.", INSTEAD,
     ))]  # fmt: skip

@@ -50,7 +50,7 @@ class Suspicion:
         sigma: How far from its neutral value, in standard deviations; what the car file allows
             counts as one of them.
         shown_by: The pair of sensors that shows it.
-        twins: Faults that explain the same pair just as well.
+        indistinguishable: Faults that explain the same pair just as well.
         text: One sentence.
         repaired: So gross that it is undone before anything else is looked at: the other values
             are those of the repaired recording.
@@ -62,7 +62,7 @@ class Suspicion:
     std: Mapping[str, float]
     sigma: float
     shown_by: tuple[str, str]
-    twins: tuple[str, ...] = ()
+    indistinguishable: tuple[str, ...] = ()
     text: str = ""
     repaired: bool = False
 
@@ -99,7 +99,7 @@ class Usable:
 
     @property
     def can_diagnose(self) -> bool:
-        """Say whether there is enough to hold a simulation against."""
+        """Return whether there is enough to hold a simulation against."""
         return not self.lacks
 
 

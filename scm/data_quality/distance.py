@@ -1,19 +1,23 @@
-"""Positions of the pose against distance as another sensor adds it up, laid along the heading."""
+"""How far the car has gone: by each sensor of distance, and by the poses against it."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from scm.arrays import Floats
-from scm.data_quality.suspicion import Measured, Relation
-from scm.data_quality.track import Grid, Series, Track, cut_at_gaps, recorded_s
-from scm.data_quality.whitened import Fit, fit
+from scm.data_quality.pose_track import Grid, Series, Track, cut_at_gaps, recorded_s, series
+from scm.data_quality.problem import DataProblem
+from scm.data_quality.quality import Measured, Relation
+from scm.data_quality.whitened_fit import Fit, fit
+from scm.recording.read import Recording
+from scm.vehicles.car import Car
 
+SIDES = (("encoder.left", "encoder.right"), ("wheel_speed.rl", "wheel_speed.rr"))
 ROUNDS = 6
-SMALLEST_LEAN = 2e-5
+SMALLEST_TILT = 2e-5
 SHORTEST_S = 10.0
 CHORD_S = 1.0
 PLACE_WIDTH_S, YAW_WIDTH_S, FEWEST_SMOOTHED = 0.3, 0.08, 20
@@ -26,6 +30,81 @@ NAMES = (
     "scale", "heading", "ahead", "aside", "tilt_x", "tilt_y", "side_slip", "drive_slip",
     "turn_slip", "delay", "rate",
 )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class DistanceSensor:
+    """Distance since the start [m], forward counted positive.
+
+    Attributes:
+        name: Of the sensor, such as `encoder.*`.
+        channels: It is made of.
+        wheels: Whether it is counted on wheels, so that their radius enters.
+        scale_std: What the car file, or the last digit, leaves open about its scale.
+        turned: Yaw as the wheels' difference says [rad]; None where there is none.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    wheels: bool
+    scale_std: float
+    distance: Series
+    turned: Series | None = None
+
+
+def distance_sensors(recording: Recording, car: Car | None) -> list[DistanceSensor]:
+    """Return every sensor of distance; wheels need the car's radius."""
+    found = [_counted(recording, car), _rolled(recording, car)]
+    for name in ("speed", "velocity.x"):
+        speed = series(recording, name)
+        if speed is not None:
+            found.append(DistanceSensor(name, (name,), False, _rounded(speed), speed.integral()))
+    return [way for way in found if way is not None and np.ptp(way.distance.values) > 0.0]
+
+
+def uncounted(recording: Recording, car: Car) -> Iterator[DataProblem]:
+    """Yield that encoders are of no use where the car file does not say what they count."""
+    names = [name for name in SIDES[0] if name in recording.channels]
+    if names and not car.has("encoder.counts_per_revolution"):
+        yield DataProblem(
+            channel="encoder.*",
+            name="unknown_counts",
+            text=f"The car file {car.name!r} does not say how many counts a turn makes: encoders "
+            "are not used.",
+            record_instead="Nothing: state encoder.counts_per_revolution in the car file.",
+        )
+
+
+def _rounded(speed: Series) -> float:
+    """Return by how much a speed is off where its last digit is cut instead of rounded."""
+    steps = np.diff(np.unique(speed.values))
+    moving = float(np.percentile(np.abs(speed.values), 75))
+    return 0.5 * float(np.percentile(steps, 10)) / moving if len(steps) and moving > 0.0 else 0.0
+
+
+def _counted(recording: Recording, car: Car | None) -> DistanceSensor | None:
+    left, right = (series(recording, name) for name in SIDES[0])
+    if car is None or left is None or right is None or not car.has("encoder.counts_per_revolution"):
+        return None
+    metre = math.tau * car.value("wheel.radius_m") / car.value("encoder.counts_per_revolution")
+    return _pair("encoder.*", SIDES[0], left, right, metre, car)
+
+
+def _rolled(recording: Recording, car: Car | None) -> DistanceSensor | None:
+    left, right = (series(recording, name) for name in SIDES[1])
+    if car is None or left is None or right is None:
+        return None
+    radius = car.value("wheel.radius_m")
+    return _pair("wheel_speed.*", SIDES[1], left.integral(), right.integral(), radius, car)
+
+
+def _pair(
+    name: str, channels: tuple[str, str], left: Series, right: Series, metre: float, car: Car
+) -> DistanceSensor:
+    l_m, r_m = left.values * metre, right.at(left.t) * metre
+    turned = Series(left.t, (r_m - l_m) / car.value("body.track_m"))
+    std = (car.quantity("wheel.radius_m").std or 0.0) / car.value("wheel.radius_m")
+    return DistanceSensor(name, channels, True, std, Series(left.t, 0.5 * (l_m + r_m)), turned)
 
 
 def travel_against(
@@ -64,14 +143,14 @@ def travel_against(
         straight = _straightened(rows, tilt)
         measured = np.stack((straight.x, straight.y), axis=1)
         u = rows.t - warp[0] - warp[1] * since
-        columns = _columns(_calm(straight, starts), distance, u)[:, :, :count]
+        columns = _columns(_smoothed(straight, starts), distance, u)[:, :, :count]
         found = fit(measured, columns, _priors()[:count], starts, near=found)
         step = found.values[9:] / found.values[0] if found.values[0] else np.zeros(1)
         warp[: len(step)] += np.clip(step, -0.5, 0.5)
-        lean = np.clip(found.values[4:6], -0.02, 0.02)
-        tilt += lean
+        tilt_step = np.clip(found.values[4:6], -0.02, 0.02)
+        tilt += tilt_step
         late = np.abs(step) < (1e-4, 1e-6)[: len(step)]
-        if np.all(late) and np.all(np.abs(lean) < SMALLEST_LEAN):
+        if np.all(late) and np.all(np.abs(tilt_step) < SMALLEST_TILT):
             break
     if found is None:
         return None
@@ -117,7 +196,7 @@ def _priors() -> Floats:
     return priors
 
 
-def _calm(rows: Track, starts: Sequence[int]) -> Track:
+def _smoothed(rows: Track, starts: Sequence[int]) -> Track:
     """Return the poses smoothed: their noise, met again in a column, would look like a fault."""
     x, y, yaw = rows.x.copy(), rows.y.copy(), rows.yaw.copy()
     for i, j in pairwise((*starts, len(rows.t))):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scm.arrays import Bools, Floats
-from scm.data_quality.track import FEWEST, Grid
+from scm.data_quality.pose_track import FEWEST, Grid
 
 Spectrum = NDArray[np.complex128]
 
@@ -29,7 +29,7 @@ class Lag:
     Attributes:
         delay_s: Of the first, at the start of what overlaps.
         rate: Seconds by which the delay grows a second.
-        alike: Correlation at best, negative where the sign is turned, -1..1.
+        correlation: Correlation at best, negative where the sign is turned, -1..1.
         size: First over second, signed.
         sure: Windows all over the drive agree on the delay.
         gain: By how much the correlation is better than without any delay.
@@ -37,7 +37,7 @@ class Lag:
 
     delay_s: float
     rate: float
-    alike: float
+    correlation: float
     size: float
     sure: bool
     gain: float
@@ -78,7 +78,7 @@ def size_where(first: Floats, second: Floats, lag: Lag, known: Bools, step_s: fl
     steps = round(lag.delay_s / step_s)
     a, b = _overlap(first, second, steps)
     rows = _overlap(first, known.astype(np.float64), steps)[1] > 0.0
-    sign = float(np.sign(lag.alike)) or 1.0
+    sign = float(np.sign(lag.correlation)) or 1.0
     return sign * _size(a[rows], sign * b[rows]) if rows.sum() > FEWEST else lag.size
 
 
