@@ -40,7 +40,7 @@ def credentials_argument(parser: argparse.ArgumentParser) -> None:
         "--credentials",
         type=Path,
         metavar="FILE",
-        help="who this station is, from `scm fleet add`; not needed where anybody may enter",
+        help="credentials of this station, from `scm fleet add`; not needed in an open city",
     )
 
 
@@ -90,7 +90,7 @@ def part_arguments(parser: argparse.ArgumentParser) -> None:
         "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router (%(default)s)"
     )
     credentials_argument(parser)
-    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of all randomness (%(default)s)")
 
 
@@ -99,7 +99,7 @@ def state_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--state",
         metavar="URL",
-        help="where to store what must outlive this process: sqlite:PATH or postgresql://...",
+        help="store of what must outlive this process, sqlite:PATH or postgresql://...",
     )
 
 

@@ -159,7 +159,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="REST, event stream and dashboard.",
+    help="Serve REST, the event stream and the dashboard.",
     example="scm api driving_school --port 8000",
     arguments=_arguments,
     run=_run,

@@ -21,7 +21,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help="Zenoh router (%(default)s)"
     )
     credentials_argument(parser)
-    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
     parser.add_argument(
         "--seed", type=int, default=0, help="of the attack's randomness (%(default)s)"
     )

@@ -9,7 +9,7 @@ from scm.command import Command, part_arguments, run_part
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
     parser.add_argument(
-        "--light", type=float, default=1.0, help="its strength; 1 is a well lit room (%(default)s)"
+        "--light", type=float, default=1.0, help="its strength; 1 is a well-lit room (%(default)s)"
     )
     parser.add_argument(
         "--sun",
@@ -17,7 +17,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         nargs=2,
         default=(126.0, 54.0),
         metavar=("AZIMUTH_DEG", "ELEVATION_DEG"),
-        help="where the light comes from: counter-clockwise from the map's x, and how high",
+        help="direction of the light: counter-clockwise from the map's x axis, and elevation",
     )
 
 
@@ -37,7 +37,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="The cars' own cameras: rendered while somebody looks.",
+    help="Render the cars' own cameras while somebody subscribes to them.",
     example="scm camera driving_school --sun 45 30",
     arguments=_arguments,
     run=_run,

@@ -22,16 +22,19 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="the .mcap of a run, or description files or their folders",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where to write")
-    parser.add_argument("--rate-hz", type=float, default=30.0, help="rows a second (%(default)g)")
-    parser.add_argument("--vehicle", metavar="NAME", help="of several cars this one")
+    parser.add_argument("--rate-hz", type=float, default=30.0, help="rows per second (%(default)g)")
+    parser.add_argument("--vehicle", metavar="NAME", help="export only this car of several")
     parser.add_argument(
-        "--data", type=Path, metavar="DIR", help="where a description's tables are; default: beside"
+        "--data",
+        type=Path,
+        metavar="DIR",
+        help="folder of the description's tables; default: beside it",
     )
     parser.add_argument(
         "--start",
         default=BEGINNING,
         metavar="STAMP",
-        help="when a description's time 0 was (%(default)s); a run knows its own, in UTC",
+        help="UTC time of a description's time 0 (%(default)s); a run has its own",
     )
 
 
@@ -96,7 +99,7 @@ def _of_described(arguments: argparse.Namespace) -> "Sequence[Written]":
 
 
 COMMAND = Command(
-    help="A recording as the logs of AutoDRIVE's data recorder, for their tools.",
+    help="Write a recording as logs of AutoDRIVE's data recorder, for AutoDRIVE's tools.",
     example="scm export autodrive runs/today.mcap --out runs/today_autodrive",
     arguments=_arguments,
     run=_run,

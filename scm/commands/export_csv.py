@@ -14,12 +14,18 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--vehicle",
         default="",
         metavar="NAME",
-        help="a car's own reports; without: all cars as the world saw them",
+        help="export this car's own reports; default: all cars as the world saw them",
     )
     parser.add_argument(
-        "--from-s", type=float, default=0.0, metavar="S", help="since the run began (%(default)s)"
+        "--from-s",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="start, in seconds since the run began (%(default)s)",
     )
-    parser.add_argument("--to-s", type=float, metavar="S", help="likewise; without: to the end")
+    parser.add_argument(
+        "--to-s", type=float, metavar="S", help="end, likewise; default: the end of the run"
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:

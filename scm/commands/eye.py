@@ -16,19 +16,19 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="0 or /dev/video0, csi:0, rtsp://..., http://..., a film, a picture, a folder, "
         "bus:CAMERA; default: emulated",
     )
-    parser.add_argument("--loop", action="store_true", help="begin a film or folder again")
+    parser.add_argument("--loop", action="store_true", help="repeat a film or folder")
     parser.add_argument(
         "--delay-ms",
         type=float,
         default=0.0,
         metavar="MS",
-        help="from exposure to arrival at the least, where the camera's stamps cannot tell",
+        help="least delay from exposure to arrival, if the camera's stamps do not show it",
     )
     parser.add_argument(
         "--calibration",
         type=Path,
         metavar="FILE",
-        help="lens: of `scm eye calibrate`, a ROS camera_info YAML, or OpenCV's YAML or XML",
+        help="lens: a file of `scm eye calibrate`, a ROS camera_info YAML, or OpenCV's YAML or XML",
     )
     parser.add_argument(
         "--tags", type=Path, metavar="FILE", help="more tags on the floor, as for `scm eye locate`"
@@ -80,7 +80,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="AutoDRIVE Eye: poses of tags in the overhead camera's frames.",
+    help="Locate cars by their tags in an overhead camera's frames.",
     example="scm eye driving_school --connect tcp/127.0.0.1:7447",
     arguments=_arguments,
     run=_run,

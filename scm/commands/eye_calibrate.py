@@ -18,37 +18,45 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "image", nargs="*", type=Path, metavar="IMAGE", help="pictures of the board, or one film"
     )
-    parser.add_argument("--camera", type=int, metavar="N", help="live from this camera instead")
-    parser.add_argument("--views", type=int, default=25, help="from a live camera (%(default)s)")
+    parser.add_argument("--camera", type=int, metavar="N", help="use this live camera instead")
+    parser.add_argument(
+        "--views", type=int, default=25, help="number of views from a live camera (%(default)s)"
+    )
     parser.add_argument(
         "--board", choices=("chessboard", "charuco", "tags"), default="chessboard",
-        help="what was printed (%(default)s)",
+        help="what the printed board shows (%(default)s)",
     )  # fmt: skip
     parser.add_argument(
         "--squares", type=squares, required=True, metavar="9x6",
-        help="squares (not inner corners) across and down; or tags",
+        help="number of squares (not inner corners), or of tags, across and down",
     )  # fmt: skip
     parser.add_argument(
         "--square-m", type=float, required=True, metavar="M",
-        help="edge of a square; of tags from middle to middle",
+        help="edge of a square; for tags the distance of their centres",
     )  # fmt: skip
     parser.add_argument("--marker-m", type=float, metavar="M", help="black edge of a marker or tag")
     parser.add_argument(
         "--dictionary", default="DICT_4X4_50", help="markers of a ChArUco board (%(default)s)"
     )
     parser.add_argument(
-        "--first-id", type=int, default=0, metavar="ID", help="of the tag at the lower left"
-    )
-    parser.add_argument("--fisheye", action="store_true", help="a lens of more than about 100 deg")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="lens.toml")
-    parser.add_argument(
-        "--look", action="store_true", help="only find the board in the pictures, measure nothing"
+        "--first-id", type=int, default=0, metavar="ID", help="id of the tag at the lower left"
     )
     parser.add_argument(
-        "--report", type=Path, metavar="FILE", help="all that was found as JSON, for programs"
+        "--fisheye", action="store_true", help="for lenses of more than about 100 deg"
     )
-    parser.add_argument("--map", metavar="MAP", help="whose camera it is: checks the frame's size")
-    parser.add_argument("--camera-name", metavar="NAME", help="which; default: the map's first")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="file to write, such as lens.toml")
+    parser.add_argument(
+        "--look", action="store_true", help="only find the board in the pictures, without measuring"
+    )
+    parser.add_argument(
+        "--report", type=Path, metavar="FILE", help="write all results as JSON, for programs"
+    )
+    parser.add_argument(
+        "--map", metavar="MAP", help="map of the camera, to check the size of the frames"
+    )
+    parser.add_argument(
+        "--camera-name", metavar="NAME", help="name of the camera; default: the map's first"
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -136,7 +144,7 @@ def _progress(text: str) -> None:
 
 
 COMMAND = Command(
-    help="Measure a camera's lens with a printed board; refuses views that cannot tell it.",
+    help="Measure a camera's lens with a printed board; refuses views that do not determine it.",
     example="scm eye calibrate shots/*.jpg --squares 10x7 --square-m 0.025 --out lens.toml",
     arguments=_arguments,
     run=_run,

@@ -20,16 +20,19 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FILE",
-        help="by its suffix: .toml ours, .yaml ROS camera_info, .yml OpenCV",
+        help="file to write: .toml for our format, .yaml for ROS camera_info, .yml for OpenCV",
     )  # fmt: skip
     parser.add_argument(
-        "--format", choices=("scm", "ros", "opencv"), help="of --out, whatever its suffix"
+        "--format", choices=("scm", "ros", "opencv"), help="format of --out, whatever its suffix"
     )
     parser.add_argument(
-        "--size", type=_size, metavar="1280x720", help="of the frames, where FILE does not hold it"
+        "--size",
+        type=_size,
+        metavar="1280x720",
+        help="size of the frames, if FILE does not state it",
     )
     parser.add_argument(
-        "--camera-name", default="camera", metavar="NAME", help="for ROS (%(default)s)"
+        "--camera-name", default="camera", metavar="NAME", help="camera name for ROS (%(default)s)"
     )
 
 
@@ -65,7 +68,7 @@ def _size(text: str) -> tuple[int, int]:
 
 
 COMMAND = Command(
-    help="A camera's lens from ROS or OpenCV files into ours, or the other way.",
+    help="Convert a camera's lens between our format, ROS and OpenCV.",
     example="scm eye convert camera_info.yaml --out lens.toml",
     arguments=_arguments,
     run=_run,

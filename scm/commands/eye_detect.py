@@ -20,9 +20,9 @@ _ORDER = (
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = f"{COMMAND.help} {_ORDER}"
     parser.add_argument(
-        "image", nargs="+", type=Path, metavar="IMAGE", help="any that OpenCV reads"
+        "image", nargs="+", type=Path, metavar="IMAGE", help="any picture that OpenCV reads"
     )
-    parser.add_argument("--json", action="store_true", help="one JSON object a line, one a picture")
+    parser.add_argument("--json", action="store_true", help="print one line of JSON per picture")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -58,7 +58,7 @@ def _as_text(path: Path, tags: Sequence["TagSeen"], why: str) -> str:
 
 
 COMMAND = Command(
-    help="Every AprilTag (tag36h11) in pictures: id, corners in pixels, decision margin.",
+    help="List the AprilTags (tag36h11) in pictures: id, corners in pixels, decision margin.",
     example="scm eye detect overhead.jpg --json",
     arguments=_arguments,
     run=_run,

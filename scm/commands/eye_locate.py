@@ -18,9 +18,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--calibration",
         type=Path,
         metavar="FILE",
-        help="of `scm eye calibrate`, ROS or OpenCV; else the map's",
+        help="lens file of `scm eye calibrate`, ROS or OpenCV; default: the map's",
     )
-    parser.add_argument("--camera", metavar="NAME", help="which of the map; default: its first")
+    parser.add_argument("--camera", metavar="NAME", help="camera of the map; default: its first")
     parser.add_argument(
         "--tags",
         type=Path,
@@ -28,7 +28,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="more tags: [[tags]] id, x_m, y_m, yaw_rad, size_m",
     )
     parser.add_argument(
-        "--report", type=Path, metavar="FILE", help="all that was found as JSON, for programs"
+        "--report", type=Path, metavar="FILE", help="write all results as JSON, for programs"
     )
 
 
@@ -130,7 +130,7 @@ def _block(place: "Place") -> str:
 
 
 COMMAND = Command(
-    help="Where a camera hangs, from tags on the map; prints its [[cameras]] block.",
+    help="Locate a camera by tags on the map, and print its [[cameras]] block.",
     example="scm eye locate frame.png --map driving_school --calibration lens.toml",
     arguments=_arguments,
     run=_run,

@@ -27,19 +27,27 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--car", default="nigel", help="car file of the vehicles (%(default)s)")
     parser.add_argument("--map-tag", action="store_true", help="the tag on the floor")
-    parser.add_argument("--tags", nargs="+", type=int, default=[], metavar="ID", help="by number")
+    parser.add_argument(
+        "--tags", nargs="+", type=int, default=[], metavar="ID", help="tags by number"
+    )
     parser.add_argument(
         "--size-m", type=float, default=0.0762, metavar="M",
         help="black edge of the tags by number (%(default)s)",
     )  # fmt: skip
     parser.add_argument(
-        "--board", choices=("chessboard", "charuco", "tags"), help="for `scm eye calibrate`"
+        "--board", choices=("chessboard", "charuco", "tags"), help="a board for `scm eye calibrate`"
     )
-    parser.add_argument("--squares", type=squares, default=(9, 6), metavar="9x6", help="of it")
+    parser.add_argument(
+        "--squares", type=squares, default=(9, 6), metavar="9x6", help="of the board"
+    )
     parser.add_argument("--square-m", type=float, default=0.03, metavar="M", help="(%(default)s)")
     parser.add_argument("--marker-m", type=float, default=0.022, metavar="M", help="(%(default)s)")
-    parser.add_argument("--dictionary", default="DICT_4X4_50", help="of ChArUco (%(default)s)")
-    parser.add_argument("--first-id", type=int, default=0, metavar="ID", help="of a grid of tags")
+    parser.add_argument(
+        "--dictionary", default="DICT_4X4_50", help="of a ChArUco board (%(default)s)"
+    )
+    parser.add_argument(
+        "--first-id", type=int, default=0, metavar="ID", help="first id of a board of tags"
+    )
     parser.add_argument("--paper", default="A4", help="A4 to A0, letter, tabloid (%(default)s)")
 
 
@@ -124,7 +132,7 @@ def _board(arguments: argparse.Namespace) -> "Page":
 
 
 COMMAND = Command(
-    help="Roof tags by name, the map's tag, and boards at true size: PDF or SVG with a ruler.",
+    help="Print roof tags, the map's tag and boards at true size, as PDF or SVG with a ruler.",
     example="scm eye print driving_school --map-tag --vehicles n1..n8 --out tags.pdf",
     arguments=_arguments,
     run=_run,

@@ -21,30 +21,36 @@ TRUTH, CAMERA = "truth.jsonl", "camera.toml"
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("map", metavar="MAP", help="map name or file")
-    add("--out", type=Path, required=True, metavar="DIR", help="where to; made if missing")
+    add(
+        "--out", type=Path, required=True, metavar="DIR", help="folder to write; created if missing"
+    )
     add("--cars", type=int, default=6, help="how many (%(default)s)")
     add("--frames", type=int, default=30, help="how many (%(default)s)")
-    add("--rate-hz", type=float, default=30.0, help="frames a second (%(default)s)")
+    add("--rate-hz", type=float, default=30.0, help="frames per second (%(default)s)")
     add("--speed-mps", type=float, default=0.5, help="of every car (%(default)s)")
-    add("--lanes", action="store_true", help="cars keep to the map's lanes, not round the floor")
+    add(
+        "--lanes",
+        action="store_true",
+        help="let the cars follow the map's lanes, not the edge of the floor",
+    )
     add("--size", type=_size, default=(1920, 1080), help="COLUMNSxROWS (1920x1080)")
     add("--height-m", type=float, default=2.5, help="of the lens (%(default)s)")
-    add("--focal-px", type=float, help="as long as the whole floor allows, if not given")
+    add("--focal-px", type=float, help="default: the longest that shows the whole floor")
     add("--tilt-deg", type=float, default=0.0, help="from straight down (%(default)s)")
-    add("--fisheye", action="store_true", help="a fisheye lens; else a pinhole's five terms")
-    add("--exposure-ms", type=float, default=0.0, help="each row gathers light so long")
+    add("--fisheye", action="store_true", help="a fisheye lens; default: a pinhole with five terms")
+    add("--exposure-ms", type=float, default=0.0, help="exposure time of each row")
     add("--rolling-ms", type=float, default=0.0, help="from the first row to the last")
-    add("--blur-px", type=float, default=0.0, help="smear of the whole picture, sideways")
-    add("--defocus-px", type=float, default=0.0, help="radius of the disc of a point")
+    add("--blur-px", type=float, default=0.0, help="sideways blur of the whole picture")
+    add("--defocus-px", type=float, default=0.0, help="radius of the disc that a point becomes")
     add("--vignetting", type=float, default=0.0, help="share of light missing at the corners")
     add("--gradient", type=float, default=0.0, help="how much brighter one side is, as a share")
-    add("--lamps", type=int, default=0, help="lamps that light their surroundings more")
+    add("--lamps", type=int, default=0, help="number of lamps that brighten their surroundings")
     add("--noise-sigma", type=float, default=2.0, help="grey levels at grey 128 (%(default)s)")
-    add("--glare", action="store_true", help="mirror images of two lamps on floor and tags")
-    add("--hands", action="store_true", help="a hand that moves and two cables in the way")
+    add("--glare", action="store_true", help="reflections of two lamps on floor and tags")
+    add("--hands", action="store_true", help="a moving hand and two cables in the picture")
     add("--jpeg", type=int, metavar="QUALITY", help="write JPEG, not PNG")
     add("--grey", action="store_true", help="grey frames")
-    add("--seed", type=int, default=0, help="of all that is drawn by chance (%(default)s)")
+    add("--seed", type=int, default=0, help="of all randomness (%(default)s)")
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -173,7 +179,7 @@ def _truth(shot: "Shot") -> dict[str, Any]:
 
 
 COMMAND = Command(
-    help="Frames of an overhead camera with the truth beside each: blur, glare, noise, hands.",
+    help="Render frames of an overhead camera with the truth: blur, glare, noise, hands.",
     example="scm eye render driving_school --out film --cars 10 --exposure-ms 4 --noise-sigma 8",
     arguments=_arguments,
     run=_run,

@@ -28,15 +28,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     auth = parser.add_mutually_exclusive_group()
     auth.add_argument(
         "--password", dest="auth", action="store_const", const="password",
-        help="a fleet with passwords: on this machine only (default)",
+        help="make a fleet with passwords, for this machine only (default)",
     )  # fmt: skip
     auth.add_argument(
         "--mtls", dest="auth", action="store_const", const="mtls",
-        help="a fleet with certificates over TLS: across a network",
+        help="make a fleet with certificates over TLS, for a network",
     )  # fmt: skip
     parser.add_argument(
         "--host", action="append", default=[], metavar="ADDRESS",
-        help="one more that stations reach the router by; its certificate has to name it",
+        help="another address of the router, for its certificate",
     )  # fmt: skip
     fleet_argument(parser)
 
@@ -65,7 +65,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="Let a station into the city: a fleet file and its credentials.",
+    help="Admit a station to the city: writes it into the fleet file, with its credentials.",
     example="scm fleet add n7 --role vehicle --mtls --host 192.168.1.5",
     arguments=_arguments,
     run=_run,

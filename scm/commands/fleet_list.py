@@ -36,7 +36,7 @@ def _state(fleet: "Fleet", name: str) -> str:
 
 
 COMMAND = Command(
-    help="Who may enter the city, and until when.",
+    help="List the stations that may enter the city, and until when.",
     example="scm fleet list",
     arguments=fleet_argument,
     run=_run,

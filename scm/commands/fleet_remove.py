@@ -20,7 +20,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="Let a station into the city no more.",
+    help="Remove a station from the fleet file.",
     example="scm fleet remove n7",
     arguments=_arguments,
     run=_run,

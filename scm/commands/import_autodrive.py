@@ -11,7 +11,9 @@ RADIUS, COUNTS = "wheel.radius_m", "encoder.counts_per_revolution"
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="where 'V1 Log.csv' is")
+    parser.add_argument(
+        "folder", type=Path, metavar="FOLDER", help="folder that holds 'V1 Log.csv'"
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="NAME", help="folder to write")
     parser.add_argument(
         "--car", default="nigel", metavar="FILE", help="car file or name (%(default)s)"
@@ -20,13 +22,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--steering-positive",
         choices=("left", "right"),
         default="left",
-        help="where positive steering turns in the logs (%(default)s)",
+        help="direction of positive steering in the logs (%(default)s)",
     )
     parser.add_argument(
         "--axes",
         choices=("ros", "unity"),
         default="ros",
-        help="of the logs: ros has z up, as the recorder writes it; unity has y up (%(default)s)",
+        help="axes of the logs: ros, z up as the recorder writes; unity, y up (%(default)s)",
     )
 
 
@@ -63,7 +65,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="Logs of AutoDRIVE's data recorder as a recording for scm replay and scm mismatch.",
+    help="Import logs of AutoDRIVE's data recorder for scm replay and scm mismatch.",
     example="scm import autodrive data/eight_30_hz --out runs/eight",
     arguments=_arguments,
     run=_run,

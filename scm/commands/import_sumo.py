@@ -35,10 +35,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("net", type=Path, metavar="NET", help="a SUMO network, .net.xml")
     parser.add_argument("--out", type=Path, required=True, metavar="MAP", help="map file to write")
     parser.add_argument(
-        "--scale", type=float, help="full size over ours (14, or what makes it fit the floor)"
+        "--scale", type=float, help="full size divided by ours (14, or what fits the floor)"
     )
     parser.add_argument(
-        "--floor", type=floor_of, metavar="WxD", help="floor that it must fit [m], as in 6x4"
+        "--floor", type=floor_of, metavar="WxD", help="floor that it must fit [m], such as 6x4"
     )
 
 
@@ -141,7 +141,7 @@ def _some(names: Sequence[str]) -> str:
 
 
 COMMAND = Command(
-    help="A SUMO network as a map file; OpenStreetMap and OpenDRIVE by netconvert first.",
+    help="Import a SUMO network as a map; convert OpenStreetMap and OpenDRIVE with netconvert.",
     example="scm import sumo town.net.xml --out town.toml --scale 14",
     arguments=_arguments,
     run=_run,

@@ -48,19 +48,19 @@ def key_ring(url: str) -> "Iterator[KeyRing]":
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("owner", metavar="OWNER", help="whose it is, for people")
+    parser.add_argument("owner", metavar="OWNER", help="the owner's name, for people")
     parser.add_argument(
         "--role",
         required=True,
         choices=("viewer", "operator", "engineer", "admin"),
-        help="each may do what those before it may, and more",
+        help="each role includes those before it",
     )
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE",
-        help="write the key into a new file that you alone can read, and do not show it: "
-        "`SCM_API_KEY_FILE` tells programs of it",
+        help="write the key into a new file that only you can read, and do not print it; "
+        "programs read it through `SCM_API_KEY_FILE`",
     )
     keys_argument(parser)
 
@@ -103,7 +103,7 @@ def _output(path: Path | None) -> Iterator[TextIO]:
 
 
 COMMAND = Command(
-    help="Make an API key; it is shown once and counts at once.",
+    help="Create an API key; it is shown once and valid at once.",
     example="scm key add anna --role operator",
     arguments=_arguments,
     run=_run,

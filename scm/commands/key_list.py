@@ -19,7 +19,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="Whose API keys there are; their secrets are not kept.",
+    help="List the API keys and their owners; secrets are not stored.",
     example="scm key list",
     arguments=keys_argument,
     run=_run,

@@ -19,7 +19,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="End an API key; it counts at once.",
+    help="Revoke an API key, at once.",
     example="scm key revoke 1a2b3c4d",
     arguments=_arguments,
     run=_run,

@@ -13,7 +13,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="Judge what cars claim on the air, with the Eye as witness.",
+    help="Check what cars claim over the radio, with the Eye as witness.",
     example="scm misbehaviour driving_school --connect tcp/127.0.0.1:7447",
     arguments=part_arguments,
     run=_run,

@@ -22,27 +22,30 @@ FOLDER = "mismatch"
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "recording", nargs="+", type=Path,
-        help="description files, their folders, or .mcap of a city",
+        help="description files, their folders, or the .mcap of a run",
     )  # fmt: skip
     parser.add_argument(
-        "--car", metavar="FILE", help="car file or name, of one car; default: the recording's"
+        "--car", metavar="FILE", help="car file or name, for one car; default: the recording's"
     )
-    parser.add_argument("--vehicle", metavar="NAME", help="of several cars this one")
+    parser.add_argument("--vehicle", metavar="NAME", help="only this car of several")
     parser.add_argument(
         "--told", nargs="+", type=Path, default=[], metavar="DIR",
-        help="drives of the same car by scm play; whole, whatever part is taken of the others",
+        help="further drives of the same car by scm play, used as a whole",
     )  # fmt: skip
     parser.add_argument(
-        "--data", type=Path, metavar="DIR", help="where the tables are; default: beside"
+        "--data",
+        type=Path,
+        metavar="DIR",
+        help="folder of the tables; default: beside the description",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help=f"the report's folder; default: runs/{FOLDER}-NAME"
     )
     parser.add_argument(
-        "--from-s", type=float, metavar="S", help="leave out what is before, since its begin"
+        "--from-s", type=float, metavar="S", help="leave out everything before, from its start"
     )
     parser.add_argument(
-        "--to-s", type=float, metavar="S", help="leave out what is after, since its begin"
+        "--to-s", type=float, metavar="S", help="leave out everything after, from its start"
     )
     parser.add_argument(
         "--budget-s",
@@ -53,7 +56,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="refuse a recording in which rows have to be left out or repaired",
+        help="refuse a recording in which rows must be left out or repaired",
     )
 
 

@@ -24,7 +24,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="The second channel that doubts the signals.",
+    help="Monitor the signals independently, and latch flashing red on a fault.",
     example="scm monitor driving_school --connect tcp/127.0.0.1:7447",
     arguments=_arguments,
     run=_run,

@@ -13,7 +13,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="Counters, delays, queues and violations, from what cameras and cars tell.",
+    help="Measure traffic: counts, delays, queues and violations, from cameras and CAMs.",
     example="scm observer driving_school --connect tcp/127.0.0.1:7447",
     arguments=part_arguments,
     run=_run,

@@ -33,7 +33,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="Prove that a signal plan is safe and does what it says.",
+    help="Prove that a signal plan is safe and runs as written.",
     example="scm plan prove runs/plans/crossing/rush.json",
     arguments=_arguments,
     run=_run,

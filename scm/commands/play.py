@@ -23,7 +23,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--car", metavar="FILE", help="another car than the drive names")
     parser.add_argument(
-        "--connect", metavar="ROUTER", help="of a running city; default: one of its own"
+        "--connect", metavar="ROUTER", help="router of a running city; default: a city of its own"
     )
     credentials_argument(parser)
     parser.add_argument("--city", default="city", help="name of the running city (%(default)s)")
@@ -35,8 +35,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         nargs=4,
         metavar=("X0", "X1", "Y0", "Y1"),
-        help="of the running city [m]: bring the car to rest, refuse a drive that does not fit "
-        "from there, end it at the floor's edge, at a hit, or on Ctrl-C",
+        help="floor of the running city [m]: bring the car to rest, refuse a drive that does not "
+        "fit from there, end it at the floor's edge, at a collision, or on Ctrl-C",
     )
 
 
@@ -104,7 +104,7 @@ def _named(car: str, folder: Path) -> str:
 
 
 COMMAND = Command(
-    help="Drive a written table of commands with one car, and record it for scm mismatch.",
+    help="Drive a table of commands with one car, and record it for scm mismatch.",
     example="scm play found/next_drive/next_drive.yaml --out again",
     arguments=_arguments,
     run=_run,

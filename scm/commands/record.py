@@ -17,13 +17,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=1.0,
         metavar="HZ",
-        help="pictures kept of each overhead camera a second, 0: none (%(default)s); "
-        "all else is always kept",
+        help="pictures per second to record of each overhead camera, 0 for none (%(default)s); "
+        "all else is recorded in full",
     )
     parser.add_argument(
         "--sparse",
         action="store_true",
-        help="leave out each car's own states, sensors and radio frames: snapshots tell of all",
+        help="leave out each car's own states, sensors and radio frames; snapshots cover all cars",
     )
 
 
@@ -34,15 +34,15 @@ def camera_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="HZ",
-        help="above 0: run the cars' own cameras, and keep so many pictures of each a second "
-        "(%(default)s)",
+        help="if above 0, render the cars' own cameras and record so many pictures of each per "
+        "second (%(default)s)",
     )
     parser.add_argument(
         "--cameras-of",
         action="append",
         default=[],
         metavar="CAR",
-        help="the cameras of this car alone; may be given again; without: of all cars",
+        help="only the cameras of this car; repeatable; default: all cars",
     )
 
 
@@ -66,7 +66,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="Record everything on the bus; what is older than half a second survives a kill.",
+    help="Record everything on the bus; a kill loses at most half a second.",
     example="scm record --out runs/today.mcap",
     arguments=_arguments,
     run=_run,

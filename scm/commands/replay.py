@@ -24,12 +24,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "recording",
         nargs="+",
         type=Path,
-        help="description files, their folders, or .mcap of a city",
+        help="description files, their folders, or the .mcap of a run",
     )
     parser.add_argument("--car", metavar="FILE", help="car file or name; default: the recording's")
-    parser.add_argument("--vehicle", metavar="NAME", help="of several cars this one")
+    parser.add_argument("--vehicle", metavar="NAME", help="only this car of several")
     parser.add_argument(
-        "--data", type=Path, metavar="DIR", help="where the tables are; default: beside"
+        "--data",
+        type=Path,
+        metavar="DIR",
+        help="folder of the tables; default: beside the description",
     )
     parser.add_argument(
         "--horizon-s", type=float, default=3.0, help="length of a window [s] (%(default)g)"
@@ -37,12 +40,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="refuse a recording in which rows have to be left out or repaired",
+        help="refuse a recording in which rows must be left out or repaired",
     )
-    parser.add_argument("--from-s", type=float, metavar="S", help="leave out what is before [s]")
-    parser.add_argument("--to-s", type=float, metavar="S", help="leave out what is after [s]")
+    parser.add_argument("--from-s", type=float, metavar="S", help="leave out everything before [s]")
+    parser.add_argument("--to-s", type=float, metavar="S", help="leave out everything after [s]")
     parser.add_argument(
-        "--report", type=Path, metavar="DIR", help="work out the figures of this report again"
+        "--report", type=Path, metavar="DIR", help="recompute the figures of this report"
     )
     parser.add_argument("--save", type=Path, metavar="CSV", help="write every window's poses here")
 
@@ -203,7 +206,7 @@ def _save(path: Path, runs: "list[FreeRun]") -> None:
 
 
 COMMAND = Command(
-    help="Drive a recording again by free run from the measured state and print the errors.",
+    help="Simulate a recording's drive from its measured state, and print the errors.",
     example="scm replay recordings/dart/free_driving_10_02_28.yaml --data ../recordings/dart",
     arguments=_arguments,
     run=_run,

@@ -25,10 +25,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--ros-listen",
         default=DEFAULT_LISTEN,
         metavar="ENDPOINT",
-        help="be the router that ROS nodes connect to (%(default)s)",
+        help="address of the router that ROS nodes connect to (%(default)s)",
     )
     side.add_argument(
-        "--ros-connect", metavar="ENDPOINT", help="join the rmw_zenohd that runs there instead"
+        "--ros-connect",
+        metavar="ENDPOINT",
+        help="connect to the rmw_zenohd that runs there instead",
     )
 
 

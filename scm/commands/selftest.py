@@ -20,18 +20,21 @@ if TYPE_CHECKING:
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "fault", nargs="*", metavar="FAULT", help="only these; default: one after the other, all"
+        "fault",
+        nargs="*",
+        metavar="FAULT",
+        help="inject only these; default: all, one after the other",
     )
     parser.add_argument(
         "--faults",
         action="store_true",
-        help="hurt processes, router, disk and bus of a whole city of one's own instead",
+        help="inject faults into processes, router, disk and bus of a private city instead",
     )
     parser.add_argument("--map", default="driving_school", help="map name or file (%(default)s)")
     parser.add_argument(
         "--connect",
         metavar="ENDPOINT",
-        help="test the signals of a city that runs on this machine, not of one's own",
+        help="test the signals of a city that runs on this machine, not of a private one",
     )
     parser.add_argument("--city", default="city", help="its name (%(default)s)")
     credentials_argument(parser)
@@ -131,7 +134,7 @@ def _open(
 
 
 COMMAND = Command(
-    help="Hurt a city in every way there is, and measure how it takes it.",
+    help="Inject every known fault into a city, and measure its reaction.",
     example="scm selftest frozen_controller short_yellow",
     arguments=_arguments,
     run=_run,

@@ -32,7 +32,7 @@ _SLOPES = "its floor slopes: cars get what lets them stand on it, docs/floor.md 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("what", choices=("map", "car", "terms", "messages"))
     parser.add_argument(
-        "name", nargs="?", help="map or car, by name or file, or an effect; without: what there is"
+        "name", nargs="?", help="map or car, by name or file, or an effect; default: list them"
     )
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help="map: the SVG picture to write (NAME.svg)"

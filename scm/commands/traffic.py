@@ -14,8 +14,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--car",
         action="append",
         metavar="CAR",
-        help="name or file of a car that drives here, as often as there are kinds; least times are "
-        "safe for the worst of them (nigel)",
+        help="name or file of a car that drives here; repeatable; minimum times are safe for the "
+        "slowest of them (nigel)",
     )
     parser.add_argument(
         "--learned", metavar="MODULE:FUNCTION", help="your own code, for the policy `learned`"
@@ -43,7 +43,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="The signals of a map's junctions.",
+    help="Run the signals of a map's junctions.",
     example="scm traffic driving_school --connect tcp/127.0.0.1:7447",
     arguments=_arguments,
     run=_run,

@@ -22,22 +22,27 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--strength", type=float, nargs=2, default=(1.0, 4.0), metavar=("LOW", "HIGH"),
-        help="times the smallest effect that a drive can show (1 4)",
+        help="size of effects, in multiples of the smallest that a drive can show (1 4)",
     )  # fmt: skip
     parser.add_argument(
-        "--engine", choices=ENGINES, default="own", help="who moves the cars (%(default)s)"
+        "--engine",
+        choices=ENGINES,
+        default="own",
+        help="engine that simulates the cars (%(default)s)",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="default: runs/trial-SEED, or -NAME of --trials"
     )
     parser.add_argument(
-        "--trials", type=Path, metavar="DIR", help="judge these cases instead of making any"
+        "--trials", type=Path, metavar="DIR", help="diagnose these cases instead of simulating any"
     )
     parser.add_argument(
-        "--only", default="", metavar="00,01", help="of --trials, the cases to diagnose"
+        "--only", default="", metavar="00,01", help="diagnose only these cases of --trials"
     )
     parser.add_argument(
-        "--kept", action="store_true", help="judge the diagnoses kept in --out again, make none"
+        "--kept",
+        action="store_true",
+        help="score the stored diagnoses of --out again, without new ones",
     )
     parser.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
 
@@ -80,7 +85,7 @@ def _title(arguments: argparse.Namespace) -> str:
 
 
 COMMAND = Command(
-    help="Conceal effects in an independent reality, diagnose blind, open the labels: a table.",
+    help="Conceal effects in an independent simulation, diagnose blind, and score the results.",
     example="scm trial --seed 7 --cases 20",
     arguments=_arguments,
     run=_run,

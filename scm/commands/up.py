@@ -17,7 +17,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "map", nargs="?", default="driving_school", metavar="MAP", help="map name or file"
     )
-    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
     parser.add_argument(
         "--hosted", type=int, default=4, help="cars the world simulates (%(default)s)"
     )
@@ -37,35 +37,37 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--fleet",
         type=Path,
         metavar="FILE",
-        help="who may enter, from `scm fleet add`; without: everybody on this machine, nobody else",
+        help="stations that may enter, from `scm fleet add`; default: everybody on this machine",
     )
     parser.add_argument(
         "--state",
         metavar="URL",
-        help="store of what must outlive a restart, sqlite:PATH or postgresql://...; default: a "
+        help="store of what must survive a restart, sqlite:PATH or postgresql://...; default: a "
         "new file beside the recording",
     )
     parser.add_argument("--host", default="127.0.0.1", help="of the dashboard (%(default)s)")
     parser.add_argument(
-        "--keys", metavar="STORE", help="API keys of `scm key add`; needed for another --host"
+        "--keys",
+        metavar="STORE",
+        help="store of API keys from `scm key add`; required for another --host",
     )
     proxy_arguments(parser)
     parser.add_argument(
-        "--demand", type=Path, metavar="TABLE", help="who wants to drive from where to where"
+        "--demand", type=Path, metavar="TABLE", help="demand table: who drives from where to where"
     )
     parser.add_argument(
         "--radio",
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="what the air does, instead of what the map says: loss=0.3; see docs/radio.md",
+        help="radio model instead of the map's, such as loss=0.3; see docs/radio.md",
     )
     parser.add_argument(
         "--without",
         type=lambda text: tuple(filter(None, text.split(","))),
         default=(),
         metavar="PARTS",
-        help="leave out parts, comma between, where the computer is too slow: "
+        help="leave out parts, separated by commas, if the computer is too slow: "
         "eye, camera, record, observer, misbehaviour; see docs/performance.md",
     )
     parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")

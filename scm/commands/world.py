@@ -22,7 +22,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="what the air does, instead of what the map says: loss=0.3; see docs/radio.md",
+        help="radio model instead of the map's, such as loss=0.3; see docs/radio.md",
     )
 
 
@@ -54,7 +54,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="The shared world: cars, walls, contacts, sensors, radio, leases.",
+    help="Simulate the shared world: cars, contacts, sensors, radio, leases.",
     example="scm world driving_school --connect tcp/127.0.0.1:7447",
     arguments=_arguments,
     run=_run,

@@ -34,7 +34,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--connect", required=True, metavar="ENDPOINT", help="the city's router")
     credentials_argument(parser)
-    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
     parser.add_argument("--car", default="nigel", help="car file to begin with (%(default)s)")
     parser.add_argument("--serial", default="", metavar="PORT", help="drive a real Nigel over it")
     parser.add_argument(

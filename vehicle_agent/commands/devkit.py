@@ -39,7 +39,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--name", help="of this bridge, which holds the leases: one a bridge (devkit-PORT)"
     )
-    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
     parser.add_argument(
         "--light", dest="lights", type=int, action="append", default=[], metavar="ID",
         help="a light of the map; the first is TL1; default: all, in the map's order",

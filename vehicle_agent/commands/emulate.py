@@ -33,7 +33,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--name", help="of the vehicle in the city: a-z 0-9 _ -")
     credentials_argument(parser)
-    parser.add_argument("--city", default="city", help="whose keys to use (%(default)s)")
+    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
     parser.add_argument("--car", default="nigel", help="car file (%(default)s)")
     spawn_argument(parser)
     parser.add_argument(
