@@ -20,6 +20,7 @@ from typing import Any
 import msgspec
 
 from scm.api.app import create_app
+from scm.api.openapi import PUBLISHED
 from scm.api.view import CityView
 from scm.maps.load import load_map
 from scm.registry import names
@@ -41,7 +42,7 @@ from typing import Self
 
 from scm.client.connection import Connection
 {imports}
-from scm.client.teleop import Wheel, taken
+from scm.client.teleop import Wheel, acquired
 from scm.client.work import finished
 from scm.records.operations import Operation
 
@@ -60,16 +61,16 @@ class Client:
 
     def wheel(self, vehicle: str, reason: str = "") -> AbstractContextManager[Wheel]:
         """Take a car's wheel; with a reason, from whoever holds it. See `scm.client.teleop`."""
-        return taken(self.connection, vehicle, reason)
+        return acquired(self.connection, vehicle, reason)
 
     def wait(
         self,
         work: Operation,
-        hear: Callable[[Operation], object] | None = None,
+        on_progress: Callable[[Operation], object] | None = None,
         timeout_s: float = 600.0,
     ) -> Operation:
-        """Return long work once it is done; `hear` is told of every step. See `scm.client.work`."""
-        return finished(self.connection, work, hear, timeout_s)
+        """Return long work once it is done; `on_progress` gets each step; see `scm.client.work`."""
+        return finished(self.connection, work, on_progress, timeout_s)
 
     def close(self) -> None:
         """End the connection."""
@@ -168,6 +169,8 @@ def _imports(used: set[str], schemas: Schema) -> list[str]:
 
 def _kind(record: str) -> str:
     """Return a described record as a type of Python: `Page_EventRow_` is `Page[EventRow]`."""
+    own = {published: name for name, published in PUBLISHED.items()}
+    record = re.sub(r"[^_]+", lambda found: own.get(found[0], found[0]), record)
     return re.sub(r"^Page_(\w+)_$", r"Page[\1]", record)
 
 
@@ -303,7 +306,7 @@ class _Method:
                 facts.append(f"{word}={_dict(self._places[place])}")
         if not media or media == "application/json" or media.endswith("+json"):
             kind = _type(schema, self._schemas) if media else "None"
-            verb = "send" if self._sends_bytes else "ask" if media else "tell"
+            verb = "send" if self._sends_bytes else "request" if media else "send_only"
             more = ([kind] if media else []) + (["content"] if self._sends_bytes else [])
             facts = [f'"{self._method}"', facts[0], *more, *facts[1:]]
             facts += [f"body={_dict(self._places['body'])}"] if self._body else []
@@ -372,8 +375,8 @@ def _docstring(about: str, title: str, entries: list[str], indent: int) -> list[
 def _name(text: str) -> str:
     """Return a name of Python, with a line behind it where it means something else already."""
     name = re.sub(r"\W", "_", text).strip("_").lower()
-    taken = keyword.iskeyword(name) or (hasattr(builtins, name) and name not in ("id", "type"))
-    return f"{name}_" if taken else name
+    acquired = keyword.iskeyword(name) or (hasattr(builtins, name) and name not in ("id", "type"))
+    return f"{name}_" if acquired else name
 
 
 def _file(noun: str) -> str:

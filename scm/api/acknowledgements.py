@@ -13,7 +13,7 @@ from scm.errors import StoreError
 from scm.records.events import Acknowledgement
 from scm.store.repository import Repository
 
-KEPT = 5000
+MAX_ACKNOWLEDGEMENTS = 5000
 _PREFIX = "event/"
 
 
@@ -27,9 +27,9 @@ class Acknowledgements:
         self._store = store
         self._clock = clock
         self._changing = threading.Lock()
-        kept = [_read(key, body) for key, body in store.items("seen") if key.startswith(_PREFIX)]
-        kept.sort(key=lambda row: row.at_ns)
-        self._rows = {row.event: row for row in kept}  # replaced by a change, never changed
+        stored = [_read(key, body) for key, body in store.items("seen") if key.startswith(_PREFIX)]
+        stored.sort(key=lambda row: row.at_ns)
+        self._rows = {row.event: row for row in stored}  # replaced by a change, never changed
 
     def rows(self) -> dict[str, Acknowledgement]:
         """Return all of them by the event's id."""
@@ -49,7 +49,7 @@ class Acknowledgements:
                 if event not in self._rows
             }
             rows = self._rows | fresh
-            gone = tuple(rows)[: max(0, len(rows) - KEPT)]
+            gone = tuple(rows)[: max(0, len(rows) - MAX_ACKNOWLEDGEMENTS)]
             with self._store.transaction():
                 for event, row in fresh.items():
                     self._store.put("seen", _PREFIX + event, msgspec.json.encode(row))
@@ -60,7 +60,7 @@ class Acknowledgements:
             self._rows = rows  # what is not stored was not done
             return tuple(rows[event] for event in events if event in rows)
 
-    def take_back(self, event: str) -> Acknowledgement | None:
+    def withdraw(self, event: str) -> Acknowledgement | None:
         """Take one back; return what it was, or None."""
         with self._changing:
             row = self._rows.get(event)

@@ -13,10 +13,11 @@ from scm.api.acknowledgements import Acknowledgements
 from scm.api.audit_trail import Audited
 from scm.api.based import HERE, Based, Site, check_base
 from scm.api.body_limit import Bounded
-from scm.api.calibration_desk import LARGEST_PICTURE
-from scm.api.city import Ask, City, Link
+from scm.api.calibration_jobs import LARGEST_PICTURE
+from scm.api.city import City, Link, SendRequest
 from scm.api.dashboard import Dashboard, astray, index_text
 from scm.api.deeds import Words
+from scm.api.folders import Folders
 from scm.api.gate import Gate, content_policy
 from scm.api.head import Headed
 from scm.api.idempotency import Idempotent
@@ -63,8 +64,7 @@ from scm.api.routes import (
     vehicles,
 )
 from scm.api.routes import keys as key_routes
-from scm.api.shelves import Shelves
-from scm.api.signal_plans import PlanShelf
+from scm.api.signal_plans import PlanRepository
 from scm.api.stream import Stream
 from scm.api.trace import Traced
 from scm.api.vehicle_frames import VehicleFrames
@@ -83,12 +83,12 @@ FILES = {
 
 def create_app(
     view: CityView,
-    ask: Ask,
+    send: SendRequest,
     city_map: CityMap,
     *,
     keys: KeyRing | None = None,
     plans: Mapping[str, Sequence[str]] | None = None,
-    shelves: Shelves | None = None,
+    folders: Folders | None = None,
     link: Link | None = None,
     state: Repository | None = None,
     site: Site = HERE,
@@ -97,12 +97,12 @@ def create_app(
 
     Args:
         view: What is shown; stepped by its runner on another thread.
-        ask: Sends a request on the bus and waits for the reply, at most so many seconds.
+        send: Sends a request on the bus and waits for the reply, at most so many seconds.
         city_map: Of the city that `view` hears.
         keys: Who may call, and what each may do; without it only this machine may call, and may do
             everything.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
-        shelves: Folders of recordings, reports and the like; None: the city offers none.
+        folders: Those of recordings, reports and the like; None: the city offers none.
         link: What is known of the connection to the bus.
         state: The city's store, with its audit log; None: a new one in memory.
         site: Where people find the server.
@@ -112,8 +112,8 @@ def create_app(
     """
     site = site._replace(base=check_base(site.base))
     clock = WallClock()
-    desk = _Desk(
-        city=City(view, ask, city_map, plans or {}, shelves or Shelves(), link or Link()),
+    parts = _Parts(
+        city=City(view, send, city_map, plans or {}, folders or Folders(), link or Link()),
         keys=keys,
         store=state or MemoryStore(),
         clock=clock,
@@ -125,16 +125,16 @@ def create_app(
         redoc_url=None,
         openapi_url="/api/v1/openapi.json",
         generate_unique_id_function=openapi.operation_id,
-        lifespan=desk.lifespan,
+        lifespan=parts.lifespan,
         servers=[{"url": site.base}] if site.base else None,
     )
     app.state.base = site.base
-    app.state.stream = desk.stream
-    app.state.frames = desk.frames
+    app.state.stream = parts.stream
+    app.state.frames = parts.frames
     app.state.keys = keys
     problem.install(app)
-    _add_layers(app, desk, clock, site)
-    nouns = desk.by_prefix()
+    _add_layers(app, parts, clock, site)
+    nouns = parts.by_prefix()
     for prefix, routers in nouns.items():
         for noun in routers:
             app.include_router(noun, prefix=prefix, responses=problem.RESPONSES)
@@ -143,7 +143,7 @@ def create_app(
     return app
 
 
-class _Desk:
+class _Parts:
     """What the routes of one server share, and the nouns that are made of it."""
 
     def __init__(
@@ -155,7 +155,7 @@ class _Desk:
         self.store = store
         self.seen = Acknowledgements(store, clock)
         self.work = Operations(clock)
-        self.plans = PlanShelf(city.shelves.plans)
+        self.plans = PlanRepository(city.folders.plans)
         self.jobs = MismatchJobs(city, self.work, clock, city.link.words)
         self.stream = Stream(city, uuid.uuid4().hex[:8], self.seen)
         self.frames = VehicleFrames(city.view)
@@ -230,16 +230,16 @@ class _Desk:
         await asyncio.gather(*tasks)
 
 
-def _add_layers(app: FastAPI, desk: _Desk, clock: WallClock, site: Site) -> None:
+def _add_layers(app: FastAPI, parts: _Parts, clock: WallClock, site: Site) -> None:
     policy = content_policy(index_text(site.base))
     app.add_middleware(Headed)  # what is added later sees a request earlier
     app.add_middleware(Idempotent, clock=clock)
     app.add_middleware(Bounded, larger=FILES)
-    app.add_middleware(Audited, store=desk.store, clock=clock)
+    app.add_middleware(Audited, store=parts.store, clock=clock)
     app.add_middleware(Limited, clock=clock)  # what is asked too often fills no log
     app.add_middleware(Dashboard, base=site.base)
-    app.add_middleware(Gate, keys=desk.known, policy=policy, origins=site.origins)
-    app.add_middleware(Measured, metrics=desk.metrics, clock=clock)
+    app.add_middleware(Gate, keys=parts.known, policy=policy, origins=site.origins)
+    app.add_middleware(Measured, metrics=parts.metrics, clock=clock)
     app.add_middleware(Traced)
     app.add_middleware(Based, base=site.base)
     app.add_exception_handler(HTTPStatus.NOT_FOUND, astray)

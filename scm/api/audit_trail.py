@@ -52,7 +52,7 @@ class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):
             self.station in ("", row.station)
             and self.by.casefold() in row.by.casefold()
             and self.kind.casefold() in row.kind.casefold()
-            and (not self.text or as_read(self.text) in as_read(_said(row)))
+            and (not self.text or as_read(self.text) in as_read(_text(row)))
         )
 
 
@@ -120,7 +120,7 @@ class Audited:
 def _deed(scope: Scope, status: int, received: int, began_ns: int, ended_ns: int) -> Deed:
     client = scope.get("client")
     headers = dict(scope["headers"])
-    asked = {
+    request = {
         "role": scope.get("scm_role", ""),
         "address": str(client[0]) if client else "",
         "query": scope["query_string"].decode("latin-1")[:500],
@@ -134,7 +134,7 @@ def _deed(scope: Scope, status: int, received: int, began_ns: int, ended_ns: int
         kind=f"{scope['method']} {scope['path']}"[:300],
         by=str(scope.get("scm_actor", "")),
         request_id=headers.get(b"idempotency-key", b"").decode("latin-1")[:128],
-        request=_raw(asked),
+        request=_raw(request),
         reply=_raw(done),
     )
 
@@ -169,5 +169,5 @@ def _object(raw: msgspec.Raw) -> dict[str, Any]:
     return body if isinstance(body, dict) else {"value": body}
 
 
-def _said(row: AuditRow) -> str:
+def _text(row: AuditRow) -> str:
     return msgspec.json.encode(row).decode()

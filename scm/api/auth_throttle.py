@@ -12,7 +12,7 @@ from scm.clock import Clock, seconds
 
 BURST = 10.0
 REFILL_PER_S = 0.2
-ADDRESSES_KEPT = 4096
+MAX_ADDRESSES = 4096
 
 
 class Brake:
@@ -31,7 +31,7 @@ class Brake:
         whose = _whose(address, key)
         self._buckets[whose] = (self._tries(whose) - 1.0, self._clock.now_ns())
         self._buckets.move_to_end(whose)
-        if len(self._buckets) > ADDRESSES_KEPT:
+        if len(self._buckets) > MAX_ADDRESSES:
             self._buckets.popitem(last=False)
 
     def _tries(self, whose: str) -> float:

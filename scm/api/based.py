@@ -20,7 +20,7 @@ _COOKIE_PATH = re.compile(r"(?i)(;\s*path=)/")
 
 PAGES = ("map", "signals", "vehicles", "cars", "eye", "recordings", "mismatch", "events")
 """First part of the address of each page of the dashboard; what follows is the page's own."""
-TAKEN = (*PAGES, "api", "static", "docs", "ngsi-ld", "metrics")
+RESERVED = (*PAGES, "api", "static", "docs", "ngsi-ld", "metrics")
 
 
 class Site(NamedTuple):
@@ -46,8 +46,8 @@ def check_base(base: str) -> str:
         RunError: when it is no such path, or the server's own addresses begin like that.
     """
     path = base.rstrip("/")
-    if path and (not _BASE.fullmatch(path) or path.split("/")[1] in TAKEN):
-        msg = f"base: got {base!r}, expected a path like /city, none of {', '.join(TAKEN)}"
+    if path and (not _BASE.fullmatch(path) or path.split("/")[1] in RESERVED):
+        msg = f"base: got {base!r}, expected a path like /city, none of {', '.join(RESERVED)}"
         raise RunError(msg)
     return path
 

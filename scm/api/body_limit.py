@@ -78,5 +78,9 @@ class Bounded:
 
 def _announced(scope: Scope) -> int:
     """Return how many bytes a request says it has; 0: it does not say."""
-    told = Headers(scope=scope).get("content-length", "")
-    return int(told) if told.isascii() and told.isdigit() and len(told) <= _LONGEST_NUMBER else 0
+    declared = Headers(scope=scope).get("content-length", "")
+    return (
+        int(declared)
+        if declared.isascii() and declared.isdigit() and len(declared) <= _LONGEST_NUMBER
+        else 0
+    )

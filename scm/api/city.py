@@ -8,17 +8,17 @@ from typing import Annotated, TypeVar
 from fastapi import Header, Path, Response
 
 from scm.api.encoding import encode
+from scm.api.folders import Folders
 from scm.api.problem import RefusedError
-from scm.api.shelves import Shelves
 from scm.api.view import CityView
 from scm.api.wire import Wire
 from scm.clock import Clock
 from scm.records.city_map import CityMap
 from scm.v2x.message import Message, Refused, Request
 
-ASK_TIMEOUT_S = 2.0
+REQUEST_TIMEOUT_S = 2.0
 
-Ask = Callable[[Request, float], Message]
+SendRequest = Callable[[Request, float], Message]
 Name = Annotated[
     str, Path(pattern=r"^[a-z0-9_-]{1,32}$", description="a name on the bus", examples=["n1"])
 ]
@@ -76,10 +76,10 @@ class City:
     """
 
     view: CityView
-    send: Ask
+    send: SendRequest
     city_map: CityMap
     plans: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    shelves: Shelves = field(default_factory=Shelves)
+    folders: Folders = field(default_factory=Folders)
     link: Link = field(default_factory=Link)
 
     @property
@@ -97,13 +97,13 @@ class City:
         stepped_ns = self.view.picture().now_ns
         return stepped_ns if self.link.clock is None else max(stepped_ns, self.link.clock.now_ns())
 
-    def ask(self, request: Request, reply: type[R]) -> R:
+    def call(self, request: Request, reply: type[R]) -> R:
         """Ask the city and return its answer; blocks, so only for routes in the thread pool.
 
         Raises:
             RefusedError: when the city says no, or does not answer in time.
         """
-        answer = self.send(request, ASK_TIMEOUT_S)
+        answer = self.send(request, REQUEST_TIMEOUT_S)
         if isinstance(answer, Refused):
             raise RefusedError(answer)
         if not isinstance(answer, reply):

@@ -43,7 +43,7 @@ class CloseUps:
 
     def __init__(self) -> None:
         self._watched: Counter[str] = Counter()
-        self._heard: dict[str, deque[tuple[int, VehicleState]]] = {}
+        self._states: dict[str, deque[tuple[int, VehicleState]]] = {}
         self._count = 0
 
     def watch(self, vehicle: str, more: int) -> None:
@@ -51,20 +51,20 @@ class CloseUps:
         self._watched[vehicle] += more
         if self._watched[vehicle] <= 0:
             del self._watched[vehicle]
-            self._heard.pop(vehicle, None)
+            self._states.pop(vehicle, None)
 
-    def take(self, state: VehicleState, _t_ns: int) -> None:
+    def receive(self, state: VehicleState, _t_ns: int) -> None:
         """Keep a report of a watched car."""
         if state.vehicle in self._watched:
             self._count += 1
-            heard = self._heard.setdefault(state.vehicle, deque(maxlen=DEPTH))
-            heard.append((self._count, state))
+            states = self._states.setdefault(state.vehicle, deque(maxlen=DEPTH))
+            states.append((self._count, state))
 
     def after(self, vehicle: str, number: int) -> tuple[int, tuple[VehicleState, ...]]:
         """Return the number of a car's newest report, and all of its after `number`, in order."""
-        heard = self._heard.get(vehicle, ())
-        newer = tuple(state for count, state in heard if count > number)
-        return (heard[-1][0] if heard else number), newer
+        states = self._states.get(vehicle, ())
+        newer = tuple(state for count, state in states if count > number)
+        return (states[-1][0] if states else number), newer
 
     def subscriptions(self) -> Iterator[Subscription]:
         """Yield what has to be heard for those who watch now."""

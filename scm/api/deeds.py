@@ -70,15 +70,17 @@ _REQUESTS: dict[str, Callable[[Facts], str]] = {
     "BoxesRequest": lambda _: "put the boxes back to their places",
     "CalibrationRequest": _calibration,
     "JoinRequest": _join,
-    "LeaseRequest": lambda asked: f"{_LEASES[asked['verb']]} the wheel of {asked['vehicle']}",
-    "LightRequest": lambda asked: f"set the lights of {asked['vehicle']}",
-    "MonitorReset": lambda asked: f"reset the monitor of {_spaced(asked['junction'])}",
+    "LeaseRequest": lambda request: f"{_LEASES[request['verb']]} the wheel of {request['vehicle']}",
+    "LightRequest": lambda request: f"set the lights of {request['vehicle']}",
+    "MonitorReset": lambda request: f"reset the monitor of {_spaced(request['junction'])}",
     "PlanRequest": _plan,
-    "RemoveRequest": lambda asked: f"take {asked['vehicle']} off the map",
+    "RemoveRequest": lambda request: f"take {request['vehicle']} off the map",
     "RouteRequest": _route,
     "SignalRequest": _signal,
     "SpawnRequest": _spawn,
-    "StopRequest": lambda asked: "stop the city" if asked["engaged"] else "release the city stop",
+    "StopRequest": lambda request: (
+        "stop the city" if request["engaged"] else "release the city stop"
+    ),
 }
 
 
@@ -127,6 +129,6 @@ class Words:
             match, found = route.matches(scope)
             if match is Match.FULL:
                 named = _names(str(value) for value in found["path_params"].values())
-                said = str(route.summary)
-                return said[:1].lower() + said[1:] + (f" ({named})" if named else "")
+                summary = str(route.summary)
+                return summary[:1].lower() + summary[1:] + (f" ({named})" if named else "")
         return f"ask for what the interface does not have, {method} {path}"

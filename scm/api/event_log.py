@@ -88,8 +88,8 @@ class EventLog:
 
 def id_of(event: CityEvent) -> str:
     """Return what an event is called for good: 16 hexadecimal digits."""
-    said = f"{event.t_ns}\n{event.source}\n{event.name}\n{event.vehicle}\n{event.text}"
-    return hashlib.blake2b(said.encode(), digest_size=8).hexdigest()
+    text = f"{event.t_ns}\n{event.source}\n{event.name}\n{event.vehicle}\n{event.text}"
+    return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
 def _names(wanted: str, own: str) -> bool:

@@ -12,10 +12,10 @@ from scm.clock import NS_PER_S
 from scm.records.eye import Residual, ResidualSample, ResidualStats
 from scm.v2x.messages.eye_pose import EyePose
 
-KEPT_NS = 300 * NS_PER_S
+HISTORY_NS = 300 * NS_PER_S
 EVERY_NS = NS_PER_S // 2
 MOST_PAIRS = 2_000
-_DEPTH = KEPT_NS // EVERY_NS
+_DEPTH = HISTORY_NS // EVERY_NS
 
 
 class ResidualLog:
@@ -29,12 +29,12 @@ class ResidualLog:
         pair = (pose.camera, pose.vehicle)
         if pair not in self._pairs and len(self._pairs) >= MOST_PAIRS:
             return
-        kept = self._pairs.setdefault(pair, deque(maxlen=_DEPTH))
-        if kept and pose.t_ns < kept[-1].t_ns:
-            kept.clear()  # the world was restarted: its time went back
-        if kept and pose.t_ns < kept[-1].t_ns + EVERY_NS:
+        stored = self._pairs.setdefault(pair, deque(maxlen=_DEPTH))
+        if stored and pose.t_ns < stored[-1].t_ns:
+            stored.clear()  # the world was restarted: its time went back
+        if stored and pose.t_ns < stored[-1].t_ns + EVERY_NS:
             return
-        kept.append(
+        stored.append(
             ResidualSample(
                 vehicle=pose.vehicle,
                 t_ns=pose.t_ns,
@@ -52,15 +52,15 @@ class ResidualLog:
         """Return what a camera's poses of the last seconds were off by, oldest first, by car."""
         oldest_ns = now_ns - round(window_s * NS_PER_S)
         return {
-            name: tuple(one for one in kept if one.t_ns >= oldest_ns)
-            for (seen_by, name), kept in sorted(self._pairs.items())
+            name: tuple(one for one in stored if one.t_ns >= oldest_ns)
+            for (seen_by, name), stored in sorted(self._pairs.items())
             if seen_by == camera and vehicle in ("", name)
         }
 
     def forget(self, now_ns: int) -> None:
         """Drop cars that no camera has seen for long."""
-        oldest_ns = now_ns - KEPT_NS
-        for pair in [pair for pair, kept in self._pairs.items() if kept[-1].t_ns < oldest_ns]:
+        oldest_ns = now_ns - HISTORY_NS
+        for pair in [pair for pair, stored in self._pairs.items() if stored[-1].t_ns < oldest_ns]:
             del self._pairs[pair]
 
 
@@ -91,9 +91,9 @@ def thinned(
     samples: Mapping[str, Sequence[ResidualSample]], most: int
 ) -> tuple[ResidualSample, ...]:
     """Return at most so many of all cars' samples, evenly taken, the newest of each among them."""
-    total = sum(len(kept) for kept in samples.values())
+    total = sum(len(stored) for stored in samples.values())
     step = max(1, math.ceil(total / most))
-    return tuple(one for kept in samples.values() for one in tuple(kept)[::-1][::step][::-1])
+    return tuple(one for stored in samples.values() for one in tuple(stored)[::-1][::step][::-1])
 
 
 def _mean(values: Sequence[float]) -> float:

@@ -59,7 +59,7 @@ def tags_of(picture: Picture, camera: str) -> Held[EyeTags] | None:
 
 def _row(camera: str, picture: Picture, floor: Mapping[int, MapTag]) -> CameraRow:
     frame, tags = frame_of(picture, camera), tags_of(picture, camera)
-    said = picture.eye_statuses.get(camera)
+    status = picture.eye_statuses.get(camera)
     return CameraRow(
         camera=camera,
         frame_t_ns=None if frame is None else str(frame.message.t_ns),
@@ -71,19 +71,19 @@ def _row(camera: str, picture: Picture, floor: Mapping[int, MapTag]) -> CameraRo
         tags_t_ns=None if tags is None else str(tags.message.t_ns),
         known=tuple(_known(camera, picture, floor)),
         seen=tuple(_seen(camera, picture)),
-        **_status(said, picture.now_ns),
-        in_force=None if said is None else said.message.in_force,
+        **_status(status, picture.now_ns),
+        in_force=None if status is None else status.message.in_force,
     )
 
 
-def _status(said: Held[EyeStatus] | None, now_ns: int) -> _Status:
+def _status(status: Held[EyeStatus] | None, now_ns: int) -> _Status:
     """Return what a camera says of itself; one that says nothing any more is not good."""
-    if said is None:
+    if status is None:
         return {"good": None, "complaints": ()}
-    age_s, complaints = said.age_s(now_ns), tuple(one.said for one in said.message.complaints)
+    age_s, complaints = status.age_s(now_ns), tuple(one.said for one in status.message.complaints)
     if age_s > SILENT_S:
         return {"good": False, "complaints": (f"no word from this camera for {age_s:.0f} s",)}
-    return {"good": said.message.good, "complaints": complaints}
+    return {"good": status.message.good, "complaints": complaints}
 
 
 def _seen(camera: str, picture: Picture) -> list[SeenRow]:
@@ -107,8 +107,8 @@ def _seen(camera: str, picture: Picture) -> list[SeenRow]:
 
 
 def _known(camera: str, picture: Picture, floor: Mapping[int, MapTag]) -> list[TagRow]:
-    told = () if picture.snapshot is None else picture.snapshot.message.vehicles
-    cars = {car.tag_id: car.vehicle for car in told}
+    vehicles = () if picture.snapshot is None else picture.snapshot.message.vehicles
+    cars = {car.tag_id: car.vehicle for car in vehicles}
     return [
         _tag(one, picture, camera, cars.get(tag_id, ""), floor.get(tag_id))
         for (seen_by, tag_id), one in sorted(picture.tags_seen.items())

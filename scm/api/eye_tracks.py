@@ -20,7 +20,7 @@ class TrackWatch:
         self._until_ns: int | None = None
         self._newest: dict[str, Held[EyeTrack]] = {}
 
-    def ask(self, now_ns: int) -> bool:
+    def subscribe(self, now_ns: int) -> bool:
         """Hear tracks from now on; return whether they were not heard before."""
         is_new = self._until_ns is None
         self._until_ns = now_ns + WATCHED_NS
@@ -39,7 +39,7 @@ class TrackWatch:
         self._until_ns, self._newest = None, {}
         return True
 
-    def take(self, track: EyeTrack, t_ns: int) -> None:
+    def receive(self, track: EyeTrack, t_ns: int) -> None:
         """Keep a track."""
         if self._until_ns is not None:
             self._newest[track.vehicle] = Held(track, t_ns)

@@ -21,13 +21,13 @@ class Headed:
         if scope["type"] != "http" or scope["method"] != "HEAD":
             await self._app(scope, receive, send)
             return
-        asked = {**scope, "method": "GET"}
-        was_asked, is_over = False, asyncio.Event()
+        as_get = {**scope, "method": "GET"}
+        was_received, is_over = False, asyncio.Event()
 
         async def receive_once() -> Message:
-            nonlocal was_asked
-            if not was_asked:
-                was_asked = True
+            nonlocal was_received
+            if not was_received:
+                was_received = True
                 return await receive()
             await is_over.wait()
             return {"type": "http.disconnect"}
@@ -38,5 +38,5 @@ class Headed:
                 await send({"type": "http.response.body", "body": b""})
                 is_over.set()
 
-        await self._app(asked, receive_once, send_head)
-        scope.update({name: asked[name] for name in _FOUND if name in asked})
+        await self._app(as_get, receive_once, send_head)
+        scope.update({name: as_get[name] for name in _FOUND if name in as_get})

@@ -20,13 +20,13 @@ from scm.api.gate import caller_of
 from scm.api.problem import problem
 from scm.clock import NS_PER_S, Clock
 
-KEPT = 2000
-KEPT_NS = 3600 * NS_PER_S
+MAX_ANSWERS = 2000
+STORED_NS = 3600 * NS_PER_S
 LARGEST_KEY = 128
 LARGEST_ANSWER = 256 * 1024
 LARGEST_DIGESTED = 1024 * 1024
 CHANGES = frozenset({"POST", "PUT", "PATCH", "DELETE"})
-_TOLD = frozenset({"content-type", "location", "etag", "link", "cache-control"})
+_HEADERS = frozenset({"content-type", "location", "etag", "link", "cache-control"})
 
 
 @dataclass(slots=True)
@@ -44,7 +44,7 @@ class _Answer:
             self.status = message["status"]
             named = [(name.decode("latin-1").lower(), value) for name, value in message["headers"]]
             self.sets_cookie = any(name == "set-cookie" for name, _ in named)
-            self.headers = [(name.encode(), value) for name, value in named if name in _TOLD]
+            self.headers = [(name.encode(), value) for name, value in named if name in _HEADERS]
         elif message["type"] == "http.response.body":
             piece = message.get("body", b"")
             self.is_too_large = self.is_too_large or len(self.body) + len(piece) > LARGEST_ANSWER
@@ -53,7 +53,7 @@ class _Answer:
             self.is_whole = not message.get("more_body", False)
 
     @property
-    def can_be_kept(self) -> bool:
+    def can_be_stored(self) -> bool:
         """Whether the change took effect, the answer is all here, and it holds no secret."""
         is_here = self.is_whole and not self.is_too_large and not self.sets_cookie
         return 200 <= self.status < 300 and is_here
@@ -110,20 +110,20 @@ class Idempotent:
             _name_caller(scope, key)
             await self._app(scope, _again(body, receive), send_noted)
         finally:
-            self._settle(mine, entry, answer)
+            self._store(mine, entry, answer)
 
-    def _settle(self, mine: tuple[str, str], entry: _Entry, answer: _Answer) -> None:
+    def _store(self, mine: tuple[str, str], entry: _Entry, answer: _Answer) -> None:
         entry.in_flight = False
-        if answer.can_be_kept:
+        if answer.can_be_stored:
             entry.answer = answer
         elif 0 < answer.status < 500:
             self._entries.pop(mine, None)
 
     def _forget(self) -> None:
-        oldest_ns = self._clock.now_ns() - KEPT_NS
+        oldest_ns = self._clock.now_ns() - STORED_NS
         while self._entries:
             mine, entry = next(iter(self._entries.items()))
-            if len(self._entries) <= KEPT and entry.since_ns >= oldest_ns:
+            if len(self._entries) <= MAX_ANSWERS and entry.since_ns >= oldest_ns:
                 return
             del self._entries[mine]
 

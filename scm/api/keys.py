@@ -76,8 +76,8 @@ class KeyRing:
         Raises:
             AccessError: when their key is nobody's any more.
         """
-        kept = self.record(public_part(key))
-        lender = None if kept is None else whose(key, kept)
+        stored = self.record(public_part(key))
+        lender = None if stored is None else whose(key, stored)
         if lender is None:
             msg = f"{doing}: the key of who asked for it has ended"
             raise AccessError(msg)
@@ -85,7 +85,7 @@ class KeyRing:
         self._lent[record.key_id] = record, lender.key_id
         return lent
 
-    def take_back(self, lent: str) -> None:
+    def end_lent(self, lent: str) -> None:
         """End a key that was lent."""
         self._lent.pop(public_part(lent), None)
         self._ended.add(public_part(lent))

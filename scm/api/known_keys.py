@@ -61,7 +61,9 @@ class KnownKeys:
         if not key_id:
             return None
         held = self._younger_than(FRESH_NS, key_id)
-        return self._judged(await self._others.ask(key_id) if held is None else held, key)
+        return self._judged(
+            await self._others.look_up_shared(key_id) if held is None else held, key
+        )
 
     async def find_for_stop(self, key: str) -> Known:
         """Return what is known of a key that presses the red stop, soon.
@@ -78,13 +80,15 @@ class KnownKeys:
         if held is not None:
             return Known(self._judged(held, key))
         before = self._younger_than(REMEMBERED_NS, key_id)
-        asking = asyncio.ensure_future(self._stop.ask(key_id))
+        looking_up = asyncio.ensure_future(self._stop.look_up_shared(key_id))
         if before is None:
-            return Known(self._judged(await asking, key))
-        await asyncio.wait({asking}, timeout=PATIENCE_S)
-        if asking.done() and asking.exception() is None:
-            return Known(self._judged(asking.result(), key))
-        asking.add_done_callback(lambda late: late.cancelled() or late.exception())  # it was heard
+            return Known(self._judged(await looking_up, key))
+        await asyncio.wait({looking_up}, timeout=PATIENCE_S)
+        if looking_up.done() and looking_up.exception() is None:
+            return Known(self._judged(looking_up.result(), key))
+        looking_up.add_done_callback(
+            lambda late: late.cancelled() or late.exception()
+        )  # it was heard
         return Known(self._judged(before, key), is_sure=False)
 
     def look_up(self, key_id: str) -> KeyRecord | None:
@@ -122,18 +126,18 @@ class _Queue:
         self._under_way: dict[str, Future[KeyRecord | None]] = {}
         self._lock = threading.Lock()
 
-    async def ask(self, key_id: str) -> KeyRecord | None:
+    async def look_up_shared(self, key_id: str) -> KeyRecord | None:
         """Return what the store says of a key.
 
         Raises:
             StoreError: when it does not answer.
         """
         with self._lock:
-            asked = self._under_way.get(key_id)
-            if asked is None:
-                asked = self._threads.submit(self._look_up, key_id)
-                self._under_way[key_id] = asked
-        return await asyncio.shield(asyncio.wrap_future(asked))  # others may wait for it as well
+            running = self._under_way.get(key_id)
+            if running is None:
+                running = self._threads.submit(self._look_up, key_id)
+                self._under_way[key_id] = running
+        return await asyncio.shield(asyncio.wrap_future(running))  # others may wait for it as well
 
     def _look_up(self, key_id: str) -> KeyRecord | None:
         try:

@@ -17,7 +17,7 @@ from scm.api.gate import caller_of
 from scm.api.problem import problem
 from scm.clock import Clock, seconds
 
-CALLERS_KEPT = 4096
+MAX_CALLERS = 4096
 FREE = ("/static/", "/healthz", "/readyz", "/api/v1/stop")
 STREAMS = ("/stream", "/film", "/scan", ".bin")
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -48,7 +48,7 @@ class Buckets:
         self._clock = clock
         self._left: OrderedDict[str, tuple[float, int]] = OrderedDict()
 
-    def take(self, caller: str) -> tuple[float, float]:
+    def acquire(self, caller: str) -> tuple[float, float]:
         """Take a token, if there is one; return how many are left, and seconds to wait for one."""
         now_ns = self._clock.now_ns()
         left, at_ns = self._left.pop(caller, (float(self.policy.most), now_ns))
@@ -57,7 +57,7 @@ class Buckets:
         if wait_s == 0.0:
             left -= 1.0
         self._left[caller] = (left, now_ns)
-        if len(self._left) > CALLERS_KEPT:
+        if len(self._left) > MAX_CALLERS:
             self._left.popitem(last=False)
         return left, wait_s
 
@@ -78,28 +78,28 @@ class Limited:
             await self._app(scope, receive, send)
             return
         buckets = self._looking if scope["method"] in _SAFE_METHODS else self._changing
-        left, wait_s = buckets.take(caller_of(scope))
+        left, wait_s = buckets.acquire(caller_of(scope))
         policy = buckets.policy
         refill_s = math.ceil((policy.most - left) / policy.per_s)
-        told = {
+        headers = {
             "RateLimit-Policy": policy.header,
             "RateLimit": f'"{policy.name}";r={math.floor(left)};t={refill_s}',
         }
 
-        async def send_told(message: Message) -> None:
+        async def send_with_limits(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(told)
+                MutableHeaders(scope=message).update(headers)
             await send(message)
 
         if wait_s == 0.0:
-            await self._app(scope, receive, send_told)
+            await self._app(scope, receive, send_with_limits)
             return
         detail = (
             f"more than {policy.per_s:g} requests a second ({policy.name}); wait {wait_s:.2g} s"
         )
         refused = problem(HTTPStatus.TOO_MANY_REQUESTS, "too_many", detail, instance=scope["path"])
         refused.headers["Retry-After"] = str(max(1, math.ceil(wait_s)))
-        await refused(scope, receive, send_told)
+        await refused(scope, receive, send_with_limits)
 
 
 def _is_free(path: str) -> bool:

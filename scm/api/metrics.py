@@ -169,8 +169,8 @@ def _command_ages(world: WorldSnapshot, age_s: float) -> Labels:
     oldest_s: Labels = {}
     for car in world.vehicles:
         if car.command_age_ms is not None:
-            told_s = car.command_age_ms / 1000.0 + age_s
-            oldest_s[car.kind,] = max(oldest_s.get((car.kind,), 0.0), told_s)
+            command_age_s = car.command_age_ms / 1000.0 + age_s
+            oldest_s[car.kind,] = max(oldest_s.get((car.kind,), 0.0), command_age_s)
     return oldest_s
 
 

@@ -13,7 +13,7 @@ import msgspec
 
 from scm.api import uploads
 from scm.api.city import City, not_found
-from scm.api.operations import Operations, Teller
+from scm.api.operations import Operations, ProgressReporter
 from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
 from scm.api.report_folders import ReportFolders
@@ -46,21 +46,21 @@ class MismatchJobs:
 
     def __init__(self, city: City, work: Operations, clock: Clock, bus: Sequence[str]) -> None:
         self._city, self._work, self._clock, self._bus = city, work, clock, bus
-        self.reports = ReportFolders(city.shelves.reports)
-        for left in (city.shelves.reports or Path("/nowhere")).glob(f".*{_PARTIAL}"):
+        self.reports = ReportFolders(city.folders.reports)
+        for left in (city.folders.reports or Path("/nowhere")).glob(f".*{_PARTIAL}"):
             shutil.rmtree(left, ignore_errors=True)  # of a server that was killed
 
-    def shelf(self) -> Path:
+    def folder(self) -> Path:
         """Return the shelf of reports.
 
         Raises:
             RefusedError: when this city has none.
         """
-        if self._city.shelves.reports is None:
+        if self._city.folders.reports is None:
             detail = "this city keeps no reports: start `scm api` with --data FOLDER"
             raise RefusedError(Refused(code="not_kept", detail=detail))
-        self._city.shelves.reports.mkdir(parents=True, exist_ok=True)
-        return self._city.shelves.reports
+        self._city.folders.reports.mkdir(parents=True, exist_ok=True)
+        return self._city.folders.reports
 
     def recording(self, name: str) -> Path:
         """Return a recording of the city's shelf, by its name with or without `.mcap`.
@@ -68,9 +68,9 @@ class MismatchJobs:
         Raises:
             RefusedError: when there is none of that name.
         """
-        shelf = self._city.shelves.recordings
-        if shelf is not None and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}", name):
-            for path in (shelf / name, shelf / f"{name}.mcap"):
+        folder = self._city.folders.recordings
+        if folder is not None and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}", name):
+            for path in (folder / name, folder / f"{name}.mcap"):
                 is_run = path.suffix == _RUN and path.is_file()
                 if is_run or (path / "recording.yaml").is_file():
                     return path
@@ -82,7 +82,7 @@ class MismatchJobs:
         Raises:
             RefusedError: when there is none of that id, or no longer.
         """
-        folder = self.shelf() / uploads.FOLDER / upload
+        folder = self.folder() / uploads.FOLDER / upload
         if not re.fullmatch(uploads.ID, upload) or not folder.is_dir():
             raise not_found("upload", upload)
         return uploads.recording_in(folder)
@@ -107,7 +107,7 @@ class MismatchJobs:
         if gone is not None:
             detail = f"{report}: the recording it was made from is gone: {gone.name}"
             raise RefusedError(Refused(code="conflict", detail=detail))
-        driven = tuple(map(str, self.reports.told(folder)))
+        driven = tuple(map(str, self.reports.recorded_drives(folder)))
         _, _, car = report.partition(".")
         return msgspec.structs.replace(
             job,
@@ -118,19 +118,19 @@ class MismatchJobs:
 
     def search(self, job: Job) -> Operation:
         """Start a search."""
-        shelf = self.shelf()
+        folder = self.folder()
         job = msgspec.structs.replace(job, asked_ns=self._clock.now_ns())
         base = _slug(f"{_stem(Path(job.recordings[0]))}-{job.vehicle}".strip("-"))
 
-        def work(tell: Teller) -> str:
+        def work(progress: ProgressReporter) -> str:
             partial, whole = (
-                shelf / f".{base}-{job.asked_ns}{end}{_PARTIAL}" for end in ("", "-run")
+                folder / f".{base}-{job.asked_ns}{end}{_PARTIAL}" for end in ("", "-run")
             )
             try:
-                runs = [_whole(Path(path), whole, tell) for path in job.recordings]
-                run_scm(_words(runs, job, partial), tell, lambda line: _hear(line, tell))
+                runs = [_whole(Path(path), whole, progress) for path in job.recordings]
+                run_scm(_words(runs, job, partial), progress, lambda line: _on_line(line, progress))
                 (partial / "job.json").write_bytes(msgspec.json.encode(job))
-                return f"/mismatch/{_placed(partial, shelf, base)}"
+                return f"/mismatch/{_placed(partial, folder, base)}"
             finally:
                 shutil.rmtree(partial, ignore_errors=True)
                 shutil.rmtree(whole, ignore_errors=True)
@@ -154,11 +154,11 @@ class MismatchJobs:
             detail = f"part: got {part}, expected 1 to {len(plans)}"
             raise RefusedError(Refused(code="invalid", detail=detail))
 
-        def work(tell: Teller) -> str:
-            tell(f"{vehicle} comes to rest and drives")
+        def work(progress: ProgressReporter) -> str:
+            progress(f"{vehicle} comes to rest and drives")
             trip = trip_of(self._city.view, vehicle)
             try:
-                self._play(plans[part - 1], vehicle, folder, tell)
+                self._play(plans[part - 1], vehicle, folder, progress)
             finally:
                 if trip is not None:
                     self._send_on(trip)
@@ -172,23 +172,23 @@ class MismatchJobs:
         until_ns = self._clock.now_ns() + RESUME_NS
         while True:
             try:
-                self._city.ask(request, RouteReply)
+                self._city.call(request, RouteReply)
             except RefusedError as refusal:
                 if refusal.refused.code == "owned" and self._clock.now_ns() < until_ns:
                     threading.Event().wait(RESUME_PAUSE_S)
                     continue
             return
 
-    def _play(self, plan: Path, vehicle: str, folder: Path, tell: Teller) -> None:
+    def _play(self, plan: Path, vehicle: str, folder: Path, progress: ProgressReporter) -> None:
         """Play a drive and keep its recording; one that ended early, or was called off, is none."""
-        known = self.reports.told(folder)
+        known = self.reports.recorded_drives(folder)
         number = 1 + max((int(one.name.removeprefix("told_")) for one in known), default=0)
         out, floor = folder / f"told_{number}", self._city.city_map.floor
         words = ["play", str(plan), *self._bus, "--vehicle", vehicle, "--out", str(out)]
         words += ["--floor", *(f"{edge:g}" for edge in (*floor.x_m, *floor.y_m))]
         whole = False
         try:
-            lines = run_scm(words, tell, lambda _: None, kinder=False)
+            lines = run_scm(words, progress, lambda _: None, kinder=False)
             early = next((line for line in lines if line.startswith("stopped")), "")
             whole = not early
         finally:
@@ -198,7 +198,7 @@ class MismatchJobs:
             raise RunError(early)
 
 
-def _whole(recording: Path, folder: Path, tell: Teller) -> Path:
+def _whole(recording: Path, folder: Path, progress: ProgressReporter) -> Path:
     """Return a recording to be searched: of a run without its end a copy of what is there of it.
 
     A run has none while it is being written, or where its writer was killed.
@@ -208,10 +208,10 @@ def _whole(recording: Path, folder: Path, tell: Teller) -> Path:
     """
     if recording.suffix != _RUN or not _has_no_end(recording):
         return recording
-    tell("takes what is recorded so far")
+    progress("takes what is recorded so far")
     folder.mkdir(exist_ok=True)
     run_scm(
-        ["recover", str(recording), "--out", str(folder / recording.name)], tell, lambda _: None
+        ["recover", str(recording), "--out", str(folder / recording.name)], progress, lambda _: None
     )
     return folder / recording.name
 
@@ -234,24 +234,24 @@ def _words(runs: Sequence[Path], job: Job, out: Path) -> list[str]:
     return words
 
 
-def _hear(line: str, tell: Teller) -> None:
+def _on_line(line: str, progress: ProgressReporter) -> None:
     found = _STEP.fullmatch(line)
     if found is not None:
-        tell(found["said"], int(found["share"]) / 100.0)
+        progress(found["said"], int(found["share"]) / 100.0)
 
 
-def _placed(partial: Path, shelf: Path, base: str) -> str:
+def _placed(partial: Path, folder: Path, base: str) -> str:
     """Give a finished report its place on the shelf; return its name, or that of its first car."""
     number = 1
     while True:
         name = base if number == 1 else f"{base}-{number}"
-        if not (shelf / name).exists():
+        if not (folder / name).exists():
             break
         number += 1
-    partial.rename(shelf / name)
-    if (shelf / name / "report.json").is_file():
+    partial.rename(folder / name)
+    if (folder / name / "report.json").is_file():
         return name
-    cars = sorted(path.parent.name for path in (shelf / name).glob("*/report.json"))
+    cars = sorted(path.parent.name for path in (folder / name).glob("*/report.json"))
     return f"{name}.{cars[0]}" if cars else name
 
 

@@ -117,18 +117,18 @@ def _segment(city: City, lane: Lane) -> Entity:
 def _flows(city: City, picture: Picture) -> Iterator[Entity]:
     if picture.traffic is None:
         return
-    told = picture.traffic.message
+    counts = picture.traffic.message
     lanes = {lane.name: lane for lane in city.city_map.lanes}
-    for count in told.lanes:
+    for count in counts.lanes:
         if count.lane in lanes:
-            yield _flow(city, lanes[count.lane], count, told)
+            yield _flow(city, lanes[count.lane], count, counts)
 
 
-def _flow(city: City, lane: Lane, count: LaneCount, told: TrafficCounts) -> Entity:
+def _flow(city: City, lane: Lane, count: LaneCount, counts: TrafficCounts) -> Entity:
     path = LanePath(lane)
     middle = path.at(path.length_m / 2.0)
-    since_ns = told.t_ns - nanoseconds(told.window_s)
-    at = _time(told.t_ns)
+    since_ns = counts.t_ns - nanoseconds(counts.window_s)
+    at = _time(counts.t_ns)
     entity = {
         "id": urn(city, "TrafficFlowObserved", lane.name),
         "type": "TrafficFlowObserved",
@@ -137,7 +137,7 @@ def _flow(city: City, lane: Lane, count: LaneCount, told: TrafficCounts) -> Enti
         "refRoadSegment": {"type": "Relationship", "object": urn(city, "RoadSegment", lane.name)},
         "dateObserved": _property(f"{_time(since_ns)}/{at}"),
         "dateObservedFrom": _date(since_ns),
-        "dateObservedTo": _date(told.t_ns),
+        "dateObservedTo": _date(counts.t_ns),
         "laneId": _property(1),
         "laneDirection": _property("forward"),
         "vehicleType": _property("car"),
@@ -152,12 +152,12 @@ def _flow(city: City, lane: Lane, count: LaneCount, told: TrafficCounts) -> Enti
 
 
 def _property(value: object, at: str = "", unit: str = "") -> Entity:
-    told: Entity = {"type": "Property", "value": value}
+    counts: Entity = {"type": "Property", "value": value}
     if at:
-        told["observedAt"] = at
+        counts["observedAt"] = at
     if unit:
-        told["unitCode"] = unit
-    return told
+        counts["unitCode"] = unit
+    return counts
 
 
 def _place(geometry: Entity, at: str = "") -> Entity:

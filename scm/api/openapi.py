@@ -20,6 +20,15 @@ from scm.api.roles import ROLES, SCHEME
 from scm.api.words import UNITS, WORDS
 from scm.errors import RunError
 
+PUBLISHED = {
+    "AcquireBody": "TakeBody",
+    "ForecastScore": "PromiseScore",
+    "OverrideBody": "WishBody",
+    "SignalOverride": "SignalWish",
+    "StageInterval": "SignalSlot",
+}
+"""Names of records that programs generated from the description already know."""
+
 _DEFS, _COMPONENTS = "#/$defs/", "#/components/schemas/"
 _ENTRY = re.compile(r"^ {4}(\w+(?:, \w+)*): ")
 _DEPTH = 6
@@ -80,7 +89,8 @@ def described(document: Schema) -> Schema:
     """
     schemas: Schema = document.setdefault("components", {}).setdefault("schemas", {})
     for holder in list(_records(document)):
-        for name, schema in holder.pop("$defs").items():
+        for record, schema in holder.pop("$defs").items():
+            name = _published(record)
             if schemas.setdefault(name, schema) != schema:
                 msg = f"openapi: two records are named {name!r}; expected one, or another name"
                 raise RunError(msg)
@@ -126,11 +136,16 @@ def _records(node: Any) -> Iterator[Schema]:
             yield from _records(child)
 
 
+def _published(record: str) -> str:
+    """Return what a record, or a page of it, is called in the description."""
+    return re.sub(r"[^_]+", lambda found: PUBLISHED.get(found[0], found[0]), record)
+
+
 def _point(node: Any) -> None:
     """Make all references name records below `components`."""
     if isinstance(node, dict):
         if str(node.get("$ref", "")).startswith(_DEFS):
-            node["$ref"] = _COMPONENTS + node["$ref"].removeprefix(_DEFS)
+            node["$ref"] = _COMPONENTS + _published(node["$ref"].removeprefix(_DEFS))
         for child in node.values():
             _point(child)
     elif isinstance(node, list):
@@ -140,12 +155,12 @@ def _point(node: Any) -> None:
 
 def _describe_fields(schema: Schema) -> None:
     fields: Schema = schema.get("properties", {})
-    about, told = _attributes(schema.get("description", ""))
+    about, described_fields = _attributes(schema.get("description", ""))
     if about:
         schema["description"] = about
     for name, field in fields.items():
         _lift_words(field)
-        words = told.get(name) or (WORDS[name][0] if name in WORDS else "")
+        words = described_fields.get(name) or (WORDS[name][0] if name in WORDS else "")
         if words:
             field.setdefault("description", words)
         field.pop("title", None)
@@ -171,16 +186,18 @@ def _describe_by_record(field: Schema, schemas: Schema) -> None:
 def _attributes(docstring: str) -> tuple[str, dict[str, str]]:
     """Return a record's own description, and what its docstring says of its fields."""
     about, _, entries = inspect.cleandoc(docstring).partition("Attributes:\n")
-    told: dict[str, str] = {}
+    described_fields: dict[str, str] = {}
     names: list[str] = []
     for line in entries.splitlines():
         entry = _ENTRY.match(line)
         if entry is not None:
             names = entry[1].split(", ")
-            told.update(dict.fromkeys(names, line[entry.end() :].strip()))
+            described_fields.update(dict.fromkeys(names, line[entry.end() :].strip()))
         elif line.strip():
-            told.update({name: f"{told[name]} {line.strip()}" for name in names})
-    return " ".join(about.split()), told
+            described_fields.update(
+                {name: f"{described_fields[name]} {line.strip()}" for name in names}
+            )
+    return " ".join(about.split()), described_fields
 
 
 def _add_example(name: str, field: Schema, schemas: Schema) -> None:

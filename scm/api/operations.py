@@ -23,7 +23,7 @@ from scm.v2x.message import Refused
 
 _LOGGER = logging.getLogger(__name__)
 
-KEPT = 200
+MAX_OPERATIONS = 200
 MOST_WAITING = 20
 
 # A quoted path may hold spaces. `km/h` and `http://host/x` are no paths, `/api/...` is an address.
@@ -37,7 +37,7 @@ class Cancelled(Exception):  # noqa: N818  it is no error
     """Raised inside work that was called off, at its next word about itself."""
 
 
-class Teller:
+class ProgressReporter:
     """How work tells where it is; raises `Cancelled` when it was called off."""
 
     def __init__(self, operations: "Operations", name: str, cancel: threading.Event) -> None:
@@ -57,7 +57,7 @@ class Teller:
             raise Cancelled
 
 
-Work = Callable[[Teller], str]
+Work = Callable[[ProgressReporter], str]
 """Does the work; returns the address of what it made."""
 
 
@@ -149,22 +149,22 @@ class Operations:
             self._moved.notify_all()
 
     def _run(self, name: str, work: Work, queue: deque[str]) -> None:
-        tell = Teller(self, name, self._cancels[name])
+        progress = ProgressReporter(self, name, self._cancels[name])
         with self._moved:
-            self._moved.wait_for(lambda: queue[0] == name or tell.cancelled.is_set())
+            self._moved.wait_for(lambda: queue[0] == name or progress.cancelled.is_set())
         try:
-            self._work(name, work, tell)
+            self._work(name, work, progress)
         finally:
             with self._moved:
                 queue.remove(name)
                 self._moved.notify_all()
 
-    def _work(self, name: str, work: Work, tell: Teller) -> None:
+    def _work(self, name: str, work: Work, progress: ProgressReporter) -> None:
         try:
-            tell.check()
+            progress.check()
             self.change(name, state="running", began_ns=self._clock.now_ns())
-            tell("begins")
-            result = work(tell)
+            progress("begins")
+            result = work(progress)
         except Cancelled:
             self._end(name, "cancelled")
         except ScmError as error:
@@ -181,7 +181,7 @@ class Operations:
 
     def _forget(self) -> None:
         for name in [name for name, row in self._rows.items() if row.ended_ns is not None]:
-            if len(self._rows) <= KEPT:
+            if len(self._rows) <= MAX_OPERATIONS:
                 return
             del self._rows[name]
             del self._cancels[name]

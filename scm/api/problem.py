@@ -96,7 +96,7 @@ def problem(
     code: str,
     detail: str,
     *,
-    asked: str = "",
+    request: str = "",
     instance: str = "",
     errors: tuple[dict[str, str], ...] = (),
 ) -> Response:
@@ -107,7 +107,7 @@ def problem(
         status=status,
         code=code,
         detail=detail,
-        asked=asked,
+        asked=request,
         instance=instance,
         trace_id=trace_id(),
         errors=errors,
@@ -137,7 +137,7 @@ async def _on_refused(request: Request, error: Exception) -> Response:
     refused = error.refused
     status = STATUS_OF_CODE.get(refused.code, 409)
     at = request.url.path
-    return problem(status, refused.code, refused.detail, asked=refused.asked, instance=at)
+    return problem(status, refused.code, refused.detail, request=refused.asked, instance=at)
 
 
 async def _on_invalid(request: Request, error: Exception) -> Response:
@@ -168,8 +168,8 @@ async def on_http(request: Request, error: Exception) -> Response:
 def _allowed(request: Request) -> Iterator[str]:
     """Yield the methods of an address: its route that refused one knows its own alone."""
     for method in _METHODS:
-        asked = {**request.scope, "method": method}
-        if any(route.matches(asked)[0] is Match.FULL for route in request.app.routes):
+        scope = {**request.scope, "method": method}
+        if any(route.matches(scope)[0] is Match.FULL for route in request.app.routes):
             yield method
             if method == "GET":
                 yield "HEAD"

@@ -11,24 +11,26 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 
-from scm.api.operations import Teller
+from scm.api.operations import ProgressReporter
 from scm.api.priority import stand_back
 from scm.errors import RunError
 from scm.runtime.parent_watch import with_parent
 
 LOOK_S = 0.2
 GRACE_S = 8.0
-KEPT_LINES = 40
-Hear = Callable[[str], None]
+MAX_LINES = 40
+OnLine = Callable[[str], None]
 
 
-def run_scm(words: Sequence[str], tell: Teller, hear: Hear, *, kinder: bool = True) -> list[str]:
+def run_scm(
+    words: Sequence[str], progress: ProgressReporter, on_line: OnLine, *, kinder: bool = True
+) -> list[str]:
     """Run `scm WORDS` to its end and return the last lines that it said.
 
     Args:
         words: Command and arguments.
-        tell: Of the operation; when it is called off, the program is asked to end.
-        hear: Is told every line, on this thread.
+        progress: Of the operation; when it is cancelled, the program is asked to end.
+        on_line: Receives every line, on this thread.
         kinder: Whether the city's parts go first.
 
     Raises:
@@ -46,13 +48,13 @@ def run_scm(words: Sequence[str], tell: Teller, hear: Hear, *, kinder: bool = Tr
     reader = threading.Thread(target=_read, args=(process, lines), daemon=True)
     reader.start()
     try:
-        last = _follow(lines, tell, hear)
+        last = _follow(lines, progress, on_line)
     finally:
         _end(process)
         reader.join(GRACE_S)
     if process.returncode != 0:
         msg = "\n".join(last).strip() or f"it ended with code {process.returncode}"
-        raise RunError(_told(msg))
+        raise RunError(_failure(msg))
     return last
 
 
@@ -64,11 +66,13 @@ def _read(process: "subprocess.Popen[str]", lines: "SimpleQueue[str | None]") ->
     lines.put(None)
 
 
-def _follow(lines: "SimpleQueue[str | None]", tell: Teller, hear: Hear) -> list[str]:
+def _follow(
+    lines: "SimpleQueue[str | None]", progress: ProgressReporter, on_line: OnLine
+) -> list[str]:
     """Pass lines on until there are no more; raise when the work was called off."""
-    last: deque[str] = deque(maxlen=KEPT_LINES)
+    last: deque[str] = deque(maxlen=MAX_LINES)
     while True:
-        tell.check()
+        progress.check()
         try:
             line = lines.get(timeout=LOOK_S)
         except Empty:
@@ -76,7 +80,7 @@ def _follow(lines: "SimpleQueue[str | None]", tell: Teller, hear: Hear) -> list[
         if line is None:
             return list(last)
         last.append(line)
-        hear(line)
+        on_line(line)
 
 
 def _end(process: "subprocess.Popen[str]") -> None:
@@ -90,8 +94,8 @@ def _end(process: "subprocess.Popen[str]") -> None:
     process.wait()
 
 
-def _told(said: str) -> str:
+def _failure(output: str) -> str:
     """Return what a program said of its failure: from its own `scm ...:` on, or the last line."""
-    lines = said.splitlines()
+    lines = output.splitlines()
     begin = next((i for i, line in enumerate(lines) if line.startswith("scm ")), len(lines) - 1)
     return " ".join(lines[begin:])

@@ -21,24 +21,24 @@ def send_file(request: Request, path: Path, media_type: str) -> Response:
         "Content-Disposition": f'attachment; filename="{path.name}"',
         "ETag": tag,
     }
-    asked = request.headers.get("range", "")
-    if asked and request.headers.get("if-range", tag) != tag:
-        asked = ""  # the part would not fit to what the reader has
-    span = _span(asked, size)
+    requested = request.headers.get("range", "")
+    if requested and request.headers.get("if-range", tag) != tag:
+        requested = ""  # the part would not fit to what the reader has
+    span = _span(requested, size)
     if span is None:
         return Response(status_code=416, headers={**headers, "Content-Range": f"bytes */{size}"})
     start, end = span
     headers["Content-Length"] = str(end - start)
     status = 200
-    if _RANGE.fullmatch(asked):
+    if _RANGE.fullmatch(requested):
         status = 206
         headers["Content-Range"] = f"bytes {start}-{end - 1}/{size}"
     return StreamingResponse(_blocks(path, start, end), status, headers, media_type)
 
 
-def _span(asked: str, size: int) -> tuple[int, int] | None:
+def _span(requested: str, size: int) -> tuple[int, int] | None:
     """Return begin and end of a range; the whole file for forms we do not know; None: no such."""
-    match = _RANGE.fullmatch(asked)
+    match = _RANGE.fullmatch(requested)
     if match is None or match[0] == "bytes=-":
         return 0, size
     first, last = match.groups()

@@ -70,7 +70,7 @@ def frames_of(index: RunIndex, from_s: float, to_s: float, hz: float) -> Frames:
     gathering.pictures_before(begin_ns)
     damage: list[str] = []
     for one in index.read(begin_ns, end_ns, _DRAWN, damage):
-        if not gathering.take(one):
+        if not gathering.add(one):
             end_ns = one.t_ns
             break
     return Frames(
@@ -126,7 +126,7 @@ class _Frames:
             if found is not None:
                 self._picture(found)
 
-    def take(self, one: Recorded) -> bool:
+    def add(self, one: Recorded) -> bool:
         """Take a message; return False when the answer is full."""
         if _PICTURE(one.key):
             is_full = self._is_full(1)
@@ -267,16 +267,16 @@ def map_of(index: RunIndex) -> CityMap | None:
         RecordingError: when the file cannot be opened any more.
     """
     found = index.newest(index.end_ns, DEFINITION)
-    told = read(found, WorldDefinition) if found is not None else None
-    return told.map if told is not None else None
+    message = read(found, WorldDefinition) if found is not None else None
+    return message.map if message is not None else None
 
 
 def cars_in(index: RunIndex) -> tuple[CarFacts, ...]:
     """Return all cars of the first and the last snapshot: those that a sparse recording tells."""
     first = next(index.read(0, index.end_ns, SNAPSHOT), None)
     last = index.newest(index.end_ns, SNAPSHOT)
-    told = [read(one, WorldSnapshot) for one in (first, last) if one is not None]
-    cars = {car.vehicle: _facts(car) for one in told if one is not None for car in one.vehicles}
+    message = [read(one, WorldSnapshot) for one in (first, last) if one is not None]
+    cars = {car.vehicle: _facts(car) for one in message if one is not None for car in one.vehicles}
     return tuple(cars.values())
 
 
@@ -335,8 +335,8 @@ def _blocks(of_each: Iterable[Row], damage: list[str]) -> Iterator[bytes]:
             yield text.getvalue().encode()
             text.seek(0)
             text.truncate()
-    for told in damage:
-        text.write(f"# left out: {told}\n")
+    for message in damage:
+        text.write(f"# left out: {message}\n")
     yield text.getvalue().encode()
 
 

@@ -25,12 +25,12 @@ FILES = {
     "windows.csv": "text/csv",
 }
 _FIELDS, _DRAWN, _JOB, _CARS = "report.json", "drawn.json", "job.json", "cars.json"
-_DRIVE, _TOLD = re.compile(r"next_drive(_\d{1,2})?"), re.compile(r"told_\d{1,4}")
+_DRIVE, _RECORDED_DRIVE = re.compile(r"next_drive(_\d{1,2})?"), re.compile(r"told_\d{1,4}")
 MOST_SHOWN_BYTES = 16 * 2**20
 
 
 class _Cars(msgspec.Struct):
-    said: str
+    text: str
     conclusions: tuple[str, ...] = ()
 
 
@@ -55,7 +55,7 @@ class _Title(msgspec.Struct):
 
 
 class _Drawn(msgspec.Struct):
-    said: str
+    text: str
     vehicle: str = ""
     recordings: tuple[str, ...] = ()
     effects: tuple[_Title, ...] = ()
@@ -64,8 +64,8 @@ class _Drawn(msgspec.Struct):
 class ReportFolders:
     """The shelf of reports; None: there is no such shelf, and it is empty."""
 
-    def __init__(self, shelf: Path | None) -> None:
-        self.shelf = shelf
+    def __init__(self, root: Path | None) -> None:
+        self.root = root
         self._rows: dict[Path, tuple[int, ReportRow]] = {}
 
     def rows(self) -> list[ReportRow]:
@@ -75,9 +75,9 @@ class ReportFolders:
 
     def find(self, name: str) -> Path | None:
         """Return a report's folder; None: there is none of that name."""
-        if self.shelf is None or not re.fullmatch(NAME, name):
+        if self.root is None or not re.fullmatch(NAME, name):
             return None
-        folder = self.shelf.joinpath(*name.split(".", 1))
+        folder = self.root.joinpath(*name.split(".", 1))
         return folder if (folder / _FIELDS).is_file() else None
 
     def row(self, name: str, folder: Path) -> ReportRow:
@@ -91,7 +91,7 @@ class ReportFolders:
             return False
         shutil.rmtree(folder)
         above = folder.parent
-        if above != self.shelf and not _cars_in(above):
+        if above != self.root and not _cars_in(above):
             shutil.rmtree(above)
         return True
 
@@ -111,7 +111,7 @@ class ReportFolders:
     def together(self, folder: Path) -> Together | None:
         """Return what a report's car has in common with those beside it; None: it is alone."""
         above = folder.parent
-        found = _read(above / _CARS, _Cars) if above != self.shelf else None
+        found = _read(above / _CARS, _Cars) if above != self.root else None
         if found is None:
             return None
         cars = sorted(f"{above.name}.{car.name}" for car in _cars_in(above))
@@ -122,18 +122,18 @@ class ReportFolders:
         found = [one.name for one in folder.iterdir() if _DRIVE.fullmatch(one.name)]
         return sorted(name for name in found if any((folder / name).glob("*.yaml")))
 
-    def told(self, folder: Path) -> list[Path]:
+    def recorded_drives(self, folder: Path) -> list[Path]:
         """Return recordings of suggested drives that were driven, oldest first."""
-        found = [one for one in folder.iterdir() if _TOLD.fullmatch(one.name)]
+        found = [one for one in folder.iterdir() if _RECORDED_DRIVE.fullmatch(one.name)]
         return sorted(
             (one for one in found if (one / "recording.yaml").is_file()),
             key=lambda one: int(one.name.removeprefix("told_")),
         )
 
     def _folders(self) -> Iterator[tuple[str, Path]]:
-        if self.shelf is None or not self.shelf.is_dir():
+        if self.root is None or not self.root.is_dir():
             return
-        for folder in self.shelf.iterdir():
+        for folder in self.root.iterdir():
             if not re.fullmatch(NAME, folder.name) or not folder.is_dir():
                 continue
             if (folder / _FIELDS).is_file():
@@ -153,8 +153,8 @@ class ReportFolders:
         report = _read(folder / _FIELDS, _Report)
         drawn = _read(folder / _DRAWN, _Drawn)
         if report is None:
-            said = "Its files are damaged, or of another version."
-            return ReportRow(name=name, made_ns=made_ns, verdict="unreadable", said=said)
+            text = "Its files are damaged, or of another version."
+            return ReportRow(name=name, made_ns=made_ns, verdict="unreadable", said=text)
         job = self.job(folder)
         confirm = report.fit.confirm if report.fit else _Errors()
         return ReportRow(

@@ -31,7 +31,7 @@ class ScanWatch:
             del self._watched[vehicle]
             self._newest.pop(vehicle, None)
 
-    def take(self, scan: LidarScan, t_ns: int) -> None:
+    def receive(self, scan: LidarScan, t_ns: int) -> None:
         """Keep a scan of a watched car."""
         if scan.vehicle in self._watched:
             self._newest[scan.vehicle] = Held(scan, t_ns)

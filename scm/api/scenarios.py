@@ -25,7 +25,7 @@ import msgspec
 import scm
 from scm.api.city import not_found
 from scm.api.keys import KeyRing
-from scm.api.operations import Cancelled, Operations, Teller
+from scm.api.operations import Cancelled, Operations, ProgressReporter
 from scm.api.problem import RefusedError
 from scm.errors import ScmError
 from scm.records.operations import Operation
@@ -33,7 +33,7 @@ from scm.records.scenarios import Lines, Scenario
 from scm.v2x.message import Refused
 
 NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,59}$"
-KEPT_LINES, KEPT_RUNS, LINE_CHARACTERS = 2000, 50, 2000
+MAX_LINES, MAX_RUNS, LINE_CHARACTERS = 2000, 50, 2000
 LOOK_S, GRACE_S = 0.1, 8.0
 SHIPPED = Path(scm.__file__).parents[1] / "examples"
 KIND = "scenario"
@@ -48,7 +48,7 @@ runpy.run_path(sys.argv[0], run_name="__main__")
 """
 
 
-class ScenarioShelf:
+class ScenarioRepository:
     """The scripts of a folder, and those that came with the program.
 
     Attributes:
@@ -98,8 +98,8 @@ class ScenarioShelf:
             compile(text, f"{name}.py", "exec", dont_inherit=True)
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             line = f", line {error.lineno}" if isinstance(error, SyntaxError) else ""
-            said = error.msg if isinstance(error, SyntaxError) else str(error)
-            detail = f"{name}.py{line}: expected a Python script: {said}"
+            text = error.msg if isinstance(error, SyntaxError) else str(error)
+            detail = f"{name}.py{line}: expected a Python script: {text}"
             raise RefusedError(Refused(code="invalid", detail=detail)) from None
         assert self._folder is not None  # noqa: S101  or it would not be one's own
         file = self._folder / f"{name}.py"
@@ -109,7 +109,7 @@ class ScenarioShelf:
             fresh.write_text(text, "utf-8")
             fresh.replace(file)
         except OSError as cause:
-            raise _not_kept(name, cause) from None
+            raise _not_written(name, cause) from None
         return self._read(file)
 
     def remove(self, name: str) -> None:
@@ -123,7 +123,7 @@ class ScenarioShelf:
         try:
             path.unlink()
         except OSError as cause:
-            raise _not_kept(name, cause) from None
+            raise _not_written(name, cause) from None
 
     def _check_own(self, name: str) -> None:
         if self._folder is None:
@@ -157,16 +157,16 @@ class ScenarioRuns:
 
     def __init__(
         self,
-        shelf: ScenarioShelf,
+        repository: ScenarioRepository,
         work: Operations,
         connect: str,
         credentials: Path | None,
         keys: KeyRing | None,
     ) -> None:
-        self._shelf, self._work, self._connect, self._keys = shelf, work, connect, keys
-        self._told = {"SCM_CONNECT": connect, "PYTHONUNBUFFERED": "1"}
+        self._repository, self._work, self._connect, self._keys = repository, work, connect, keys
+        self._environment = {"SCM_CONNECT": connect, "PYTHONUNBUFFERED": "1"}
         if credentials is not None:
-            self._told["SCM_CREDENTIALS"] = str(credentials.absolute())
+            self._environment["SCM_CREDENTIALS"] = str(credentials.absolute())
         self._lock = threading.Lock()
         self._printed: OrderedDict[str, _Printed] = OrderedDict()
 
@@ -182,19 +182,19 @@ class ScenarioRuns:
         Raises:
             RefusedError: when there is none of that name, or too many wait.
         """
-        path = self._shelf.path(name)
+        path = self._repository.path(name)
         with self._lock:
             printed = _Printed()
             filled = [one.replace(_CONNECT, self._connect) for one in arguments]
 
-            def work(tell: Teller) -> str:
-                with self._lent(key, name) as told:
-                    return self._run(path, filled, printed, tell, told)
+            def work(progress: ProgressReporter) -> str:
+                with self._lent(key, name) as environment:
+                    return self._run(path, filled, printed, progress, environment)
 
             row = self._work.start(KIND, name, work, owner=owner)
             printed.run = row.id
             self._printed[row.id] = printed
-            while len(self._printed) > KEPT_RUNS:
+            while len(self._printed) > MAX_RUNS:
                 self._printed.popitem(last=False)
         return row
 
@@ -223,15 +223,15 @@ class ScenarioRuns:
                 file.flush()
                 yield {"SCM_API_KEY_FILE": file.name}
         finally:
-            self._keys.take_back(lent)
+            self._keys.end_lent(lent)
 
     def _run(
         self,
         path: Path,
         arguments: list[str],
         printed: "_Printed",
-        tell: Teller,
-        told: Mapping[str, str],
+        progress: ProgressReporter,
+        environment: Mapping[str, str],
     ) -> str:
         try:
             process = subprocess.Popen(
@@ -241,7 +241,7 @@ class ScenarioRuns:
                 stderr=subprocess.STDOUT,
                 text=True,
                 errors="replace",
-                env={**os.environ, **self._told, **told},
+                env={**os.environ, **self._environment, **environment},
                 start_new_session=True,
             )
         except OSError as cause:
@@ -252,8 +252,8 @@ class ScenarioRuns:
         reader.start()
         try:
             while process.poll() is None:
-                tell(printed.last() or "runs")
-                tell.cancelled.wait(LOOK_S)
+                progress(printed.last() or "runs")
+                progress.cancelled.wait(LOOK_S)
         except Cancelled:
             _end(process)
             raise
@@ -281,7 +281,7 @@ class _Printed:
             while line := stream.readline(LINE_CHARACTERS):
                 with self._lock:
                     self._lines.append(line.rstrip("\n"))
-                    if len(self._lines) > KEPT_LINES:
+                    if len(self._lines) > MAX_LINES:
                         del self._lines[0]
                         self._first += 1
 
@@ -311,6 +311,6 @@ def _end(process: "subprocess.Popen[str]") -> None:
             return
 
 
-def _not_kept(name: str, cause: OSError) -> RefusedError:
+def _not_written(name: str, cause: OSError) -> RefusedError:
     detail = f"{name}.py: cannot be changed: {cause.strerror or cause}"
     return RefusedError(Refused(code="not_written", detail=detail))

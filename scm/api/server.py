@@ -157,10 +157,10 @@ async def _serve(
     on_ready: Callable[[str], None] | None,
 ) -> None:
     serving = asyncio.create_task(server.serve([listener]))
-    told = False
+    is_announced = False
     while not (stop_event.is_set() or serving.done()):  # a thread's event: it has to be polled
-        if server.started and not told:
-            told = True
+        if server.started and not is_announced:
+            is_announced = True
             if on_ready is not None:
                 on_ready(_address(listener))
         await asyncio.sleep(_POLL_S)

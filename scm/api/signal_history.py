@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.records.signal_history import (
     Bar,
+    ForecastScore,
     GroupBars,
     History,
     LeadScore,
-    PromiseScore,
     Running,
     Verdict,
 )
@@ -25,11 +25,11 @@ from scm.records.signals import SignalGroup
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Spat
 
-KEPT_S = 600
+HISTORY_S = 600
 GAP_NS = 1_000 * NS_PER_MS
 LEADS_S = (2, 5, 10, 20)
 CLOSE_S = 1.0
-VERDICTS_KEPT = 50
+MAX_VERDICTS = 50
 _UNPROMISED = ("flashing_red", "dark")
 
 
@@ -54,15 +54,15 @@ class _Shown:
     start_ns: int
     earliest_ns: int
     latest_ns: int | None
-    told: list[tuple[int, int | None, float]] = field(default_factory=list)
+    forecasts: list[tuple[int, int | None, float]] = field(default_factory=list)
 
     def note(self, group: SignalGroup, now_ns: int) -> None:
         self.earliest_ns = max(self.earliest_ns, group.min_end_ns)
         if group.max_end_ns is not None:
             latest_ns = self.latest_ns
             self.latest_ns = min(group.max_end_ns, latest_ns or group.max_end_ns)
-        if not self.told or self.told[-1][1] != group.likely_end_ns:
-            self.told.append((now_ns, group.likely_end_ns, group.likely_confidence or 0.0))
+        if not self.forecasts or self.forecasts[-1][1] != group.likely_end_ns:
+            self.forecasts.append((now_ns, group.likely_end_ns, group.likely_confidence or 0.0))
 
     def judged(self, end_ns: int, *, cut: bool) -> _Judged:
         leads = [] if cut else [(lead_s, self._error(end_ns, lead_s)) for lead_s in LEADS_S]
@@ -80,10 +80,10 @@ class _Shown:
     def _error(self, end_ns: int, lead_s: int) -> tuple[float, float] | None:
         """Return how far the likely end was off that was told some time before the end."""
         at_ns = end_ns - lead_s * NS_PER_S
-        told = next((one for one in reversed(self.told) if one[0] <= at_ns), None)
-        if told is None or told[1] is None:
+        forecasts = next((one for one in reversed(self.forecasts) if one[0] <= at_ns), None)
+        if forecasts is None or forecasts[1] is None:
             return None
-        return round(seconds(told[1] - end_ns), 3), told[2]
+        return round(seconds(forecasts[1] - end_ns), 3), forecasts[2]
 
 
 @dataclass(slots=True)
@@ -102,7 +102,7 @@ class JunctionHistory:
         self._ran: deque[Running] = deque()
         self._t_ns: int | None = None
 
-    def take(self, spat: Spat) -> None:
+    def receive(self, spat: Spat) -> None:
         """Note what is shown and told."""
         now_ns, last_ns = spat.t_ns, self._t_ns
         if last_ns is not None and now_ns < last_ns:
@@ -114,9 +114,11 @@ class JunctionHistory:
         running = (spat.mode, spat.plan)
         if not self._ran or (self._ran[-1].mode, self._ran[-1].plan) != running:
             self._ran.append(Running(t_ns=now_ns, mode=spat.mode, plan=spat.plan))
-        for told in spat.groups:
-            self._take_group(self._groups.setdefault(told.group, _Group()), told, now_ns)
-        self._forget(now_ns - KEPT_S * NS_PER_S)
+        for forecasts in spat.groups:
+            self._receive_group(
+                self._groups.setdefault(forecasts.group, _Group()), forecasts, now_ns
+            )
+        self._forget(now_ns - HISTORY_S * NS_PER_S)
 
     def history(self, names: Iterable[str]) -> History:
         """Return what was shown, of the groups named, in their order."""
@@ -124,17 +126,17 @@ class JunctionHistory:
         return History(
             junction=self._junction,
             t_ns=self._t_ns,
-            kept_s=KEPT_S,
+            kept_s=HISTORY_S,
             groups=tuple(GroupBars(group=name, bars=_bars(group)) for name, group in groups),
             ran=tuple(self._ran),
         )
 
-    def score(self) -> PromiseScore:
+    def score(self) -> ForecastScore:
         """Return what became of what was told."""
         ended = [one for group in self._groups.values() for one in group.judged]
-        return PromiseScore(
+        return ForecastScore(
             junction=self._junction,
-            kept_s=KEPT_S,
+            kept_s=HISTORY_S,
             judged=sum(not one.cut for one in ended),
             early=sum(one.early for one in ended),
             late=sum(one.late for one in ended),
@@ -147,17 +149,19 @@ class JunctionHistory:
             ),
         )
 
-    def _take_group(self, group: _Group, told: SignalGroup, now_ns: int) -> None:
+    def _receive_group(self, group: _Group, forecasts: SignalGroup, now_ns: int) -> None:
         shown = group.shown
-        if shown is None or shown.colour != told.colour:
+        if shown is None or shown.colour != forecasts.colour:
             if shown is not None:
-                group.bars.append(_bar(shown, told.since_ns))
+                group.bars.append(_bar(shown, forecasts.since_ns))
                 if shown.colour not in _UNPROMISED:
-                    cut = told.colour in _UNPROMISED
-                    group.judged.append(shown.judged(told.since_ns, cut=cut))
-            start_ns = told.since_ns if shown is not None else now_ns
-            shown = group.shown = _Shown(told.colour, start_ns, told.min_end_ns, told.max_end_ns)
-        shown.note(told, now_ns)
+                    cut = forecasts.colour in _UNPROMISED
+                    group.judged.append(shown.judged(forecasts.since_ns, cut=cut))
+            start_ns = forecasts.since_ns if shown is not None else now_ns
+            shown = group.shown = _Shown(
+                forecasts.colour, start_ns, forecasts.min_end_ns, forecasts.max_end_ns
+            )
+        shown.note(forecasts, now_ns)
 
     def _interrupt(self, last_ns: int) -> None:
         """Nothing was heard for a while: what was shown then is not known, nor when it ended."""
@@ -183,24 +187,27 @@ class SignalHistory:
         self._junctions: dict[str, JunctionHistory] = {}
         self._verdicts: dict[str, deque[Verdict]] = {}
 
-    def take(self, spat: Spat) -> None:
+    def receive(self, spat: Spat) -> None:
         """Note what a junction shows and tells."""
         if spat.junction not in self._junctions:
             self._junctions[spat.junction] = JunctionHistory(spat.junction)
-        self._junctions[spat.junction].take(spat)
+        self._junctions[spat.junction].receive(spat)
 
-    def take_monitor(self, status: MonitorStatus) -> None:
+    def receive_monitor(self, status: MonitorStatus) -> None:
         """Note what a monitor says, when it says something else."""
-        said = self._verdicts.setdefault(status.junction, deque(maxlen=VERDICTS_KEPT))
-        if not said or (said[-1].fault, said[-1].detail) != (status.fault, status.detail):
+        verdicts = self._verdicts.setdefault(status.junction, deque(maxlen=MAX_VERDICTS))
+        if not verdicts or (verdicts[-1].fault, verdicts[-1].detail) != (
+            status.fault,
+            status.detail,
+        ):
             verdict = Verdict(t_ns=status.t_ns, fault=status.fault, detail=status.detail)
-            said.append(verdict)
+            verdicts.append(verdict)
 
     def history(self, junction: str, groups: Iterable[str]) -> History:
         """Return what a junction's groups showed."""
         return self._of(junction).history(groups)
 
-    def score(self, junction: str) -> PromiseScore:
+    def score(self, junction: str) -> ForecastScore:
         """Return what became of what a junction told."""
         return self._of(junction).score()
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import msgspec
 
-from scm.api.operations import Teller
+from scm.api.operations import ProgressReporter
 from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.errors import PlanError
@@ -23,11 +23,11 @@ from scm.v2x.plan_file import PlanFile
 
 MOST_PLANS = 50
 PLAN_NAME = re.compile(r"[a-z][a-z0-9_-]{0,31}")
-PROOFS_KEPT = 200
+MAX_PROOFS = 200
 LOOK_S = 0.2
 
 
-class PlanShelf:
+class PlanRepository:
     """The plans of all junctions; safe from any thread.
 
     Attributes:
@@ -90,18 +90,18 @@ class PlanShelf:
         with self._lock:
             return self._proofs.get(digest)
 
-    def prove(self, file: PlanFile, tell: Teller) -> str:
+    def prove(self, file: PlanFile, progress: ProgressReporter) -> str:
         """Run the search in a process of its own; return the address of the proof.
 
         Raises:
             PlanError: saying what is not as it must be.
             Cancelled: when it was called off.
         """
-        tell("walks through every state of kernel and plan")
-        found = _search(file, tell)
+        progress("walks through every state of kernel and plan")
+        found = _search(file, progress)
         with self._lock:
             self._proofs[found.digest] = found
-            while len(self._proofs) > PROOFS_KEPT:
+            while len(self._proofs) > MAX_PROOFS:
                 self._proofs.popitem(last=False)
         return f"/api/v1/signals/{file.junction}/proofs/{found.digest}"
 
@@ -112,7 +112,7 @@ class PlanShelf:
         return self.folder / junction / f"{plan}.json"
 
 
-def _search(file: PlanFile, tell: Teller) -> PlanProof:
+def _search(file: PlanFile, progress: ProgressReporter) -> PlanProof:
     command = [sys.executable, "-m", "scm", "plan", "prove", "-"]
     pipe = subprocess.PIPE
     given: bytes | None = msgspec.json.encode(file)
@@ -121,15 +121,15 @@ def _search(file: PlanFile, tell: Teller) -> PlanProof:
         try:
             while True:
                 try:
-                    out, said = process.communicate(given, timeout=LOOK_S)
+                    out, error_text = process.communicate(given, timeout=LOOK_S)
                     break
                 except subprocess.TimeoutExpired:
                     given = None
-                    tell("walks through every state of kernel and plan")
+                    progress("walks through every state of kernel and plan")
         except BaseException:
             process.kill()
             raise
     if process.returncode != 0:
-        words = said.decode("utf-8", "replace").strip().splitlines()
+        words = error_text.decode("utf-8", "replace").strip().splitlines()
         raise PlanError(words[-1] if words else "the search ended without a word")
     return msgspec.json.decode(out, type=PlanProof)

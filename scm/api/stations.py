@@ -39,12 +39,15 @@ class StationTable:
 
     def status(self, status: PartStatus, now_ns: int) -> None:
         """Note what a station says of itself."""
-        told = self._status.setdefault(status.station, deque())
-        if told and (status.steps, status.dropped) < (told[-1][0].steps, told[-1][0].dropped):
-            told.clear()  # it was started again, and counts from nought
-        told.append((status, now_ns))
-        while len(told) > 2 and told[1][1] <= now_ns - LATELY_NS:
-            told.popleft()
+        reports = self._status.setdefault(status.station, deque())
+        if reports and (status.steps, status.dropped) < (
+            reports[-1][0].steps,
+            reports[-1][0].dropped,
+        ):
+            reports.clear()  # it was started again, and counts from nought
+        reports.append((status, now_ns))
+        while len(reports) > 2 and reports[1][1] <= now_ns - LATELY_NS:
+            reports.popleft()
 
     def forget(self, now_ns: int) -> None:
         """Drop those lost for more than 60 s, and what was last heard from them."""
@@ -52,8 +55,8 @@ class StationTable:
             if row.lost_ns is not None and now_ns - row.lost_ns > LOST_SHOWN_NS:
                 del self._rows[key]
         names = {row.name for row in self._rows.values()}
-        for name, told in list(self._status.items()):
-            if name not in names and now_ns - told[-1][1] > LOST_SHOWN_NS:
+        for name, reports in list(self._status.items()):
+            if name not in names and now_ns - reports[-1][1] > LOST_SHOWN_NS:
                 del self._status[name]
 
     def rows(self, now_ns: int) -> tuple[StationRow, ...]:

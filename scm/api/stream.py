@@ -25,7 +25,7 @@ from scm.api.topics import EVENTS, topics_of
 _LOGGER = logging.getLogger(__name__)
 
 PERIOD_S = 0.05
-BEAT_FRAMES = 20
+HEARTBEAT_FRAMES = 20
 EVENTS_SHOWN = 100
 CARS_A_FRAME = 250  # so many more cars, one frame longer to wait: pages draw on by themselves
 QUEUE_DEPTH = 20  # frames: one second
@@ -40,7 +40,7 @@ class Listener:
 
     def __init__(self, topics: frozenset[str]) -> None:
         self.topics = topics
-        self.told_seq: int | None = None
+        self.sent_seq: int | None = None
         self._frames: deque[tuple[bytes, int]] = deque()
         self._wake = asyncio.Event()
         self.behind = False
@@ -62,14 +62,14 @@ class Listener:
         self.closed = True
         self._wake.set()
 
-    async def take(self) -> bytes | None:
+    async def next_frame(self) -> bytes | None:
         """Wait for the next frame; None: the page is behind or closed."""
         while not (self._frames or self.behind or self.closed):
             self._wake.clear()
             await self._wake.wait()
         if self.behind or self.closed:
             return None
-        frame, self.told_seq = self._frames.popleft()
+        frame, self.sent_seq = self._frames.popleft()
         return frame
 
 
@@ -82,7 +82,7 @@ class Stream:
         self._listeners: set[Listener] = set()
         self._sent: dict[str, bytes] = {}
         self._frame = 0
-        self._failed_frame = -BEAT_FRAMES
+        self._failed_frame = -HEARTBEAT_FRAMES
         self._event_seq = 0
         self._closed = False
         self._topics = topics_of(city, seen)
@@ -145,12 +145,12 @@ class Stream:
         if not self._listeners:
             self._event_seq = self._city.view.picture().event_seq
         listener = Listener(frozenset(self.topics if topics is None else topics))
-        listener.told_seq = self._resume_seq(last_event_id)
+        listener.sent_seq = self._resume_seq(last_event_id)
         self._listeners.add(listener)
         try:
             yield b"retry: 1000\n\n" + self._snapshot(listener)
             while not (self._closed or listener.closed):
-                frame = await listener.take()
+                frame = await listener.next_frame()
                 if frame is not None:
                     yield frame
                 elif listener.behind:
@@ -160,7 +160,7 @@ class Stream:
             self._listeners.discard(listener)
 
     def _log_failure(self, failure: Exception) -> None:
-        if self._frame - self._failed_frame >= BEAT_FRAMES:
+        if self._frame - self._failed_frame >= HEARTBEAT_FRAMES:
             self._failed_frame = self._frame
             _LOGGER.error("stream_frame_failed frame=%d", self._frame, exc_info=failure)
 
@@ -169,14 +169,14 @@ class Stream:
         own = {name: body for name, body in changed.items() if name in topics}
         if own:
             return self._event("delta", own, self._event_seq)
-        beat_is_due = self._frame % BEAT_FRAMES == 0
-        return self._event("beat", own, self._event_seq) if beat_is_due else None
+        heartbeat_is_due = self._frame % HEARTBEAT_FRAMES == 0
+        return self._event("beat", own, self._event_seq) if heartbeat_is_due else None
 
     def _changed(self, picture: Picture) -> dict[str, msgspec.Raw]:
         changed: dict[str, msgspec.Raw] = {}
-        heard = frozenset[str]().union(*(listener.topics for listener in self._listeners))
+        wanted = frozenset[str]().union(*(listener.topics for listener in self._listeners))
         for name, topic in self._topics.items():
-            if name in heard and self._frame % (topic.every + _crowding(name, picture)) == 0:
+            if name in wanted and self._frame % (topic.every + _crowding(name, picture)) == 0:
                 body = encode(topic.make(picture))
                 if self._sent.get(name) != body:
                     self._sent[name] = body
@@ -191,9 +191,9 @@ class Stream:
         """Return everything as it is; of events those that no delta told it, nor the next will."""
         picture = self._city.view.picture()
         newest = self._event_seq
-        after_seq = min(max(listener.told_seq or 0, newest - EVENTS_SHOWN), newest)
+        after_seq = min(max(listener.sent_seq or 0, newest - EVENTS_SHOWN), newest)
         events = self._city.view.events_after(after_seq, newest - after_seq)
-        listener.told_seq = newest
+        listener.sent_seq = newest
         body = {
             name: msgspec.Raw(encode(topic.make(picture)))
             for name, topic in self._topics.items()

@@ -19,26 +19,27 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from scm.api.city import City
 from scm.api.problem import RefusedError
 from scm.api.trip_resume import RESUME_NS, RESUME_PAUSE_S, onward, trip_of
-from scm.api.wheel import (
-    LEASE_MS,
-    DrivePacket,
-    GiveBackPacket,
-    Packet,
-    TakePacket,
-    Wheel,
-)
+from scm.api.wheel import LEASE_MS, Wheel
 from scm.api.wire import Wire
 from scm.clock import Clock, seconds
 from scm.errors import LinkError, StoreError
 from scm.log import event
+from scm.records.drive import (
+    Acquired,
+    AcquirePacket,
+    DrivePacket,
+    DriveStatus,
+    GiveBackPacket,
+    Over,
+    Packet,
+)
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.trip import Trip
 
-PROTOCOL = "scm.drive.v1"
-BEAT_S = 0.05
+PERIOD_S = 0.05
 GAP_S = 0.01
 FIRST_WORD_S = 5.0
 RENEW_TIMEOUT_S = 0.7
@@ -47,48 +48,10 @@ NORMAL, GOING_AWAY, BAD_PACKET, NOT_YOURS = 1000, 1001, 1007, 4409
 _log = logging.getLogger(__name__)
 
 
-class Taken(msgspec.Struct, kw_only=True, frozen=True, tag="taken"):
-    """The wheel is yours."""
-
-    vehicle: str
-    owner: str
-    epoch: int
-
-
-class Told(msgspec.Struct, kw_only=True, frozen=True, tag="told"):
-    """What became of your newest packet.
-
-    Attributes:
-        seq, t_ms: Of that packet, to measure the way; None: none came yet.
-        why: `driving`, `released` (no hand on the dead-man) or `silent` (no packet for 250 ms).
-        throttle, steering: What the car was told.
-        mode: The car's, as the world last told it: `stop` also while the city is stopped.
-    """
-
-    seq: int | None
-    t_ms: float | None
-    why: str
-    throttle: float
-    steering: float
-    mode: str
-    speed_mps: float | None
-
-
-class Over(msgspec.Struct, kw_only=True, frozen=True, tag="over"):
-    """You do not hold the wheel: refused, lost, or given back; the connection ends.
-
-    Attributes:
-        code: `given_back`, `abandoned`, `lost`, `ended`, or the city's word for its refusal.
-    """
-
-    code: str
-    detail: str
-
-
 _packets: msgspec.json.Decoder[Packet] = msgspec.json.Decoder(Packet)
 
 
-class Seat:
+class DriveSession:
     """One connection of one person to one car.
 
     Args:
@@ -129,14 +92,14 @@ class Seat:
             return
         trip = trip_of(self._city.view, self._vehicle)
         try:
-            lease = await asyncio.to_thread(self._take, first.reason)
+            lease = await asyncio.to_thread(self._acquire, first.reason)
         except RefusedError as refusal:
             await self._end(Over(code=refusal.refused.code, detail=str(refusal)), NOT_YOURS)
             return
         wheel = Wheel(self._vehicle, self._owner, lease.epoch, self._clock.now_ns())
         reading: asyncio.Task[None] | None = None
         try:
-            await self._send(Taken(vehicle=self._vehicle, owner=self._owner, epoch=lease.epoch))
+            await self._send(Acquired(vehicle=self._vehicle, owner=self._owner, epoch=lease.epoch))
             reading = asyncio.create_task(self._read(wheel))
             await self._drive(wheel)
         except (WebSocketDisconnect, RuntimeError):
@@ -146,11 +109,11 @@ class Seat:
                 reading.cancel()
             await asyncio.shield(self._leave(wheel, trip))
 
-    async def _first_word(self) -> TakePacket | None:
+    async def _first_word(self) -> AcquirePacket | None:
         try:
             word = await asyncio.wait_for(self._socket.receive_text(), FIRST_WORD_S)
             packet = _packets.decode(word)
-            if isinstance(packet, TakePacket):
+            if isinstance(packet, AcquirePacket):
                 return packet
             detail = f"the first packet: got a {type(packet).__name__}, expected a take"
             await self._end(Over(code="invalid", detail=detail), BAD_PACKET)
@@ -161,7 +124,7 @@ class Seat:
             pass
         return None
 
-    def _take(self, reason: str) -> LeaseReply:
+    def _acquire(self, reason: str) -> LeaseReply:
         request = LeaseRequest(
             vehicle=self._vehicle,
             owner=self._owner,
@@ -169,8 +132,8 @@ class Seat:
             ttl_ms=LEASE_MS,
             reason=reason,
         )
-        lease = self._city.ask(request, LeaseReply)
-        self._tell("wheel_taken", f"{self._owner} drives {self._vehicle} by hand")
+        lease = self._city.call(request, LeaseReply)
+        self._log_event("wheel_taken", f"{self._owner} drives {self._vehicle} by hand")
         return lease
 
     async def _read(self, wheel: Wheel) -> None:
@@ -181,7 +144,7 @@ class Seat:
                 if isinstance(packet, GiveBackPacket):
                     self._over = Over(code="given_back", detail="")
                 elif isinstance(packet, DrivePacket):
-                    wheel.hear(packet, self._clock.now_ns())
+                    wheel.receive(packet, self._clock.now_ns())
                 self._news.set()
         except (msgspec.MsgspecError, KeyError) as cause:
             self._over = Over(code="invalid", detail=f"packet: {cause}")
@@ -192,7 +155,7 @@ class Seat:
     async def _drive(self, wheel: Wheel) -> None:
         while self._over is None:
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._news.wait(), BEAT_S)
+                await asyncio.wait_for(self._news.wait(), PERIOD_S)
             self._news.clear()
             now_ns = self._clock.now_ns()
             if self._over is None:
@@ -207,7 +170,7 @@ class Seat:
     async def _pass_on(self, wheel: Wheel, now_ns: int) -> None:
         command = wheel.command(now_ns)
         try:
-            self._wire.say(command)
+            self._wire.publish(command)
         except LinkError as closed:
             self._over = Over(code="offline", detail=str(closed))
             return
@@ -219,7 +182,7 @@ class Seat:
         cars = () if snapshot is None else snapshot.message.vehicles
         car = next((car for car in cars if car.vehicle == self._vehicle), None)
         newest = wheel.newest
-        told = Told(
+        status = DriveStatus(
             seq=None if newest is None else newest.seq,
             t_ms=None if newest is None else newest.t_ms,
             why=wheel.why(now_ns),
@@ -228,7 +191,7 @@ class Seat:
             mode="lost" if car is None else car.mode,
             speed_mps=None if car is None else round(car.speed_mps, 4),
         )
-        await self._send(told)
+        await self._send(status)
 
     async def _renew(self, request: LeaseRequest) -> None:
         try:
@@ -241,7 +204,7 @@ class Seat:
             self._news.set()
             return
         try:
-            reply = await asyncio.to_thread(self._wire.ask_once, request, RENEW_TIMEOUT_S)
+            reply = await asyncio.to_thread(self._wire.request_once, request, RENEW_TIMEOUT_S)
         except LinkError as closed:
             reply = Refused(code="offline", detail=str(closed))
         if isinstance(reply, Refused) and reply.code not in ("timeout", "offline"):
@@ -251,11 +214,11 @@ class Seat:
     async def _leave(self, wheel: Wheel, trip: Trip | None) -> None:
         over = self._over or Over(code="ended", detail="the connection ended")
         if over.code != "lost":
-            told = await self._give_back(wheel, trip)
-            over = Over(code=over.code, detail=f"{over.detail}; {told}".removeprefix("; "))
-        self._tell("wheel_left", f"{self._owner} let go of {self._vehicle}: {over.detail}")
-        status = {"given_back": NORMAL, "invalid": BAD_PACKET, "lost": NOT_YOURS}
-        await self._end(over, status.get(over.code, GOING_AWAY))
+            status = await self._give_back(wheel, trip)
+            over = Over(code=over.code, detail=f"{over.detail}; {status}".removeprefix("; "))
+        self._log_event("wheel_left", f"{self._owner} let go of {self._vehicle}: {over.detail}")
+        codes = {"given_back": NORMAL, "invalid": BAD_PACKET, "lost": NOT_YOURS}
+        await self._end(over, codes.get(over.code, GOING_AWAY))
 
     async def _give_back(self, wheel: Wheel, trip: Trip | None) -> str:
         """Return the lease, send the car on where it was going, and say how that went."""
@@ -263,7 +226,7 @@ class Seat:
             vehicle=self._vehicle, owner=self._owner, verb="release", epoch=wheel.epoch
         )
         try:
-            await asyncio.to_thread(self._city.ask, request, LeaseReply)
+            await asyncio.to_thread(self._city.call, request, LeaseReply)
         except RefusedError as refusal:
             return f"the lease was not given back: {refusal}"
         return f"{self._vehicle} stands" if trip is None else await self._resume(trip)
@@ -273,24 +236,24 @@ class Seat:
         until_ns = self._clock.now_ns() + RESUME_NS
         request = onward(self._city.view, trip)
         while True:
-            answer = await asyncio.to_thread(self._ask_route, request)
+            answer = await asyncio.to_thread(self._request_route, request)
             if not isinstance(answer, Refused):
                 return f"{self._vehicle} goes on by itself"
             if answer.code != "owned" or self._clock.now_ns() >= until_ns:
                 return f"{self._vehicle} stands: {answer.detail.removeprefix(f'{self._vehicle}: ')}"
             await asyncio.sleep(RESUME_PAUSE_S)
 
-    def _ask_route(self, request: RouteRequest) -> Message:
+    def _request_route(self, request: RouteRequest) -> Message:
         try:
-            return self._city.ask(request, RouteReply)
+            return self._city.call(request, RouteReply)
         except RefusedError as refusal:
             return refusal.refused
 
-    def _tell(self, name: str, text: str) -> None:
+    def _log_event(self, name: str, text: str) -> None:
         now_ns = self._clock.now_ns()
         event(_log, name, vehicle=self._vehicle, owner=repr(self._owner), t_s=seconds(now_ns))
         with contextlib.suppress(LinkError):
-            self._wire.say(
+            self._wire.publish(
                 CityEvent(
                     severity="info",
                     source=self._city.view.name,
@@ -301,7 +264,7 @@ class Seat:
                 )
             )
 
-    async def _send(self, word: Taken | Told | Over) -> None:
+    async def _send(self, word: Acquired | DriveStatus | Over) -> None:
         await self._socket.send_text(msgspec.json.encode(word).decode())
 
     async def _end(self, over: Over, status: int) -> None:

@@ -64,14 +64,14 @@ def pulse_of(picture: Picture) -> Pulse:
             t_ns=None, tick=None, real_time_factor=0.0, late_ticks=0, vehicles=0, moving=0,
             silent_signals=silent, disturbances=disturbances,
         )  # fmt: skip
-    told = picture.snapshot.message
+    snapshot = picture.snapshot.message
     return Pulse(
-        t_ns=told.t_ns,
-        tick=told.tick,
-        real_time_factor=round(told.real_time_factor, 3),
-        late_ticks=told.late_ticks,
-        vehicles=len(told.vehicles),
-        moving=sum(abs(car.speed_mps) > STANDS_MPS for car in told.vehicles),
+        t_ns=snapshot.t_ns,
+        tick=snapshot.tick,
+        real_time_factor=round(snapshot.real_time_factor, 3),
+        late_ticks=snapshot.late_ticks,
+        vehicles=len(snapshot.vehicles),
+        moving=sum(abs(car.speed_mps) > STANDS_MPS for car in snapshot.vehicles),
         silent_signals=silent,
         disturbances=disturbances,
     )

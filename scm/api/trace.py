@@ -74,7 +74,7 @@ class Traced:
             if message["type"] == "http.response.start":
                 MutableHeaders(scope=message)[HEADER] = own
                 if message["status"] >= 500:
-                    _tell(scope, message["status"], own)
+                    _log_request(scope, message["status"], own)
             await send(message)
 
         try:
@@ -83,7 +83,7 @@ class Traced:
             _current.reset(token)
 
 
-def _tell(scope: Scope, status: int, own: str) -> None:
+def _log_request(scope: Scope, status: int, own: str) -> None:
     path = quote(str(scope["path"]))  # which may hold lines, and would write them into the log
     facts = {"method": scope["method"], "path": path, "status": status, "trace_id": own}
     event(_LOGGER, "request_failed", level=logging.WARNING, **facts)

@@ -35,18 +35,18 @@ MOST_DESCRIPTION_BYTES = 256 * 1024
 MOST_NESTED = 20  # each level costs the reader all that follow
 MOST_READING_S, MOST_READING_BYTES = 10, 2**30  # of a description, processor time and memory
 PATIENCE_S = 120.0  # on a busy computer
-KEPT = 20
+MAX_UPLOADS = 20
 ID = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 _CHUNK = 2**20
 _RUN = ".mcap"
 _ENTRY = b"PK\x01\x02"  # begins each entry of a zip's list of contents
 
 
-def take(shelf: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Upload:
+def store(folder: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Upload:
     """Unpack a recording below `shelf` and return what it is.
 
     Args:
-        shelf: Of reports: uploads lie in a folder of it.
+        folder: Of reports: uploads lie in a folder of it.
         body: The zip, wherever it was read to.
         name: What the sender calls it: the id begins with it.
         cars: Names of the car files that it may ask for.
@@ -56,7 +56,7 @@ def take(shelf: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Uploa
     """
     stem = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40] or "upload"
     upload = f"{stem}-{secrets.token_hex(4)}"
-    folder = shelf / FOLDER / upload
+    folder = folder / FOLDER / upload
     folder.mkdir(parents=True)
     try:
         size = _unpack(body, folder)
@@ -65,7 +65,7 @@ def take(shelf: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Uploa
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
-    _forget(shelf / FOLDER)
+    _forget(folder / FOLDER)
     files = sum(path.is_file() for path in folder.rglob("*"))
     return Upload(upload=upload, files=files, size_bytes=size, vehicles=vehicles)
 
@@ -227,10 +227,10 @@ def _vehicles(description: Description, folder: Path, cars: tuple[str, ...]) -> 
     return vehicles
 
 
-def _forget(shelf: Path) -> None:
+def _forget(folder: Path) -> None:
     """Remove the oldest uploads beyond those that are kept."""
-    there = sorted(shelf.iterdir(), key=lambda path: path.stat().st_mtime_ns)
-    for old in there[: max(0, len(there) - KEPT)]:
+    there = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime_ns)
+    for old in there[: max(0, len(there) - MAX_UPLOADS)]:
         shutil.rmtree(old, ignore_errors=True)
 
 

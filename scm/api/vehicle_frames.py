@@ -39,7 +39,7 @@ VERSION, NAMES, STATES = 1, 1, 2
 MEDIA_TYPE = "application/octet-stream"
 COLUMNS = ("x_m", "y_m", "yaw_rad", "speed_mps", "steering_rad", "age_ms", "done_m", "length_m")
 LOOK_S = 0.02
-BEAT_LOOKS = 50  # looks without news until the last states are sent again: shows that we live
+HEARTBEAT_LOOKS = 50  # looks without news until the last states are sent again: shows that we live
 MOST_WORDS = 31  # five bits
 MOST_LIGHTS = 21
 TRIP_SHOWN_S = 10.0
@@ -84,7 +84,7 @@ class VehicleFrames:
         self._vehicles: tuple[NamedVehicle, ...] = ()
         self._modes, self._waits = Words(MOST_WORDS, "idle"), Words(MOST_WORDS, "")
         self._lights = Words(MOST_LIGHTS)
-        self._told = (0, 0, 0)
+        self._sent_words = (0, 0, 0)
         self._generation = 0
         self._names = b""
         self._states = b""
@@ -99,14 +99,14 @@ class VehicleFrames:
         silent = 0
         while not self._closed:
             silent = 0 if self.look() else silent + 1
-            if silent and silent % BEAT_LOOKS == 0:
-                self._tell()
+            if silent and silent % HEARTBEAT_LOOKS == 0:
+                self._notify()
             await asyncio.sleep(LOOK_S)
 
     def close(self) -> None:
         """End all streams; call it in the event loop."""
         self._closed = True
-        self._tell()
+        self._notify()
 
     def look(self) -> bool:
         """Encode the newest snapshot if it is new and somebody listens; return whether it was."""
@@ -115,7 +115,7 @@ class VehicleFrames:
             return False
         self._shown = held
         self._encode(held)
-        self._tell()
+        self._notify()
         return True
 
     async def listen(self) -> AsyncIterator[bytes]:
@@ -137,7 +137,7 @@ class VehicleFrames:
         finally:
             self._listeners -= 1
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         self._sequence += 1
         self._news.set()
         self._news = asyncio.Event()
@@ -169,9 +169,9 @@ class VehicleFrames:
             for car in cars
         )
         words = (len(self._modes.list), len(self._waits.list), len(self._lights.list))
-        if vehicles == self._vehicles and words == self._told and self._names:
+        if vehicles == self._vehicles and words == self._sent_words and self._names:
             return
-        self._vehicles, self._told = vehicles, words
+        self._vehicles, self._sent_words = vehicles, words
         self._generation += 1
         body = {
             "generation": self._generation,

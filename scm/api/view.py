@@ -25,7 +25,7 @@ from scm.disturbances import Disturbances
 from scm.geometry import Pose2
 from scm.records.events import LoggedEvent
 from scm.records.eye import ResidualSample, TrackRow
-from scm.records.signal_history import History, PromiseScore, Verdict
+from scm.records.signal_history import ForecastScore, History, Verdict
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
@@ -58,7 +58,7 @@ FRAME_DEPTH = 4
 TAGS_DEPTH = 8
 FORGET_NS = 60 * NS_PER_S
 VIOLATIONS_DEPTH = 500
-STOP_TOLD_NS = 3 * NS_PER_S  # of a world that speaks: it repeats an engaged stop each second
+STOP_EXPIRES_NS = 3 * NS_PER_S  # of a world that speaks: it repeats an engaged stop each second
 LONGEST_GAP_NS = 200 * NS_PER_MS  # between two snapshots; more is silence, not speech
 MOST_REPORTED = 500
 
@@ -103,36 +103,36 @@ class CityView(BasePart):
         self._stations = StationTable()
         self._disturbances = Disturbances()
         self._log = EventLog()
-        self._takers = self._always_heard()
-        self._always = tuple(Subscription(kind) for kind in self._takers)
-        self._takers[CameraFrame] = self._take_camera_frame
-        self._takers[LidarScan] = self._scans.take
-        self._takers[EyeTrack] = self._tracks.take
-        self._takers[VehicleState] = self._close_ups.take
+        self._receivers = self._receivers_of_all()
+        self._always = tuple(Subscription(kind) for kind in self._receivers)
+        self._receivers[CameraFrame] = self._receive_camera_frame
+        self._receivers[LidarScan] = self._scans.receive
+        self._receivers[EyeTrack] = self._tracks.receive
+        self._receivers[VehicleState] = self._close_ups.receive
         self.subscriptions: Sequence[Subscription] = self._always
 
-    def _always_heard(self) -> dict[type[Message], Callable[[Any, int], None]]:
+    def _receivers_of_all(self) -> dict[type[Message], Callable[[Any, int], None]]:
         """Return who takes each message that is heard whether somebody looks or not."""
         return {
-            WorldSnapshot: self._take_snapshot,
-            WorldDefinition: self._take_definition,
-            Spat: self._take_spat,
+            WorldSnapshot: self._receive_snapshot,
+            WorldDefinition: self._receive_definition,
+            Spat: self._receive_spat,
             SignalSite: lambda m, _: self._sites.update({m.junction: m}),
             SignalStatus: lambda m, t: self._signal_statuses.update({m.junction: Held(m, t)}),
-            MonitorStatus: self._take_monitor,
-            EyeFrame: self._take_frame,
-            EyeTags: self._take_tags,
-            EyePose: self._take_pose,
+            MonitorStatus: self._receive_monitor,
+            EyeFrame: self._receive_frame,
+            EyeTags: self._receive_tags,
+            EyePose: self._receive_pose,
             EyeStatus: lambda m, t: self._eye_statuses.update({m.camera: Held(m, t)}),
             Presence: self._stations.presence,
             PartStatus: self._stations.status,
             CityEvent: lambda m, _: self._log.add(m),
             Trip: lambda m, t: self._trips.update({m.vehicle: Held(m, t)}),
-            CityStop: self._take_stop,
-            TrafficCounts: self._take_counts,
+            CityStop: self._receive_stop,
+            TrafficCounts: self._receive_counts,
             Violation: lambda m, _: self._violations.append(m),
-            MisbehaviourScores: self._take_scores,
-            MisbehaviourReport: self._take_report,
+            MisbehaviourScores: self._receive_scores,
+            MisbehaviourReport: self._receive_report,
         }
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -141,7 +141,7 @@ class CityView(BasePart):
             self._now_ns = now_ns
             self._picture = None
             for incoming in inbox:
-                taker = self._takers.get(type(incoming.message))
+                taker = self._receivers.get(type(incoming.message))
                 if taker is not None:
                     taker(incoming.message, incoming.t_ns)
                 self._disturbances.receive(incoming)
@@ -217,7 +217,7 @@ class CityView(BasePart):
         with self._lock:
             return self._signal_history.history(junction, groups)
 
-    def signal_score(self, junction: str) -> PromiseScore:
+    def signal_score(self, junction: str) -> ForecastScore:
         """Return what became of what a junction told; safe from any thread."""
         with self._lock:
             return self._signal_history.score(junction)
@@ -267,8 +267,8 @@ class CityView(BasePart):
     def tracks(self) -> tuple[TrackRow, ...]:
         """Return the Eye's tracks, and hear them for some seconds more; safe from any thread."""
         with self._lock:
-            if self._tracks.ask(self._now_ns):
-                self._wish()
+            if self._tracks.subscribe(self._now_ns):
+                self._update_subscriptions()
             return self._tracks.rows(self._now_ns)
 
     @property
@@ -304,12 +304,12 @@ class CityView(BasePart):
     def _watch_closely(self, vehicle: str, more: int) -> None:
         with self._lock:
             self._close_ups.watch(vehicle, more)
-            self._wish()
+            self._update_subscriptions()
 
     def _watch_scan(self, vehicle: str, more: int) -> None:
         with self._lock:
             self._scans.watch(vehicle, more)
-            self._wish()
+            self._update_subscriptions()
 
     def _watch(self, which: tuple[str, str], more: int) -> None:
         with self._lock:
@@ -317,60 +317,60 @@ class CityView(BasePart):
             if self._watched[which] <= 0:
                 del self._watched[which]
                 self._camera_frames.pop(which, None)
-            self._wish()
+            self._update_subscriptions()
 
-    def _wish(self) -> None:
+    def _update_subscriptions(self) -> None:
         """Say what is to be heard now."""
         cameras = (
             Subscription(CameraFrame, {"vehicle": vehicle, "camera": camera})
             for vehicle, camera in self._watched
         )
         watched = (self._scans, self._close_ups, self._tracks)
-        asked = (each for one in watched for each in one.subscriptions())
-        self.subscriptions = (*self._always, *cameras, *asked)
+        requested = (each for one in watched for each in one.subscriptions())
+        self.subscriptions = (*self._always, *cameras, *requested)
 
-    def _take_camera_frame(self, frame: CameraFrame, t_ns: int) -> None:
+    def _receive_camera_frame(self, frame: CameraFrame, t_ns: int) -> None:
         which = (frame.vehicle, frame.camera)
         if which in self._watched:
             self._camera_frames[which] = Held(frame, t_ns)
 
-    def _take_snapshot(self, snapshot: WorldSnapshot, t_ns: int) -> None:
+    def _receive_snapshot(self, snapshot: WorldSnapshot, t_ns: int) -> None:
         if self._snapshot is not None:
             passed_ns = t_ns - self._snapshot.arrived_ns
             self._stop_untold_ns += max(0, min(passed_ns, LONGEST_GAP_NS))
-        if self._stop_untold_ns > STOP_TOLD_NS:
+        if self._stop_untold_ns > STOP_EXPIRES_NS:
             self._stop = None  # its release was missed: an engaged stop is repeated
         self._snapshot = Held(snapshot, t_ns)
         if self._truth and snapshot.t_ns < self._truth[-1].t_ns:
             self._truth.clear()  # the world was restarted: its time went back
         self._truth.append(snapshot)
 
-    def _take_definition(self, definition: WorldDefinition, _t_ns: int) -> None:
+    def _receive_definition(self, definition: WorldDefinition, _t_ns: int) -> None:
         self._definition = definition
 
-    def _take_spat(self, spat: Spat, t_ns: int) -> None:
+    def _receive_spat(self, spat: Spat, t_ns: int) -> None:
         self._spats[spat.junction] = Held(spat, t_ns)
-        self._signal_history.take(spat)
+        self._signal_history.receive(spat)
 
-    def _take_monitor(self, status: MonitorStatus, t_ns: int) -> None:
+    def _receive_monitor(self, status: MonitorStatus, t_ns: int) -> None:
         self._monitors[status.junction] = Held(status, t_ns)
-        self._signal_history.take_monitor(status)
+        self._signal_history.receive_monitor(status)
 
-    def _take_stop(self, stop: CityStop, _t_ns: int) -> None:
+    def _receive_stop(self, stop: CityStop, _t_ns: int) -> None:
         self._stop, self._stop_untold_ns = stop, 0
 
-    def _take_counts(self, counts: TrafficCounts, t_ns: int) -> None:
+    def _receive_counts(self, counts: TrafficCounts, t_ns: int) -> None:
         self._traffic = Held(counts, t_ns)
 
-    def _take_frame(self, frame: EyeFrame, t_ns: int) -> None:
+    def _receive_frame(self, frame: EyeFrame, t_ns: int) -> None:
         self._frames.setdefault(frame.camera, deque(maxlen=FRAME_DEPTH)).append(Held(frame, t_ns))
 
-    def _take_tags(self, tags: EyeTags, t_ns: int) -> None:
+    def _receive_tags(self, tags: EyeTags, t_ns: int) -> None:
         self._tags.setdefault(tags.camera, deque(maxlen=TAGS_DEPTH)).append(Held(tags, t_ns))
         for tag in tags.tags:
             self._tags_seen[tags.camera, tag.tag_id] = TagSighting(tag, tags.t_ns, t_ns)
 
-    def _take_pose(self, pose: EyePose, t_ns: int) -> None:
+    def _receive_pose(self, pose: EyePose, t_ns: int) -> None:
         truth = truth_at(self._truth, pose.vehicle, pose.t_ns)
         measured = Pose2(pose.x_m, pose.y_m, pose.yaw_rad)
         residual = residual_of(measured, truth) if truth is not None else None
@@ -378,10 +378,10 @@ class CityView(BasePart):
         if residual is not None:
             self._residuals.add(pose, residual)
 
-    def _take_scores(self, scores: MisbehaviourScores, t_ns: int) -> None:
+    def _receive_scores(self, scores: MisbehaviourScores, t_ns: int) -> None:
         self._scores = Held(scores, t_ns)
 
-    def _take_report(self, report: MisbehaviourReport, _t_ns: int) -> None:
+    def _receive_report(self, report: MisbehaviourReport, _t_ns: int) -> None:
         self._reports.pop(report.suspect, None)
         self._reports[report.suspect] = report
         if len(self._reports) > MOST_REPORTED:
@@ -390,7 +390,7 @@ class CityView(BasePart):
     def _forget(self, now_ns: int) -> None:
         self._stations.forget(now_ns)
         if self._tracks.forget(now_ns):
-            self._wish()
+            self._update_subscriptions()
         oldest_ns = now_ns - FORGET_NS
         for name in [n for n, trip in self._trips.items() if trip.arrived_ns < oldest_ns]:
             del self._trips[name]

@@ -9,11 +9,10 @@ Whatever passes here passes the car's own guard as well, which stops it when thi
 """
 
 import math
-from typing import Annotated, Literal
-
-import msgspec
+from typing import Literal
 
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.records.drive import DrivePacket
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseRequest
 
@@ -23,41 +22,6 @@ LEASE_MS = 3000  # the guard stops the car long before: this bridges a slow mome
 RENEW_NS = 700 * NS_PER_MS
 
 Why = Literal["driving", "released", "silent"]
-
-
-class TakePacket(msgspec.Struct, kw_only=True, frozen=True, tag="take", forbid_unknown_fields=True):
-    """The first word of a person; with a `reason` the car is taken from whoever has it."""
-
-    reason: Annotated[str, msgspec.Meta(max_length=500)] = ""
-
-
-class DrivePacket(
-    msgspec.Struct, kw_only=True, frozen=True, tag="drive", forbid_unknown_fields=True
-):
-    """What is wished for now.
-
-    Attributes:
-        seq: Counts up, below 2^53: more than that is no exact number in a browser.
-        t_ms: On the person's clock; comes back in the answer to this packet.
-        held: Whether a hand is on the dead-man: a key, a trigger, a pad.
-        throttle: -1 to 1, + = forward.
-        steering: -1 to 1, + = left.
-    """
-
-    seq: Annotated[int, msgspec.Meta(ge=-(2**53), le=2**53)]
-    t_ms: float
-    held: bool
-    throttle: float
-    steering: float
-
-
-class GiveBackPacket(
-    msgspec.Struct, kw_only=True, frozen=True, tag="give_back", forbid_unknown_fields=True
-):
-    """The last word of a person."""
-
-
-Packet = TakePacket | DrivePacket | GiveBackPacket
 
 
 class Wheel:
@@ -75,30 +39,30 @@ class Wheel:
         self.owner = owner
         self.epoch = epoch
         self.newest: DrivePacket | None = None
-        self._heard_ns = now_ns
+        self._received_ns = now_ns
         self._renew_ns = now_ns + RENEW_NS
         self._seq = 0
         self._steering = 0.0
 
-    def hear(self, packet: DrivePacket, now_ns: int) -> bool:
+    def receive(self, packet: DrivePacket, now_ns: int) -> bool:
         """Take a packet; refuse one that is old or holds no numbers; return which."""
         numbers = (packet.throttle, packet.steering, packet.t_ms)
         is_old = self.newest is not None and packet.seq <= self.newest.seq
         if is_old or not all(map(math.isfinite, numbers)):
             return False
-        self.newest, self._heard_ns = packet, now_ns
+        self.newest, self._received_ns = packet, now_ns
         self._steering = max(-1.0, min(1.0, packet.steering))
         return True
 
     def why(self, now_ns: int) -> Why:
         """Return whether the person drives, and why not."""
-        if now_ns - self._heard_ns >= SILENT_NS:
+        if now_ns - self._received_ns >= SILENT_NS:
             return "silent"
         return "driving" if self.newest is not None and self.newest.held else "released"
 
     def is_abandoned(self, now_ns: int) -> bool:
         """Return whether nobody has been there for so long that the car goes back."""
-        return now_ns - self._heard_ns >= GONE_NS
+        return now_ns - self._received_ns >= GONE_NS
 
     def command(self, now_ns: int) -> DriveCommand:
         """Return what the car is to do now."""

@@ -16,7 +16,7 @@ SLACK_S = 0.5
 class Wire(Protocol):
     """What teleoperation needs of the bus; safe from any thread."""
 
-    def say(self, message: Message) -> None:
+    def publish(self, message: Message) -> None:
         """Publish; never waits for a slow receiver.
 
         Raises:
@@ -24,7 +24,7 @@ class Wire(Protocol):
         """
         ...
 
-    def ask_once(self, request: Request, timeout_s: float) -> Message:
+    def request_once(self, request: Request, timeout_s: float) -> Message:
         """Return the reply, or a `Refused`: asked once, under no id, so that none is stored.
 
         Raises:
@@ -39,24 +39,24 @@ class BusWire:
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
 
-    def say(self, message: Message) -> None:
+    def publish(self, message: Message) -> None:
         """Publish."""
         self._bus.publish(message)
 
-    def ask(self, request: Request, timeout_s: float) -> Message:
+    def request(self, request: Request, timeout_s: float) -> Message:
         """Ask until there is an answer, under an id, and the trace of what is being answered."""
         return send_request(self._bus, traced(request), timeout_s)
 
-    def ask_once(self, request: Request, timeout_s: float) -> Message:
+    def request_once(self, request: Request, timeout_s: float) -> Message:
         """Ask, and wait for the reply."""
         replied = threading.Event()
         replies: list[Incoming] = []
 
-        def take(reply: Incoming) -> None:
+        def receive(reply: Incoming) -> None:
             replies.append(reply)
             replied.set()
 
-        self._bus.call(Call(request, timeout_s), take)
+        self._bus.call(Call(request, timeout_s), receive)
         if replied.wait(timeout_s + SLACK_S):
             return replies[0].message
         return no_answer(Call(request, timeout_s), key_of(self._bus.city, request))

@@ -34,7 +34,7 @@ from scm.client.nouns.stop import StopNoun
 from scm.client.nouns.stream import StreamNoun
 from scm.client.nouns.traffic import TrafficNoun
 from scm.client.nouns.vehicles import VehiclesNoun
-from scm.client.teleop import Wheel, taken
+from scm.client.teleop import Wheel, acquired
 from scm.client.work import finished
 from scm.records.operations import Operation
 
@@ -78,16 +78,16 @@ class Client:
 
     def wheel(self, vehicle: str, reason: str = "") -> AbstractContextManager[Wheel]:
         """Take a car's wheel; with a reason, from whoever holds it. See `scm.client.teleop`."""
-        return taken(self.connection, vehicle, reason)
+        return acquired(self.connection, vehicle, reason)
 
     def wait(
         self,
         work: Operation,
-        hear: Callable[[Operation], object] | None = None,
+        on_progress: Callable[[Operation], object] | None = None,
         timeout_s: float = 600.0,
     ) -> Operation:
-        """Return long work once it is done; `hear` is told of every step. See `scm.client.work`."""
-        return finished(self.connection, work, hear, timeout_s)
+        """Return long work once it is done; `on_progress` gets each step; see `scm.client.work`."""
+        return finished(self.connection, work, on_progress, timeout_s)
 
     def close(self) -> None:
         """End the connection."""

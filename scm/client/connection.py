@@ -22,6 +22,7 @@ from scm.caller import program_name
 from scm.client.key import key_of_environment
 from scm.client.stream import Lines, LiveEvent, events_of
 from scm.errors import LinkError, MessageError, ScmError
+from scm.records.problems import Problem
 
 TRIES = 4
 PAUSE_S = 0.25
@@ -33,18 +34,6 @@ _PRODUCT = re.compile(r"[^\x21-\x2e\x30-\x7e]")  # what a product's name in a he
 
 T = TypeVar("T")
 Values = Mapping[str, Any]
-
-
-class Problem(msgspec.Struct, kw_only=True, frozen=True):
-    """The body of an error, RFC 9457."""
-
-    status: int
-    title: str = ""
-    code: str = ""
-    detail: str = ""
-    asked: str = ""
-    trace_id: str = ""
-    errors: tuple[dict[str, str], ...] = ()
 
 
 class ProblemError(ScmError):
@@ -96,7 +85,7 @@ class Connection:
         self._closed.set()
         self._http.close()
 
-    def ask(
+    def request(
         self,
         method: str,
         path: str,
@@ -125,9 +114,9 @@ class Connection:
             MessageError: when the answer is not of that kind.
         """
         content = None if body is None else msgspec.json.encode(_given(body))
-        return _typed(self._ask(method, path, query, headers, content, key), kind)
+        return _typed(self._send(method, path, query, headers, content, key), kind)
 
-    def tell(
+    def send_only(
         self,
         method: str,
         path: str,
@@ -139,7 +128,7 @@ class Connection:
     ) -> None:
         """Ask for what has no answer but that it is done; as `ask` otherwise."""
         content = None if body is None else msgspec.json.encode(_given(body))
-        self._ask(method, path, query, headers, content, key)
+        self._send(method, path, query, headers, content, key)
 
     def fetch(
         self,
@@ -149,7 +138,7 @@ class Connection:
         headers: Values | None = None,
     ) -> bytes:
         """Return what is no JSON, whole; raises as `ask`."""
-        return self._ask("GET", path, query, headers, None, None).content
+        return self._send("GET", path, query, headers, None, None).content
 
     def send(
         self,
@@ -164,7 +153,7 @@ class Connection:
     ) -> T:
         """Send bytes that are no JSON, and return the answer; raises as `ask`."""
         media = "application/octet-stream"
-        return _typed(self._ask(method, path, query, headers, content, key, media), kind)
+        return _typed(self._send(method, path, query, headers, content, key, media), kind)
 
     def pieces(
         self, path: str, *, query: Values | None = None, headers: Values | None = None
@@ -229,7 +218,7 @@ class Connection:
             _check(response)
             yield from response.iter_lines()
 
-    def _ask(
+    def _send(
         self,
         method: str,
         path: str,
@@ -270,8 +259,8 @@ class Connection:
 
     def _pause(self, number: int, at_least: str = "") -> bool:
         """Wait before trying again; return whether the connection was closed meanwhile."""
-        asked_s = float(at_least) if at_least.isascii() and at_least.isdigit() else 0.0
-        pause_s = max(asked_s, PAUSE_S * 2.0**number)
+        at_least_s = float(at_least) if at_least.isascii() and at_least.isdigit() else 0.0
+        pause_s = max(at_least_s, PAUSE_S * 2.0**number)
         return self._closed.wait(min(pause_s, LONGEST_PAUSE_S))
 
 
@@ -296,19 +285,19 @@ def _typed(response: httpx.Response, kind: type[T]) -> T:
     try:
         return msgspec.json.decode(response.content, type=kind)
     except msgspec.MsgspecError as cause:
-        asked = f"{response.request.method} {response.request.url.path}"
-        msg = f"{asked}: {cause}; expected {kind}: is the server another version?"
+        request = f"{response.request.method} {response.request.url.path}"
+        msg = f"{request}: {cause}; expected {kind}: is the server another version?"
         raise MessageError(msg) from cause
 
 
 def _is_under_way(response: httpx.Response) -> bool:
     """Return whether the city is still at the same change, whose first answer was lost."""
-    return response.status_code == CONFLICT and _told(response.read()).code == "in_flight"
+    return response.status_code == CONFLICT and _parsed(response.read()).code == "in_flight"
 
 
 def _no_answer(cause: Exception) -> LinkError:
-    said = f"{type(cause).__name__}: {cause}"
-    return LinkError(f"no answer from the city: {said}; is `scm up` running?")
+    why = f"{type(cause).__name__}: {cause}"
+    return LinkError(f"no answer from the city: {why}; is `scm up` running?")
 
 
 def _check(response: httpx.Response) -> None:
@@ -318,12 +307,18 @@ def _check(response: httpx.Response) -> None:
 
 
 def _problem(status: int, body: bytes) -> ProblemError:
-    return ProblemError(_told(body, status))
+    return ProblemError(_parsed(body, status))
 
 
-def _told(body: bytes, status: int = 0) -> Problem:
+def _parsed(body: bytes, status: int = 0) -> Problem:
     """Return the problem that an answer tells; one that was none of ours in its words."""
     try:
         return msgspec.json.decode(body, type=Problem)
     except msgspec.MsgspecError:
-        return Problem(status=status, detail=body.decode(errors="replace")[:200])
+        return Problem(
+            type="about:blank",
+            title="",
+            status=status,
+            code="",
+            detail=body.decode(errors="replace")[:200],
+        )

@@ -15,59 +15,11 @@ from websockets.sync.client import ClientConnection
 
 from scm.client.connection import Connection, part
 from scm.errors import LinkError, MessageError, ScmError
+from scm.records.drive import PROTOCOL, Acquired, DriveStatus, Over
 
-PROTOCOL = "scm.drive.v1"
-BEAT_S = 0.05
+PERIOD_S = 0.05
 SILENT_S = 2.0
 ANSWER_S = 6.0
-
-
-class Taken(msgspec.Struct, kw_only=True, frozen=True, tag="taken"):
-    """The wheel is yours.
-
-    Attributes:
-        vehicle: The car.
-        owner: In whose name: that of your key, and of this connection alone.
-        epoch: Of the lease.
-    """
-
-    vehicle: str
-    owner: str
-    epoch: int
-
-
-class Told(msgspec.Struct, kw_only=True, frozen=True, tag="told"):
-    """What the car was told last.
-
-    Attributes:
-        seq: Number of your newest packet that counted; None: none came yet.
-        t_ms: When you sent it, by your clock [ms].
-        why: `driving`, `released` (you hold nothing) or `silent` (no packet for 250 ms).
-        throttle: -1 to 1, + = forward.
-        steering: -1 to 1, + = left.
-        mode: The car's, as the world last told it: `stop` also while the city is stopped.
-        speed_mps: How fast it is, + = forward [m/s]; None: not known.
-    """
-
-    seq: int | None
-    t_ms: float | None
-    why: str
-    throttle: float
-    steering: float
-    mode: str
-    speed_mps: float | None
-
-
-class Over(msgspec.Struct, kw_only=True, frozen=True, tag="over"):
-    """You do not hold the wheel any more.
-
-    Attributes:
-        code: `given_back`, `abandoned`, `lost`, `ended`, or the city's word for its refusal.
-        detail: What became of the car, or why it was refused.
-    """
-
-    code: str
-    detail: str
 
 
 class WheelError(ScmError):
@@ -78,14 +30,16 @@ class WheelError(ScmError):
         self.over = over
 
 
-_words: msgspec.json.Decoder[Taken | Told | Over] = msgspec.json.Decoder(Taken | Told | Over)
-_NOTHING_YET = Told(
+_words: msgspec.json.Decoder[Acquired | DriveStatus | Over] = msgspec.json.Decoder(
+    Acquired | DriveStatus | Over
+)
+_NOTHING_YET = DriveStatus(
     seq=None, t_ms=None, why="released", throttle=0.0, steering=0.0, mode="", speed_mps=None
 )
 
 
 @contextlib.contextmanager
-def taken(connection: Connection, vehicle: str, reason: str) -> Iterator["Wheel"]:
+def acquired(connection: Connection, vehicle: str, reason: str) -> Iterator["Wheel"]:
     """Take a car's wheel, and give it back in the end, whatever happens.
 
     Args:
@@ -100,7 +54,7 @@ def taken(connection: Connection, vehicle: str, reason: str) -> Iterator["Wheel"
     """
     with connection.socket(f"/api/v1/vehicles/{part(vehicle)}/drive", PROTOCOL) as socket:
         wheel = Wheel(socket, vehicle)
-        wheel.take(reason)
+        wheel.acquire(reason)
         try:
             yield wheel
         except BaseException:
@@ -118,22 +72,22 @@ class Wheel:
         vehicle: The car.
 
     Attributes:
-        told: What the car was told last.
+        status: What the car was told last.
         over: How it ended; None: it has not.
     """
 
     def __init__(self, socket: ClientConnection, vehicle: str) -> None:
         self._socket, self._vehicle, self._seq = socket, vehicle, 0
         self._next_s = monotonic()
-        self.told = _NOTHING_YET
+        self.status = _NOTHING_YET
         self.over: Over | None = None
 
-    def take(self, reason: str) -> Taken | Told:
+    def acquire(self, reason: str) -> Acquired | DriveStatus:
         """Ask for the wheel; raises as `taken`."""
-        self._say({"type": "take", "reason": reason})
+        self._send({"type": "take", "reason": reason})
         return self._expect(ANSWER_S)
 
-    def drive(self, throttle: float, steering: float, for_s: float = 0.0) -> Told:
+    def drive(self, throttle: float, steering: float, for_s: float = 0.0) -> DriveStatus:
         """Drive for a beat of 50 ms, or for longer, and return what the car was told last.
 
         Args:
@@ -147,10 +101,10 @@ class Wheel:
         """
         until_s = monotonic() + for_s
         while True:
-            self._wish(throttle, steering)
+            self._send_drive(throttle, steering)
             self._listen()
             if monotonic() >= until_s:
-                return self.told
+                return self.status
 
     def give_back(self) -> Over:
         """Let go, and return what becomes of the car: it goes on with its trip, or stands.
@@ -158,39 +112,39 @@ class Wheel:
         Raises:
             LinkError: when the city does not say.
         """
-        self._say({"type": "give_back"})
+        self._send({"type": "give_back"})
         until_s = monotonic() + ANSWER_S
         while self.over is None:
             with contextlib.suppress(WheelError):
                 self._expect(until_s - monotonic())
         return self.over
 
-    def _wish(self, throttle: float, steering: float) -> None:
+    def _send_drive(self, throttle: float, steering: float) -> None:
         now_s = monotonic()
-        self._next_s = max(self._next_s, now_s - BEAT_S) + BEAT_S
+        self._next_s = max(self._next_s, now_s - PERIOD_S) + PERIOD_S
         self._seq += 1
-        wish = {"held": True, "throttle": throttle, "steering": steering}
-        self._say({"type": "drive", "seq": self._seq, "t_ms": 1e3 * now_s, **wish})
+        command = {"held": True, "throttle": throttle, "steering": steering}
+        self._send({"type": "drive", "seq": self._seq, "t_ms": 1e3 * now_s, **command})
 
     def _listen(self) -> None:
         """Hear the city until the next wish is due, one word at least."""
         self._expect(SILENT_S)
         while (left_s := self._next_s - monotonic()) > 0.0:
-            self._hear(left_s)
+            self._receive(left_s)
 
-    def _say(self, word: dict[str, object]) -> None:
+    def _send(self, word: dict[str, object]) -> None:
         with contextlib.suppress(ConnectionClosed):  # what it said last is heard all the same
             self._socket.send(msgspec.json.encode(word).decode())
 
-    def _expect(self, timeout_s: float) -> Taken | Told:
+    def _expect(self, timeout_s: float) -> Acquired | DriveStatus:
         """Return the next word, which has to come."""
-        word = self._hear(timeout_s)
+        word = self._receive(timeout_s)
         if word is None:
             msg = f"{self._vehicle}: the city said nothing in time; is `scm up` running?"
             raise LinkError(msg)
         return word
 
-    def _hear(self, timeout_s: float) -> Taken | Told | None:
+    def _receive(self, timeout_s: float) -> Acquired | DriveStatus | None:
         """Return the next word; None: none came in time.
 
         Raises:
@@ -208,6 +162,6 @@ class Wheel:
         if isinstance(word, Over):
             self.over = self.over or word
             raise WheelError(self._vehicle, self.over)
-        if isinstance(word, Told):
-            self.told = word
+        if isinstance(word, DriveStatus):
+            self.status = word
         return word

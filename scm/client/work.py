@@ -22,7 +22,7 @@ class WorkError(ScmError):
 def finished(
     connection: Connection,
     work: Operation,
-    hear: Callable[[Operation], object] | None,
+    on_progress: Callable[[Operation], object] | None,
     timeout_s: float,
 ) -> Operation:
     """Return work once it is done.
@@ -30,7 +30,7 @@ def finished(
     Args:
         connection: To its city.
         work: As it was begun.
-        hear: Is told of every step.
+        on_progress: Receives every step.
         timeout_s: How long to wait.
 
     Raises:
@@ -43,9 +43,12 @@ def finished(
             msg = f"{work.kind} of {work.what}: not over after {timeout_s:g} s: {work.doing}"
             raise LinkError(msg)
         threading.Event().wait(LOOK_S)
-        before, work = work, connection.ask("GET", path, Operation)
-        if hear is not None and (work.doing, work.progress) != (before.doing, before.progress):
-            hear(work)
+        before, work = work, connection.request("GET", path, Operation)
+        if on_progress is not None and (work.doing, work.progress) != (
+            before.doing,
+            before.progress,
+        ):
+            on_progress(work)
     if work.state != "done":
         raise WorkError(work)
     return work

@@ -104,10 +104,10 @@ def _link(arguments: argparse.Namespace, bus: "ZenohBus", wire: "BusWire") -> "L
 def _run(arguments: argparse.Namespace) -> int:
     from scm.api.app import create_app
     from scm.api.based import Site
+    from scm.api.folders import folders_in
     from scm.api.gate import check_bind
     from scm.api.keys import KeyRing
     from scm.api.server import serve
-    from scm.api.shelves import shelves_in
     from scm.api.view import CityView
     from scm.api.wire import BusWire
     from scm.clock import WallClock
@@ -130,11 +130,11 @@ def _run(arguments: argparse.Namespace) -> int:
         wire = BusWire(bus)
         app = create_app(
             view,
-            wire.ask,
+            wire.request,
             city_map,
             keys=keys,
             state=open_store(arguments.state) if arguments.state else None,
-            shelves=shelves_in(arguments.data) if arguments.data else None,
+            folders=folders_in(arguments.data) if arguments.data else None,
             link=_link(arguments, bus, wire),
             plans={one.name: shipped for one in city_map.junctions},
             site=Site(arguments.base, arguments.origin),

@@ -29,7 +29,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from scm.api.recordings_shelf import cars_of
+    from scm.api.recording_repository import cars_of
     from scm.api.replay import csv_of, no_rows
     from scm.errors import RecordingError
     from scm.recorder.run_index import read_index

@@ -23,7 +23,7 @@ class LeaseRow(msgspec.Struct, kw_only=True, frozen=True):
     left_ms: float | None
 
 
-class TakeBody(Body, kw_only=True, frozen=True):
+class AcquireBody(Body, kw_only=True, frozen=True):
     """A car to drive."""
 
     program: Annotated[

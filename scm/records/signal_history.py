@@ -64,7 +64,7 @@ class LeadScore(msgspec.Struct, kw_only=True, frozen=True):
     told: float | None
 
 
-class PromiseScore(msgspec.Struct, kw_only=True, frozen=True):
+class ForecastScore(msgspec.Struct, kw_only=True, frozen=True):
     """What became of what SPaT told in the last minutes.
 
     Attributes:

@@ -43,7 +43,7 @@ class SignalPhase(msgspec.Struct, kw_only=True, frozen=True):
     max2_s: float
 
 
-class SignalSlot(msgspec.Struct, kw_only=True, frozen=True):
+class StageInterval(msgspec.Struct, kw_only=True, frozen=True):
     """A stage of a cycle: green from `start_s` to `end_s` after the cycle's begin."""
 
     groups: tuple[str, ...]
@@ -66,7 +66,7 @@ class SignalPlan(msgspec.Struct, kw_only=True, frozen=True):
     about: str
     cycle_s: float
     stages: tuple[SignalStage, ...]
-    slots: tuple[SignalSlot, ...]
+    slots: tuple[StageInterval, ...]
     in_step: bool = False
     offset_s: float | None = None
 

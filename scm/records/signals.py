@@ -20,7 +20,7 @@ Verb = Literal["call", "hold", "force_off", "omit", "preempt", "policy", "clear"
 Colour = Literal["red", "green", "yellow", "flashing_red", "dark"]
 
 
-class SignalWish(msgspec.Struct, kw_only=True, frozen=True):
+class SignalOverride(msgspec.Struct, kw_only=True, frozen=True):
     """A wish that is in force.
 
     Attributes:
@@ -140,7 +140,7 @@ class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
     policy: str
     plan: str
     pending: str
-    wishes: tuple[SignalWish, ...]
+    wishes: tuple[SignalOverride, ...]
     detectors: tuple[SignalDetector, ...]
     turns: tuple[SignalTurn, ...]
     failure: str
@@ -162,7 +162,7 @@ class FlashReply(msgspec.Struct, kw_only=True, frozen=True):
     pending: str
     policy: str | None = None
     plan: str | None = None
-    wishes: tuple[SignalWish, ...] = ()
+    wishes: tuple[SignalOverride, ...] = ()
 
 
 class Signals(msgspec.Struct, kw_only=True, frozen=True):
@@ -196,7 +196,7 @@ class PlanChoiceBody(Attributed, kw_only=True, frozen=True):
     ]
 
 
-class WishBody(Attributed, kw_only=True, frozen=True):
+class OverrideBody(Attributed, kw_only=True, frozen=True):
     """A wish for signal groups; it lapses, and the junction goes back to what runs."""
 
     groups: Annotated[

@@ -17,13 +17,14 @@ STANDARD = {
     "_slots_",  # of ctypes structures
 }
 PENDING = (
-    "scm/api", "scm/camera", "scm/client",
+    "scm/camera",
     "scm/eye", "scm/maps", "scm/mismatch", "scm/play.py",
-    "scm/play_watch.py", "scm/recorder", "scm/recording", "scm/records", "scm/replay",
+    "scm/play_watch.py", "scm/recorder", "scm/recording", "scm/replay",
     "scm/ros2", "scm/scenery", "scm/traffic",
     "scm/vehicles", "scm/world", "vehicle_agent",
 )  # fmt: skip
 """Where old names still stand; this list only gets shorter."""
+PUBLISHED = ("scm/client/nouns",)  # written from the interface: methods carry its operation ids
 
 
 def retired() -> set[str]:
@@ -84,7 +85,7 @@ def modules(of: str) -> list[Path]:
 def is_pending(place: Path) -> bool:
     """Say whether a module still awaits its new names."""
     path = place.relative_to(ROOT).as_posix()
-    return any(path == each or path.startswith(each + "/") for each in PENDING)
+    return any(path == each or path.startswith(each + "/") for each in (*PENDING, *PUBLISHED))
 
 
 def test_no_identifier_is_made_of_a_retired_word() -> None:

@@ -30,6 +30,6 @@ def router(city: City) -> APIRouter:
         responses=answer(BoxesReply),
     )
     def reset(signer: Signer, key: IdempotencyKey = "") -> Response:
-        return json_response(city.ask(BoxesRequest(request_id=key, by=signer("")), BoxesReply))
+        return json_response(city.call(BoxesRequest(request_id=key, by=signer("")), BoxesReply))
 
     return routes

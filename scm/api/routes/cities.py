@@ -33,7 +33,7 @@ def router(city: City) -> APIRouter:
 
 def _row(city: City) -> CityRow:
     picture = city.view.picture()
-    held, told = picture.snapshot, picture.definition
+    held, definition = picture.snapshot, picture.definition
     world = held.message if held is not None else None
     return CityRow(
         name=city.name,
@@ -41,7 +41,7 @@ def _row(city: City) -> CityRow:
         title=city.city_map.title,
         software=SOFTWARE,
         interface=INTERFACE,
-        seed=told.seed if told is not None else None,
+        seed=definition.seed if definition is not None else None,
         lanes=len(city.city_map.lanes),
         junctions=len(city.city_map.junctions),
         vehicles=len(world.vehicles) if world is not None else 0,

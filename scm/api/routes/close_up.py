@@ -114,7 +114,7 @@ def _measured(city: City, car: SnapshotVehicle) -> LinkRow:
         raise RefusedError(Refused(code="offline", detail=detail))
     clock = WallClock()
     sent_ns = clock.now_ns()
-    reply = city.wire.ask_once(EchoRequest(vehicle=car.vehicle), ECHO_TIMEOUT_S)
+    reply = city.wire.request_once(EchoRequest(vehicle=car.vehicle), ECHO_TIMEOUT_S)
     back_ns = clock.now_ns()
     if not isinstance(reply, EchoReply):
         kind = type(reply).__name__

@@ -12,8 +12,9 @@ from scm.api.known_keys import KnownKeys
 from scm.api.problem import RefusedError
 from scm.api.roles import OPERATOR
 from scm.api.stream import Stream
-from scm.api.teleop import PROTOCOL, Seat
+from scm.api.teleop import DriveSession
 from scm.clock import WallClock
+from scm.records.drive import PROTOCOL
 from scm.v2x.message import Refused
 
 
@@ -36,7 +37,7 @@ def router(city: City, stream: Stream, keys: KnownKeys | None) -> APIRouter:
         async def may_drive() -> bool:
             return keys is None or await keys.find(key) is not None
 
-        await Seat(
+        await DriveSession(
             city,
             city.wire,
             WallClock(),

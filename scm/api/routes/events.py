@@ -102,12 +102,13 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
 
     @routes.delete(
         "/acknowledgements/{name}",
+        name="take_back",
         summary="Take an acknowledgement back",
         responses=answer(Acknowledgement),
         dependencies=[OPERATOR],
     )
-    def take_back(name: Name, key: IdempotencyKey = "") -> Response:
-        row = seen.take_back(name)
+    def withdraw(name: Name, key: IdempotencyKey = "") -> Response:
+        row = seen.withdraw(name)
         if row is None:
             raise not_found("acknowledgement", name)
         return json_response(row)

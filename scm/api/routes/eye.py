@@ -140,15 +140,15 @@ def _add_poses(routes: APIRouter, city: City) -> None:
         if not any(name in known for known in (picture.frames, picture.tags, picture.eye_statuses)):
             raise not_found("camera", name)
         samples = city.view.residuals(name, window_s, vehicle)
-        told = Residuals(
+        residuals = Residuals(
             camera=name,
             window_s=window_s,
-            stats=stats_of(one for kept in samples.values() for one in kept),
+            stats=stats_of(one for stored in samples.values() for one in stored),
             vehicles=tuple(
-                VehicleResiduals(vehicle=car, stats=stats_of(kept))
-                for car, kept in samples.items()
-                if kept
+                VehicleResiduals(vehicle=car, stats=stats_of(stored))
+                for car, stored in samples.items()
+                if stored
             ),
             samples=thinned(samples, most) if most else (),
         )
-        return json_response(told)
+        return json_response(residuals)

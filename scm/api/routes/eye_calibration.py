@@ -7,8 +7,8 @@ import msgspec
 from fastapi import APIRouter, Path, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from scm.api.calibration_desk import CalibrationDesk, FloorTag
-from scm.api.calibration_shelf import CalibrationShelf
+from scm.api.calibration_jobs import CalibrationJobs, FloorTag
+from scm.api.calibration_repository import CalibrationRepository
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
 from scm.api.etag import Matching, tagged
 from scm.api.eye_rows import frame_of
@@ -52,22 +52,24 @@ ViewName = Annotated[
 def router(city: City, work: Operations) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/eye", tags=["eye"], dependencies=[VIEWER])
-    folder = city.shelves.calibrations
-    desk = (
+    folder = city.folders.calibrations
+    jobs = (
         None
         if folder is None
-        else CalibrationDesk(CalibrationShelf(folder), city.link.map_file or city.city_map.name)
+        else CalibrationJobs(
+            CalibrationRepository(folder), city.link.map_file or city.city_map.name
+        )
     )
 
-    def there() -> CalibrationDesk:
-        if desk is None:
+    def there() -> CalibrationJobs:
+        if jobs is None:
             detail = "this city keeps no calibrations: start its interface with --data FOLDER"
             raise RefusedError(Refused(code="not_found", detail=detail))
-        return desk
+        return jobs
 
     _add_views(routes, city, there)
     _add_measuring(routes, city, there, work)
-    _add_shelf(routes, there)
+    _add_calibrations(routes, there)
     _add_files(routes, there)
     return routes
 
@@ -141,13 +143,13 @@ def _add_measuring(routes: APIRouter, city: City, there: Any, work: Operations) 
         request: Request, name: Name, body: Json[LensBody], key: IdempotencyKey = ""
     ) -> Response:
         del key  # the same key gets the same operation
-        desk = there()
-        if not desk.views(name):
+        jobs = there()
+        if not jobs.views(name):
             raise not_found("camera with pictures of a board", name)
         save_as = body.save_as or ""
-        _check_free(desk, save_as)
+        _check_free(jobs, save_as)
         what = f"lens of {name}" if save_as else f"board in pictures of {name}"
-        job = desk.measure_lens(name, _board_words(body), save_as)
+        job = jobs.measure_lens(name, _board_words(body), save_as)
         return accepted(work.start("calibration", what, job, owner=_owner(request)))
 
     @routes.post(
@@ -161,31 +163,31 @@ def _add_measuring(routes: APIRouter, city: City, there: Any, work: Operations) 
         request: Request, name: Name, body: Json[PlaceBody], key: IdempotencyKey = ""
     ) -> Response:
         del key  # the same key gets the same operation
-        desk = there()
+        jobs = there()
         if all(camera.name != name for camera in city.city_map.cameras):
             raise not_found("camera on the map", name)
-        _check_free(desk, body.save_as)
-        if body.lens and desk.shelf.get(body.lens).row.kind != "lens":
+        _check_free(jobs, body.save_as)
+        if body.lens and jobs.repository.get(body.lens).row.kind != "lens":
             detail = f"lens: expected a lens, got {body.lens!r}, which is a place"
             raise RefusedError(Refused(code="invalid", detail=detail))
         tags = _floor_tags(body)
-        job = desk.locate(name, _newest(city, name), body.lens or "", tags, body.save_as)
+        job = jobs.locate(name, _newest(city, name), body.lens or "", tags, body.save_as)
         return accepted(work.start("calibration", f"place of {name}", job, owner=_owner(request)))
 
 
-def _add_shelf(routes: APIRouter, there: Any) -> None:
+def _add_calibrations(routes: APIRouter, there: Any) -> None:
     @routes.get(
         "/calibrations",
         summary="All calibrations kept, newest first",
         responses=answer_page(CalibrationRow),
     )
     def calibrations(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
-        page = page_of(there().shelf.rows(), lambda row: row.name, limit=limit, cursor=cursor)
+        page = page_of(there().repository.rows(), lambda row: row.name, limit=limit, cursor=cursor)
         return page_response(request, page)
 
     @routes.get("/calibrations/{name}", summary="One", responses=answer(CalibrationFile))
     def calibration(request: Request, name: CalibrationName) -> Response:
-        return tagged(request, there().shelf.get(name))
+        return tagged(request, there().repository.get(name))
 
     @routes.put(
         "/calibrations/{name}",
@@ -201,11 +203,11 @@ def _add_shelf(routes: APIRouter, there: Any) -> None:
         key: IdempotencyKey = "",
     ) -> Response:
         del key  # the state that the writer saw is asked for
-        shelf = there().shelf
-        with shelf.editing:
-            before = shelf.find(name)
+        repository = there().repository
+        with repository.editing:
+            before = repository.find(name)
             condition.check(before)
-            written = shelf.write(name, body.toml)
+            written = repository.write(name, body.toml)
         return tagged(request, written, 201 if before is None else 200)
 
     @routes.delete(
@@ -216,11 +218,11 @@ def _add_shelf(routes: APIRouter, there: Any) -> None:
     )
     def delete(name: CalibrationName, condition: Matching, key: IdempotencyKey = "") -> Response:
         del key  # the state that the writer saw is asked for
-        shelf = there().shelf
-        with shelf.editing:
-            found = shelf.get(name)
+        repository = there().repository
+        with repository.editing:
+            found = repository.get(name)
             condition.check(found)
-            shelf.delete(name)
+            repository.delete(name)
         return json_response(found)
 
 
@@ -231,7 +233,7 @@ def _add_files(routes: APIRouter, there: Any) -> None:
         responses=answer(dict[str, Any]),
     )
     def report(name: CalibrationName) -> Response:
-        found = there().shelf.report(name)
+        found = there().repository.report(name)
         if found is None:
             raise not_found("calibration with a report", name)
         return json_response(found)
@@ -243,23 +245,23 @@ def _add_files(routes: APIRouter, there: Any) -> None:
         responses=answer_file("application/toml", "The file, as the Eye's commands take it."),
     )
     def download(name: CalibrationName) -> Response:
-        toml = there().shelf.get(name).toml
+        toml = there().repository.get(name).toml
         headers = {"Content-Disposition": f'attachment; filename="{name}.toml"'}
         return Response(toml, headers=headers, media_type="application/toml")
 
 
-def _views(desk: CalibrationDesk, camera: str) -> Views:
-    findings = desk.findings(camera) or {}
+def _views(jobs: CalibrationJobs, camera: str) -> Views:
+    findings = jobs.findings(camera) or {}
     by_name = {FilePath(one["name"]).name: one for one in findings.get("views", ())}
     rest = {key: value for key, value in findings.items() if key not in ("views", "said")}
-    views = tuple(_view(path, by_name) for path in desk.views(camera))
+    views = tuple(_view(path, by_name) for path in jobs.views(camera))
     return Views(views=views, findings=rest or None)
 
 
 def _view(path: FilePath, found: dict[str, Any]) -> View:
     one = found.get(path.name)
-    told = None if one is None else {key: one[key] for key in one if key != "name"}
-    return View(name=path.name, made_ns=path.stat().st_mtime_ns, found=told)
+    facts = None if one is None else {key: one[key] for key in one if key != "name"}
+    return View(name=path.name, made_ns=path.stat().st_mtime_ns, found=facts)
 
 
 def _newest(city: City, camera: str) -> bytes:
@@ -269,8 +271,8 @@ def _newest(city: City, camera: str) -> bytes:
     return held.message.payload
 
 
-def _check_free(desk: CalibrationDesk, name: str) -> None:
-    if name and desk.shelf.path(name).exists():
+def _check_free(jobs: CalibrationJobs, name: str) -> None:
+    if name and jobs.repository.path(name).exists():
         detail = f"save_as: there is a calibration named {name!r}; choose another name"
         raise RefusedError(Refused(code="exists", detail=detail))
 

@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter, Response
 
-from scm.api.calibration_shelf import CalibrationShelf
+from scm.api.calibration_repository import CalibrationRepository
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
 from scm.api.inputs import Json
 from scm.api.problem import RefusedError
@@ -16,7 +16,7 @@ from scm.v2x.messages.calibration_request import CalibrationReply, CalibrationRe
 def router(city: City) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/eye/cameras", tags=["eye"], dependencies=[ENGINEER])
-    folder = city.shelves.calibrations
+    folder = city.folders.calibrations
 
     @routes.put(
         "/{name}/calibration",
@@ -29,7 +29,7 @@ def router(city: City) -> APIRouter:
         _check_camera(city, name)
         if folder is None:
             raise not_found("calibration", body.calibration)
-        place, lens = CalibrationShelf(folder).holds(body.calibration)
+        place, lens = CalibrationRepository(folder).holds(body.calibration)
         if place is not None and place.name != name:
             got = f"calibration: {body.calibration!r} is the place of camera {place.name!r}"
             detail = f"{got}, expected one of {name!r}"
@@ -44,7 +44,7 @@ def router(city: City) -> APIRouter:
             reason=body.reason,
             accept_unsure=body.accept_unsure,
         )
-        return json_response(city.ask(request, CalibrationReply))
+        return json_response(city.call(request, CalibrationReply))
 
     @routes.post(
         "/{name}/calibration/back",
@@ -58,7 +58,7 @@ def router(city: City) -> APIRouter:
         request = CalibrationRequest(
             request_id=key, camera=name, verb="back", by=signer(body.by), reason=body.reason
         )
-        return json_response(city.ask(request, CalibrationReply))
+        return json_response(city.call(request, CalibrationReply))
 
     return routes
 

@@ -89,18 +89,17 @@ class _Disk:
     def check(self) -> Check:
         """Look at the shelf with the least room."""
         free = [
-            (shutil.disk_usage(folder).free, shelf, folder)
-            for shelf, folder in _folders(self._city)
+            (shutil.disk_usage(folder).free, kind, folder) for kind, folder in _folders(self._city)
         ]
         if not free:
             return Check(name="disk", good=True, detail="there are no shelves")
-        least, shelf, folder = min(free, key=lambda found: found[0])
+        least, kind, folder = min(free, key=lambda found: found[0])
         was_good, self._is_good = self._is_good, least >= LEAST_FREE_BYTES
         if was_good and not self._is_good:
             mib = least // 2**20
-            event(_log, "disk_short", level=logging.WARNING, shelf=shelf, at=folder, free_mib=mib)
+            event(_log, "disk_short", level=logging.WARNING, kind=kind, at=folder, free_mib=mib)
         detail = (
-            f"where {shelf} are kept {least // 2**20} MiB are free, "
+            f"where {kind} are kept {least // 2**20} MiB are free, "
             f"expected {LEAST_FREE_BYTES // 2**20} or more"
         )
         return Check(name="disk", good=self._is_good, detail=detail)
@@ -108,8 +107,8 @@ class _Disk:
 
 def _folders(city: City) -> Iterator[tuple[str, Path]]:
     """Yield the shelves by kind, each with its folder or what that will be made in."""
-    for shelf in fields(city.shelves):
-        folder: Path | None = getattr(city.shelves, shelf.name)
+    for kind in fields(city.folders):
+        folder: Path | None = getattr(city.folders, kind.name)
         if folder is not None:
             parents = (folder, *folder.absolute().parents)
-            yield shelf.name, next(found for found in parents if found.exists())
+            yield kind.name, next(found for found in parents if found.exists())

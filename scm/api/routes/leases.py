@@ -9,7 +9,7 @@ from scm.api.inputs import Json
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import OPERATOR, VIEWER
 from scm.api.schemas import answer, answer_page
-from scm.records.leases import LeaseRow, RenewBody, TakeBody
+from scm.records.leases import AcquireBody, LeaseRow, RenewBody
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 
 
@@ -38,15 +38,16 @@ def router(city: City) -> APIRouter:
 def _add_taking(routes: APIRouter, city: City) -> None:
     @routes.post(
         "/{name}",
+        name="take",
         summary="Take a car",
         status_code=201,
         dependencies=[OPERATOR],
         responses=answer(LeaseReply, 201),
     )
-    def take(
-        request: Request, name: Name, body: Json[TakeBody], key: IdempotencyKey = ""
+    def acquire(
+        request: Request, name: Name, body: Json[AcquireBody], key: IdempotencyKey = ""
     ) -> Response:
-        asked = LeaseRequest(
+        lease = LeaseRequest(
             request_id=key,
             vehicle=name,
             owner=_owner(request, body.program),
@@ -54,7 +55,7 @@ def _add_taking(routes: APIRouter, city: City) -> None:
             ttl_ms=body.ttl_ms,
             reason=body.reason,
         )
-        return json_response(city.ask(asked, LeaseReply), 201)
+        return json_response(city.call(lease, LeaseReply), 201)
 
     @routes.put(
         "/{name}",
@@ -65,7 +66,7 @@ def _add_taking(routes: APIRouter, city: City) -> None:
     def renew(
         request: Request, name: Name, body: Json[RenewBody], key: IdempotencyKey = ""
     ) -> Response:
-        asked = LeaseRequest(
+        lease = LeaseRequest(
             request_id=key,
             vehicle=name,
             owner=_owner(request, body.program),
@@ -73,7 +74,7 @@ def _add_taking(routes: APIRouter, city: City) -> None:
             epoch=body.epoch,
             ttl_ms=body.ttl_ms,
         )
-        return json_response(city.ask(asked, LeaseReply))
+        return json_response(city.call(lease, LeaseReply))
 
 
 def _add_returning(routes: APIRouter, city: City) -> None:
@@ -95,14 +96,14 @@ def _add_returning(routes: APIRouter, city: City) -> None:
         ),
         key: IdempotencyKey = "",
     ) -> Response:
-        asked = LeaseRequest(
+        lease = LeaseRequest(
             request_id=key,
             vehicle=name,
             owner=_owner(request, program),
             verb="release",
             epoch=epoch,
         )
-        return json_response(city.ask(asked, LeaseReply))
+        return json_response(city.call(lease, LeaseReply))
 
 
 def _owner(request: Request, program: str) -> str:

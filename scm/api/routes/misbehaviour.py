@@ -21,12 +21,12 @@ def router(city: City) -> APIRouter:
     async def scores() -> Response:
         held, reports = city.view.misbehaviour()
         is_fresh = held is not None and held.age_s(city.now_ns()) <= FRESH_S
-        told = held.message if held is not None and is_fresh else None
+        scores = held.message if held is not None and is_fresh else None
         body = Misbehaviour(
-            watched=told is not None,
-            witness=told is not None and told.witness,
-            t_ns=None if told is None else told.t_ns,
-            stations=() if told is None else told.stations,
+            watched=scores is not None,
+            witness=scores is not None and scores.witness,
+            t_ns=None if scores is None else scores.t_ns,
+            stations=() if scores is None else scores.stations,
             reported=tuple(sorted(reports)),
         )
         return json_response(body)

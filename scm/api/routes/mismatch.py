@@ -59,15 +59,15 @@ def router(city: City, jobs: MismatchJobs) -> APIRouter:
 def _add_jobs(routes: APIRouter, city: City, jobs: MismatchJobs) -> None:
     @routes.get("/offers", summary="What can be searched", responses=answer(Offers))
     def offers() -> Response:
-        shelf = city.shelves.recordings
-        runs = [path for path in shelf.glob("*.mcap") if path.is_file()] if shelf else []
+        folder = city.folders.recordings
+        runs = [path for path in folder.glob("*.mcap") if path.is_file()] if folder else []
         runs.sort(key=lambda path: -path.stat().st_mtime_ns)
-        told = Offers(
+        answer_ = Offers(
             recordings=tuple(path.name for path in runs[:200]),
             cars=tuple(sorted(car_files())),
             most_upload_bytes=uploads.MOST_BYTES,
         )
-        return json_response(told)
+        return json_response(answer_)
 
     @routes.post(
         "/jobs",
@@ -92,12 +92,12 @@ def _add_uploads(routes: APIRouter, jobs: MismatchJobs) -> None:
     )
     async def upload(request: Request, name: Title = "", key: IdempotencyKey = "") -> Response:
         del key  # a second copy is a second upload; the oldest are forgotten
-        shelf, cars = jobs.shelf(), tuple(sorted(car_files()))
-        with TemporaryFile(dir=shelf) as body:  # of no name: gone with this request
+        folder, cars = jobs.folder(), tuple(sorted(car_files()))
+        with TemporaryFile(dir=folder) as body:  # of no name: gone with this request
             async for chunk in request.stream():
                 await run_in_threadpool(body.write, chunk)
-            taken = await run_in_threadpool(uploads.take, shelf, body, name, cars)
-        return json_response(taken, 201)
+            stored = await run_in_threadpool(uploads.store, folder, body, name, cars)
+        return json_response(stored, 201)
 
 
 def _add_reports(routes: APIRouter, jobs: MismatchJobs) -> None:
@@ -111,17 +111,17 @@ def _add_reports(routes: APIRouter, jobs: MismatchJobs) -> None:
     def report(name: ReportName) -> Response:
         folder = _folder(jobs, name)
         fields, drawn = jobs.reports.fields(folder)
-        told = Report(
+        answer_ = Report(
             row=jobs.reports.row(name, folder),
             report=fields,
             drawn=drawn,
             job=_shown(jobs.reports.job(folder)),
             drives=tuple(jobs.reports.drives(folder)),
-            told=len(jobs.reports.told(folder)),
+            told=len(jobs.reports.recorded_drives(folder)),
             files=tuple(file for file in FILES if (folder / file).is_file()),
             together=jobs.reports.together(folder),
         )
-        return json_response(told)
+        return json_response(answer_)
 
     @routes.delete(
         "/reports/{name}",
@@ -195,13 +195,13 @@ def _job(jobs: MismatchJobs, body: Json[JobBody], owner: str) -> Job:
     else:
         path = jobs.recording(body.recording) if body.recording else jobs.upload(body.upload)
         before = Job(recordings=(str(path),), source=body.recording or body.upload)
-    said = {
+    media = {
         name: getattr(body, name)
         for name in ("vehicle", "budget_s", "from_s", "to_s")
         if getattr(body, name) not in ("", None)
     }
     car = _known_car(body.car) or before.car
-    return msgspec.structs.replace(before, car=car, owner=owner, **said)
+    return msgspec.structs.replace(before, car=car, owner=owner, **media)
 
 
 def _folder(jobs: MismatchJobs, name: str) -> FilePath:
@@ -215,10 +215,10 @@ def _shown(job: Job | None) -> Job | None:
     """Return what may be told of a job: files by name, not where they lie on this machine."""
     if job is None:
         return None
-    names, told = (
+    names, answer_ = (
         tuple(FilePath(path).name for path in paths) for paths in (job.recordings, job.told)
     )
-    return msgspec.structs.replace(job, recordings=names, told=told)
+    return msgspec.structs.replace(job, recordings=names, told=answer_)
 
 
 def _known_car(name: str) -> str:

@@ -145,11 +145,11 @@ def _response(
 ) -> Response:
     """Return entities with their context inside as JSON-LD, or named in `Link` as JSON."""
     own = {"Cache-Control": "no-store", **(headers or {})}
-    told = list(links)
+    links_ = list(links)
     if JSON_LD not in request.headers.get("accept", ""):
-        told.insert(0, f'<{CORE}>; rel="{_TYPE}"; type="{JSON_LD}"')
-    if told:
-        own["Link"] = ", ".join(told)
+        links_.insert(0, f'<{CORE}>; rel="{_TYPE}"; type="{JSON_LD}"')
+    if links_:
+        own["Link"] = ", ".join(links_)
     if JSON_LD in request.headers.get("accept", ""):
         inside = (
             [{"@context": CONTEXT, **one} for one in body]

@@ -14,14 +14,14 @@ from scm.api.city import City, IdempotencyKey, json_response, not_found
 from scm.api.city import Name as BusName
 from scm.api.etag import Matching, tagged
 from scm.api.inputs import Json
-from scm.api.operations import Operations, Teller, accepted
+from scm.api.operations import Operations, ProgressReporter, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
 from scm.api.ranged import send_file
 from scm.api.recorded_disturbances import disturbances_of
-from scm.api.recordings_shelf import NAME, RecordingsShelf, cars_of, natural, unreadable
+from scm.api.recording_repository import NAME, RecordingRepository, cars_of, natural, unreadable
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER
 from scm.api.schemas import answer, answer_file, answer_nothing, answer_page
 from scm.clock import NS_PER_S
@@ -47,7 +47,7 @@ from scm.v2x.message import Refused
 MCAP = "application/octet-stream"
 MOST_S = 120.0
 BLOCK = 256 * 1024
-PICTURE_KEPT = "private, max-age=60"  # looped and stepped through without asking again
+PICTURE_CACHING = "private, max-age=60"  # looped and stepped through without asking again
 MOST_EXPORTS = 2  # programs at once; further ones wait for their turn
 
 Name = Annotated[
@@ -81,13 +81,13 @@ CameraOnCar = Annotated[
 def router(city: City, work: Operations) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/recordings", tags=["recordings"], dependencies=[VIEWER])
-    shelf = RecordingsShelf(city.shelves.recordings)
-    _add_downloads(routes, shelf)
-    _add_moments(routes, shelf)
-    _add_disturbances(routes, shelf)
-    _add_pictures(routes, shelf, city)
-    _add_notes(routes, shelf)
-    _add_parts(routes, shelf, work)
+    repository = RecordingRepository(city.folders.recordings)
+    _add_downloads(routes, repository)
+    _add_moments(routes, repository)
+    _add_disturbances(routes, repository)
+    _add_pictures(routes, repository, city)
+    _add_notes(routes, repository)
+    _add_parts(routes, repository, work)
 
     @routes.get(
         "",
@@ -95,13 +95,13 @@ def router(city: City, work: Operations) -> APIRouter:
         responses=answer_page(RecordingRow),
     )
     def all_recordings(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
-        names = page_of(shelf.names(), str, limit=limit, cursor=cursor)
-        rows = Page(items=_rows(shelf, names.items), next=names.next)
+        names = page_of(repository.names(), str, limit=limit, cursor=cursor)
+        rows = Page(items=_rows(repository, names.items), next=names.next)
         return page_response(request, rows)
 
     @routes.get("/{name}", summary="One recording", responses=answer(RecordingRow))
     def one_recording(name: Name) -> Response:
-        return json_response(shelf.row(name))
+        return json_response(repository.row(name))
 
     @routes.delete(
         "/{name}",
@@ -112,13 +112,13 @@ def router(city: City, work: Operations) -> APIRouter:
     )
     def remove(name: Name, key: IdempotencyKey = "") -> Response:
         del key  # what is gone stays gone
-        shelf.remove(name)
+        repository.remove(name)
         return Response(status_code=204)
 
     return routes
 
 
-def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
+def _add_downloads(routes: APIRouter, repository: RecordingRepository) -> None:
     """Add files to take home; before the routes whose names would match them too."""
     turns = asyncio.Semaphore(MOST_EXPORTS)
 
@@ -129,7 +129,7 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
         response_class=Response,
     )
     def file(request: Request, name: Name) -> Response:
-        return send_file(request, shelf.path(name), MCAP)
+        return send_file(request, repository.path(name), MCAP)
 
     @routes.get(
         "/{name}/foxglove.mcap",
@@ -138,7 +138,7 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
         response_class=Response,
     )
     async def foxglove(name: Name) -> Response:
-        index = await asyncio.to_thread(shelf.index, name)
+        index = await asyncio.to_thread(repository.index, name)
         return StreamingResponse(
             _converted(index.path, turns), 200, _named(f"{name}.foxglove.mcap"), MCAP
         )
@@ -158,7 +158,7 @@ def _add_downloads(routes: APIRouter, shelf: RecordingsShelf) -> None:
             Query(ge=0.0, le=1e7, description="to when; without: to the end", examples=[60.0]),
         ] = None,
     ) -> Response:
-        index = shelf.index(name)
+        index = repository.index(name)
         if to_s is not None and to_s < from_s:
             detail = f"to_s: got {to_s:g}, expected from_s ({from_s:g}) or later"
             raise RefusedError(Refused(code="invalid", detail=detail))
@@ -179,18 +179,18 @@ def _span(from_s: float, to_s: float | None) -> str:
     return f"-{from_s:g}-{to_s:g}s"
 
 
-def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:
+def _add_moments(routes: APIRouter, repository: RecordingRepository) -> None:
     """Add what a replay shows."""
 
     @routes.get(
         "/{name}/summary", summary="What a replay has to know first", responses=answer(Summary)
     )
     def summary(name: Name) -> Response:
-        index = _readable(shelf, name)
+        index = _readable(repository, name)
         city_map = replay.map_of(index)
         return json_response(
             Summary(
-                recording=shelf.row(name),
+                recording=repository.row(name),
                 cars=_cars(index),
                 map_title=city_map.title if city_map else "",
                 lights=city_map.lights if city_map else (),
@@ -217,7 +217,7 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:
         if not from_s <= to_s <= from_s + MOST_S:
             detail = f"to_s: got {to_s:g}, expected from_s ({from_s:g}) to {MOST_S:g} s after it"
             raise RefusedError(Refused(code="invalid", detail=detail))
-        return json_response(replay.frames_of(_readable(shelf, name), from_s, to_s, hz))
+        return json_response(replay.frames_of(_readable(repository, name), from_s, to_s, hz))
 
     @routes.get(
         "/{name}/events",
@@ -225,22 +225,22 @@ def _add_moments(routes: APIRouter, shelf: RecordingsShelf) -> None:
         responses=answer_page(RecordedEvent),
     )
     def events(request: Request, name: Name, limit: Limit = 500, cursor: Cursor = "") -> Response:
-        rows = replay.events_of(_readable(shelf, name))
+        rows = replay.events_of(_readable(repository, name))
         page = page_of(rows, lambda row: str(row.number), limit=limit, cursor=cursor)
         return page_response(request, page)
 
 
-def _add_disturbances(routes: APIRouter, shelf: RecordingsShelf) -> None:
+def _add_disturbances(routes: APIRouter, repository: RecordingRepository) -> None:
     @routes.get(
         "/{name}/disturbances",
         summary="What made measurements void while it was recorded",
         responses=answer(RecordedDisturbances),
     )
     def disturbances(name: Name) -> Response:
-        return json_response(disturbances_of(_readable(shelf, name)))
+        return json_response(disturbances_of(_readable(repository, name)))
 
 
-def _add_pictures(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None:
+def _add_pictures(routes: APIRouter, repository: RecordingRepository, city: City) -> None:
     @routes.get(
         "/{name}/eye/{camera}.jpg",
         summary="What an overhead camera saw, at a time",
@@ -248,7 +248,7 @@ def _add_pictures(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None
         response_class=Response,
     )
     def picture(name: Name, camera: Camera, t_s: Seconds = 0.0) -> Response:
-        return _picture(name, _readable(shelf, name), camera, t_s)
+        return _picture(name, _readable(repository, name), camera, t_s)
 
     @routes.get(
         "/{name}/vehicles/{vehicle}/camera/{camera}.jpg",
@@ -259,7 +259,7 @@ def _add_pictures(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None
     def car_picture(
         name: Name, vehicle: BusName, camera: CameraOnCar, t_s: Seconds = 0.0
     ) -> Response:
-        return _picture(name, _readable(shelf, name), camera, t_s, vehicle)
+        return _picture(name, _readable(repository, name), camera, t_s, vehicle)
 
     @routes.get(
         "/{name}/map.svg",
@@ -268,15 +268,15 @@ def _add_pictures(routes: APIRouter, shelf: RecordingsShelf, city: City) -> None
         response_class=Response,
     )
     def map_svg(name: Name) -> Response:
-        city_map = replay.map_of(_readable(shelf, name)) or city.city_map
+        city_map = replay.map_of(_readable(repository, name)) or city.city_map
         headers = {"Cache-Control": "no-cache"}
         return Response(draw_svg(city_map, movable=False), 200, headers, "image/svg+xml")
 
 
-def _add_notes(routes: APIRouter, shelf: RecordingsShelf) -> None:
+def _add_notes(routes: APIRouter, repository: RecordingRepository) -> None:
     @routes.get("/{name}/notes", summary="What people wrote about it", responses=answer(Notes))
     def notes(request: Request, name: Name) -> Response:
-        return tagged(request, shelf.notes(name))
+        return tagged(request, repository.notes(name))
 
     @routes.put(
         "/{name}/notes",
@@ -293,13 +293,13 @@ def _add_notes(routes: APIRouter, shelf: RecordingsShelf) -> None:
     ) -> Response:
         del key  # the same notes twice are the same notes
         fresh = Notes(title=body.title.strip(), notes=body.notes.strip())
-        with shelf.editing:
-            condition.check(shelf.notes(name))
-            shelf.write_notes(name, fresh)
+        with repository.editing:
+            condition.check(repository.notes(name))
+            repository.write_notes(name, fresh)
         return tagged(request, fresh)
 
 
-def _add_parts(routes: APIRouter, shelf: RecordingsShelf, work: Operations) -> None:
+def _add_parts(routes: APIRouter, repository: RecordingRepository, work: Operations) -> None:
     @routes.post(
         "/{name}/parts",
         summary="Copy a part of it into a recording of its own",
@@ -311,7 +311,7 @@ def _add_parts(routes: APIRouter, shelf: RecordingsShelf, work: Operations) -> N
         request: Request, name: Name, body: Json[PartBody], key: IdempotencyKey = ""
     ) -> Response:
         del key  # the same key gets the same operation
-        index = _readable(shelf, name)
+        index = _readable(repository, name)
         length_s = (index.end_ns - index.begin_ns) / NS_PER_S
         to_s = min(length_s if body.to_s is None else body.to_s, length_s)
         if not body.from_s < to_s:
@@ -319,14 +319,14 @@ def _add_parts(routes: APIRouter, shelf: RecordingsShelf, work: Operations) -> N
             detail += f"the {length_s:.1f} s of {name}"
             raise RefusedError(Refused(code="invalid", detail=detail))
 
-        def do(tell: Teller) -> str:
-            target = shelf.free_path(f"{name[:80]}{_span(body.from_s, to_s)}")
+        def do(progress: ProgressReporter) -> str:
+            target = repository.free_path(f"{name[:80]}{_span(body.from_s, to_s)}")
             partial = target.with_name(f".{target.name}")  # in no list until it is whole
             words = ["cut", str(index.path), "--out", str(partial)]
             words += ["--from-s", f"{body.from_s!r}", "--to-s", f"{to_s!r}"]
             try:
-                tell("copies it")
-                run_scm(words, tell, lambda _: None)
+                progress("copies it")
+                run_scm(words, progress, lambda _: None)
                 partial.rename(target)
             finally:
                 partial.unlink(missing_ok=True)
@@ -337,20 +337,20 @@ def _add_parts(routes: APIRouter, shelf: RecordingsShelf, work: Operations) -> N
         return accepted(work.start("cut", what, do, owner=owner))
 
 
-def _rows(shelf: RecordingsShelf, names: tuple[str, ...]) -> tuple[RecordingRow, ...]:
+def _rows(repository: RecordingRepository, names: tuple[str, ...]) -> tuple[RecordingRow, ...]:
     """Return rows of recordings, without those that were deleted meanwhile."""
     rows = []
     for name in names:
         try:
-            rows.append(shelf.row(name))
+            rows.append(repository.row(name))
         except RefusedError:
             continue
     return tuple(rows)
 
 
-def _readable(shelf: RecordingsShelf, name: str) -> RunIndex:
+def _readable(repository: RecordingRepository, name: str) -> RunIndex:
     """Return a recording's index; refuse one that holds nothing yet."""
-    index = shelf.index(name)
+    index = repository.index(name)
     if not index.chunks:
         raise unreadable(RecordingError(f"{index.path}: nothing was recorded yet"))
     return index
@@ -364,7 +364,7 @@ def _picture(name: str, index: RunIndex, camera: str, t_s: float, vehicle: str =
         detail = f"{name}: {whose} {camera!r} has no picture of {t_s:g} s or before"
         raise RefusedError(Refused(code="not_found", detail=detail))
     t_ns, jpeg = found
-    headers = {"Cache-Control": PICTURE_KEPT, "X-Time-Ns": str(t_ns)}
+    headers = {"Cache-Control": PICTURE_CACHING, "X-Time-Ns": str(t_ns)}
     return Response(jpeg, 200, headers, "image/jpeg")
 
 

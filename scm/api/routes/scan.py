@@ -18,7 +18,7 @@ from scm.v2x.message import Refused
 
 LOOK_S = 0.02
 PATIENCE_S = 3.0
-BEAT_LOOKS = 50  # silent for a second: a comment, so that a lost page is noticed
+HEARTBEAT_LOOKS = 50  # silent for a second: a comment, so that a lost page is noticed
 
 
 def router(city: City, stream: Stream) -> APIRouter:
@@ -66,7 +66,7 @@ async def _turns(
         while not stream.is_closed:
             news = turns.news()
             silent = 0 if news else silent + 1
-            if news or silent % BEAT_LOOKS == 0:
+            if news or silent % HEARTBEAT_LOOKS == 0:
                 yield news or b": silent\n\n"
             await asyncio.sleep(LOOK_S)
 
@@ -77,13 +77,13 @@ class Turns:
     def __init__(self, city: City, name: str, scanner: tuple[float, float] | None) -> None:
         self._city, self._name, self._scanner = city, name, scanner
         self._shown_ns: int | None = None
-        self._is_told = False
+        self._is_sent = False
 
     def news(self) -> bytes:
         """Return the newest turn as an event; empty: it was told."""
         row = None if self._scanner is None else _newest(self._city, self._name, self._scanner)
-        if self._scanner is None and not self._is_told:
-            self._is_told = True
+        if self._scanner is None and not self._is_sent:
+            self._is_sent = True
         elif row is None or row.t_ns == self._shown_ns:
             return b""
         else:

@@ -11,7 +11,7 @@ from scm.api.keys import KeyRing
 from scm.api.operations import Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import ADMIN, OPERATOR, VIEWER
-from scm.api.scenarios import NAME, ScenarioRuns, ScenarioShelf
+from scm.api.scenarios import NAME, ScenarioRepository, ScenarioRuns
 from scm.api.schemas import answer, answer_nothing, answer_page
 from scm.records.operations import Operation
 from scm.records.scenarios import Lines, RunBody, Scenario, ScenarioBody
@@ -28,9 +28,9 @@ Run = Annotated[
 def router(city: City, work: Operations, keys: KeyRing | None) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/scenarios", tags=["scenarios"], dependencies=[VIEWER])
-    shelf = ScenarioShelf(city.shelves.scenarios)
-    runs = ScenarioRuns(shelf, work, city.link.connect, city.link.script_credentials, keys)
-    _add_scripts(routes, shelf)
+    repository = ScenarioRepository(city.folders.scenarios)
+    runs = ScenarioRuns(repository, work, city.link.connect, city.link.script_credentials, keys)
+    _add_scripts(routes, repository)
 
     @routes.post(
         "/{name}/runs",
@@ -59,15 +59,15 @@ def router(city: City, work: Operations, keys: KeyRing | None) -> APIRouter:
     return routes
 
 
-def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
+def _add_scripts(routes: APIRouter, repository: ScenarioRepository) -> None:
     @routes.get("", summary="All scripts, one's own first", responses=answer_page(Scenario))
     def all_scenarios(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
-        page = page_of(shelf.rows(), lambda row: row.name, limit=limit, cursor=cursor)
+        page = page_of(repository.rows(), lambda row: row.name, limit=limit, cursor=cursor)
         return page_response(request, page)
 
     @routes.get("/{name}", summary="One script with its text", responses=answer(Scenario))
     def one(request: Request, name: Name) -> Response:
-        found = shelf.find(name)
+        found = repository.find(name)
         if found is None:
             raise not_found("scenario", name)
         return tagged(request, found)
@@ -86,10 +86,10 @@ def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
         key: IdempotencyKey = "",
     ) -> Response:
         del key  # the same script twice is the same script
-        with shelf.editing:
-            before = shelf.find(name)
+        with repository.editing:
+            before = repository.find(name)
             condition.check(before)
-            written = shelf.write(name, body.text)
+            written = repository.write(name, body.text)
         return tagged(request, written, 200 if before else 201)
 
     @routes.delete(
@@ -101,9 +101,9 @@ def _add_scripts(routes: APIRouter, shelf: ScenarioShelf) -> None:
     )
     def remove(name: Name, condition: Matching, key: IdempotencyKey = "") -> Response:
         del key  # what is gone stays gone
-        with shelf.editing:
-            before = shelf.find(name)
+        with repository.editing:
+            before = repository.find(name)
             if before is not None and not before.shipped:
                 condition.check(before)
-            shelf.remove(name)
+            repository.remove(name)
         return Response(status_code=204)

@@ -16,7 +16,7 @@ from scm.api.problem import RefusedError
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER, Signer
 from scm.api.routes.signals import junction_of, site_of
 from scm.api.schemas import answer, answer_page
-from scm.api.signal_plans import PlanShelf
+from scm.api.signal_plans import PlanRepository
 from scm.clock import WallClock
 from scm.errors import PlanError
 from scm.records.operations import Operation
@@ -46,32 +46,34 @@ Digest = Annotated[
 ]
 
 
-def router(city: City, shelf: PlanShelf, work: Operations) -> APIRouter:
+def router(city: City, repository: PlanRepository, work: Operations) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/signals/{name}", tags=["signals"], dependencies=[VIEWER])
-    _add_reading(routes, city, shelf)
-    _add_proving(routes, city, shelf, work)
-    _add_writing(routes, city, shelf)
+    _add_reading(routes, city, repository)
+    _add_proving(routes, city, repository, work)
+    _add_writing(routes, city, repository)
     return routes
 
 
-def _add_reading(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
+def _add_reading(routes: APIRouter, city: City, repository: PlanRepository) -> None:
     @routes.get("/plans", summary="All plans of a junction", responses=answer_page(PlanRow))
     def plans(request: Request, name: Name, limit: Limit = 100, cursor: Cursor = "") -> Response:
         site = site_of(city, name)
-        rows = [*(_shipped(site, plan) for plan in site.plans), *_readable(site, shelf)]
+        rows = [*(_shipped(site, plan) for plan in site.plans), *_readable(site, repository)]
         page = page_of(rows, lambda row: row.plan, limit=limit, cursor=cursor)
         return page_response(request, page)
 
     @routes.get("/plans/{plan}", summary="One plan", responses=answer(PlanRow))
     def one_plan(request: Request, name: Name, plan: PlanName) -> Response:
-        row = _find(site_of(city, name), shelf, plan)
+        row = _find(site_of(city, name), repository, plan)
         if row is None:
             raise not_found("plan", plan)
         return tagged(request, row)
 
 
-def _add_proving(routes: APIRouter, city: City, shelf: PlanShelf, work: Operations) -> None:
+def _add_proving(
+    routes: APIRouter, city: City, repository: PlanRepository, work: Operations
+) -> None:
     @routes.post(
         "/proofs",
         summary="Search every state of kernel and plan for fault",
@@ -87,19 +89,21 @@ def _add_proving(routes: APIRouter, city: City, shelf: PlanShelf, work: Operatio
         owner = str(request.scope.get("scm_owner", ""))
         what = f"plan {body.plan} of junction {name}"
         return accepted(
-            work.start("plan-proof", what, lambda tell: shelf.prove(file, tell), owner=owner)
+            work.start(
+                "plan-proof", what, lambda progress: repository.prove(file, progress), owner=owner
+            )
         )
 
     @routes.get("/proofs/{digest}", summary="One proof", responses=answer(PlanProof))
     def proof(name: Name, digest: Digest) -> Response:
         junction_of(city, name)
-        found = shelf.proof_of(digest)
+        found = repository.proof_of(digest)
         if found is None:
             raise not_found("proof", digest)
         return json_response(found)
 
 
-def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
+def _add_writing(routes: APIRouter, city: City, repository: PlanRepository) -> None:
     @routes.put(
         "/plans/{plan}",
         summary="Save a proven plan",
@@ -119,10 +123,10 @@ def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         site = site_of(city, name)
         _check_own(site, plan)
         file = _file(site, plan, body.stages)
-        with shelf.editing:
-            before = _find(site, shelf, plan)
+        with repository.editing:
+            before = _find(site, repository, plan)
             condition.check(before)
-            row = _saved(site, _keep(shelf, file, body, signer(body.by), before))
+            row = _saved(site, _keep(repository, file, body, signer(body.by), before))
         return tagged(request, row, 200 if before is not None else 201)
 
     @routes.delete(
@@ -137,24 +141,28 @@ def _add_writing(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         del key  # the state that the writer saw is asked for
         site = site_of(city, name)
         _check_own(site, plan)
-        with shelf.editing:
-            before = _find(site, shelf, plan)
+        with repository.editing:
+            before = _find(site, repository, plan)
             if before is None:
                 raise not_found("plan", plan)
             condition.check(before)
-            shelf.delete(name, plan)
+            repository.delete(name, plan)
         return json_response(before)
 
 
 def _keep(
-    shelf: PlanShelf, file: PlanFile, body: Json[PlanBody], by: str, before: PlanRow | None
+    repository: PlanRepository,
+    file: PlanFile,
+    body: Json[PlanBody],
+    by: str,
+    before: PlanRow | None,
 ) -> PlanFile:
     """Save a plan with its proof, and return it.
 
     Raises:
         RefusedError: when nobody proved it, its offset is beyond its cycle, or no more are kept.
     """
-    proof = shelf.proof_of(file.digest) or (before.proof if before is not None else None)
+    proof = repository.proof_of(file.digest) or (before.proof if before is not None else None)
     if proof is None or proof.digest != file.digest:
         detail = f"plan {file.plan!r}: these stages are not proven; POST them to .../proofs first"
         raise RefusedError(Refused(code="unproven", detail=detail))
@@ -163,7 +171,7 @@ def _keep(
     made = {"offset_s": body.offset_s, "saved_ns": WallClock().now_ns(), "proof": proof}
     file = msgspec.structs.replace(file, **named, **made)
     try:
-        shelf.write(file)
+        repository.write(file)
     except PlanError as refusal:
         raise RefusedError(Refused(code="full", detail=str(refusal))) from refusal
     return file
@@ -175,8 +183,8 @@ def _check_own(site: SignalSite, plan: str) -> None:
     Raises:
         RefusedError: saying so.
     """
-    taken = {"flash", *(one.plan for one in site.plans), *(one.policy for one in site.policies)}
-    if plan in taken:
+    reserved = {"flash", *(one.plan for one in site.plans), *(one.policy for one in site.policies)}
+    if plan in reserved:
         detail = f"plan {plan!r}: the junction has one of that name; save it under another"
         raise RefusedError(Refused(code="name_taken", detail=detail))
 
@@ -205,12 +213,12 @@ def _file(site: SignalSite, plan: str, stages: Sequence[StageBody]) -> PlanFile:
     )
 
 
-def _readable(site: SignalSite, shelf: PlanShelf) -> list[PlanRow]:
+def _readable(site: SignalSite, repository: PlanRepository) -> list[PlanRow]:
     """Return the saved plans; one whose file is broken must not hide the others."""
     rows = []
-    for plan in shelf.names(site.junction):
+    for plan in repository.names(site.junction):
         try:
-            row = _find(site, shelf, plan)
+            row = _find(site, repository, plan)
         except RefusedError as wrong:
             _LOGGER.warning("plan_unreadable %s", wrong)
             continue
@@ -219,7 +227,7 @@ def _readable(site: SignalSite, shelf: PlanShelf) -> list[PlanRow]:
     return rows
 
 
-def _find(site: SignalSite, shelf: PlanShelf, plan: str) -> PlanRow | None:
+def _find(site: SignalSite, repository: PlanRepository, plan: str) -> PlanRow | None:
     """Return a plan by name; None: there is none.
 
     Raises:
@@ -228,7 +236,7 @@ def _find(site: SignalSite, shelf: PlanShelf, plan: str) -> PlanRow | None:
     shipped = next((one for one in site.plans if one.plan == plan), None)
     if shipped is not None:
         return _shipped(site, shipped)
-    file = shelf.read(site.junction, plan)
+    file = repository.read(site.junction, plan)
     return None if file is None else _saved(site, file)
 
 

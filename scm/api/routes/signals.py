@@ -14,24 +14,24 @@ from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.problem import RefusedError
 from scm.api.roles import ENGINEER, OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer, answer_page
-from scm.api.signal_plans import PlanShelf
+from scm.api.signal_plans import PlanRepository
 from scm.api.signal_rows import junction_rows, status_row
 from scm.records.city_map import Junction
-from scm.records.signal_history import History, PromiseScore, Verdict
+from scm.records.signal_history import ForecastScore, History, Verdict
 from scm.records.signals import (
     LONGEST_S,
     ClearBody,
     FlashBody,
     FlashReply,
     JunctionRow,
+    OverrideBody,
     PlanChoiceBody,
     PolicyBody,
     ResetBody,
+    SignalOverride,
     Signals,
-    SignalWish,
     StatusRow,
     Verb,
-    WishBody,
 )
 from scm.v2x.message import Refused
 from scm.v2x.messages.monitor_reset import MonitorReset
@@ -50,12 +50,12 @@ _VERBS: dict[str, tuple[Verb, str]] = {
 }
 
 
-def router(city: City, shelf: PlanShelf) -> APIRouter:
+def router(city: City, repository: PlanRepository) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/signals", tags=["signals"], dependencies=[VIEWER])
     _add_reading(routes, city)
-    _add_wishes(routes, city)
-    _add_running(routes, city, shelf)
+    _add_overrides(routes, city)
+    _add_running(routes, city, repository)
     _add_monitor(routes, city)
     return routes
 
@@ -104,8 +104,8 @@ def _add_reading(routes: APIRouter, city: City) -> None:
         responses=answer(SignalSite),
     )
     def site(request: Request, name: Name) -> Response:
-        told = site_of(city, name)
-        return tagged(request, msgspec.structs.replace(told, t_ns=0))
+        site = site_of(city, name)
+        return tagged(request, msgspec.structs.replace(site, t_ns=0))
 
     @routes.get(
         "/{name}/status",
@@ -130,21 +130,25 @@ def _add_reading(routes: APIRouter, city: City) -> None:
 
     @routes.get(
         "/{name}/promises",
+        name="promises",
         summary="What SPaT told against what happened",
-        responses=answer(PromiseScore),
+        responses=answer(ForecastScore),
     )
-    def promises(name: Name) -> Response:
+    def forecasts(name: Name) -> Response:
         junction_of(city, name)
         return json_response(city.view.signal_score(name))
 
 
-def _add_wishes(routes: APIRouter, city: City) -> None:
+def _add_overrides(routes: APIRouter, city: City) -> None:
     @routes.get(
         "/{name}/wishes",
+        name="wishes",
         summary="Wishes in force, each with who, why and its end",
-        responses=answer_page(SignalWish),
+        responses=answer_page(SignalOverride),
     )
-    def wishes(request: Request, name: Name, limit: Limit = 100, cursor: Cursor = "") -> Response:
+    def overrides(
+        request: Request, name: Name, limit: Limit = 100, cursor: Cursor = ""
+    ) -> Response:
         junction_of(city, name)
         held = city.view.picture().signal_statuses.get(name)
         rows = held.message.wishes if held is not None else ()
@@ -173,12 +177,12 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
             by=signer(body.by),
             reason=body.reason,
         )
-        return json_response(city.ask(request, SignalReply))
+        return json_response(city.call(request, SignalReply))
 
 
 def _add_verb(routes: APIRouter, city: City, noun: str, verb: Verb, summary: str) -> None:
-    def wish(
-        name: Name, body: Json[WishBody], signer: Signer, key: IdempotencyKey = ""
+    def override(
+        name: Name, body: Json[OverrideBody], signer: Signer, key: IdempotencyKey = ""
     ) -> Response:
         junction_of(city, name)
         request = SignalRequest(
@@ -190,7 +194,7 @@ def _add_verb(routes: APIRouter, city: City, noun: str, verb: Verb, summary: str
             reason=body.reason,
             expires_s=body.expires_s,
         )
-        return json_response(city.ask(request, SignalReply))
+        return json_response(city.call(request, SignalReply))
 
     routes.post(
         f"/{{name}}/{noun}",
@@ -198,10 +202,10 @@ def _add_verb(routes: APIRouter, city: City, noun: str, verb: Verb, summary: str
         dependencies=[OPERATOR],
         operation_id=f"signals_{verb}",
         responses=answer(SignalReply),
-    )(wish)
+    )(override)
 
 
-def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
+def _add_running(routes: APIRouter, city: City, repository: PlanRepository) -> None:
     @routes.put(
         "/{name}/plan",
         summary="Run another plan",
@@ -212,9 +216,9 @@ def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
         name: Name, body: Json[PlanChoiceBody], signer: Signer, key: IdempotencyKey = ""
     ) -> Response:
         junction_of(city, name)
-        request = _wish_for(city, shelf, name, body.plan)
+        request = _plan_request(city, repository, name, body.plan)
         who = {"by": signer(body.by), "reason": body.reason, "request_id": key}
-        return json_response(city.ask(msgspec.structs.replace(request, **who), PlanReply))
+        return json_response(city.call(msgspec.structs.replace(request, **who), PlanReply))
 
     @routes.put(
         "/{name}/policy",
@@ -227,7 +231,7 @@ def _add_running(routes: APIRouter, city: City, shelf: PlanShelf) -> None:
     ) -> Response:
         junction_of(city, name)
         request = _policy(name, body.policy, body, signer(body.by), key)
-        return json_response(city.ask(request, SignalReply))
+        return json_response(city.call(request, SignalReply))
 
     _add_flash(routes, city)
 
@@ -245,12 +249,14 @@ def _add_flash(routes: APIRouter, city: City) -> None:
         junction_of(city, name)
         by = signer(body.by)
         if body.engaged and body.expires_s is not None:
-            return json_response(city.ask(_policy(name, "flashing", body, by, key), SignalReply))
+            return json_response(city.call(_policy(name, "flashing", body, by, key), SignalReply))
         held = city.view.picture().signal_statuses.get(name)
         if held is None:
             raise not_found("status of a junction", name)
-        if not body.engaged and any(wish.policy == "flashing" for wish in held.message.wishes):
-            request = SignalRequest(
+        if not body.engaged and any(
+            override.policy == "flashing" for override in held.message.wishes
+        ):
+            clear = SignalRequest(
                 request_id=f"{key}-wish" if key else "",
                 junction=name,
                 verb="clear",
@@ -258,15 +264,15 @@ def _add_flash(routes: APIRouter, city: City) -> None:
                 by=by,
                 reason=body.reason,
             )
-            city.ask(request, SignalReply)
-        asked = PlanRequest(
+            city.call(clear, SignalReply)
+        request = PlanRequest(
             request_id=key,
             junction=name,
             plan="flash" if body.engaged else "",
             by=by,
             reason=body.reason,
         )
-        return json_response(city.ask(asked, PlanReply))
+        return json_response(city.call(request, PlanReply))
 
 
 def _policy(
@@ -307,20 +313,20 @@ def _add_monitor(routes: APIRouter, city: City) -> None:
         junction_of(city, name)
         by, reason = signer(body.by), body.reason
         request = MonitorReset(request_id=key, junction=name, by=by, reason=reason)
-        return json_response(city.ask(request, MonitorStatus))
+        return json_response(city.call(request, MonitorStatus))
 
 
-def _wish_for(city: City, shelf: PlanShelf, name: str, plan: str) -> PlanRequest:
+def _plan_request(city: City, repository: PlanRepository, name: str, plan: str) -> PlanRequest:
     """Return a wish for a plan, which brings its stages where somebody saved it.
 
     Raises:
         RefusedError: when it was proven for a junction that has changed since.
     """
-    asked = PlanRequest(junction=name, plan=plan, by="")
-    file = None if plan == "flash" else shelf.read(name, plan)
+    request = PlanRequest(junction=name, plan=plan, by="")
+    file = None if plan == "flash" else repository.read(name, plan)
     if file is None:
-        return asked
+        return request
     if not file.is_proven or not fits(file, site_of(city, name)):
         detail = f"plan {plan!r} is not proven for junction {name!r} as it is now: prove it again"
         raise RefusedError(Refused(code="unproven", detail=detail))
-    return msgspec.structs.replace(asked, stages=file.stages, offset_s=file.offset_s)
+    return msgspec.structs.replace(request, stages=file.stages, offset_s=file.offset_s)

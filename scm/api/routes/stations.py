@@ -30,8 +30,8 @@ def router(city: City) -> APIRouter:
     )
     async def station_events(name: Name) -> Response:
         _named(city, name)
-        told = city.view.events_after(0, _LOOKED_THROUGH)
-        own = [one for one in reversed(told) if name in (one.source, one.vehicle)]
+        events = city.view.events_after(0, _LOOKED_THROUGH)
+        own = [one for one in reversed(events) if name in (one.source, one.vehicle)]
         return json_response(StationEvents(events=tuple(own[:MOST])))
 
     return routes

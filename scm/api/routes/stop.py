@@ -44,16 +44,16 @@ def router(city: City) -> APIRouter:
         responses=answer(CityStop),
     )
     async def set_stop(
-        asked: Request, body: Json[StopBody], signer: Signer, key: IdempotencyKey = ""
+        request_: Request, body: Json[StopBody], signer: Signer, key: IdempotencyKey = ""
     ) -> Response:
-        if not (body.engaged or asked.scope.get("scm_is_sure", True)):
+        if not (body.engaged or request_.scope.get("scm_is_sure", True)):
             detail = "the store of API keys cannot be read now: it must know your key for that"
             raise RefusedError(Refused(code="offline", detail=detail))
         by, reason = signer(body.by), body.reason
         request = StopRequest(request_id=key, engaged=body.engaged, by=by, reason=reason)
         loop = asyncio.get_running_loop()
-        ask = copy_context().run  # the trace of this request goes along
-        told = await loop.run_in_executor(threads, ask, city.ask, request, CityStop)
-        return json_response(told)
+        run = copy_context().run  # the trace of this request goes along
+        stop = await loop.run_in_executor(threads, run, city.call, request, CityStop)
+        return json_response(stop)
 
     return routes

@@ -39,8 +39,8 @@ def router(city: City) -> APIRouter:
             int, Query(ge=1, le=500, description="how many at most", examples=[100])
         ] = 100,
     ) -> Response:
-        told = reversed(city.view.picture().violations)
-        found = [one for one in told if vehicle in ("", one.vehicle)]
+        newest_first = reversed(city.view.picture().violations)
+        found = [one for one in newest_first if vehicle in ("", one.vehicle)]
         return json_response(Violations(violations=tuple(found[:limit])))
 
     return routes

@@ -33,7 +33,7 @@ def router(city: City) -> APIRouter:
     )
     def spawn(body: Json[SpawnBody], key: IdempotencyKey = "") -> Response:
         request = SpawnRequest(request_id=key, vehicle=body.vehicle, car=body.car, spawn=body.spawn)
-        reply = city.ask(request, SpawnReply)
+        reply = city.call(request, SpawnReply)
         return json_response(reply, 201, {"Location": f"/api/v1/vehicles/{reply.vehicle}"})
 
     @routes.get("/{name}", summary="One car", responses=answer(VehicleRow))
@@ -54,13 +54,13 @@ def router(city: City) -> APIRouter:
         key: IdempotencyKey = "",
     ) -> Response:
         request = RemoveRequest(request_id=key, vehicle=name, reason=reason)
-        return json_response(city.ask(request, RemoveReply))
+        return json_response(city.call(request, RemoveReply))
 
-    _add_wishes(routes, city)
+    _add_commands(routes, city)
     return routes
 
 
-def _add_wishes(routes: APIRouter, city: City) -> None:
+def _add_commands(routes: APIRouter, city: City) -> None:
     @routes.post(
         "/{name}/route",
         summary="Send a car on a route",
@@ -76,7 +76,7 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
             speed_mps=body.speed_mps,
             then=body.then,
         )
-        return json_response(city.ask(request, RouteReply))
+        return json_response(city.call(request, RouteReply))
 
     @routes.put(
         "/{name}/lights",
@@ -88,7 +88,7 @@ def _add_wishes(routes: APIRouter, city: City) -> None:
         request = LightRequest(
             request_id=key, vehicle=name, headlights=body.headlights, indicators=body.indicators
         )
-        return json_response(city.ask(request, LightReply))
+        return json_response(city.call(request, LightReply))
 
 
 def _find(city: City, name: str) -> VehicleRow:

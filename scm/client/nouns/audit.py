@@ -36,7 +36,7 @@ class AuditNoun:
             kind: part of class or path
             text: to be found in it
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             "/api/v1/audit",
             Page[AuditRow],
@@ -80,6 +80,6 @@ class AuditNoun:
             number: of an entry noted before; 0: none
             digest: its hash, noted before
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", "/api/v1/audit/verdict", ChainVerdict, query={"number": number, "digest": digest}
         )

@@ -16,7 +16,7 @@ class BoxesNoun:
 
     def boxes(self) -> Boxes:
         """Where the boxes are that cars can push."""
-        return self._connection.ask("GET", "/api/v1/boxes", Boxes)
+        return self._connection.request("GET", "/api/v1/boxes", Boxes)
 
     def reset(self, *, idempotency_key: str = "") -> BoxesReply:
         """Put all boxes back where the map has them.
@@ -24,4 +24,6 @@ class BoxesNoun:
         Args:
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask("POST", "/api/v1/boxes/reset", BoxesReply, key=idempotency_key)
+        return self._connection.request(
+            "POST", "/api/v1/boxes/reset", BoxesReply, key=idempotency_key
+        )

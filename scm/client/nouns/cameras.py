@@ -39,4 +39,4 @@ class CamerasNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/camera", Cameras)
+        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/camera", Cameras)

@@ -18,7 +18,7 @@ class CarsNoun:
 
     def all_cars(self) -> CarFiles:
         """All car files of this city."""
-        return self._connection.ask("GET", "/api/v1/cars", CarFiles)
+        return self._connection.request("GET", "/api/v1/cars", CarFiles)
 
     def write(
         self,
@@ -62,7 +62,7 @@ class CarsNoun:
             camera: whether it has one
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             "/api/v1/cars",
             CarFile,
@@ -127,7 +127,7 @@ class CarsNoun:
             lidar: whether it has one
             camera: whether it has one
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             "/api/v1/cars/preview",
             CarFile,
@@ -165,4 +165,4 @@ class CarsNoun:
         Args:
             name: name of a car file
         """
-        return self._connection.ask("GET", f"/api/v1/cars/{part(name)}", CarFile)
+        return self._connection.request("GET", f"/api/v1/cars/{part(name)}", CarFile)

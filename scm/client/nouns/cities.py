@@ -15,7 +15,7 @@ class CitiesNoun:
 
     def all_cities(self) -> Cities:
         """The cities that this server shows: its own."""
-        return self._connection.ask("GET", "/api/v1/cities", Cities)
+        return self._connection.request("GET", "/api/v1/cities", Cities)
 
     def one_city(self, name: str) -> CityRow:
         """One city.
@@ -23,4 +23,4 @@ class CitiesNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/cities/{part(name)}", CityRow)
+        return self._connection.request("GET", f"/api/v1/cities/{part(name)}", CityRow)

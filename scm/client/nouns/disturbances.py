@@ -15,4 +15,4 @@ class DisturbancesNoun:
 
     def disturbances(self) -> DisturbanceList:
         """What made measurements void in the last hour, and does so now."""
-        return self._connection.ask("GET", "/api/v1/disturbances", DisturbanceList)
+        return self._connection.request("GET", "/api/v1/disturbances", DisturbanceList)

@@ -46,7 +46,7 @@ class EventsNoun:
             since_ns: not before [ns since 1970]
             until_ns: not after [ns since 1970]
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             "/api/v1/events",
             Page[EventRow],
@@ -116,7 +116,7 @@ class EventsNoun:
             note: what there is to say
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             "/api/v1/events/acknowledgements",
             Acknowledged,
@@ -131,7 +131,7 @@ class EventsNoun:
             name: a name on the bus
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "DELETE",
             f"/api/v1/events/acknowledgements/{part(name)}",
             Acknowledgement,

@@ -23,7 +23,7 @@ class EyeNoun:
 
     def overhead(self) -> Overhead:
         """All cameras, with tags and poses seen."""
-        return self._connection.ask("GET", "/api/v1/eye", Overhead)
+        return self._connection.request("GET", "/api/v1/eye", Overhead)
 
     def cameras(self, *, limit: int = 100, cursor: str = "") -> Page[CameraRow]:
         """The cameras, a page.
@@ -32,7 +32,7 @@ class EyeNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", "/api/v1/eye/cameras", Page[CameraRow], query={"limit": limit, "cursor": cursor}
         )
 
@@ -42,7 +42,7 @@ class EyeNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/eye/cameras/{part(name)}", CameraState)
+        return self._connection.request("GET", f"/api/v1/eye/cameras/{part(name)}", CameraState)
 
     def frame(self, name: str, *, t_ns: int | None = None) -> bytes:
         """A camera's newest picture.
@@ -61,7 +61,7 @@ class EyeNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/eye/cameras/{part(name)}/tags", EyeTags)
+        return self._connection.request("GET", f"/api/v1/eye/cameras/{part(name)}/tags", EyeTags)
 
     def poses(self, *, limit: int = 100, cursor: str = "") -> Page[PoseRow]:
         """The newest pose of each car by each camera.
@@ -70,13 +70,13 @@ class EyeNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", "/api/v1/eye/poses", Page[PoseRow], query={"limit": limit, "cursor": cursor}
         )
 
     def tracks(self) -> TrackList:
         """Where each car is by all cameras together."""
-        return self._connection.ask("GET", "/api/v1/eye/tracks", TrackList)
+        return self._connection.request("GET", "/api/v1/eye/tracks", TrackList)
 
     def residuals(
         self, name: str, *, window_s: float = 120.0, vehicle: str = "", most: int = 1000
@@ -89,7 +89,7 @@ class EyeNoun:
             vehicle: one car; empty: all
             most: samples at most, evenly taken
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             f"/api/v1/eye/cameras/{part(name)}/residuals",
             Residuals,
@@ -102,7 +102,7 @@ class EyeNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/eye/cameras/{part(name)}/views", Views)
+        return self._connection.request("GET", f"/api/v1/eye/cameras/{part(name)}/views", Views)
 
     def add_view(self, name: str, *, content: bytes, idempotency_key: str = "") -> View:
         """Keep a picture of a board: one that is sent, or the camera's newest.
@@ -123,7 +123,7 @@ class EyeNoun:
             name: a name on the bus
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "DELETE", f"/api/v1/eye/cameras/{part(name)}/views", Views, key=idempotency_key
         )
 
@@ -144,7 +144,7 @@ class EyeNoun:
             view: a picture's file name
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "DELETE",
             f"/api/v1/eye/cameras/{part(name)}/views/{part(view)}",
             Views,
@@ -181,7 +181,7 @@ class EyeNoun:
             save_as: what the lens is called, as with a place; null: only look
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/eye/cameras/{part(name)}/lens",
             Operation,
@@ -217,7 +217,7 @@ class EyeNoun:
             save_as: what the result is called, with a number where it is taken by then
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/eye/cameras/{part(name)}/place",
             Operation,
@@ -232,7 +232,7 @@ class EyeNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             "/api/v1/eye/calibrations",
             Page[CalibrationRow],
@@ -245,7 +245,7 @@ class EyeNoun:
         Args:
             name: a calibration's name
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", f"/api/v1/eye/calibrations/{part(name)}", CalibrationFile
         )
 
@@ -267,7 +267,7 @@ class EyeNoun:
             toml: a lens of `scm eye calibrate`, or one [[cameras]] block
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             f"/api/v1/eye/calibrations/{part(name)}",
             CalibrationFile,
@@ -292,7 +292,7 @@ class EyeNoun:
             if_none_match: `*`: only where there is none yet
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "DELETE",
             f"/api/v1/eye/calibrations/{part(name)}",
             CalibrationFile,
@@ -306,7 +306,7 @@ class EyeNoun:
         Args:
             name: a calibration's name
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", f"/api/v1/eye/calibrations/{part(name)}/report", dict[str, Any]
         )
 
@@ -339,7 +339,7 @@ class EyeNoun:
                 guarded cars would stop; without it such a calibration is a 409 of code `unsure`
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             f"/api/v1/eye/cameras/{part(name)}/calibration",
             CalibrationReply,
@@ -363,7 +363,7 @@ class EyeNoun:
             reason: why
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/eye/cameras/{part(name)}/calibration/back",
             CalibrationReply,

@@ -15,11 +15,11 @@ class HealthNoun:
 
     def healthz(self) -> Alive:
         """The server answers."""
-        return self._connection.ask("GET", "/healthz", Alive)
+        return self._connection.request("GET", "/healthz", Alive)
 
     def readyz(self) -> Ready:
         """The router, the world, all parts and the disk are there."""
-        return self._connection.ask("GET", "/readyz", Ready)
+        return self._connection.request("GET", "/readyz", Ready)
 
     def all_metrics(self) -> bytes:
         """Metrics, as Prometheus reads them."""

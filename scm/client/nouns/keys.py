@@ -15,7 +15,7 @@ class KeysNoun:
 
     def all_keys(self) -> AllKeys:
         """All API keys, without their secrets."""
-        return self._connection.ask("GET", "/api/v1/keys", AllKeys)
+        return self._connection.request("GET", "/api/v1/keys", AllKeys)
 
     def revoke(self, key_id: str, *, idempotency_key: str = "") -> KeyRow:
         """End an API key at once.
@@ -24,6 +24,6 @@ class KeysNoun:
             key_id: public part of the key
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "DELETE", f"/api/v1/keys/{part(key_id)}", KeyRow, key=idempotency_key
         )

@@ -22,7 +22,7 @@ class LeasesNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", "/api/v1/leases", Page[LeaseRow], query={"limit": limit, "cursor": cursor}
         )
 
@@ -32,7 +32,7 @@ class LeasesNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/leases/{part(name)}", LeaseRow)
+        return self._connection.request("GET", f"/api/v1/leases/{part(name)}", LeaseRow)
 
     def take(
         self,
@@ -52,7 +52,7 @@ class LeasesNoun:
             reason: why it is taken from whoever holds it; empty: only if it is free
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/leases/{part(name)}",
             LeaseReply,
@@ -78,7 +78,7 @@ class LeasesNoun:
             ttl_ms: how long it lives unless renewed [ms]
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             f"/api/v1/leases/{part(name)}",
             LeaseReply,
@@ -97,7 +97,7 @@ class LeasesNoun:
             program: as when it was taken
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "DELETE",
             f"/api/v1/leases/{part(name)}",
             LeaseReply,

@@ -15,7 +15,7 @@ class MapNoun:
 
     def map_json(self) -> CityMap:
         """The map as JSON."""
-        return self._connection.ask("GET", "/api/v1/map", CityMap)
+        return self._connection.request("GET", "/api/v1/map", CityMap)
 
     def map_svg(self) -> bytes:
         """The map drawn."""

@@ -16,7 +16,7 @@ class MisbehaviourNoun:
 
     def scores(self) -> Misbehaviour:
         """Scores of all stations, and who is reported."""
-        return self._connection.ask("GET", "/api/v1/misbehaviour", Misbehaviour)
+        return self._connection.request("GET", "/api/v1/misbehaviour", Misbehaviour)
 
     def report(self, name: str) -> MisbehaviourReport:
         """The newest report on a station, with its evidence.
@@ -24,4 +24,6 @@ class MisbehaviourNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/misbehaviour/{part(name)}", MisbehaviourReport)
+        return self._connection.request(
+            "GET", f"/api/v1/misbehaviour/{part(name)}", MisbehaviourReport
+        )

@@ -19,7 +19,7 @@ class MismatchNoun:
 
     def offers(self) -> Offers:
         """What can be searched."""
-        return self._connection.ask("GET", "/api/v1/mismatch/offers", Offers)
+        return self._connection.request("GET", "/api/v1/mismatch/offers", Offers)
 
     def search(
         self,
@@ -48,7 +48,7 @@ class MismatchNoun:
             to_s: leave out what is after [s]
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             "/api/v1/mismatch/jobs",
             Operation,
@@ -89,7 +89,7 @@ class MismatchNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             "/api/v1/mismatch/reports",
             Page[ReportRow],
@@ -102,7 +102,7 @@ class MismatchNoun:
         Args:
             name: a report's name
         """
-        return self._connection.ask("GET", f"/api/v1/mismatch/reports/{part(name)}", Report)
+        return self._connection.request("GET", f"/api/v1/mismatch/reports/{part(name)}", Report)
 
     def remove(self, name: str, *, idempotency_key: str = "") -> None:
         """Remove a report.
@@ -111,7 +111,7 @@ class MismatchNoun:
             name: a report's name
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        self._connection.tell(
+        self._connection.send_only(
             "DELETE", f"/api/v1/mismatch/reports/{part(name)}", key=idempotency_key
         )
 
@@ -131,7 +131,7 @@ class MismatchNoun:
             name: a report's name
             drive: a suggested drive
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", f"/api/v1/mismatch/reports/{part(name)}/drives/{part(drive)}", DrivePlans
         )
 
@@ -147,7 +147,7 @@ class MismatchNoun:
             part_: of a drive in parts, between which the car is changed
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/mismatch/reports/{part(name)}/drives/{part(drive)}/play",
             Operation,

@@ -32,7 +32,7 @@ class NgsiNoun:
             count: tell how many there are in all
             options: `keyValues`, `simplified`: attributes are their values
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             "/ngsi-ld/v1/entities",
             tuple[dict[str, Any], ...],
@@ -54,7 +54,7 @@ class NgsiNoun:
             entity: its urn
             options: `keyValues`, `simplified`: attributes are their values
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             f"/ngsi-ld/v1/entities/{part(entity)}",
             dict[str, Any],

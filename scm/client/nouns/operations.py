@@ -21,7 +21,7 @@ class OperationsNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", "/api/v1/operations", Page[Operation], query={"limit": limit, "cursor": cursor}
         )
 
@@ -31,7 +31,7 @@ class OperationsNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/operations/{part(name)}", Operation)
+        return self._connection.request("GET", f"/api/v1/operations/{part(name)}", Operation)
 
     def cancel(self, name: str, *, idempotency_key: str = "") -> Operation:
         """Cancel long work.
@@ -40,6 +40,6 @@ class OperationsNoun:
             name: a name on the bus
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "DELETE", f"/api/v1/operations/{part(name)}", Operation, key=idempotency_key
         )

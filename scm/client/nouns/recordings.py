@@ -56,7 +56,7 @@ class RecordingsNoun:
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}/summary", Summary)
+        return self._connection.request("GET", f"/api/v1/recordings/{part(name)}/summary", Summary)
 
     def frames(
         self, name: str, *, from_s: float = 0.0, to_s: float = 10.0, hz: float = 10.0
@@ -69,7 +69,7 @@ class RecordingsNoun:
             to_s: seconds since the recording began
             hz: frames a second, at most
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             f"/api/v1/recordings/{part(name)}/frames",
             Frames,
@@ -84,7 +84,7 @@ class RecordingsNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             f"/api/v1/recordings/{part(name)}/events",
             Page[RecordedEvent],
@@ -97,7 +97,7 @@ class RecordingsNoun:
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", f"/api/v1/recordings/{part(name)}/disturbances", RecordedDisturbances
         )
 
@@ -141,7 +141,7 @@ class RecordingsNoun:
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}/notes", Notes)
+        return self._connection.request("GET", f"/api/v1/recordings/{part(name)}/notes", Notes)
 
     def write(
         self,
@@ -163,7 +163,7 @@ class RecordingsNoun:
             notes: in words, as long as need be
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             f"/api/v1/recordings/{part(name)}/notes",
             Notes,
@@ -188,7 +188,7 @@ class RecordingsNoun:
             to_s: likewise; without: to the end
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/recordings/{part(name)}/parts",
             Operation,
@@ -203,7 +203,7 @@ class RecordingsNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             "/api/v1/recordings",
             Page[RecordingRow],
@@ -216,7 +216,7 @@ class RecordingsNoun:
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.ask("GET", f"/api/v1/recordings/{part(name)}", RecordingRow)
+        return self._connection.request("GET", f"/api/v1/recordings/{part(name)}", RecordingRow)
 
     def remove(self, name: str, *, idempotency_key: str = "") -> None:
         """Delete a recording.
@@ -225,4 +225,6 @@ class RecordingsNoun:
             name: a recording: its file without .mcap
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        self._connection.tell("DELETE", f"/api/v1/recordings/{part(name)}", key=idempotency_key)
+        self._connection.send_only(
+            "DELETE", f"/api/v1/recordings/{part(name)}", key=idempotency_key
+        )

@@ -22,7 +22,7 @@ class ScansNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/scan", ScanRow)
+        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/scan", ScanRow)
 
     def every(self, name: str) -> Iterator[LiveEvent]:
         """Every turn, as server-sent events.

@@ -22,7 +22,7 @@ class ScenariosNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", "/api/v1/scenarios", Page[Scenario], query={"limit": limit, "cursor": cursor}
         )
 
@@ -32,7 +32,7 @@ class ScenariosNoun:
         Args:
             name: a script without .py
         """
-        return self._connection.ask("GET", f"/api/v1/scenarios/{part(name)}", Scenario)
+        return self._connection.request("GET", f"/api/v1/scenarios/{part(name)}", Scenario)
 
     def write(
         self,
@@ -52,7 +52,7 @@ class ScenariosNoun:
             text: Python that drives the fleet, as `scm.fleet` says
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             f"/api/v1/scenarios/{part(name)}",
             Scenario,
@@ -77,7 +77,7 @@ class ScenariosNoun:
             if_none_match: `*`: only where there is none yet
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        self._connection.tell(
+        self._connection.send_only(
             "DELETE",
             f"/api/v1/scenarios/{part(name)}",
             headers={"if-match": if_match, "if-none-match": if_none_match},
@@ -94,7 +94,7 @@ class ScenariosNoun:
             arguments: of its command line; {connect} becomes the address of this city's router
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/scenarios/{part(name)}/runs",
             Operation,
@@ -109,6 +109,6 @@ class ScenariosNoun:
             run: its operation
             after: number of the first line
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", f"/api/v1/scenarios/runs/{part(run)}/lines", Lines, query={"after": after}
         )

@@ -15,12 +15,12 @@ class SessionNoun:
 
     def session(self) -> Session:
         """Who this key says you are."""
-        return self._connection.ask("GET", "/api/v1/session", Session)
+        return self._connection.request("GET", "/api/v1/session", Session)
 
     def begin(self) -> Session:
         """Keep this key as a cookie, good for reading."""
-        return self._connection.ask("PUT", "/api/v1/session", Session)
+        return self._connection.request("PUT", "/api/v1/session", Session)
 
     def end(self) -> Ended:
         """Forget the cookie."""
-        return self._connection.ask("DELETE", "/api/v1/session", Ended)
+        return self._connection.request("DELETE", "/api/v1/session", Ended)

@@ -8,9 +8,9 @@ from typing import Literal
 from scm.client.connection import Connection, part
 from scm.records.operations import Operation
 from scm.records.page import Page
-from scm.records.signal_history import History, PromiseScore, Verdict
+from scm.records.signal_history import ForecastScore, History, Verdict
 from scm.records.signal_plans import PlanProof, PlanRow, StageBody
-from scm.records.signals import FlashReply, JunctionRow, Signals, SignalWish, StatusRow
+from scm.records.signals import FlashReply, JunctionRow, SignalOverride, Signals, StatusRow
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanReply
 from scm.v2x.messages.signal_request import SignalReply
@@ -25,7 +25,7 @@ class SignalsNoun:
 
     def all_signals(self) -> Signals:
         """All junctions."""
-        return self._connection.ask("GET", "/api/v1/signals", Signals)
+        return self._connection.request("GET", "/api/v1/signals", Signals)
 
     def one_signal(self, name: str) -> JunctionRow:
         """One junction.
@@ -33,7 +33,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}", JunctionRow)
+        return self._connection.request("GET", f"/api/v1/signals/{part(name)}", JunctionRow)
 
     def site(self, name: str) -> SignalSite:
         """Phases, least times, conflicts, rings, policies.
@@ -41,7 +41,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/site", SignalSite)
+        return self._connection.request("GET", f"/api/v1/signals/{part(name)}/site", SignalSite)
 
     def status(self, name: str) -> StatusRow:
         """What runs, detectors, greens to come.
@@ -49,7 +49,7 @@ class SignalsNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/status", StatusRow)
+        return self._connection.request("GET", f"/api/v1/signals/{part(name)}/status", StatusRow)
 
     def history(self, name: str) -> History:
         """What each group showed in the last ten minutes.
@@ -57,17 +57,19 @@ class SignalsNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/history", History)
+        return self._connection.request("GET", f"/api/v1/signals/{part(name)}/history", History)
 
-    def promises(self, name: str) -> PromiseScore:
+    def promises(self, name: str) -> ForecastScore:
         """What SPaT told against what happened.
 
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/signals/{part(name)}/promises", PromiseScore)
+        return self._connection.request(
+            "GET", f"/api/v1/signals/{part(name)}/promises", ForecastScore
+        )
 
-    def wishes(self, name: str, *, limit: int = 100, cursor: str = "") -> Page[SignalWish]:
+    def wishes(self, name: str, *, limit: int = 100, cursor: str = "") -> Page[SignalOverride]:
         """Wishes in force, each with who, why and its end.
 
         Args:
@@ -75,10 +77,10 @@ class SignalsNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             f"/api/v1/signals/{part(name)}/wishes",
-            Page[SignalWish],
+            Page[SignalOverride],
             query={"limit": limit, "cursor": cursor},
         )
 
@@ -102,7 +104,7 @@ class SignalsNoun:
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/signals/{part(name)}/calls",
             SignalReply,
@@ -130,7 +132,7 @@ class SignalsNoun:
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/signals/{part(name)}/holds",
             SignalReply,
@@ -158,7 +160,7 @@ class SignalsNoun:
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/signals/{part(name)}/force-offs",
             SignalReply,
@@ -186,7 +188,7 @@ class SignalsNoun:
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/signals/{part(name)}/omits",
             SignalReply,
@@ -214,7 +216,7 @@ class SignalsNoun:
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/signals/{part(name)}/preempts",
             SignalReply,
@@ -242,7 +244,7 @@ class SignalsNoun:
             verb: wishes of this kind; empty: of any
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/signals/{part(name)}/clear",
             SignalReply,
@@ -262,7 +264,7 @@ class SignalsNoun:
             plan: a plan by name (shipped, the map's own, or saved), a policy, or `flash`
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             f"/api/v1/signals/{part(name)}/plan",
             PlanReply,
@@ -290,7 +292,7 @@ class SignalsNoun:
             expires_s: seconds until it lapses by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             f"/api/v1/signals/{part(name)}/policy",
             SignalReply,
@@ -318,7 +320,7 @@ class SignalsNoun:
             expires_s: seconds until it ends by itself; null: not by itself
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             f"/api/v1/signals/{part(name)}/flash",
             FlashReply,
@@ -334,7 +336,7 @@ class SignalsNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             f"/api/v1/signals/{part(name)}/monitor",
             Page[Verdict],
@@ -352,7 +354,7 @@ class SignalsNoun:
             reason: why it is over
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/signals/{part(name)}/monitor/reset",
             MonitorStatus,
@@ -368,7 +370,7 @@ class SignalsNoun:
             limit: rows a page
             cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             f"/api/v1/signals/{part(name)}/plans",
             Page[PlanRow],
@@ -382,7 +384,7 @@ class SignalsNoun:
             name: a name on the bus
             plan: a plan's name
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", f"/api/v1/signals/{part(name)}/plans/{part(plan)}", PlanRow
         )
 
@@ -416,7 +418,7 @@ class SignalsNoun:
                 null: with nobody
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
             PlanRow,
@@ -449,7 +451,7 @@ class SignalsNoun:
             if_none_match: `*`: only where there is none yet
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "DELETE",
             f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
             PlanRow,
@@ -468,7 +470,7 @@ class SignalsNoun:
             stages: in the order of the cycle
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/signals/{part(name)}/proofs",
             Operation,
@@ -483,6 +485,6 @@ class SignalsNoun:
             name: a name on the bus
             digest: of a proof
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET", f"/api/v1/signals/{part(name)}/proofs/{part(digest)}", PlanProof
         )

@@ -15,7 +15,7 @@ class StationsNoun:
 
     def all_stations(self) -> Stations:
         """All stations."""
-        return self._connection.ask("GET", "/api/v1/stations", Stations)
+        return self._connection.request("GET", "/api/v1/stations", Stations)
 
     def one_station(self, name: str) -> Stations:
         """One station.
@@ -23,7 +23,7 @@ class StationsNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/stations/{part(name)}", Stations)
+        return self._connection.request("GET", f"/api/v1/stations/{part(name)}", Stations)
 
     def station_events(self, name: str) -> StationEvents:
         """The last events that a station told, or that are about it.
@@ -31,4 +31,6 @@ class StationsNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/stations/{part(name)}/events", StationEvents)
+        return self._connection.request(
+            "GET", f"/api/v1/stations/{part(name)}/events", StationEvents
+        )

@@ -15,7 +15,7 @@ class StopNoun:
 
     def stop(self) -> CityStop:
         """Whether the city-wide stop is engaged."""
-        return self._connection.ask("GET", "/api/v1/stop", CityStop)
+        return self._connection.request("GET", "/api/v1/stop", CityStop)
 
     def set_stop(
         self, *, engaged: bool, by: str = "", reason: str = "", idempotency_key: str = ""
@@ -28,7 +28,7 @@ class StopNoun:
             reason: why, for the log
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             "/api/v1/stop",
             CityStop,

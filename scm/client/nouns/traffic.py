@@ -15,7 +15,7 @@ class TrafficNoun:
 
     def counts(self) -> Counts:
         """Counts, delays, queues and level of service."""
-        return self._connection.ask("GET", "/api/v1/traffic", Counts)
+        return self._connection.request("GET", "/api/v1/traffic", Counts)
 
     def violations(self, *, vehicle: str = "", limit: int = 100) -> Violations:
         """Violations, newest first, with their evidence.
@@ -24,7 +24,7 @@ class TrafficNoun:
             vehicle: of this car alone
             limit: how many at most
         """
-        return self._connection.ask(
+        return self._connection.request(
             "GET",
             "/api/v1/traffic/violations",
             Violations,

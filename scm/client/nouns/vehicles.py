@@ -23,7 +23,7 @@ class VehiclesNoun:
 
     def all_vehicles(self) -> VehiclesTopic:
         """All cars on the map."""
-        return self._connection.ask("GET", "/api/v1/vehicles", VehiclesTopic)
+        return self._connection.request("GET", "/api/v1/vehicles", VehiclesTopic)
 
     def spawn(
         self, *, vehicle: str = "", car: str = "nigel", spawn: str = "", idempotency_key: str = ""
@@ -36,7 +36,7 @@ class VehiclesNoun:
             spawn: a spawn place, or X,Y,DEG (metres, degrees, map frame); empty: any free one
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             "/api/v1/vehicles",
             SpawnReply,
@@ -50,7 +50,7 @@ class VehiclesNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}", VehicleRow)
+        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}", VehicleRow)
 
     def remove(self, name: str, *, reason: str = "", idempotency_key: str = "") -> RemoveReply:
         """Take a car off the map.
@@ -60,7 +60,7 @@ class VehiclesNoun:
             reason: why, for the log
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "DELETE",
             f"/api/v1/vehicles/{part(name)}",
             RemoveReply,
@@ -88,7 +88,7 @@ class VehiclesNoun:
             then: at the end of the last lane: stand, or drive on without end
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "POST",
             f"/api/v1/vehicles/{part(name)}/route",
             RouteReply,
@@ -112,7 +112,7 @@ class VehiclesNoun:
             indicators: null: as they are
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.ask(
+        return self._connection.request(
             "PUT",
             f"/api/v1/vehicles/{part(name)}/lights",
             LightReply,
@@ -126,7 +126,7 @@ class VehiclesNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/path", PathRow)
+        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/path", PathRow)
 
     def reports(self, name: str, *, scan: bool = False) -> Iterator[LiveEvent]:
         """All that a car reports, as server-sent events `reports`.
@@ -145,4 +145,4 @@ class VehiclesNoun:
         Args:
             name: a name on the bus
         """
-        return self._connection.ask("GET", f"/api/v1/vehicles/{part(name)}/link", LinkRow)
+        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/link", LinkRow)

@@ -7,8 +7,8 @@ from msgspec.structs import replace
 from scm import registry
 from scm.clock import NS_PER_S
 from scm.errors import PlanError
-from scm.records.signal_plans import SignalPhase, SignalPlan, SignalPolicy, SignalSlot
-from scm.records.signals import SignalDetector, SignalTurn, SignalWish
+from scm.records.signal_plans import SignalPhase, SignalPlan, SignalPolicy, StageInterval
+from scm.records.signals import SignalDetector, SignalOverride, SignalTurn
 from scm.traffic.signals.controller import Controller
 from scm.traffic.signals.custom_plans import stages_of
 from scm.traffic.signals.detectors import Detector
@@ -88,10 +88,10 @@ class JunctionFacts:
         return tuple(name for name in self.program.groups if name in groups)
 
 
-def wishes_of(asked: Iterable[Asked]) -> tuple[SignalWish, ...]:
+def wishes_of(asked: Iterable[Asked]) -> tuple[SignalOverride, ...]:
     """Return wishes in force as they are told."""
     return tuple(
-        SignalWish(
+        SignalOverride(
             verb=one.verb,
             groups=one.groups,
             by=one.by,
@@ -156,7 +156,7 @@ def _plan(table: Timetable, program: Program, wave: Wave | None) -> SignalPlan:
         cycle_s=table.length_ns / NS_PER_S,
         stages=stages_of(table, program),
         slots=tuple(
-            SignalSlot(
+            StageInterval(
                 groups=tuple(name for name in program.groups if name in slot.groups),
                 start_s=slot.start_ns / NS_PER_S,
                 end_s=slot.end_ns / NS_PER_S,

@@ -2,7 +2,7 @@
 
 from typing import ClassVar, Literal
 
-from scm.records.signals import SignalWish, Verb
+from scm.records.signals import SignalOverride, Verb
 from scm.v2x.message import Message, Request
 
 
@@ -19,7 +19,7 @@ class SignalReply(Message, kw_only=True, frozen=True):
     junction: str
     policy: str
     pending: str = ""
-    wishes: tuple[SignalWish, ...] = ()
+    wishes: tuple[SignalOverride, ...] = ()
 
 
 class SignalRequest(Request, kw_only=True, frozen=True):

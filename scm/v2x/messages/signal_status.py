@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from scm.records.signal_plans import SignalStage
-from scm.records.signals import SignalDetector, SignalTurn, SignalWish
+from scm.records.signals import SignalDetector, SignalOverride, SignalTurn
 from scm.v2x.message import Message
 
 
@@ -29,7 +29,7 @@ class SignalStatus(Message, kw_only=True, frozen=True):
     policy: str
     plan: str
     pending: str = ""
-    wishes: tuple[SignalWish, ...] = ()
+    wishes: tuple[SignalOverride, ...] = ()
     detectors: tuple[SignalDetector, ...] = ()
     turns: tuple[SignalTurn, ...] = ()
     failure: str = ""

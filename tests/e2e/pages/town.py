@@ -15,8 +15,8 @@ import httpx
 
 from scm.api.app import create_app
 from scm.api.based import Site
+from scm.api.folders import folders_in
 from scm.api.server import serve
-from scm.api.shelves import shelves_in
 from scm.api.view import CityView
 from scm.maps.load import load_map
 from scm.registry import names
@@ -47,8 +47,8 @@ class Town:
         plans = {
             junction.name: names("scm.traffic.signals.plans") for junction in city_map.junctions
         }
-        shelves, site = shelves_in(folder), Site(base)
-        app = create_app(view, self._ask, city_map, shelves=shelves, plans=plans, site=site)
+        folders, site = folders_in(folder), Site(base)
+        app = create_app(view, self._ask, city_map, folders=folders, plans=plans, site=site)
         self._threads = [
             threading.Thread(target=self._drive),
             threading.Thread(

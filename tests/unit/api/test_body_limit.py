@@ -6,8 +6,8 @@ import pytest
 
 from scm.api.app import create_app
 from scm.api.body_limit import LARGEST_BODY
+from scm.api.folders import folders_in
 from scm.api.keys import KeyRing
-from scm.api.shelves import shelves_in
 from scm.store.memory import MemoryStore
 
 STOP = "/api/v1/stop"
@@ -44,7 +44,7 @@ def test_what_is_refused_anyway_is_so_for_its_own_reason(view, fake_city, city_m
 def test_a_file_may_be_larger_than_other_bodies(
     view, fake_city, city_map, client_of, tmp_path, headers
 ):
-    app = create_app(view, fake_city.ask, city_map, shelves=shelves_in(tmp_path))
+    app = create_app(view, fake_city.ask, city_map, folders=folders_in(tmp_path))
     read = client_of(app)("POST", UPLOADS, content=LARGE, headers=headers)
     assert (read.status_code, read.json()["code"]) == (422, "invalid")
     assert "zip" in read.json()["detail"]
@@ -54,7 +54,7 @@ def test_a_file_may_be_larger_than_other_bodies(
 
 
 def test_a_body_that_breaks_off_is_no_failure_of_ours(view, fake_city, city_map, tmp_path):
-    app = create_app(view, fake_city.ask, city_map, shelves=shelves_in(tmp_path))
+    app = create_app(view, fake_city.ask, city_map, folders=folders_in(tmp_path))
     came = iter(
         [{"type": "http.request", "body": b"PK", "more_body": True}, {"type": "http.disconnect"}]
     )

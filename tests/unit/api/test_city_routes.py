@@ -7,7 +7,7 @@ import pytest
 
 from scm.api.app import create_app
 from scm.api.city import Link
-from scm.api.shelves import shelves_in
+from scm.api.folders import folders_in
 from scm.clock import NS_PER_S, StepClock
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
@@ -55,8 +55,8 @@ class TestReady:
     @pytest.fixture
     def ready(self, view, fake_city, city_map, client_of, tmp_path):
         def ask(**link):
-            shelves = shelves_in(tmp_path / "runs")
-            app = create_app(view, fake_city.ask, city_map, shelves=shelves, link=Link(**link))
+            folders = folders_in(tmp_path / "runs")
+            app = create_app(view, fake_city.ask, city_map, folders=folders, link=Link(**link))
             return client_of(app)("GET", "/readyz")
 
         return ask
@@ -105,8 +105,8 @@ class TestReady:
     def test_the_folder_of_a_full_shelf_stands_in_the_log_once(
         self, view, fake_city, city_map, client_of, heard, full, tmp_path, caplog
     ):
-        shelves = shelves_in(tmp_path / "runs")
-        ask = client_of(create_app(view, fake_city.ask, city_map, shelves=shelves))
+        folders = folders_in(tmp_path / "runs")
+        ask = client_of(create_app(view, fake_city.ask, city_map, folders=folders))
         assert [ask("GET", "/readyz").status_code for _ in range(3)] == [503] * 3
         told = [line for line in caplog.messages if line.startswith("disk_short")]
         assert told == [f"disk_short shelf=recordings at={tmp_path} free_mib=1"]

@@ -17,11 +17,12 @@ from scm.api.app import create_app
 from scm.api.city import Link
 from scm.api.keys import KeyRing
 from scm.api.server import serve
-from scm.api.teleop import NOT_YOURS, PROTOCOL
+from scm.api.teleop import NOT_YOURS
 from scm.client import Client, ProblemError, connection
 from scm.client import teleop as client_side
 from scm.client.teleop import WheelError
 from scm.errors import LinkError
+from scm.records.drive import PROTOCOL
 from scm.store.memory import MemoryStore
 from scm.v2x.message import Refused
 from scm.v2x.messages.drive_command import DriveCommand
@@ -46,7 +47,7 @@ class FakeWire:
     def say(self, message):
         self.said.append(message)
 
-    def ask_once(self, request, timeout_s):
+    def request_once(self, request, timeout_s):
         assert timeout_s > 0.0
         self.asked.append(request)
         return self.answer
@@ -376,7 +377,7 @@ class TestTheClient:
             told = wheel.drive(0.4, -0.2)
             if told.why == "driving":
                 return told
-        raise AssertionError(wheel.told)
+        raise AssertionError(wheel.status)
 
     def test_it_drives_at_a_beat_and_gives_the_car_back(self, serving, wire, fake_city):
         with Client(serving()) as city, city.wheel("n1") as wheel:

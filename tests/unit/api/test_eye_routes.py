@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from scm.api.app import create_app
-from scm.api.calibration_desk import LARGEST_PICTURE, MOST_CAMERAS, MOST_VIEWS, size_of
+from scm.api.calibration_jobs import LARGEST_PICTURE, MOST_CAMERAS, MOST_VIEWS, size_of
+from scm.api.folders import Folders, folders_in
 from scm.api.keys import KeyRing
 from scm.api.problem import RefusedError
-from scm.api.shelves import Shelves, shelves_in
 from scm.records.eye import Calibrated, InForce, TagSeen
 from scm.store.memory import MemoryStore
 from scm.v2x.message import Refused
@@ -57,7 +57,7 @@ PLACE_BENT = PLACE + "distortion = [-0.15, 0.05, 0.0005, -0.0004, 0.0]\n"
 
 @pytest.fixture
 def app(view, fake_city, city_map, tmp_path):
-    return create_app(view, fake_city.ask, city_map, shelves=shelves_in(tmp_path))
+    return create_app(view, fake_city.ask, city_map, folders=folders_in(tmp_path))
 
 
 @pytest.fixture
@@ -231,8 +231,8 @@ class TestViews:
 
 class TestShelf:
     def test_a_disk_that_cannot_be_written_is_told(self, view, fake_city, city_map, client_of):
-        nowhere = Shelves(calibrations=Path("/sys/calibrations"))
-        client = client_of(create_app(view, fake_city.ask, city_map, shelves=nowhere))
+        nowhere = Folders(calibrations=Path("/sys/calibrations"))
+        client = client_of(create_app(view, fake_city.ask, city_map, folders=nowhere))
         body, new = {"toml": LENS}, {"If-None-Match": "*"}
         answer = client("PUT", f"{EYE}/calibrations/lab", json=body, headers=new)
         assert (answer.status_code, answer.json()["code"]) == (507, "not_written")
@@ -286,7 +286,7 @@ class TestShelf:
         assert sorted(path.name for path in folder.iterdir()) == ["a.toml", "c.toml"]
 
     def test_a_full_shelf_takes_no_more(self, client, monkeypatch):
-        monkeypatch.setattr("scm.api.calibration_shelf.MOST_KEPT", 1)
+        monkeypatch.setattr("scm.api.calibration_repository.MOST_KEPT", 1)
         new = {"If-None-Match": "*"}
         for name, status in (("a", 201), ("b", 409)):
             path = f"{EYE}/calibrations/{name}"
@@ -347,7 +347,7 @@ class TestMeasuring:
             Path(words[words.index("--out") + 1]).write_text(LENS)
             Path(words[words.index("--report") + 1]).write_text("{}")
 
-        monkeypatch.setattr("scm.api.calibration_desk._run", measure)
+        monkeypatch.setattr("scm.api.calibration_jobs._run", measure)
         client("POST", TestViews.path, content=jpeg())
         path, body = f"{EYE}/cameras/overhead/lens", {**BOARD, "save_as": "glass"}
         asked = [client("POST", path, json=body) for _ in range(2)]
@@ -453,7 +453,7 @@ class TestInForce:
         self, view, eye, city_map, client_of, tmp_path
     ):
         ring = KeyRing(MemoryStore())
-        app = create_app(view, eye.ask, city_map, keys=ring, shelves=shelves_in(tmp_path))
+        app = create_app(view, eye.ask, city_map, keys=ring, folders=folders_in(tmp_path))
         for owner, role, status in (("ben", "operator", 403), ("eva", "engineer", 200)):
             headers = {"Authorization": f"Bearer {ring.add(owner, role, now_s=0)}"}
             reply = client_of(app)("POST", f"{self.path}/back", json=WHY, headers=headers)

@@ -9,9 +9,9 @@ from starlette.responses import Response
 from scm.api.acknowledgements import Acknowledgements
 from scm.api.app import create_app
 from scm.api.city import City, Link
+from scm.api.folders import Folders
 from scm.api.keys import KeyRing
 from scm.api.metrics import Measured, Metrics
-from scm.api.shelves import Shelves
 from scm.api.stream import Stream
 from scm.clock import StepClock
 from scm.store.memory import MemoryStore
@@ -109,7 +109,7 @@ def test_methods_that_nobody_knows_are_counted_as_one(read, client):
 
 
 def test_an_endless_answer_is_counted_and_not_timed(view, fake_city, city_map, client_of):
-    city = City(view, fake_city.ask, city_map, {}, Shelves(), Link())
+    city = City(view, fake_city.ask, city_map, {}, Folders(), Link())
     metrics = Metrics(city, Stream(city, "r", Acknowledgements(MemoryStore(), StepClock())))
     for media in ("text/event-stream", "text/plain"):
         client_of(Measured(Response("", media_type=media), metrics=metrics, clock=StepClock()))(

@@ -12,7 +12,7 @@ import pytest
 from scm.api import mismatch_jobs, uploads
 from scm.api.app import create_app
 from scm.api.city import Link
-from scm.api.shelves import shelves_in
+from scm.api.folders import folders_in
 from scm.errors import RunError
 from scm.mismatch.report.write import write_report
 from scm.v2x.messages.trip import Trip
@@ -33,16 +33,16 @@ tables:
 
 
 @pytest.fixture
-def shelves(tmp_path):
-    found = shelves_in(tmp_path)
+def folders(tmp_path):
+    found = folders_in(tmp_path)
     found.reports.mkdir()
     return found
 
 
 @pytest.fixture
-def call(view, fake_city, city_map, shelves):
+def call(view, fake_city, city_map, folders):
     bus = ("--connect", "tcp/127.0.0.1:1")
-    return Client(create_app(view, fake_city.ask, city_map, shelves=shelves, link=Link(words=bus)))
+    return Client(create_app(view, fake_city.ask, city_map, folders=folders, link=Link(words=bus)))
 
 
 @pytest.fixture
@@ -60,9 +60,9 @@ def ran(monkeypatch):
     return run
 
 
-def put(shelves, name, case="pair"):
-    write_report(*made_up.CASES[case](), shelves.reports / name)
-    return shelves.reports / name
+def put(folders, name, case="pair"):
+    write_report(*made_up.CASES[case](), folders.reports / name)
+    return folders.reports / name
 
 
 def with_drive(folder):
@@ -99,36 +99,36 @@ def test_a_city_without_a_shelf_has_no_reports_and_says_how_to_have_some(client)
     assert "--data" in answer.json()["detail"]
 
 
-def test_reports_are_listed_with_what_they_found(call, shelves):
-    put(shelves, "monday")
+def test_reports_are_listed_with_what_they_found(call, folders):
+    put(folders, "monday")
     (row,) = call("GET", f"{API}/reports").json()["items"]
     assert (row["name"], row["verdict"]) == ("monday", "mismatch")
     assert len(row["effects"]) == 2
     assert row["before_m"] > row["after_m"] > 0.0
 
 
-def test_a_search_that_time_cut_short_is_listed_as_such(call, shelves):
+def test_a_search_that_time_cut_short_is_listed_as_such(call, folders):
     for case in ("none", "cut_short"):
-        put(shelves, case.replace("_", "-"), case)
+        put(folders, case.replace("_", "-"), case)
     rows = call("GET", f"{API}/reports").json()["items"]
     assert {row["name"]: row["cut_short"] for row in rows} == {"none": False, "cut-short": True}
     report = call("GET", f"{API}/reports/cut-short").json()["report"]
     assert [question["name"] for question in report["unasked"]] == ["effects", "laws"]
 
 
-def test_the_newest_report_comes_first_and_pages_go_on(call, shelves):
+def test_the_newest_report_comes_first_and_pages_go_on(call, folders):
     for age, name in enumerate(("new", "middle", "old")):
         at = 1_700_000_000 - age
-        os.utime(put(shelves, name, "none") / "report.json", (at, at))
+        os.utime(put(folders, name, "none") / "report.json", (at, at))
     first = call("GET", f"{API}/reports?limit=2").json()
     second = call("GET", f"{API}/reports?limit=2&cursor={first['next']}").json()
     assert [row["name"] for row in first["items"] + second["items"]] == ["new", "middle", "old"]
 
 
-def test_of_several_cars_each_has_its_report(call, shelves):
-    folder = shelves.reports / "fleet"
+def test_of_several_cars_each_has_its_report(call, folders):
+    folder = folders.reports / "fleet"
     for car in ("n1", "n2"):
-        put(shelves, f"fleet/{car}", "none")
+        put(folders, f"fleet/{car}", "none")
     told = {"said": "They share a camera.", "conclusions": ["It is tilted."], "common": []}
     (folder / "cars.json").write_text(json.dumps(told), "utf-8")
     names = {row["name"] for row in call("GET", f"{API}/reports").json()["items"]}
@@ -140,16 +140,16 @@ def test_of_several_cars_each_has_its_report(call, shelves):
     assert report["together"]["cars"] == ["fleet.n1", "fleet.n2"]
 
 
-def test_a_damaged_report_is_listed_as_such_and_takes_nothing_down(call, shelves):
-    folder = put(shelves, "monday")
+def test_a_damaged_report_is_listed_as_such_and_takes_nothing_down(call, folders):
+    folder = put(folders, "monday")
     (folder / "report.json").write_text('{"verdict": 3', "utf-8")
     (row,) = call("GET", f"{API}/reports").json()["items"]
     assert row["verdict"] == "unreadable"
     assert call("GET", f"{API}/reports/monday").status_code == 200
 
 
-def test_a_report_tells_its_fields_what_it_draws_and_its_files(call, shelves):
-    with_drive(put(shelves, "monday"))
+def test_a_report_tells_its_fields_what_it_draws_and_its_files(call, folders):
+    with_drive(put(folders, "monday"))
     body = call("GET", f"{API}/reports/monday").json()
     assert body["report"]["effects"][0]["name"] == "drive_lag"
     drawn = body["drawn"]
@@ -168,8 +168,8 @@ def test_a_report_tells_its_fields_what_it_draws_and_its_files(call, shelves):
     }
 
 
-def test_files_are_downloads_and_nothing_else_can_be_had(call, shelves):
-    put(shelves, "monday")
+def test_files_are_downloads_and_nothing_else_can_be_had(call, folders):
+    put(folders, "monday")
     answer = call("GET", f"{API}/reports/monday/files/report.html")
     assert answer.headers["content-disposition"].startswith("attachment")
     for file in ("job.json", "..%2F..%2Fsecret", "pictures"):
@@ -177,38 +177,38 @@ def test_files_are_downloads_and_nothing_else_can_be_had(call, shelves):
     assert call("GET", f"{API}/reports/..%2Fmonday").status_code in (404, 422)
 
 
-def test_a_removed_report_is_gone(call, shelves):
-    folder = put(shelves, "monday")
+def test_a_removed_report_is_gone(call, folders):
+    folder = put(folders, "monday")
     assert call("DELETE", f"{API}/reports/monday").status_code == 204
     assert not folder.exists()
     assert call("DELETE", f"{API}/reports/monday").status_code == 404
 
 
-def test_a_search_runs_the_program_and_puts_its_report_on_the_shelf(call, shelves, ran):
+def test_a_search_runs_the_program_and_puts_its_report_on_the_shelf(call, folders, ran):
     def search(words, tell, hear):
         hear("   12 s   16 %  trying 46 effects")
-        out = shelves.reports / words[words.index("--out") + 1]
+        out = folders.reports / words[words.index("--out") + 1]
         write_report(*made_up.CASES["none"](), out)
         return []
 
     ran.then = search
-    (shelves.recordings / "city-1.mcap").write_bytes(b"")
+    (folders.recordings / "city-1.mcap").write_bytes(b"")
     body = {"recording": "city-1", "vehicle": "n1", "car": "nigel", "budget_s": 20, "to_s": 40.5}
     row = wait_for(call, call("POST", f"{API}/jobs", json=body))
     assert row["result"] == "/mismatch/city-1-n1", row
     words = ran.started[0]
-    assert words[:2] == ["mismatch", str(shelves.recordings / "city-1.mcap")]
+    assert words[:2] == ["mismatch", str(folders.recordings / "city-1.mcap")]
     for option, value in (("--vehicle", "n1"), ("--car", "nigel"), ("--to-s", "40.5")):
         assert words[words.index(option) + 1] == value
     assert "--from-s" not in words
     job = call("GET", f"{API}/reports/city-1-n1").json()["job"]
     assert (job["source"], job["recordings"]) == ("city-1", ["city-1.mcap"])
     assert wait_for(call, call("POST", f"{API}/jobs", json=body))["result"].endswith("-n1-2")
-    assert sorted(path.name for path in shelves.reports.iterdir()) == ["city-1-n1", "city-1-n1-2"]
+    assert sorted(path.name for path in folders.reports.iterdir()) == ["city-1-n1", "city-1-n1-2"]
 
 
 @pytest.mark.parametrize("finish", [True, False])
-def test_of_a_run_without_its_end_what_is_there_of_it_is_searched(call, shelves, ran, finish):
+def test_of_a_run_without_its_end_what_is_there_of_it_is_searched(call, folders, ran, finish):
     given = []
 
     def search(words, tell, hear):
@@ -220,25 +220,25 @@ def test_of_a_run_without_its_end_what_is_there_of_it_is_searched(call, shelves,
         return []
 
     ran.then = search
-    run = write_run(shelves.recordings / "city-1.mcap", finish=finish)
+    run = write_run(folders.recordings / "city-1.mcap", finish=finish)
     row = wait_for(call, call("POST", f"{API}/jobs", json={"recording": "city-1"}))
     assert row["state"] == "done", row
     assert given == [("city-1.mcap", run.read_bytes() if finish else b"mended")]
-    assert [path.name for path in shelves.reports.iterdir()] == ["city-1"]
-    job = json.loads((shelves.reports / "city-1" / "job.json").read_text())
+    assert [path.name for path in folders.reports.iterdir()] == ["city-1"]
+    job = json.loads((folders.reports / "city-1" / "job.json").read_text())
     assert job["recordings"] == [str(run)]
 
 
-def test_a_search_that_fails_says_why_and_leaves_nothing(call, shelves, ran):
+def test_a_search_that_fails_says_why_and_leaves_nothing(call, folders, ran):
     def fail(words, tell, hear):
-        (shelves.reports / words[words.index("--out") + 1]).mkdir()
+        (folders.reports / words[words.index("--out") + 1]).mkdir()
         raise RunError("scm mismatch: no car 'n9'")
 
     ran.then = fail
-    (shelves.recordings / "city-1.mcap").write_bytes(b"")
+    (folders.recordings / "city-1.mcap").write_bytes(b"")
     row = wait_for(call, call("POST", f"{API}/jobs", json={"recording": "city-1.mcap"}))
     assert (row["state"], row["error"]) == ("failed", "scm mismatch: no car 'n9'")
-    assert list(shelves.reports.iterdir()) == []
+    assert list(folders.reports.iterdir()) == []
 
 
 @pytest.mark.parametrize(
@@ -257,8 +257,8 @@ def test_a_search_that_fails_says_why_and_leaves_nothing(call, shelves, ran):
         ({"recording": "city-1", "out": "/etc"}, 422),
     ],
 )
-def test_a_search_that_cannot_be_is_refused(call, shelves, ran, body, status):
-    (shelves.recordings / "city-1.mcap").write_bytes(b"")
+def test_a_search_that_cannot_be_is_refused(call, folders, ran, body, status):
+    (folders.recordings / "city-1.mcap").write_bytes(b"")
     assert call("POST", f"{API}/jobs", json=body).status_code == status
     assert ran.started == []
 
@@ -269,14 +269,14 @@ def test_a_span_that_ends_before_it_begins_is_refused_in_the_models_own_words(ca
     assert told["detail"] == "body: to_s: got 4, expected more than from_s, 5"
 
 
-def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, shelves, ran, city_map):
-    with_drive(put(shelves, "monday", "undecided"))
+def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, folders, ran, city_map):
+    with_drive(put(folders, "monday", "undecided"))
     (part,) = call("GET", f"{API}/reports/monday/drives/next_drive").json()["parts"]
     assert (part["lasts_s"], part["commands"][1]) == (2.0, [2, 0.3, 0.1])
     assert part["way"] == [[1, 2, 0.5]]
 
     def play(words, tell, hear):
-        out = shelves.reports / words[words.index("--out") + 1]
+        out = folders.reports / words[words.index("--out") + 1]
         out.mkdir()
         (out / "recording.yaml").write_text("recording: 1\n", "utf-8")
         return ["12 poses of 2 s recorded"]
@@ -294,9 +294,9 @@ def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, shelves, ra
 
 
 def test_a_car_goes_on_with_its_trip_when_a_drive_has_ended(
-    call, shelves, ran, fake_city, hear, snapshot
+    call, folders, ran, fake_city, hear, snapshot
 ):
-    with_drive(put(shelves, "monday", "undecided"))
+    with_drive(put(folders, "monday", "undecided"))
     trip = Trip(
         vehicle="n1", trip_id="t1", t_ns=1, route=("a", "b", "a", "b"), done_m=0.1,
         started_ns=0, length_m=None, via=("a", "b"), then="repeat",
@@ -315,8 +315,8 @@ def test_a_car_goes_on_with_its_trip_when_a_drive_has_ended(
     assert (asked.vehicle, asked.via, asked.then) == ("n1", ("a", "b"), trip.then)
 
 
-def test_a_drive_that_ends_early_is_no_recording(call, shelves, ran):
-    folder = put(shelves, "monday", "undecided")
+def test_a_drive_that_ends_early_is_no_recording(call, folders, ran):
+    folder = put(folders, "monday", "undecided")
     with_drive(folder)
 
     def play(words, tell, hear):
@@ -338,9 +338,9 @@ def told(folder, *names):
     return [str(folder / name) for name in names]
 
 
-def test_a_search_again_takes_what_was_driven_since(call, shelves, ran):
-    folder = put(shelves, "monday", "undecided")
-    run = str(shelves.recordings / "city-1.mcap")
+def test_a_search_again_takes_what_was_driven_since(call, folders, ran):
+    folder = put(folders, "monday", "undecided")
+    run = str(folders.recordings / "city-1.mcap")
     Path(run).write_bytes(b"")
     assert call("POST", f"{API}/jobs", json={"again": "monday"}).status_code == 409
     job = {"recordings": [run], "source": "x", "vehicle": "n1", "budget_s": 60.0, "to_s": 40.0}
@@ -368,11 +368,11 @@ def test_a_search_again_takes_what_was_driven_since(call, shelves, ran):
     assert words[words.index("--budget-s") + 1] == "30"
 
 
-def test_a_search_again_of_one_of_several_cars_is_of_that_car(call, shelves, ran):
-    folder = put(shelves, "fleet/n1", "undecided")
-    (shelves.recordings / "city-1.mcap").write_bytes(b"")
-    job = {"recordings": [str(shelves.recordings / "city-1.mcap")], "source": "x"}
-    (shelves.reports / "fleet" / "job.json").write_text(json.dumps(job), "utf-8")
+def test_a_search_again_of_one_of_several_cars_is_of_that_car(call, folders, ran):
+    folder = put(folders, "fleet/n1", "undecided")
+    (folders.recordings / "city-1.mcap").write_bytes(b"")
+    job = {"recordings": [str(folders.recordings / "city-1.mcap")], "source": "x"}
+    (folders.reports / "fleet" / "job.json").write_text(json.dumps(job), "utf-8")
     (driven,) = told(folder, "told_1")
     wait_for(call, call("POST", f"{API}/jobs", json={"again": "fleet.n1"}))
     (words,) = ran.started
@@ -380,7 +380,7 @@ def test_a_search_again_of_one_of_several_cars_is_of_that_car(call, shelves, ran
     assert words[words.index("--told") + 1] == driven
 
 
-def test_an_upload_becomes_a_recording_for_a_search(call, shelves, ran):
+def test_an_upload_becomes_a_recording_for_a_search(call, folders, ran):
     body = packed({"tuesday/recording.yaml": DESCRIPTION, "tuesday/commands.csv": COMMANDS,
                    "tuesday/notes.md": "left out"})  # fmt: skip
     answer = call("POST", f"{API}/uploads?name=My%20drive", content=body)
@@ -389,7 +389,7 @@ def test_an_upload_becomes_a_recording_for_a_search(call, shelves, ran):
     assert upload.startswith("my-drive-")
     assert (answer.json()["files"], answer.json()["vehicles"]) == (2, ["nigel"])
     wait_for(call, call("POST", f"{API}/jobs", json={"upload": upload}))
-    assert ran.started[0][1] == str(shelves.reports / "uploads" / upload)
+    assert ran.started[0][1] == str(folders.reports / "uploads" / upload)
 
 
 @pytest.mark.parametrize(
@@ -421,12 +421,12 @@ def test_an_upload_becomes_a_recording_for_a_search(call, shelves, ran):
         ({"a.csv": COMMANDS, "a.csv/b.csv": COMMANDS}, "cannot be read: File exists"),
     ],
 )
-def test_an_upload_that_asks_for_what_lies_outside_is_refused(call, shelves, files, why):
+def test_an_upload_that_asks_for_what_lies_outside_is_refused(call, folders, files, why):
     answer = call("POST", f"{API}/uploads", content=packed(files))
     assert answer.status_code == 422
     assert why in answer.json()["detail"]
-    assert str(shelves.reports) not in answer.json()["detail"]
-    assert list((shelves.reports / "uploads").iterdir()) == []
+    assert str(folders.reports) not in answer.json()["detail"]
+    assert list((folders.reports / "uploads").iterdir()) == []
 
 
 def test_a_description_that_takes_too_long_to_read_is_refused(call, monkeypatch):
@@ -440,14 +440,14 @@ def test_a_description_that_takes_too_long_to_read_is_refused(call, monkeypatch)
     assert "to read it takes more than 0 s and 1024 MiB" in answer.json()["detail"]
 
 
-def test_an_upload_that_is_no_zip_or_unpacks_to_too_much_is_refused(call, shelves, monkeypatch):
+def test_an_upload_that_is_no_zip_or_unpacks_to_too_much_is_refused(call, folders, monkeypatch):
     assert call("POST", f"{API}/uploads", content=b"hello").status_code == 422
     monkeypatch.setattr(uploads, "MOST_UNPACKED_BYTES", 1000)
     bomb = packed({"recording.yaml": DESCRIPTION, "commands.csv": "0" * 5000})
     assert call("POST", f"{API}/uploads", content=bomb).status_code == 422
     large = call("POST", f"{API}/uploads", content=bytes(uploads.MOST_BYTES + 1))
     assert (large.status_code, large.json()["code"]) == (413, "too_large")
-    assert [one.name for one in shelves.reports.iterdir()] == ["uploads"]
+    assert [one.name for one in folders.reports.iterdir()] == ["uploads"]
 
 
 def test_an_upload_with_a_long_list_or_damaged_is_refused(call, monkeypatch):

@@ -11,12 +11,12 @@ import pytest
 
 from scm.__main__ import main
 from scm.api.app import create_app
+from scm.api.folders import folders_in
 from scm.api.problem import RefusedError
 from scm.api.ranged import BLOCK
-from scm.api.recordings_shelf import RecordingsShelf
+from scm.api.recording_repository import RecordingRepository
 from scm.api.replay import csv_of
 from scm.api.routes.recordings import _converted
-from scm.api.shelves import shelves_in
 from scm.recorder import run_index
 from scm.recorder.run_index import read_index
 from tests.e2e.city_process import wait_for
@@ -31,7 +31,7 @@ def folder(tmp_path):
 @pytest.fixture
 def client(view, fake_city, city_map, folder, client_of):
     folder.mkdir()
-    app = create_app(view, fake_city.ask, city_map, shelves=shelves_in(folder))
+    app = create_app(view, fake_city.ask, city_map, folders=folders_in(folder))
     return client_of(app)
 
 
@@ -96,7 +96,7 @@ def test_names_that_leave_the_folder_find_nothing(client, folder):
     for name in ("..%2Foutside", "%2e%2e%2foutside", "....", "outside"):
         assert client("GET", f"/api/v1/recordings/{name}").status_code in (404, 422)
     with pytest.raises(RefusedError):
-        RecordingsShelf(folder).path("../outside")
+        RecordingRepository(folder).path("../outside")
 
 
 def test_long_lists_come_in_pages(ask, folder):

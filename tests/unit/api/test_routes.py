@@ -144,7 +144,7 @@ class TestRefusals:
         wire = BusWire(network.bus("lab", "api"))
 
         def ask(request, _timeout_s):
-            return wire.ask_once(request, 0.05)
+            return wire.request_once(request, 0.05)
 
         return lambda: client_of(create_app(view, ask, city_map))("DELETE", f"{API}/vehicles/n5")
 

@@ -7,8 +7,8 @@ import pytest
 
 from scm.api.app import create_app
 from scm.api.city import Link
+from scm.api.folders import folders_in
 from scm.api.keys import KeyRing, public_part
-from scm.api.shelves import shelves_in
 from scm.store.memory import MemoryStore
 
 OVER = ("done", "failed", "cancelled")
@@ -31,8 +31,8 @@ def link():
 
 @pytest.fixture
 def client(view, fake_city, city_map, tmp_path, client_of, link):
-    shelves = shelves_in(tmp_path)
-    return client_of(create_app(view, fake_city.ask, city_map, shelves=shelves, link=link))
+    folders = folders_in(tmp_path)
+    return client_of(create_app(view, fake_city.ask, city_map, folders=folders, link=link))
 
 
 @pytest.fixture
@@ -142,7 +142,7 @@ def test_a_script_is_lent_a_key_while_it_runs_where_the_interface_asks_for_one(
 ):
     ring = KeyRing(MemoryStore())
     app = create_app(
-        view, fake_city.ask, city_map, shelves=shelves_in(tmp_path), link=Link(), keys=ring
+        view, fake_city.ask, city_map, folders=folders_in(tmp_path), link=Link(), keys=ring
     )
     client, key = client_of(app), ring.add("anna", "admin", 1)
     headers = {"Authorization": f"Bearer {key}"}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from scm.api.signal_history import KEPT_S, SignalHistory
+from scm.api.signal_history import HISTORY_S, SignalHistory
 from scm.clock import NS_PER_S
 from scm.records.signals import SignalGroup
 from scm.v2x.messages.monitor_status import MonitorStatus
@@ -11,7 +11,7 @@ from scm.v2x.messages.spat import Spat
 NAMES = ("north",)
 
 
-class Teller:
+class ProgressReporter:
     """Tells one group's colour, step by step, with promises given as seconds of its clock."""
 
     def __init__(self):
@@ -56,7 +56,7 @@ class Teller:
 
 @pytest.fixture
 def teller():
-    return Teller()
+    return ProgressReporter()
 
 
 def test_bars_lie_end_to_end_and_the_last_one_is_open(teller):
@@ -74,11 +74,11 @@ def test_a_bar_ends_when_the_next_colour_began_though_it_was_heard_later(teller)
 
 
 def test_nothing_is_kept_for_ever(teller):
-    for _ in range(KEPT_S // 10 + 20):
+    for _ in range(HISTORY_S // 10 + 20):
         teller.tell("green", 5, teller.t_s + 5)
         teller.tell("red", 5, teller.t_s + 5)
-    assert teller.bars()[0][2] >= teller.t_s - KEPT_S - 1
-    assert teller.score().judged <= KEPT_S // 5 + 1
+    assert teller.bars()[0][2] >= teller.t_s - HISTORY_S - 1
+    assert teller.score().judged <= HISTORY_S // 5 + 1
 
 
 def test_a_kept_promise_is_not_broken(teller):

@@ -6,9 +6,9 @@ import msgspec
 import pytest
 
 from scm.api.app import create_app
-from scm.api.shelves import Shelves
+from scm.api.folders import Folders
 from scm.records.signal_plans import SignalPhase, SignalPlan, SignalPolicy, SignalStage
-from scm.records.signals import SignalWish
+from scm.records.signals import SignalOverride
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.signal_request import SignalReply, SignalRequest
 from scm.v2x.messages.signal_site import SignalSite
@@ -56,8 +56,8 @@ def status(**changes):
 def app(view, fake_city, city_map, tmp_path):
     fake_city.answers[SignalRequest] = TAKEN
     fake_city.answers[PlanRequest] = PlanReply(junction="crossing", plan="calm")
-    shelves = Shelves(plans=tmp_path / "plans")
-    return create_app(view, fake_city.ask, city_map, shelves=shelves)
+    folders = Folders(plans=tmp_path / "plans")
+    return create_app(view, fake_city.ask, city_map, folders=folders)
 
 
 @pytest.fixture
@@ -105,7 +105,7 @@ def test_wishes_of_one_kind_are_taken_back(client, fake_city):
 
 
 def test_wishes_in_force_are_listed_a_page_at_a_time(client, hear):
-    wish = SignalWish(verb="hold", groups=("south_east",), by="ada", reason="", ends_ns=9)
+    wish = SignalOverride(verb="hold", groups=("south_east",), by="ada", reason="", ends_ns=9)
     other = msgspec.structs.replace(wish, verb="omit", groups=("south_west",))
     hear(1.0, status(wishes=(wish, other)))
     first = client("GET", f"{AT}/wishes?limit=1").json()
@@ -123,7 +123,7 @@ def test_flash_with_an_end_is_a_wish_and_without_one_a_plan(client, fake_city, h
 
 
 def test_the_end_of_flash_takes_the_wish_back_and_goes_on_with_what_ran(client, fake_city, hear):
-    flashing = SignalWish(
+    flashing = SignalOverride(
         verb="policy", groups=(), by="ada", reason="", ends_ns=9, policy="flashing"
     )
     hear(1.0, site(), status(wishes=(flashing,), policy="actuated"))

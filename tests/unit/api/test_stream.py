@@ -5,7 +5,7 @@ import pytest
 
 from scm.api.acknowledgements import Acknowledgements
 from scm.api.city import City
-from scm.api.stream import BEAT_FRAMES, EVENTS_SHOWN, QUEUE_DEPTH, Listener, Stream
+from scm.api.stream import EVENTS_SHOWN, HEARTBEAT_FRAMES, QUEUE_DEPTH, Listener, Stream
 from scm.clock import StepClock
 from scm.store.memory import MemoryStore
 
@@ -44,7 +44,7 @@ def test_a_page_first_gets_everything(stream, hear, snapshot, event):
 def test_then_it_gets_only_what_changed(stream, hear, snapshot):
     async def scenario():
         page, _ = await begin(stream)
-        for _ in range(BEAT_FRAMES // 2):
+        for _ in range(HEARTBEAT_FRAMES // 2):
             stream.send_frame()  # every topic was sent once now
         hear(1.0, snapshot(tick=2, n1=(0.5, 0.0, 0.0)))
         stream.send_frame()
@@ -183,7 +183,7 @@ def test_a_page_too_slow_gets_a_new_snapshot_instead_of_a_backlog(stream, hear, 
 def test_silence_is_broken_once_a_second(stream):
     async def scenario():
         page, _ = await begin(stream)
-        for _ in range(4 * BEAT_FRAMES):
+        for _ in range(4 * HEARTBEAT_FRAMES):
             stream.send_frame()
         names = []
         while "beat" not in names:

@@ -7,7 +7,7 @@ import pytest
 
 from scm.api.city import City
 from scm.api.encoding import encode
-from scm.api.shelves import Shelves, shelves_in
+from scm.api.folders import Folders, folders_in
 from scm.api.topics import EVENTS, pulse_of, topics_of
 from scm.clock import NS_PER_S
 from scm.v2x.messages.trip import Trip
@@ -64,12 +64,12 @@ def test_an_unknown_topic_is_refused_with_the_nearest_one(client):
 
 
 def test_all_shelves_lie_in_one_folder():
-    shelves = shelves_in(Path("runs"))
-    assert shelves.recordings == Path("runs")
-    folders = [shelves.reports, shelves.scenarios, shelves.calibrations, shelves.plans]
+    folders = folders_in(Path("runs"))
+    assert folders.recordings == Path("runs")
+    folders = [folders.reports, folders.scenarios, folders.calibrations, folders.plans]
     assert len(set(folders)) == 4
     assert all(folder.parent == Path("runs") for folder in folders)
-    assert Shelves().recordings is None
+    assert Folders().recordings is None
 
 
 def test_pulse_trips_and_a_list_say_what_makes_measurements_void(

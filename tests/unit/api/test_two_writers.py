@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import httpx
 import pytest
 
-from scm.api import calibration_shelf, recordings_shelf, scenarios, signal_plans
+from scm.api import calibration_repository, recording_repository, scenarios, signal_plans
 from scm.api.app import create_app
-from scm.api.shelves import shelves_in
+from scm.api.folders import folders_in
 from scm.records.signal_plans import PlanProof
 from tests.unit.api.conftest import HERE
 from tests.unit.api.test_eye_routes import LENS, PLACE
@@ -73,9 +73,9 @@ class _Lock:
 @pytest.fixture
 def meeting(monkeypatch):
     meeting = Meeting()
-    for shelf in (calibration_shelf, recordings_shelf, scenarios, signal_plans):
-        told = SimpleNamespace(**vars(threading) | {"Lock": meeting.lock})
-        monkeypatch.setattr(shelf, "threading", told)
+    for module in (calibration_repository, recording_repository, scenarios, signal_plans):
+        own = SimpleNamespace(**vars(threading) | {"Lock": meeting.lock})
+        monkeypatch.setattr(module, "threading", own)
     for name in ("replace", "unlink"):
         do = getattr(Path, name)
 
@@ -91,10 +91,10 @@ def meeting(monkeypatch):
 @pytest.fixture
 def ask(meeting, view, hear, fake_city, city_map, tmp_path, monkeypatch):
     """Return how to send several requests at the same time."""
-    shelves = shelves_in(tmp_path)
-    write_run(shelves.recordings / "run.mcap")
-    monkeypatch.setattr(signal_plans.PlanShelf, "proof_of", lambda _, digest: proof(digest))
-    app = create_app(view, fake_city.ask, city_map, shelves=shelves)
+    folders = folders_in(tmp_path)
+    write_run(folders.recordings / "run.mcap")
+    monkeypatch.setattr(signal_plans.PlanRepository, "proof_of", lambda _, digest: proof(digest))
+    app = create_app(view, fake_city.ask, city_map, folders=folders)
     hear(1.0, site(), status())
 
     def at_once(*requests):

@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from scm.api.wheel import RENEW_NS, DrivePacket, Wheel
+from scm.api.wheel import RENEW_NS, Wheel
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.records.drive import DrivePacket
 
 T0 = 1_000 * NS_PER_MS
 SILENT_NS, GONE_NS = 250 * NS_PER_MS, 5 * NS_PER_S

@@ -57,7 +57,7 @@ def problem(status, code, **headers):
 
 def test_an_answer_is_typed_and_what_is_new_in_it_is_left_out(served):
     own, asked = served(row(mood="good"), key="scm_1_x")
-    assert own.ask("GET", "/v", Row, query={"a": 1, "b": None}) == Row("n1")
+    assert own.request("GET", "/v", Row, query={"a": 1, "b": None}) == Row("n1")
     assert str(asked[0].url) == "http://city/v?a=1"
     assert asked[0].headers["authorization"] == "Bearer scm_1_x"
     assert "idempotency-key" not in asked[0].headers
@@ -75,7 +75,7 @@ def test_a_key_comes_from_a_file_that_only_its_owner_reads(served, tmp_path, mon
     file.chmod(0o600)
     for given, sent in (("", "scm_1_file"), ("scm_2_said", "scm_2_said")):
         own, asked = served(row(), key=given)
-        own.ask("GET", "/v", Row)
+        own.request("GET", "/v", Row)
         assert asked[0].headers["authorization"] == f"Bearer {sent}"
     for wrong, why in ((b"\n", "got nothing"), (b"\xff", "no ASCII")):
         file.write_bytes(wrong)
@@ -83,20 +83,20 @@ def test_a_key_comes_from_a_file_that_only_its_owner_reads(served, tmp_path, mon
             served(row())
     monkeypatch.delenv("SCM_API_KEY_FILE")
     own, asked = served(row())
-    own.ask("GET", "/v", Row)
+    own.request("GET", "/v", Row)
     assert "authorization" not in asked[0].headers
 
 
 def test_an_answer_of_another_kind_says_where_and_what_was_expected(served):
     own, _ = served(row(laps="many"))
     with pytest.raises(MessageError, match=r"GET /v: .*int.*laps"):
-        own.ask("GET", "/v", Row)
+        own.request("GET", "/v", Row)
 
 
 def test_a_refusal_is_raised_with_its_code_and_words(served):
     own, asked = served(problem(409, "owned"))
     with pytest.raises(ProblemError, match="409 owned: because") as refused:
-        own.ask("PUT", "/v", Row, body={}, key="")
+        own.request("PUT", "/v", Row, body={}, key="")
     assert refused.value.problem.trace_id == "ab"
     assert len(asked) == 1
 
@@ -109,7 +109,7 @@ def test_a_refusal_that_is_no_problem_is_told_as_it_is(served):
 
 def test_a_lost_change_is_asked_again_under_the_same_key(served):
     own, asked = served(httpx.ReadTimeout("late"), problem(503, "offline"), row())
-    assert own.ask("POST", "/v", Row, body={"laps": 2, "via": None}, key="") == Row("n1")
+    assert own.request("POST", "/v", Row, body={"laps": 2, "via": None}, key="") == Row("n1")
     assert len(asked) == 3
     assert len({request.headers["idempotency-key"] for request in asked}) == 1
     assert json.loads(asked[0].content) == {"laps": 2}
@@ -117,27 +117,27 @@ def test_a_lost_change_is_asked_again_under_the_same_key(served):
 
 def test_a_change_that_is_still_under_way_is_waited_for(served):
     own, asked = served(httpx.ReadTimeout("late"), problem(409, "in_flight"), row())
-    assert own.ask("POST", "/v", Row, body={}, key="") == Row("n1")
+    assert own.request("POST", "/v", Row, body={}, key="") == Row("n1")
     assert len({request.headers["idempotency-key"] for request in asked}) == 1
 
 
 def test_a_change_without_a_key_is_never_asked_twice(served):
     own, asked = served(httpx.ReadTimeout("late"), row())
     with pytest.raises(LinkError, match="ReadTimeout: late"):
-        own.ask("DELETE", "/v", Row)
+        own.request("DELETE", "/v", Row)
     assert len(asked) == 1
 
 
 def test_who_is_silent_for_ever_is_given_up(served):
     own, asked = served(httpx.ConnectError("refused"))
     with pytest.raises(LinkError, match="is `scm up` running"):
-        own.ask("GET", "/v", Row)
+        own.request("GET", "/v", Row)
     assert len(asked) == connection.TRIES
 
 
 def test_what_is_only_done_is_told_by_its_own_verb_and_under_a_key(served):
     own, asked = served(problem(503, "busy"), httpx.Response(204))
-    own.tell("DELETE", "/v/n1", key="k1")
+    own.send_only("DELETE", "/v/n1", key="k1")
     assert [one.method for one in asked] == ["DELETE", "DELETE"]
     assert {one.headers["Idempotency-Key"] for one in asked} == {"k1"}
 
@@ -219,8 +219,8 @@ class TestStream:
 def test_the_etag_of_an_answer_is_kept_for_the_change_that_follows(served):
     told = httpx.Response(200, json={"x": 1}, headers={"ETag": '"a1"'})
     own, asked = served(told, httpx.Response(200, json={}))
-    own.ask("GET", "/x", dict)
+    own.request("GET", "/x", dict)
     assert own.etag == '"a1"'
-    own.ask("PUT", "/x", dict, headers={"if-match": own.etag, "if-none-match": None})
+    own.request("PUT", "/x", dict, headers={"if-match": own.etag, "if-none-match": None})
     assert asked[-1].headers["if-match"] == '"a1"'
     assert "if-none-match" not in asked[-1].headers

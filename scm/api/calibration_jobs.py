@@ -15,9 +15,9 @@ from typing import Any
 
 import msgspec
 
-from scm.api.calibration_shelf import CalibrationShelf, read_json
+from scm.api.calibration_repository import CalibrationRepository, read_json
 from scm.api.city import not_found
-from scm.api.operations import Cancelled, Teller
+from scm.api.operations import Cancelled, ProgressReporter
 from scm.api.problem import RefusedError
 from scm.errors import RunError
 from scm.runtime.parent_watch import with_parent
@@ -44,18 +44,18 @@ class FloorTag(msgspec.Struct, kw_only=True, frozen=True):
     size_m: float
 
 
-class CalibrationDesk:
+class CalibrationJobs:
     """Pictures and tools of one city's cameras.
 
     Args:
-        shelf: Where calibrations are kept; pictures lie below it.
+        repository: Where calibrations are stored; pictures lie below it.
         map_file: Name or path of the map, as the tools are told it.
     """
 
-    def __init__(self, shelf: CalibrationShelf, map_file: str) -> None:
-        self.shelf = shelf
+    def __init__(self, repository: CalibrationRepository, map_file: str) -> None:
+        self.repository = repository
         self._map_file = map_file
-        self._views = shelf.folder / "views"
+        self._views = repository.folder / "views"
 
     def views(self, camera: str) -> tuple[Path, ...]:
         """Return a camera's pictures of a board, in the order they came."""
@@ -116,7 +116,7 @@ class CalibrationDesk:
 
     def measure_lens(
         self, camera: str, board: Sequence[str], save_as: str
-    ) -> Callable[[Teller], str]:
+    ) -> Callable[[ProgressReporter], str]:
         """Return work that looks for a board in all pictures and, with `save_as`, keeps the lens.
 
         Args:
@@ -125,17 +125,17 @@ class CalibrationDesk:
             save_as: Name of the calibration, unless it is taken by then; empty: only look.
         """
 
-        def work(tell: Teller) -> str:
+        def work(progress: ProgressReporter) -> str:
             paths = self.views(camera)
             if not paths:
                 raise RunError(f"pictures of {camera}: expected some, got none")
-            tell(f"looks for the board in {len(paths)} pictures")
+            progress(f"looks for the board in {len(paths)} pictures")
             with tempfile.TemporaryDirectory() as folder:
                 lens, report = Path(folder) / "lens.toml", Path(folder) / "report.json"
                 words = ["calibrate", *map(str, paths), *board, "--report", str(report)]
                 words += ["--out", str(lens)] if save_as else ["--look"]
                 try:
-                    _run(words, tell)
+                    _run(words, progress)
                 finally:
                     if report.is_file():
                         self._report_path(camera).write_bytes(report.read_bytes())
@@ -147,7 +147,7 @@ class CalibrationDesk:
 
     def locate(
         self, camera: str, frame: bytes, lens: str, tags: Sequence[FloorTag], save_as: str
-    ) -> Callable[[Teller], str]:
+    ) -> Callable[[ProgressReporter], str]:
         """Return work that finds where a camera hangs from the tags in a frame, and keeps it.
 
         Args:
@@ -158,8 +158,8 @@ class CalibrationDesk:
             save_as: Name of the calibration, unless it is taken by then.
         """
 
-        def work(tell: Teller) -> str:
-            tell("looks for tags on the floor")
+        def work(progress: ProgressReporter) -> str:
+            progress("looks for tags on the floor")
             with tempfile.TemporaryDirectory() as name:
                 folder = Path(name)
                 picture, report = folder / "frame.jpg", folder / "report.json"
@@ -167,12 +167,12 @@ class CalibrationDesk:
                 words = ["locate", str(picture), "--map", self._map_file, "--camera", camera]
                 words += ["--report", str(report)]
                 if lens:
-                    words += ["--calibration", str(self.shelf.path(lens))]
+                    words += ["--calibration", str(self.repository.path(lens))]
                 if tags:
                     more = folder / "tags.toml"
                     more.write_text("\n".join(map(_tag_block, tags)), "utf-8")
                     words += ["--tags", str(more)]
-                _run(words, tell)
+                _run(words, progress)
                 found = read_json(report)
                 block = f"# The place of a camera, found by `scm eye locate`.\n{found['toml']}\n"
                 return self._keep(save_as, block, report)
@@ -181,10 +181,10 @@ class CalibrationDesk:
 
     def _keep(self, name: str, toml: str, report: Path) -> str:
         """Keep what was found; under the next free name where somebody took that one meanwhile."""
-        with self.shelf.editing:
-            free = self.shelf.free_name(name)
-            self.shelf.write(free, toml)
-            self.shelf.report_path(free).write_bytes(report.read_bytes())
+        with self.repository.editing:
+            free = self.repository.free_name(name)
+            self.repository.write(free, toml)
+            self.repository.report_path(free).write_bytes(report.read_bytes())
         return f"/api/v1/eye/calibrations/{free}"
 
     def _report_path(self, camera: str) -> Path:
@@ -227,37 +227,37 @@ def _tag_block(tag: FloorTag) -> str:
     return "\n".join(["[[tags]]", *numbers, ""])
 
 
-def _run(words: Sequence[str], tell: Teller) -> None:
+def _run(words: Sequence[str], progress: ProgressReporter) -> None:
     """Run a command of the Eye until it ends, is called off, or takes too long.
 
     Raises:
         RunError: it failed; with its last words.
         Cancelled: it was called off.
     """
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as output:
         child = subprocess.Popen(
             with_parent([sys.executable, "-m", "scm", "eye", *words]),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            stderr=said,
+            stderr=output,
         )
         try:
-            status = _ended(child, tell)
+            status = _ended(child, progress)
         finally:
             if child.poll() is None:
                 child.kill()
                 child.wait()
         if status != 0:
-            said.seek(0)
-            text = said.read()[-_LAST_WORDS:].decode("utf-8", "replace").strip()
+            output.seek(0)
+            text = output.read()[-_LAST_WORDS:].decode("utf-8", "replace").strip()
             raise RunError(text or f"scm eye {words[0]} ended with {status} and no word")
 
 
-def _ended(child: "subprocess.Popen[bytes]", tell: Teller) -> int:
+def _ended(child: "subprocess.Popen[bytes]", progress: ProgressReporter) -> int:
     for _ in range(round(LONGEST_S / LOOK_S)):
         try:
             return child.wait(LOOK_S)
         except subprocess.TimeoutExpired:
-            if tell.cancelled.is_set():
+            if progress.cancelled.is_set():
                 raise Cancelled from None
     raise RunError(f"expected an end within {LONGEST_S:.0f} s, got none")

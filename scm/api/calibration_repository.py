@@ -21,7 +21,7 @@ from scm.v2x.message import Refused
 from scm.v2x.messages.calibration_request import MeasuredLens
 
 NAME = re.compile(r"[a-z0-9_-]{1,48}")
-MOST_KEPT = 500
+MAX_CALIBRATIONS = 500
 
 
 class _Lens(MeasuredLens, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -32,7 +32,7 @@ class _Place(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     cameras: tuple[Camera, ...]
 
 
-class CalibrationShelf:
+class CalibrationRepository:
     """A folder of calibrations; its files may also be put there and taken away by hand.
 
     Attributes:
@@ -107,8 +107,8 @@ class CalibrationShelf:
         """
         checked(toml)
         self.folder.mkdir(parents=True, exist_ok=True)
-        if not self.path(name).exists() and len(self.rows()) >= MOST_KEPT:
-            detail = f"calibrations: {MOST_KEPT} are kept; delete some first"
+        if not self.path(name).exists() and len(self.rows()) >= MAX_CALIBRATIONS:
+            detail = f"calibrations: {MAX_CALIBRATIONS} are kept; delete some first"
             raise RefusedError(Refused(code="full", detail=detail))
         whole = self.path(name).with_suffix(".part")
         whole.write_text(toml, "utf-8")

@@ -22,11 +22,11 @@ from scm.v2x.message import Refused
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
 SUFFIX, NOTES = ".mcap", ".notes.json"
 QUIET_S = 3.0  # a recorder writes four times a second
-KEPT_INDEXES = 200
+MAX_INDEXES = 200
 _CAR = re.compile(r"scm/@v\d+/[^/]+/v/([^/]+)/state")
 
 
-class RecordingsShelf:
+class RecordingRepository:
     """One folder of recordings; safe from any thread.
 
     Attributes:
@@ -90,7 +90,7 @@ class RecordingsShelf:
         with self._lock:
             self._indexes[name] = found
             self._indexes.move_to_end(name)
-            while len(self._indexes) > KEPT_INDEXES:
+            while len(self._indexes) > MAX_INDEXES:
                 self._indexes.popitem(last=False)
         return found
 

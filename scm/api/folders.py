@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shelves:
+class Folders:
     """Where files lie; None: this city offers none of them.
 
     Attributes:
@@ -23,9 +23,9 @@ class Shelves:
     plans: Path | None = None
 
 
-def shelves_in(folder: Path) -> Shelves:
+def folders_in(folder: Path) -> Folders:
     """Return all shelves in one folder, recordings at its top; who writes makes its folder."""
-    return Shelves(
+    return Folders(
         recordings=folder,
         reports=folder / "reports",
         scenarios=folder / "scenarios",
