@@ -311,14 +311,9 @@ def _problem(status: int, body: bytes) -> ProblemError:
 
 
 def _parsed(body: bytes, status: int = 0) -> Problem:
-    """Return the problem that an answer tells; one that was none of ours in its words."""
+    """Return the problem in an answer; an answer of another form, of a proxy, is its text."""
+    absent = {"type": "about:blank", "title": "", "status": status, "code": ""}
     try:
-        return msgspec.json.decode(body, type=Problem)
+        return msgspec.convert(absent | msgspec.json.decode(body, type=dict[str, Any]), Problem)
     except msgspec.MsgspecError:
-        return Problem(
-            type="about:blank",
-            title="",
-            status=status,
-            code="",
-            detail=body.decode(errors="replace")[:200],
-        )
+        return msgspec.convert(absent | {"detail": body.decode(errors="replace")[:200]}, Problem)

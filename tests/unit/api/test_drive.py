@@ -7,12 +7,10 @@ from contextlib import ExitStack, contextmanager
 from time import monotonic
 from urllib.parse import urlsplit
 
-import msgspec
 import pytest
 import websockets.sync.client
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from scm.api import teleop as server_side
 from scm.api.app import create_app
 from scm.api.city import Link
 from scm.api.keys import KeyRing
@@ -44,7 +42,7 @@ class FakeWire:
         self.asked = []
         self.answer = LeaseReply(vehicle="n1", owner="x", epoch=7, ttl_ms=1000)
 
-    def say(self, message):
+    def publish(self, message):
         self.said.append(message)
 
     def request_once(self, request, timeout_s):
@@ -447,14 +445,6 @@ class TestTheClient:
             city.wheel("n1"),
         ):
             pass
-
-    @pytest.mark.parametrize("word", ["Taken", "Told", "Over"])
-    def test_its_words_are_those_of_the_city(self, word):
-        def fields(module):
-            return [(one.name, one.type) for one in msgspec.structs.fields(getattr(module, word))]
-
-        assert fields(client_side) == fields(server_side)
-        assert client_side.PROTOCOL == PROTOCOL
 
 
 def test_the_way_to_a_car_is_measured_by_an_echo(
