@@ -19,7 +19,6 @@ from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.cam_tx import CamTx
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.denm_tx import DenmTx
-from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.vehicle_state import VehicleState
@@ -119,7 +118,8 @@ class Stay:
         self._begin_anew_if_lifted(now_ns)
         led_here, self._turn, self._is_led = self._commanded, "off", epoch is None
         if epoch is not None:
-            self.guard.take(self._own_command(now_ns, epoch), now_ns)
+            throttle, steering = self._decide(now_ns)
+            self.guard.drive(throttle, steering, epoch, self._seq, now_ns)
         self._body.show(self._shown(hazard=self.guard.lost))
         guarded = self.last_word.pass_on(self.guard.output(now_ns), self.astray, now_ns)
         self._commanded = guarded.throttle, guarded.steering
@@ -143,7 +143,8 @@ class Stay:
         indicators = self._turn if self.switches.indicators == "off" else self.switches.indicators
         return Switches(self.switches.headlights, "hazard" if hazard else indicators)
 
-    def _own_command(self, now_ns: int, epoch: int) -> DriveCommand:
+    def _decide(self, now_ns: int) -> tuple[float, float]:
+        """Return throttle and steering as the car's own driver wants them."""
         motion = self._body.motion()
         view = RouteView(
             now_ns=now_ns,
@@ -155,14 +156,7 @@ class Stay:
         )
         throttle, steering = self.trips.decide(view)
         self._turn = TURNS[int(self.trips.driver.batch.turn[OWN])]
-        return DriveCommand(
-            vehicle=self._vehicle,
-            t_ns=now_ns,
-            epoch=epoch,
-            seq=self._seq,
-            throttle=throttle,
-            steering=steering,
-        )
+        return throttle, steering
 
     def _reports(
         self, guarded: Guarded, led_here: tuple[float, float], now_ns: int, *, sensed: bool

@@ -91,13 +91,25 @@ class Guard:
 
     def take(self, command: DriveCommand, now_ns: int) -> bool:
         """Accept a command that arrived at `now_ns`, or refuse (and count) it; return which."""
+        return self.drive(command.throttle, command.steering, command.epoch, command.seq, now_ns)
+
+    def drive(self, throttle: float, steering: float, epoch: int, seq: int, now_ns: int) -> bool:
+        """Accept or refuse (and count) a command that a driver in this process gives; return which.
+
+        Args:
+            throttle: -1 to 1, + = forward.
+            steering: -1 to 1, + = left.
+            epoch: Of the lease under which it is given.
+            seq: Its number under that lease; only grows.
+            now_ns: The present time [ns].
+        """
         self._advance(now_ns)
-        if not self._acceptable(command):
+        is_finite = math.isfinite(throttle) and math.isfinite(steering)
+        if not (is_finite and self._is_due(epoch, seq)):
             self.refused += 1
             return False
-        self._epoch, self._seq = command.epoch, command.seq
-        self._throttle = _limited(command.throttle)
-        self._steering = _limited(command.steering)
+        self._epoch, self._seq = epoch, seq
+        self._throttle, self._steering = _limited(throttle), _limited(steering)
         self._heard_ns = self._now_ns
         self._lost = False
         return True
@@ -133,12 +145,11 @@ class Guard:
             self._lost = True
         return age_ns
 
-    def _acceptable(self, command: DriveCommand) -> bool:
-        if not (math.isfinite(command.throttle) and math.isfinite(command.steering)):
-            return False
-        if command.epoch != self._epoch:
-            return command.epoch > self._epoch
-        return not self._lost and (self._seq is None or command.seq > self._seq)
+    def _is_due(self, epoch: int, seq: int) -> bool:
+        """Return whether a command of this lease and number may be obeyed."""
+        if epoch != self._epoch:
+            return epoch > self._epoch
+        return not self._lost and (self._seq is None or seq > self._seq)
 
 
 def _limited(value: float) -> float:

@@ -17,7 +17,6 @@ from scm.geometry import Pose2
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.city_stop import CityStop
-from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.part_status import PartStatus
@@ -127,15 +126,7 @@ class CalibrationPart(BasePart):
     def _command(self, now_ns: int) -> Passed:
         throttle, steering = self._wish(now_ns)
         self._seq += 1
-        command = DriveCommand(
-            vehicle=self.name,
-            t_ns=now_ns,
-            epoch=1,
-            seq=self._seq,
-            throttle=throttle,
-            steering=steering,
-        )
-        self._commander.take(command, now_ns)
+        self._commander.drive(throttle, steering, 1, self._seq, now_ns)
         passed = self.guard.pass_on(self._commander.output(now_ns), now_ns)
         why = self._why(passed)
         self._waits = bool(why)
