@@ -190,8 +190,8 @@ class Rig:
         self._in_vain = False
         return self.agent
 
-    def keeper(self) -> int:
-        """Return the process number of the agent's keeper."""
+    def watchdog(self) -> int:
+        """Return the process number of the agent's watchdog."""
         agent = self.drive()
         children = Path(f"/proc/{agent}/task/{agent}/children").read_text().split()
         return int(children[-1])

@@ -80,7 +80,7 @@ class FedCity:
         self.telemetry, self.jpegs, self.clock = telemetry, jpegs, clock
         self.stop = threading.Event()
         self.state_ns = 0
-        telemetry.welcome("n1", "nigel", CAR)
+        telemetry.add_car("n1", "nigel", CAR)
         telemetry.show_lights([(light.junction, light.group) for light in CITY.lights])
         self.tick(0)
         self.thread = threading.Thread(target=self.run, daemon=True)
@@ -93,7 +93,7 @@ class FedCity:
             self.tick(tick)
 
     def tick(self, tick):
-        t_ns, update = self.clock.now_ns(), self.telemetry.hear
+        t_ns, update = self.clock.now_ns(), self.telemetry.update
         update(
             VehicleState(
                 vehicle="n1", t_ns=t_ns, seq=tick, x_m=0.001 * tick, y_m=1.0, yaw_rad=0.1,

@@ -15,7 +15,7 @@ import cv2
 import msgspec
 import numpy as np
 
-from scm.eye.anchor import Tolerance
+from scm.eye.extrinsics import Tolerance
 from scm.eye.part import EyePart
 from scm.eye.render.scene import camera_over
 from scm.eye.render.shots import Look, Shot, Studio
@@ -43,7 +43,7 @@ class Film:
     def __init__(self, shots: list[Shot]) -> None:
         self._left = list(shots)
 
-    def take(self, now_ns, light):
+    def read(self, now_ns, light):
         """Return the next frame."""
         del now_ns, light
         if not self._left:

@@ -2,10 +2,10 @@
 
     python -m bench kill [published] [ours] [--only WORD] [--times N]
 
-A city, an Eye, an agent with its keeper, and a device: the published firmware emulated, or ours on
+A city, an Eye, an agent with its watchdog, and a device: the published firmware emulated, or ours on
 a simulated chip. Times count to the line in which the device tells PWM 0: from the deed, and from
-when the host first knew (its keeper, or its agent that finds the keeper gone or silent); "to the
-port" from there until the keeper's zeros were written. Bars: ours 300 ms from the deed, whatever
+when the host first knew (its watchdog, or its agent that finds the watchdog gone or silent); "to the
+port" from there until the watchdog's zeros were written. Bars: ours 300 ms from the deed, whatever
 happens; the published one 20 ms, a frame, from when the host knew.
 Some ten minutes for each firmware; `--only` takes the rows with a word in their name.
 """
@@ -33,8 +33,8 @@ PATIENCE_S = 4.0
 STEADY_S = 1.0
 PULLED = tuple(f"unplug@{t}:5" for t in range(16, 400, 10))
 NOBODY = "nobody can say it"
-KEEPER_GONE = "keeper gone"
-"""What an agent prints that finds its keeper dead or silent: late ones look like it too."""
+WATCHDOG_GONE = "watchdog gone"
+"""What an agent prints that finds its watchdog dead or silent: late ones look like it too."""
 
 
 class Town:
@@ -99,23 +99,23 @@ def to_agent(number: int) -> Callable[[Rig, Town], int]:
     return do
 
 
-def to_keeper(number: int) -> Callable[[Rig, Town], int]:
-    """Return the deed of sending the keeper a signal."""
+def to_watchdog(number: int) -> Callable[[Rig, Town], int]:
+    """Return the deed of sending the watchdog a signal."""
 
     def do(rig: Rig, town: Town) -> int:
         del town
-        return struck(rig.keeper(), number)
+        return struck(rig.watchdog(), number)
 
     return do
 
 
 def to_both(number: int) -> Callable[[Rig, Town], int]:
-    """Return the deed of sending both a signal, the keeper first."""
+    """Return the deed of sending both a signal, the watchdog first."""
 
     def do(rig: Rig, town: Town) -> int:
         del town
-        keeper, agent = rig.keeper(), rig.drive()
-        t_ns = struck(keeper, number)
+        watchdog, agent = rig.watchdog(), rig.drive()
+        t_ns = struck(watchdog, number)
         os.kill(agent, number)
         return t_ns
 
@@ -224,13 +224,13 @@ def signals_of(who: str, deed: Callable[[int], Callable[[Rig, Town], int]]) -> l
     """Return the rows in which a process is sent a signal."""
     rows = []
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGKILL, signal.SIGSTOP):
-        is_gone = who == "keeper" and number in (signal.SIGKILL, signal.SIGSTOP)
+        is_gone = who == "watchdog" and number in (signal.SIGKILL, signal.SIGSTOP)
         rows.append(
             Row(
                 f"{who}: {number.name}",
                 deed(number),
                 revert=wake if number is signal.SIGSTOP else Row.revert,
-                knows=KEEPER_GONE if is_gone else "notice",
+                knows=WATCHDOG_GONE if is_gone else "notice",
                 ends=who == "agent" and number is not signal.SIGSTOP,
             )
         )
@@ -241,14 +241,14 @@ ROWS = (
     *signals_of("agent", to_agent),
     Row("agent: its step raises", failing_step(signal.SIGUSR1), ends=True),
     Row("agent: its loop stalls", failing_step(signal.SIGUSR2)),
-    *signals_of("keeper", to_keeper),
+    *signals_of("watchdog", to_watchdog),
     Row("bus: the router is killed", kill_router, new_router, ends=True),
     Row("bus: the city is stopped (SIGSTOP)", stop_city, wake, ends=True),
     Row("the lease is stolen", steal, ends=True),
     Row("the Eye is blind", blind),
     Row("the cable is pulled", pull, plug, gap=True, knows=NOBODY),
-    Row("agent and keeper: SIGKILL", to_both(signal.SIGKILL), gap=True, knows=NOBODY, ends=True),
-    Row("agent and keeper: SIGSTOP", to_both(signal.SIGSTOP), wake, gap=True, knows=NOBODY),
+    Row("agent and watchdog: SIGKILL", to_both(signal.SIGKILL), gap=True, knows=NOBODY, ends=True),
+    Row("agent and watchdog: SIGSTOP", to_both(signal.SIGSTOP), wake, gap=True, knows=NOBODY),
 )
 
 
@@ -273,7 +273,7 @@ def tried(row: Row, made: Rig, town: Town) -> Trial:
     stopped_ns = made.motor.stopped(did_ns)
     row.revert(made, town)
     time.sleep(0.05)
-    times = [made.agents.mentioned_ns(word, did_ns) for word in (row.knows, KEEPER_GONE)]
+    times = [made.agents.mentioned_ns(word, did_ns) for word in (row.knows, WATCHDOG_GONE)]
     knew_ns = min((t_ns for t_ns in times if t_ns is not None), default=None)
     sent_ns = made.agents.mentioned_ns("written", did_ns)
     if row.ends:

@@ -1,8 +1,8 @@
-"""Real cars' agents that tell when they find their keeper dead or silent, and fail when asked.
+"""Real cars' agents that report when their watchdog is dead or silent, and fail on request.
 
-A line of arguments on stdin forks one, so that everything is loaded but once; its number is told.
-SIGUSR1: its next step raises. SIGUSR2: its next step takes three seconds. All else is as it is;
-only the keeper that it starts is `bench.watched_keeper`.
+A line of arguments on stdin forks one, so that everything is loaded once; its pid is printed.
+SIGUSR1: its next step raises. SIGUSR2: its next step takes three seconds. Only the watchdog that
+it starts is replaced, by `bench.watched_watchdog`.
 """
 
 import ctypes
@@ -11,45 +11,46 @@ import signal
 import sys
 import time
 
-from bench.watched_keeper import say
+from bench.watched_watchdog import say
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.parent_watch import PR_SET_PDEATHSIG
 from scm.world.part import WorldPart
 from vehicle_agent.__main__ import main
 from vehicle_agent.agent import AgentPart
-from vehicle_agent.nigel.hand import Hand
-from vehicle_agent.nigel.helm import Helm
+from vehicle_agent.nigel.watchdog_client import FallbackPort, WatchdogClient
 
 STALL_S = 3.0
-_asked: list[int] = []
-_look, _hang_up, _init = AgentPart._check_losses, Helm._hang_up, Helm.__init__  # noqa: SLF001
-_say = Hand.say
+_signals: list[int] = []
+_look = AgentPart._check_losses  # noqa: SLF001
+_disconnect = WatchdogClient._disconnect  # noqa: SLF001
+_init = WatchdogClient.__init__
+_write_beside = FallbackPort.write_beside
 
 
 def _failing_look(self, now_ns):
-    if _asked:
+    if _signals:
         say("deed")
-        if _asked.pop() == signal.SIGUSR1:
+        if _signals.pop() == signal.SIGUSR1:
             raise ZeroDivisionError("asked for by the bench")
         time.sleep(STALL_S)
     _look(self, now_ns)
 
 
-def _telling_hang_up(self):
-    if self._line is not None:
-        say("keeper gone")
-    _hang_up(self)
+def _reporting_disconnect(self):
+    if self._socket is not None:
+        say("watchdog gone")
+    _disconnect(self)
 
 
-def _telling_say(self, frames):
-    say("keeper gone")
-    _say(self, frames)
+def _reporting_write(self, frames):
+    say("watchdog gone")
+    _write_beside(self, frames)
 
 
 def _watched_init(self, *args):
     _init(self, *args)
-    self._command[2] = "bench.watched_keeper"
+    self._argv[2] = "bench.watched_watchdog"
 
 
 def warm_up() -> None:
@@ -84,9 +85,9 @@ def lived(arguments: list[str]) -> int:
 
 if __name__ == "__main__":
     for number in (signal.SIGUSR1, signal.SIGUSR2):
-        signal.signal(number, lambda got, _frame: _asked.append(got))
+        signal.signal(number, lambda got, _frame: _signals.append(got))
     setattr(AgentPart, "_check_losses", _failing_look)  # noqa: B010
-    setattr(Helm, "_hang_up", _telling_hang_up)  # noqa: B010
-    setattr(Hand, "say", _telling_say)  # noqa: B010
-    setattr(Helm, "__init__", _watched_init)  # noqa: B010
+    setattr(WatchdogClient, "_disconnect", _reporting_disconnect)  # noqa: B010
+    setattr(FallbackPort, "write_beside", _reporting_write)  # noqa: B010
+    setattr(WatchdogClient, "__init__", _watched_init)  # noqa: B010
     serve()

@@ -1,11 +1,11 @@
 """The program of one car: its own process, its own dynamics or a real car, joined over the bus.
 
-agent      the part: hears, decides, acts, reports        link    joining, the lease, lost links
-stay       one stay in the city: body, guard, driver      leaving goodbye before the process ends
-body       the contract of a body, one file a kind        guard   before a real car's actuators
-nigel/     rosserial: a real Nigel on a cable             firmware/  a better one for its Arduino
-emulate/   the published firmware, where there is no car  calibrate/ a real car's own numbers
-devkit/    AutoDRIVE Devkit scripts, unchanged            commands/  one file a command
-May import v2x, vehicles and what is below; never the city's parts. The physics is opened by
-`bodies/`, `emulate/` and `calibrate/` alone.
+agent      the part: receives, decides, acts, reports     link      joining, lease, lost links
+session    one visit to the city: body, guard, driver     leaving   goodbye before the process ends
+body       the contract of a body, one file a kind        guard     before a real car's actuators
+nigel/     a real Nigel: rosserial over a serial cable    firmware/  better Arduino firmware
+emulate/   the published firmware without a car           calibrate/ identifies a car's parameters
+devkit/    unchanged AutoDRIVE Devkit scripts             commands/ one file a command
+May import v2x, vehicles and what is below; never the city's parts. Only `bodies/`, `emulate/` and
+`calibrate/` load the physics.
 """

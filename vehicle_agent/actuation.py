@@ -1,4 +1,4 @@
-"""The last word before a body: what its own state and a real car's guard leave of a command."""
+"""The last stage before a body: its own state and a real car's guard limit each command."""
 
 import math
 from dataclasses import replace
@@ -10,8 +10,8 @@ from scm.vehicles.guard import Guarded, Mode
 from vehicle_agent.body import Body, Wiring
 from vehicle_agent.guard import GuardLimits, RealGuard, rectangle
 
-FASTER = 1.1
-"""Than its table says a car may be: a full battery."""
+TOP_SPEED_MARGIN = 1.1
+"""Allowed factor over the car file's top speed: a full battery drives faster than its table."""
 
 
 def real_guard(limits: CarLimits, city_map: CityMap, wiring: Wiring) -> RealGuard:
@@ -26,15 +26,15 @@ def real_guard(limits: CarLimits, city_map: CityMap, wiring: Wiring) -> RealGuar
         width_m=limits.width,
     )
     if limits.speeds:
-        given = replace(given, top_speed_mps=FASTER * limits.speeds[-1])
+        given = replace(given, top_speed_mps=TOP_SPEED_MARGIN * limits.speeds[-1])
     return RealGuard(given)
 
 
-class LastWord:
-    """Passes on to a body what may reach it.
+class ActuationGate:
+    """Forwards the permitted part of a command to a body.
 
     Attributes:
-        why: What keeps the car from moving as it should, in words; empty: nothing.
+        why: Why the car does not move as commanded; empty if it does.
     """
 
     def __init__(self, body: Body, guard: RealGuard | None = None) -> None:
@@ -42,25 +42,25 @@ class LastWord:
         self.why = ""
 
     @property
-    def told(self) -> str:
-        """How often each limit of a real car's guard began to bite."""
-        return "" if self._guard is None else self._guard.told
+    def summary(self) -> str:
+        """How often each limit of a real car's guard became active."""
+        return "" if self._guard is None else self._guard.summary
 
     def see(self, track: EyeTrack, now_ns: int) -> None:
-        """Let body and guard know where the Eye sees the car."""
+        """Give body and guard a track of the car from the Eye."""
         self._body.see(track, now_ns)
         if self._guard is not None:
             self._guard.see(track, now_ns)
 
-    def pass_on(self, guarded: Guarded, astray: str, now_ns: int) -> Guarded:
-        """Command the body; return what it was commanded.
+    def pass_on(self, guarded: Guarded, off_lane: str, now_ns: int) -> Guarded:
+        """Send the command to the body and return what was sent.
 
         Args:
-            guarded: What the first guard let pass.
-            astray: Why the car must not drive from where it stands; empty: it may.
+            guarded: Output of the first guard.
+            off_lane: Why the car must not drive from where it stands; empty if it may.
             now_ns: The present time [ns].
         """
-        self.why = self._body.unfit(now_ns) or astray
+        self.why = self._body.inhibit_reason(now_ns) or off_lane
         if self.why:
             guarded = _stopped(guarded)
         if self._guard is not None:

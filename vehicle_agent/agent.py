@@ -1,7 +1,7 @@
-"""The agent of one car as a part: what it hears goes to its link, its senses, its guard.
+"""The agent of one car as a part: messages go to its link, its sensors, its guard.
 
-The car's own driver is the one who commands it, until somebody with a newer lease does. Whoever
-commands, the guard has the last word.
+The car's own driver commands it until somebody with a newer lease does. Every command passes the
+guard last.
 """
 
 import logging
@@ -37,20 +37,20 @@ from vehicle_agent.body import BodyKind, Wiring
 from vehicle_agent.link import Link
 
 if TYPE_CHECKING:
-    from vehicle_agent.session import Stay
+    from vehicle_agent.session import CitySession
 
 BODIES = "vehicle_agent.bodies"
-HARDEST = 100.0
-ASK_EVERY_NS = 100 * NS_PER_MS
+MAX_CONTACT_CHANGE = 100.0
+SUBSCRIBER_CHECK_NS = 100 * NS_PER_MS
 
 _log = logging.getLogger(__name__)
 
 
 def is_possible(contact: Contact) -> bool:
-    """Return whether a car can be hit like that: one absurd number would throw it off all maps."""
+    """Return whether a contact is plausible: one absurd number would throw the car off the map."""
     hit = (contact.dvx_mps, contact.dvy_mps, contact.dyaw_rate_radps)
     shift = (contact.dx_m, contact.dy_m, contact.dyaw_rad)
-    return all(abs(change) <= HARDEST for change in (*hit, *shift))
+    return all(abs(change) <= MAX_CONTACT_CHANGE for change in (*hit, *shift))
 
 
 class AgentPart:
@@ -80,7 +80,7 @@ class AgentPart:
             seed: Of the sensors' noise.
             body: Kind of body: a file of `vehicle_agent/bodies`.
             wiring: How a real body is connected, and what it may do.
-            tag_id: Glued onto its roof; None: whatever the city gives.
+            tag_id: Of the tag on its roof; None: the city assigns one.
         """
         self.name = check_name(name, "vehicle")
         kind = registry.load(BODIES, body, "BODY", BodyKind, RunError)
@@ -90,12 +90,12 @@ class AgentPart:
         self._car = car
         self._map: CityMap | None = None
         self._defined_ns: int | None = None
-        self._stay: Stay | None = None
+        self._session: CitySession | None = None
         self._stopped = False
         self._faults: dict[str, MonitorStatus] = {}
         self._status_ns: int | None = None
         self._is_wanted: IsWanted | None = None
-        self._sensed, self._asked_ns = True, -ASK_EVERY_NS
+        self._is_sensing, self._checked_ns = True, -SUBSCRIBER_CHECK_NS
         self._on: dict[type[Message], Callable[[Incoming], list[Outgoing]]] = {
             WorldDefinition: self._on_definition,
             Presence: self._on_presence,
@@ -112,18 +112,18 @@ class AgentPart:
             EchoRequest: self._on_echo,
             EyeTrack: self._on_eye,
         }
-        self.subscriptions: Sequence[Subscription] = self._hears()
+        self.subscriptions: Sequence[Subscription] = self._subscriptions()
         own = {"vehicle": name}
         self.services: Sequence[Service] = tuple(
             Service(kind, own) for kind in (RouteRequest, LightRequest, EchoRequest)
         )
 
     def attach(self, is_wanted: IsWanted) -> None:
-        """Let no sensor be simulated from now on that nobody subscribes to."""
+        """Simulate from now on only sensors that somebody subscribes to."""
         self._is_wanted = is_wanted
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Hear, drive, report; a failure lets go of the body before anybody is told of it."""
+        """Receive, drive, report; on a failure the body is released before the error propagates."""
         try:
             return self._stepped(now_ns, inbox)
         except Exception:
@@ -140,20 +140,20 @@ class AgentPart:
         self._check_losses(now_ns)
         if self._map is not None:
             outbox += self._link.due(now_ns)
-        if self._stay is not None:
+        if self._session is not None:
             own = self._link.epoch if self._link.standing == "own" else None
-            outbox += self._stay.step(now_ns, own, sensed=self._is_sensed(now_ns))
-        elif self._is_real:  # its port is opened at once, and it rests from the first second
+            outbox += self._session.step(now_ns, own, sensed=self._is_sensed(now_ns))
+        elif self._is_real:  # opens its port at once, and stands from the first second
             self._body.advance(now_ns)
             self._body.command(0.0, 0.0)
         return outbox + self._status(now_ns)
 
     def _is_sensed(self, now_ns: int) -> bool:
-        """Return whether anybody subscribes to the sensors, as found out 100 ms ago at most."""
-        if self._is_wanted is not None and now_ns - self._asked_ns >= ASK_EVERY_NS:
-            self._asked_ns = now_ns
-            self._sensed = self._is_wanted(VehicleSensors, {"vehicle": self.name})
-        return self._sensed
+        """Return whether anybody subscribes to the sensors; checked every 100 ms."""
+        if self._is_wanted is not None and now_ns - self._checked_ns >= SUBSCRIBER_CHECK_NS:
+            self._checked_ns = now_ns
+            self._is_sensing = self._is_wanted(VehicleSensors, {"vehicle": self.name})
+        return self._is_sensing
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Leave the city, at rest."""
@@ -161,10 +161,10 @@ class AgentPart:
         return [*self._link.goodbye()]
 
     def close(self) -> None:
-        """Let go of the body, however the agent ends."""
+        """Release the body, however the agent ends."""
         self._body.close()
 
-    def _hears(self) -> Sequence[Subscription]:
+    def _subscriptions(self) -> Sequence[Subscription]:
         here, own = {"receiver": self.name}, {"vehicle": self.name}
         return (
             Subscription(WorldDefinition),
@@ -181,29 +181,29 @@ class AgentPart:
         )
 
     def _check_losses(self, now_ns: int) -> None:
-        if self._stay is None:
+        if self._session is None:
             return
         if not self._link.is_inside:
             self._body.command(0.0, 0.0)
-            self._stay = None
+            self._session = None
         elif self._link.standing == "own" and (
-            self._stay.guard.lost or not self._link.is_alive(now_ns)
+            self._session.guard.lost or not self._link.is_alive(now_ns)
         ):
             self._link.regain()
 
     def _on_reply(self, item: Incoming, now_ns: int) -> None:
         was_own = self._link.standing == "own"
-        came_in = self._link.take(item)
+        came_in = self._link.accept_reply(item)
         if came_in and self._map is not None:
             self._body.place(self._link.start, now_ns)
-            self._begin_stay(self._map, now_ns)
-        elif self._stay is not None and self._link.standing == "own":
-            self._stay.guard.set_epoch(self._link.epoch, now_ns)
-        elif self._stay is not None and was_own and self._link.standing == "foreign":
-            self._stay.guard.set_epoch(self._link.epoch + 1, now_ns)  # whoever has it may speak now
+            self._begin_session(self._map, now_ns)
+        elif self._session is not None and self._link.standing == "own":
+            self._session.guard.set_epoch(self._link.epoch, now_ns)
+        elif self._session is not None and was_own and self._link.standing == "foreign":
+            self._session.guard.set_epoch(self._link.epoch + 1, now_ns)  # its holder may command
 
-    def _begin_stay(self, city_map: CityMap, now_ns: int) -> None:
-        from vehicle_agent.session import Stay  # noqa: PLC0415 drivers bring the compiler with them
+    def _begin_session(self, city_map: CityMap, now_ns: int) -> None:
+        from vehicle_agent.session import CitySession  # noqa: PLC0415 loads the compiler
 
         body, real = self._body, None
         if self._is_real:
@@ -211,14 +211,16 @@ class AgentPart:
 
             real = real_guard(body.limits, city_map, self._wiring)
         try:
-            stay = Stay(self.name, self._car, body, city_map, self._link.epoch, now_ns, real)
+            session = CitySession(
+                self.name, self._car, body, city_map, self._link.epoch, now_ns, real
+            )
         except MapError as error:
             event(_log, "cannot_drive", level=logging.ERROR, reason=error)
             raise
-        stay.guard.stop(self._stopped)
+        session.guard.stop(self._stopped)
         for status in self._faults.values():
-            stay.signals.receive_monitor_status(status)
-        self._stay = stay
+            session.signals.receive_monitor_status(status)
+        self._session = session
 
     def _on_definition(self, item: Incoming) -> list[Outgoing]:
         message = item.message
@@ -236,65 +238,73 @@ class AgentPart:
         return []
 
     def _on_spatem(self, item: Incoming) -> list[Outgoing]:
-        if isinstance(item.message, SpatemRx) and self._stay is not None:
-            self._stay.signals.receive_spatem(item.message.body, item.t_ns)
-            self._stay.air.add_frame("spatem", item.t_ns)
+        if isinstance(item.message, SpatemRx) and self._session is not None:
+            self._session.signals.receive_spatem(item.message.body, item.t_ns)
+            self._session.channel.add_frame("spatem", item.t_ns)
         return []
 
     def _on_cam(self, item: Incoming) -> list[Outgoing]:
         message = item.message
-        if isinstance(message, CamRx) and self._stay is not None and message.station != self.name:
-            self._stay.cars.receive(message.body, item.t_ns)
-            self._stay.air.add_frame("cam", item.t_ns)
+        if (
+            isinstance(message, CamRx)
+            and self._session is not None
+            and message.station != self.name
+        ):
+            self._session.cars.receive(message.body, item.t_ns)
+            self._session.channel.add_frame("cam", item.t_ns)
         return []
 
     def _on_denm(self, item: Incoming) -> list[Outgoing]:
         message = item.message
-        if isinstance(message, DenmRx) and self._stay is not None and message.station != self.name:
-            self._stay.trips.driver.batch.receive_denm(message.body, item.t_ns)
-            self._stay.air.add_frame("denm", item.t_ns)
+        if (
+            isinstance(message, DenmRx)
+            and self._session is not None
+            and message.station != self.name
+        ):
+            self._session.trips.driver.batch.receive_denm(message.body, item.t_ns)
+            self._session.channel.add_frame("denm", item.t_ns)
         return []
 
     def _on_radio(self, item: Incoming) -> list[Outgoing]:
         message = item.message
-        if isinstance(message, RadioStatus) and self._stay is not None:
-            told = dict(zip(message.stations, message.busy, strict=False))
-            if self.name in told:
-                self._stay.air.set_ratio(told[self.name], item.t_ns)
+        if isinstance(message, RadioStatus) and self._session is not None:
+            busy_by_station = dict(zip(message.stations, message.busy, strict=False))
+            if self.name in busy_by_station:
+                self._session.channel.set_ratio(busy_by_station[self.name], item.t_ns)
         return []
 
     def _on_monitor(self, item: Incoming) -> list[Outgoing]:
         if isinstance(item.message, MonitorStatus):
             self._faults[item.message.junction] = item.message
-            if self._stay is not None:
-                self._stay.signals.receive_monitor_status(item.message)
+            if self._session is not None:
+                self._session.signals.receive_monitor_status(item.message)
         return []
 
     def _on_stop(self, item: Incoming) -> list[Outgoing]:
         if isinstance(item.message, CityStop):
             self._stopped = item.message.engaged
-            if self._stay is not None:
-                self._stay.guard.stop(self._stopped)
+            if self._session is not None:
+                self._session.guard.stop(self._stopped)
         return []
 
     def _on_contact(self, item: Incoming) -> list[Outgoing]:
         contact = item.message
-        if isinstance(contact, Contact) and self._stay is not None and is_possible(contact):
-            self._stay.push(contact)
+        if isinstance(contact, Contact) and self._session is not None and is_possible(contact):
+            self._session.push(contact)
         return []
 
     def _on_command(self, item: Incoming) -> list[Outgoing]:
         message = item.message
-        if isinstance(message, DriveCommand) and self._stay is not None:
+        if isinstance(message, DriveCommand) and self._session is not None:
             newer = message.epoch > self._link.epoch
-            if newer and self._stay.guard.take(message, item.t_ns):
-                self._stay.told(message.headlights, message.indicators)
+            if newer and self._session.guard.take(message, item.t_ns):
+                self._session.switch_lights(message.headlights, message.indicators)
                 self._link.give_way()
         return []
 
     def _on_eye(self, item: Incoming) -> list[Outgoing]:
-        if isinstance(item.message, EyeTrack) and self._stay is not None:
-            self._stay.see(item.message, item.t_ns)
+        if isinstance(item.message, EyeTrack) and self._session is not None:
+            self._session.see(item.message, item.t_ns)
         return []
 
     def _on_route(self, item: Incoming) -> list[Outgoing]:
@@ -304,17 +314,17 @@ class AgentPart:
         return [Answer(item, self._route(request, item.t_ns))]
 
     def _route(self, request: RouteRequest, now_ns: int) -> Message:
-        if self._stay is None:
+        if self._session is None:
             return Refused(code="offline", detail=f"{self.name} is not in the city")
         is_foreign = self._link.standing == "foreign"
-        if is_foreign and self._stay.guard.output(now_ns).mode in ("drive", "hold"):
+        if is_foreign and self._session.guard.output(now_ns).mode in ("drive", "hold"):
             return Refused(code="owned", detail=f"{self.name} is driven by somebody else")
         try:
-            reply = self._stay.begin(request, now_ns)
+            reply = self._session.begin(request, now_ns)
         except MapError as error:
             return Refused(code="invalid", detail=str(error))
         if is_foreign:
-            self._link.regain()  # a car that is refused its route stands
+            self._link.regain()  # a car without a route stands still
         return reply
 
     def _on_lights(self, item: Incoming) -> list[Outgoing]:
@@ -324,12 +334,14 @@ class AgentPart:
         return [Answer(item, self._lights(request))]
 
     def _lights(self, request: LightRequest) -> Message:
-        if self._stay is None:
+        if self._session is None:
             return Refused(code="offline", detail=f"{self.name} is not in the city")
         if self._link.standing == "foreign":
             return Refused(code="owned", detail=f"{self.name} is driven by somebody else")
-        told = self._stay.told(request.headlights, request.indicators)
-        return LightReply(vehicle=self.name, headlights=told.headlights, indicators=told.indicators)
+        switches = self._session.switch_lights(request.headlights, request.indicators)
+        return LightReply(
+            vehicle=self.name, headlights=switches.headlights, indicators=switches.indicators
+        )
 
     def _on_echo(self, item: Incoming) -> list[Outgoing]:
         return [Answer(item, EchoReply(vehicle=self.name, t_ns=item.t_ns))]
@@ -341,13 +353,13 @@ class AgentPart:
         return [PartStatus(station=self.name, t_ns=now_ns, detail=self._detail())]
 
     def _detail(self) -> str:
-        if self._stay is None:
+        if self._session is None:
             return f"outside: {self._link.reason}" if self._map else "waits for the world"
-        if self._is_real and self._stay.last_word.why:
-            return f"{self._stay.last_word.why} ({self._stay.last_word.told})"
+        if self._is_real and self._session.gate.why:
+            return f"{self._session.gate.why} ({self._session.gate.summary})"
         if self._link.standing == "foreign":
             return "driven by somebody else"
         if self._link.standing == "regaining":
-            return "asks for its lease"
-        waiting = self._stay.trips.driver.waiting_for
+            return "requests its lease"
+        waiting = self._session.trips.driver.waiting_for
         return f"waits for {waiting}" if waiting else "drives"

@@ -41,7 +41,7 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class Obeyed:
-    """A command as it left for the actuators, and when, on this computer's clock [ns]."""
+    """A command as it was sent to the actuators, and when, on this computer's clock [ns]."""
 
     t_ns: int
     throttle: float
@@ -49,54 +49,54 @@ class Obeyed:
 
 
 class Body(Protocol):
-    """A car under the hands of its agent.
+    """A car as its agent drives it.
 
     Attributes:
         limits: What its driver must know of it.
-        wants_eye: Whether it must be told where the overhead cameras see it.
+        wants_eye: Whether it needs tracks from the overhead cameras.
     """
 
     limits: CarLimits
     wants_eye: bool
 
     def learn(self, city_map: CityMap, seed: int) -> None:
-        """Know the city's floor and air; everybody with the same seed feels the same gusts."""
+        """Receive the city's floor and wind; the same seed gives the same gusts everywhere."""
         ...
 
     def place(self, pose: Pose2, now_ns: int) -> None:
-        """Be at rest with the rear axle at a pose: called at each joining."""
+        """Stand with the rear axle at a pose; called at each joining."""
         ...
 
     def see(self, track: EyeTrack, now_ns: int) -> None:
-        """Learn where the overhead cameras see it: only where it `wants_eye`."""
+        """Receive a track from the overhead cameras; only called if it `wants_eye`."""
         ...
 
     def was_lifted(self) -> bool:
-        """Return, once, whether it is somewhere that it did not drive to: its way begins anew."""
+        """Return, once, whether it was carried elsewhere, so that its route must be replanned."""
         ...
 
-    def unfit(self, now_ns: int) -> str:
-        """Return why it must not move now, in words; empty: it may."""
+    def inhibit_reason(self, now_ns: int) -> str:
+        """Return why it must not move now, in words; empty if it may."""
         ...
 
     def advance(self, now_ns: int) -> None:
-        """Bring the motion up to now."""
+        """Advance the motion to now."""
         ...
 
     def command(self, throttle: float, steering: float) -> None:
-        """Obey until the next command: -1 to 1, + = forward, + = left; guarded already."""
+        """Apply a guarded command until the next one: -1 to 1, + = forward, + = left."""
         ...
 
     def obeyed(self) -> Sequence[Obeyed] | None:
-        """Return, once, what has left for the actuators; None: each command did when given."""
+        """Return, once, the commands sent to the actuators; None: each was sent when given."""
         ...
 
     def show(self, switches: Switches) -> None:
-        """Switch its lamps, where it has some of its own."""
+        """Switch its lamps, if it has any."""
         ...
 
     def push(self, contact: Contact) -> None:
-        """Feel what the world says that a contact did."""
+        """Apply the motion that a contact caused, as the world reports it."""
         ...
 
     def motion(self) -> Motion:
@@ -106,17 +106,17 @@ class Body(Protocol):
     def sensors(
         self, vehicle: str, now_ns: int, *, wanted: bool = True
     ) -> Sequence[VehicleSensors | LidarScan]:
-        """Return what its own sensors have read since the last time.
+        """Return what its own sensors have read since the last call.
 
         Args:
             vehicle: Whose they are.
             now_ns: The present time [ns].
-            wanted: Whether anybody subscribes to them: simulated ones need not read for nobody.
+            wanted: Whether anybody subscribes to them; if not, simulated sensors need not run.
         """
         ...
 
     def close(self) -> None:
-        """Come to rest and let go of whatever it holds, however its agent ends."""
+        """Come to rest and release everything it holds, however its agent ends."""
         ...
 
 
@@ -127,11 +127,11 @@ class Wiring:
     Attributes:
         port: Path of its serial port.
         baud: Of this.
-        calibration: Path of this very car's file; empty: it is as its kind.
-        lidar: Path of its scanner's serial port; empty: it has none.
+        calibration: Path of this individual car's file; empty: as its kind.
+        lidar: Path of its scanner's serial port; empty: none.
         lidar_kind: A file of `vehicle_agent/lidars`.
-        throttle: Most throttle either way, 0 to 1, beyond the dead-band.
-        raw: Whether commands go to the wheels as they are, nothing of its file undone.
+        throttle: Maximum throttle in either direction, 0 to 1, beyond the dead-band.
+        raw: Whether commands go to the wheels without the corrections of its file.
         fence: Corners it stays within, counter-clockwise, map frame [m]; empty: the whole floor.
     """
 
@@ -150,8 +150,8 @@ class BodyKind:
     """One kind of body.
 
     Attributes:
-        kind: What the city calls it when it joins: `remote` or `real`.
-        open: Makes one from the car file's name, a seed, and how it is connected.
+        kind: How it joins the city: `remote` or `real`.
+        open: Makes one from the car file's name, a seed, and its wiring.
     """
 
     kind: str

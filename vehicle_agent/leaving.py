@@ -1,4 +1,4 @@
-"""Leave politely: say goodbye, wait for the city's answer, and only then end the process.
+"""Leave cleanly: say goodbye, wait for the city's answer, and only then end the process.
 
 A process that ends at once looks to the city like one that died.
 """
@@ -10,28 +10,28 @@ from scm.clock import NS_PER_MS
 from scm.runtime.part import IsWanted, Part, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 
-PATIENCE_NS = 900 * NS_PER_MS
+MAX_GOODBYE_NS = 900 * NS_PER_MS
 
 
 class Leaving:
-    """A part that runs until it is asked to end, and then until its last words are answered.
+    """A part that runs until a stop is requested, and then until its goodbye is answered.
 
     Args:
         part: Does everything else.
-        wish: Set by whoever wants it to end.
-        done: Set by this when it may; stops the runner.
+        stop_requested: Set by whoever wants it to end.
+        done: Set by this part when it has left; stops the runner.
     """
 
-    def __init__(self, part: Part, wish: threading.Event, done: threading.Event) -> None:
+    def __init__(self, part: Part, stop_requested: threading.Event, done: threading.Event) -> None:
         self.name, self.role, self.period_ns = part.name, part.role, part.period_ns
         self.services = part.services
-        self._part, self._wish, self._done = part, wish, done
+        self._part, self._stop_requested, self._done = part, stop_requested, done
         self._since_ns: int | None = None
         self._waiting = 0
 
     @property
     def subscriptions(self) -> Sequence[Subscription]:
-        """What the part wishes to hear now."""
+        """The part's present subscriptions."""
         return self._part.subscriptions
 
     def attach(self, is_wanted: IsWanted) -> None:
@@ -39,18 +39,18 @@ class Leaving:
         self._part.attach(is_wanted)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Let the part live, or wait for the answers to its last words."""
+        """Step the part, or wait for the answers to its goodbye."""
         if self._since_ns is not None:
             self._waiting -= sum(item.call is not None for item in inbox)
-            if self._waiting <= 0 or now_ns - self._since_ns >= PATIENCE_NS:
+            if self._waiting <= 0 or now_ns - self._since_ns >= MAX_GOODBYE_NS:
                 self._done.set()
             return []
-        if not self._wish.is_set():
+        if not self._stop_requested.is_set():
             return self._part.step(now_ns, inbox)
-        last_words = self._part.finish(now_ns)
-        self._since_ns, self._waiting = now_ns, len(last_words)
-        return last_words
+        farewell = self._part.finish(now_ns)
+        self._since_ns, self._waiting = now_ns, len(farewell)
+        return farewell
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Say nothing more, unless nothing was said yet."""
+        """Return the goodbye, unless it was sent already."""
         return [] if self._since_ns is not None else self._part.finish(now_ns)

@@ -1,10 +1,10 @@
-"""The contract of a LIDAR's driver: what stands on a real car and looks around.
+"""The contract of a LIDAR driver.
 
 To add one, put a file with `LIDAR = LidarKind(...)` into `vehicle_agent/lidars`: copy one of these.
 A driver is a state machine without port or clock: bytes in, turns out. The agent opens the port at
-the kind's baud rate, writes what `begin` returns, feeds what comes, and writes `end` before it
-closes; a port that was pulled and plugged back begins with a new driver. Bytes that make no sense
-are counted and read over, never raised.
+the kind's baud rate, writes what `begin` returns, feeds received bytes, and writes `end` before it
+closes. A port that was unplugged and plugged in again gets a new driver. Invalid bytes are counted
+and skipped, never raised.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,7 +34,7 @@ class Lidar(Protocol):
     """One conversation with one scanner.
 
     Attributes:
-        skipped: Bytes that made no sense.
+        skipped: Number of invalid bytes.
     """
 
     skipped: int
@@ -43,8 +43,8 @@ class Lidar(Protocol):
         """Return what starts it."""
         ...
 
-    def hear(self, data: bytes) -> Sequence[Turn]:
-        """Take what came; return the turns that it completes."""
+    def feed(self, data: bytes) -> Sequence[Turn]:
+        """Process received bytes; return the turns they complete."""
         ...
 
     def end(self) -> bytes:
@@ -58,10 +58,10 @@ class LidarKind:
 
     Attributes:
         baud: Of its port.
-        beams: In the messages that are made of its turns: a turn is shared out evenly.
-        range_min_m: Nearest that it sees; likewise `range_max_m`.
+        beams: In the messages made of its turns, evenly spaced over a turn.
+        range_min_m: Nearest measured range; likewise `range_max_m`.
         open: Makes a driver.
-        dtr: How the port's DTR line must be while it is used.
+        dtr: State of the port's DTR line while it is used.
         clockwise: How it turns, seen from above.
     """
 
@@ -77,14 +77,14 @@ class LidarKind:
 def scan_of(
     turn: Turn, kind: LidarKind, vehicle: str, t_ns: int, turn_ns: int | None = None
 ) -> LidarScan:
-    """Return a turn as a message: of all beams around a bearing the nearest range, else a miss.
+    """Return a turn as a message: per beam the nearest range, infinity for none.
 
     Args:
         turn: Of the scanner.
         kind: Of scanner.
-        vehicle: Whose it is.
-        t_ns: When the turn was over.
-        turn_ns: How long it took; None: not known.
+        vehicle: The car that carries it.
+        t_ns: End of the turn.
+        turn_ns: Duration of the turn; None: not known.
     """
     bins = np.rint(turn.bearings * (kind.beams / (2.0 * np.pi))).astype(np.int64) % kind.beams
     seen = (turn.ranges >= kind.range_min_m) & (turn.ranges <= kind.range_max_m)

@@ -1,6 +1,6 @@
-"""A LIDAR on a port of its own: opened, begun, read in every step of the agent, ended.
+"""A LIDAR on a port of its own: opened, started, read in every step of the agent, stopped.
 
-One that tells no turn for three seconds is told to begin again, and that is said.
+A scanner that completes no turn for three seconds is started again, and a warning is logged.
 """
 
 import logging
@@ -17,14 +17,14 @@ from vehicle_agent.nigel.cable import Cable, open_serial
 
 LIDARS = "vehicle_agent.lidars"
 DRAIN_TURNS, DRAIN_S = 10, 0.005
-QUIET_NS = 3 * NS_PER_S
-SLOWEST_TURN_NS = NS_PER_S // 2  # scanners turn twice a second at least: in more a turn was lost
+MAX_SILENCE_NS = 3 * NS_PER_S
+MAX_TURN_NS = NS_PER_S // 2  # scanners turn at least twice a second: longer means a lost turn
 
 _log = logging.getLogger(__name__)
 
 
 class LidarPort:
-    """One scanner behind one port, pulled and plugged back as it likes.
+    """One scanner behind one port; it may be unplugged and plugged in again.
 
     Args:
         kind: Of the scanner.
@@ -34,17 +34,17 @@ class LidarPort:
     def __init__(self, kind: LidarKind, cable: Cable) -> None:
         self._kind, self._cable = kind, cable
         self._driver: Lidar | None = None
-        self._opened = self._heard_ns = 0
-        self._turned_ns: int | None = None  # when the newest turn was over
-        self._said = self._quiet = ""
+        self._opened = self._active_ns = 0
+        self._turned_ns: int | None = None  # end of the newest turn
+        self._logged = self._quiet = ""
 
     def step(self, vehicle: str, now_ns: int) -> list[LidarScan]:
-        """Return a message for each turn that has come; a trouble is told when it changes."""
+        """Return a message for each new turn; log trouble when it changes."""
         is_open = self._cable.keep_open(now_ns)
         is_new = self._cable.opened != self._opened
-        if is_open and (is_new or now_ns - self._heard_ns >= QUIET_NS):
+        if is_open and (is_new or now_ns - self._active_ns >= MAX_SILENCE_NS):
             self._quiet = "" if is_new else "no turn for 3 s: does it spin, is it of this kind?"
-            self._opened, self._driver, self._heard_ns = (
+            self._opened, self._driver, self._active_ns = (
                 self._cable.opened,
                 self._kind.open(),
                 now_ns,
@@ -52,31 +52,31 @@ class LidarPort:
             self._turned_ns = None
             self._cable.write([self._driver.begin()])
         data = self._cable.read()
-        turns = self._driver.hear(data) if self._driver is not None and data else ()
+        turns = self._driver.feed(data) if self._driver is not None and data else ()
         turn_ns = self._turn_ns(len(turns), now_ns)
         if turns:
-            self._heard_ns, self._quiet = now_ns, ""
+            self._active_ns, self._quiet = now_ns, ""
             self._turned_ns = now_ns
-        self._tell(self._cable.trouble or self._quiet)
+        self._log_trouble(self._cable.trouble or self._quiet)
         return [
             scan_of(turn, self._kind, vehicle, now_ns - after * (turn_ns or 0), turn_ns)
             for after, turn in zip(reversed(range(len(turns))), turns, strict=True)
         ]
 
     def _turn_ns(self, turns: int, now_ns: int) -> int | None:
-        """Return how long each of the turns took that are over now; None: not known."""
+        """Return how long each of the completed turns took; None: not known."""
         if not turns or self._turned_ns is None:
             return None
         turn_ns = (now_ns - self._turned_ns) // turns
-        return turn_ns if turn_ns <= SLOWEST_TURN_NS else None
+        return turn_ns if turn_ns <= MAX_TURN_NS else None
 
-    def _tell(self, trouble: str) -> None:
-        if trouble != self._said:
-            self._said = trouble
+    def _log_trouble(self, trouble: str) -> None:
+        if trouble != self._logged:
+            self._logged = trouble
             event(_log, "lidar", level=logging.WARNING, trouble=trouble or "none")
 
     def close(self) -> None:
-        """Stop the scanner and let go of the port."""
+        """Stop the scanner and release the port."""
         if self._driver is not None:
             self._cable.write([self._driver.end()])
         never = threading.Event()

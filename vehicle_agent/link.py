@@ -1,4 +1,4 @@
-"""The agent's tie to the city: joining, the heartbeat, and whether the car is its own to drive.
+"""The agent's link to the city: joining, heartbeat, and whether the agent may drive the car.
 
     outside    -- JoinReply -->                               own
     own        -- another's command, renewal refused -->      foreign
@@ -7,8 +7,8 @@
     regaining  -- LeaseReply with a newer epoch -->           own
     any        -- car unknown to the city, new world -->      outside
 
-The heartbeat asks the city to renew the lease; any answer of the city shows that the link is
-alive. Whoever lost the link or the car needs a newer epoch from the city to drive on.
+The heartbeat renews the lease; any answer of the city shows that the link is alive. An agent that
+lost the link or the car needs a newer epoch from the city to drive on.
 """
 
 import logging
@@ -25,9 +25,9 @@ from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.remove_request import RemoveRequest
 
 JOIN_EVERY_NS = NS_PER_S
-BEAT_EVERY_NS = 200 * NS_PER_MS
+HEARTBEAT_NS = 200 * NS_PER_MS
 LINK_LOST_NS = NS_PER_S
-NAME_TAKEN_NS = 10 * NS_PER_S  # a car that died leaves its name within a few seconds
+NAME_IN_USE_NS = 10 * NS_PER_S  # the name of a crashed car is free within a few seconds
 UNREACHABLE = ("timeout", "offline")
 
 Standing = Literal["outside", "own", "foreign", "regaining"]
@@ -43,7 +43,7 @@ class Link:
         epoch: Of the newest lease the city gave this agent.
         start: Where the city placed the car at the last joining.
         reason: Why the car is outside, in words.
-        session: Of the agent's bus; no joining before it is known.
+        session: Of the agent's bus; the agent joins only once it is known.
     """
 
     def __init__(
@@ -61,13 +61,13 @@ class Link:
         self.standing: Standing = "outside"
         self.epoch = 0
         self.start = Pose2(0.0, 0.0, 0.0)
-        self.reason = "has not asked yet"
+        self.reason = "has not requested to join yet"
         self._attempt = 0
-        self._asked_ns: int | None = None
+        self._requested_ns: int | None = None
         self._answered_ns = 0
         self._was_inside = False
         self._may_be_in = False
-        self._taken_ns: int | None = None
+        self._in_use_since_ns: int | None = None
 
     @property
     def is_inside(self) -> bool:
@@ -79,21 +79,23 @@ class Link:
         return now_ns - self._answered_ns <= LINK_LOST_NS
 
     def due(self, now_ns: int) -> list[Call]:
-        """Return what is to be asked of the city now, if anything."""
-        every_ns = BEAT_EVERY_NS if self.is_inside else JOIN_EVERY_NS
-        if not self.session or (self._asked_ns is not None and now_ns - self._asked_ns < every_ns):
+        """Return the requests that are due now."""
+        every_ns = HEARTBEAT_NS if self.is_inside else JOIN_EVERY_NS
+        if not self.session or (
+            self._requested_ns is not None and now_ns - self._requested_ns < every_ns
+        ):
             return []
-        self._asked_ns = now_ns
+        self._requested_ns = now_ns
         if not self.is_inside:
             self._may_be_in = True
             return [Call(self._join(), timeout_s=1.0)]
-        return [Call(self._beat(), timeout_s=1.0)]
+        return [Call(self._heartbeat(), timeout_s=1.0)]
 
-    def take(self, reply: Incoming) -> bool:
-        """Take a reply of the city; return whether the car has just come in.
+    def accept_reply(self, reply: Incoming) -> bool:
+        """Process a reply of the city; return whether the car has just joined.
 
         Raises:
-            RunError: when the city will never take the car as it is: no such car, no such place.
+            RunError: when the city can never accept the car: no such car, no such place.
         """
         message = reply.message
         if isinstance(message, Refused):
@@ -110,7 +112,7 @@ class Link:
         return False
 
     def leave(self, reason: str) -> None:
-        """Be outside from now on, and ask to join again."""
+        """Leave the city and request to join again."""
         if self.is_inside:
             event(_log, "left", vehicle=self._vehicle, reason=reason)
         self.standing, self.reason = "outside", reason
@@ -122,23 +124,23 @@ class Link:
             self.standing = "foreign"
 
     def regain(self) -> None:
-        """Ask the city for a newer lease: after a loss, or because of a new order."""
+        """Request a newer lease: after a loss, or because of a new route request."""
         if self.standing in ("own", "foreign"):
             self.standing = "regaining"
             self._attempt += 1
 
     def goodbye(self) -> list[Call]:
-        """Return the last words of a car that leaves.
+        """Return the goodbye of a car that leaves.
 
-        Whoever asked to join and has no answer yet says them too: the city may have let it in.
+        It is also sent while a join request is unanswered: the city may have accepted it.
         """
         if not (self.is_inside or self._may_be_in):
             return []
         reason = "its agent leaves"
         return [Call(RemoveRequest(vehicle=self._vehicle, reason=reason, session=self.session))]
 
-    def _beat(self) -> LeaseRequest:
-        """Return a renewal, or the one request for a newer lease, the same however often asked."""
+    def _heartbeat(self) -> LeaseRequest:
+        """Return a renewal, or the request for a newer lease, identical at each repetition."""
         if self.standing == "regaining":
             return LeaseRequest(
                 request_id=self._request_id(),
@@ -175,24 +177,24 @@ class Link:
             self.reason = refused.detail
             return
         self._answered_ns = max(self._answered_ns, reply.t_ns)
-        asked = reply.call.request if reply.call is not None else None
-        if isinstance(asked, JoinRequest):
+        request = reply.call.request if reply.call is not None else None
+        if isinstance(request, JoinRequest):
             self._may_be_in = False
-            if refused.code == "invalid" or self._is_taken_for_good(refused, reply.t_ns):
+            if refused.code == "invalid" or self._is_name_in_use(refused, reply.t_ns):
                 raise RunError(refused.detail)
             self._attempt += 1
             if refused.detail != self.reason:
                 event(_log, "not_joined", level=logging.WARNING, reason=refused.detail)
             self.reason = refused.detail
-        elif isinstance(asked, LeaseRequest) and self.is_inside:
+        elif isinstance(request, LeaseRequest) and self.is_inside:
             if refused.code == "not_found":
                 self.leave("the city does not know the car any more")
-            elif asked == self._beat():  # an answer to an older question says nothing new
+            elif request == self._heartbeat():  # an answer to an older request is irrelevant
                 self.give_way()
 
-    def _is_taken_for_good(self, refused: Refused, t_ns: int) -> bool:
-        """Return whether a newcomer's name has been somebody else's for too long to wait on."""
+    def _is_name_in_use(self, refused: Refused, t_ns: int) -> bool:
+        """Return whether the name of a new car has been in use by another for too long."""
         if refused.code != "owned" or self._was_inside:
             return False
-        self._taken_ns = t_ns if self._taken_ns is None else self._taken_ns
-        return t_ns - self._taken_ns >= NAME_TAKEN_NS
+        self._in_use_since_ns = t_ns if self._in_use_since_ns is None else self._in_use_since_ns
+        return t_ns - self._in_use_since_ns >= NAME_IN_USE_NS

@@ -1,6 +1,6 @@
-"""One stay in the city: from joining to leaving, twenty milliseconds at a time.
+"""One visit to the city: from joining to leaving, 20 ms a step.
 
-hear -> move the body up to now -> decide -> guard -> command the body -> report
+receive -> advance the body to now -> decide -> guard -> command the body -> report
 """
 
 import logging
@@ -29,25 +29,25 @@ from scm.vehicles.drivers.signal_table import SignalTable
 from scm.vehicles.drivers.single_car import OWN, TripDriver
 from scm.vehicles.guard import Guard, Guarded
 from scm.vehicles.lights import OFF, TURNS, Headlights, Indicators, Switches, lamps
-from vehicle_agent.actuation import LastWord
+from vehicle_agent.actuation import ActuationGate
 from vehicle_agent.body import Body
 from vehicle_agent.guard import RealGuard
 
 _log = logging.getLogger(__name__)
 
 
-class Stay:
+class CitySession:
     """A car in the city.
 
     Attributes:
-        signals: What it believes of the signals.
-        cars: What it knows of the others.
-        guard: Between every commander and the body.
-        trips: Where it is sent.
-        switches: How its headlights and indicators are switched.
-        air: How busy it is, and how seldom the car may speak.
-        last_word: Between the guard and the body.
-        astray: Why it cannot drive from where it was put; empty: it can.
+        signals: State of the signals as received.
+        cars: State of the other cars as received.
+        guard: Between every source of commands and the body.
+        trips: Its route and trip.
+        switches: State of its headlights and indicators.
+        channel: Channel load, and how often the car may transmit.
+        gate: Between the guard and the body.
+        off_lane: Why it cannot drive from where it was put; empty if it can.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class Stay:
         now_ns: int,
         real: RealGuard | None = None,
     ) -> None:
-        """Begin with the body where the city wants it; `real` guards a real car.
+        """Begin with the body where the city placed it; `real` guards a real car.
 
         Raises:
             MapError: when it stands where no lane leads anywhere.
@@ -71,38 +71,40 @@ class Stay:
         self.guard = Guard(epoch)
         self._roads = Roads(city_map)
         self.trips = TripDriver(vehicle, self._roads, body.limits, body.motion().pose, now_ns)
-        self.last_word = LastWord(body, real)
-        self.astray = ""
+        self.gate = ActuationGate(body, real)
+        self.off_lane = ""
         self._tried_ns = now_ns
         self.switches = OFF
         radio = city_map.radio
-        self.air = StationControl(radio.data_rate_mbps, is_on=radio.congestion_control)
-        self._loses_nothing = is_ideal(radio)
+        self.channel = StationControl(radio.data_rate_mbps, is_on=radio.congestion_control)
+        self._is_lossless = is_ideal(radio)
         self._cam = CamTrigger()
-        self._slow_news = LowFrequencySender()
+        self._low_frequency = LowFrequencySender()
         self._warnings = CarWarnings(vehicle)
-        self._hits: list[Contact] = []
-        self._seq = self._felt = 0
-        self._commanded = 0.0, 0.0
+        self._contacts: list[Contact] = []
+        self._seq = self._contact_number = 0
+        self._last_command = 0.0, 0.0
         self._turn: Indicators = "off"
-        self._is_led = False
+        self._is_driven_by_other = False
 
     def see(self, track: EyeTrack, now_ns: int) -> None:
-        """Learn where the overhead cameras see the car."""
-        self.last_word.see(track, now_ns)
+        """Receive a track of the car from the overhead cameras."""
+        self.gate.see(track, now_ns)
 
     def push(self, contact: Contact) -> None:
-        """Let the body feel a contact; the next report says so."""
+        """Apply a contact to the body; the next report includes it."""
         self._body.push(contact)
-        self._hits.append(contact)
-        self._felt = contact.number
+        self._contacts.append(contact)
+        self._contact_number = contact.number
 
     def begin(self, request: RouteRequest, now_ns: int) -> RouteReply:
-        """Send the car on a trip; MapError when the lanes do not allow it."""
+        """Start a trip; MapError when the lanes do not allow it."""
         return self.trips.begin(request, self._body.motion().pose, now_ns)
 
-    def told(self, headlights: Headlights | None, indicators: Indicators | None) -> Switches:
-        """Switch the lights, None leaves one as it is; return how they stand."""
+    def switch_lights(
+        self, headlights: Headlights | None, indicators: Indicators | None
+    ) -> Switches:
+        """Switch the lights (None leaves one unchanged) and return their state."""
         self.switches = self.switches.updated(headlights, indicators)
         return self.switches
 
@@ -111,35 +113,39 @@ class Stay:
 
         Args:
             now_ns: The present time [ns].
-            epoch: Under which the car's own driver commands; None: it must not.
-            sensed: Whether anybody subscribes to what the sensors read.
+            epoch: Under which the car's own driver commands; None: it may not drive.
+            sensed: Whether anybody subscribes to the sensors.
         """
         self._body.advance(now_ns)
-        self._begin_anew_if_lifted(now_ns)
-        led_here, self._turn, self._is_led = self._commanded, "off", epoch is None
+        self._replan_if_lifted(now_ns)
+        previous_command, self._turn, self._is_driven_by_other = (
+            self._last_command,
+            "off",
+            epoch is None,
+        )
         if epoch is not None:
             throttle, steering = self._decide(now_ns)
             self.guard.drive(throttle, steering, epoch, self._seq, now_ns)
-        self._body.show(self._shown(hazard=self.guard.lost))
-        guarded = self.last_word.pass_on(self.guard.output(now_ns), self.astray, now_ns)
-        self._commanded = guarded.throttle, guarded.steering
-        return self._reports(guarded, led_here, now_ns, sensed=sensed)
+        self._body.show(self._lamp_switches(hazard=self.guard.lost))
+        guarded = self.gate.pass_on(self.guard.output(now_ns), self.off_lane, now_ns)
+        self._last_command = guarded.throttle, guarded.steering
+        return self._reports(guarded, previous_command, now_ns, sensed=sensed)
 
-    def _begin_anew_if_lifted(self, now_ns: int) -> None:
-        """Look for the lane again where the car was put down, until it stands on one."""
-        is_due = self.astray and now_ns - self._tried_ns >= NS_PER_S
+    def _replan_if_lifted(self, now_ns: int) -> None:
+        """Search for a lane where the car was put down, until it stands on one."""
+        is_due = self.off_lane and now_ns - self._tried_ns >= NS_PER_S
         if not (self._body.was_lifted() or is_due):
             return
         self._tried_ns, pose = now_ns, self._body.motion().pose
         try:
             self.trips = TripDriver(self._vehicle, self._roads, self._body.limits, pose, now_ns)
-            self.astray = ""
+            self.off_lane = ""
         except MapError as error:
-            self.astray = str(error)
-        event(_log, "put_down", x_m=round(pose.x, 3), y_m=round(pose.y, 3), trouble=self.astray)
+            self.off_lane = str(error)
+        event(_log, "put_down", x_m=round(pose.x, 3), y_m=round(pose.y, 3), trouble=self.off_lane)
 
-    def _shown(self, *, hazard: bool) -> Switches:
-        """Return what a body's own lamps are to show."""
+    def _lamp_switches(self, *, hazard: bool) -> Switches:
+        """Return the state for the body's own lamps."""
         indicators = self._turn if self.switches.indicators == "off" else self.switches.indicators
         return Switches(self.switches.headlights, "hazard" if hazard else indicators)
 
@@ -152,44 +158,46 @@ class Stay:
             speed=motion.speed,
             signals=self.signals,
             others=self.cars.others(now_ns, motion.pose),
-            reception_is_good=self._loses_nothing or self.cars.reception_is_good(now_ns),
+            reception_is_good=self._is_lossless or self.cars.reception_is_good(now_ns),
         )
         throttle, steering = self.trips.decide(view)
         self._turn = TURNS[int(self.trips.driver.batch.turn[OWN])]
         return throttle, steering
 
     def _reports(
-        self, guarded: Guarded, led_here: tuple[float, float], now_ns: int, *, sensed: bool
+        self, guarded: Guarded, previous_command: tuple[float, float], now_ns: int, *, sensed: bool
     ) -> list[Outgoing]:
-        state = self._state(guarded, led_here, now_ns)
+        state = self._state(guarded, previous_command, now_ns)
         sensors = self._body.sensors(self._vehicle, now_ns, wanted=sensed)
         outbox: list[Outgoing] = [state, *sensors]
-        if self._cam.due(state, now_ns, self.air.gap_ns(now_ns)):
-            self.air.add_frame("cam", now_ns)
+        if self._cam.due(state, now_ns, self.channel.gap_ns(now_ns)):
+            self.channel.add_frame("cam", now_ns)
             limits = self._body.limits
             body = cam_of(
                 state,
                 length_m=limits.length,
                 width_m=limits.width,
                 front_m=limits.front,
-                low_frequency=self._slow_news.due(state, limits.front),
+                low_frequency=self._low_frequency.due(state, limits.front),
             )
             outbox.append(CamTx(station=self._vehicle, t_ns=now_ns, body=body))
-        hits, self._hits = tuple(self._hits), []
+        contacts, self._contacts = tuple(self._contacts), []
         outbox += [
             DenmTx(station=self._vehicle, t_ns=now_ns, body=body)
-            for body in self._warnings.step(state, hits)
+            for body in self._warnings.step(state, contacts)
         ]
         return [*outbox, *self.trips.reports(now_ns)]
 
     def _command_age_ms(self, now_ns: int) -> float | None:
-        """Return the age of the newest command of somebody else who drives it."""
-        age_ns = self.guard.command_age_ns(now_ns) if self._is_led else None
+        """Return the age of the newest command if somebody else drives the car."""
+        age_ns = self.guard.command_age_ns(now_ns) if self._is_driven_by_other else None
         return None if age_ns is None else age_ns / NS_PER_MS
 
-    def _state(self, guarded: Guarded, led_here: tuple[float, float], now_ns: int) -> VehicleState:
+    def _state(
+        self, guarded: Guarded, previous_command: tuple[float, float], now_ns: int
+    ) -> VehicleState:
         motion = self._body.motion()
-        throttle, steering = led_here
+        throttle, steering = previous_command
         self._seq += 1
         return VehicleState(
             vehicle=self._vehicle,
@@ -220,5 +228,5 @@ class Stay:
             battery_v=motion.battery_v,
             battery_charge=motion.battery_charge,
             command_age_ms=self._command_age_ms(now_ns),
-            contacts=self._felt,
+            contacts=self._contact_number,
         )

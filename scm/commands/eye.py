@@ -40,9 +40,9 @@ def _run(arguments: argparse.Namespace) -> int:
 
     from scm.eye.calibrate.locate import known_tags
     from scm.eye.calibration_files import load_calibration
+    from scm.eye.calibration_state import CalibrationHistory
     from scm.eye.camera import camera_of
     from scm.eye.part import EyePart
-    from scm.eye.sight import SightRecord
     from scm.eye.sources.choose import source_of
     from scm.eye.station import eye_station
     from scm.maps.load import load_map
@@ -64,9 +64,9 @@ def _run(arguments: argparse.Namespace) -> int:
     more.pop(city_map.tag.tag_id)
     station = eye_station(camera.name, first=camera is city_map.cameras[0])
     with state_of(arguments) as state:
-        stored = None
+        restored = None
         if state is not None:
-            stored = record(state, "calibrations", station, camera.name, SightRecord)
+            restored = record(state, "calibrations", station, camera.name, CalibrationHistory)
         part = EyePart(
             city_map,
             camera.name,
@@ -74,7 +74,7 @@ def _run(arguments: argparse.Namespace) -> int:
             source or None,
             lens=lens,
             tags=tuple(more.values()),
-            kept=stored,
+            restored=restored,
         )
         return run_part(part, arguments, state)
 

@@ -61,7 +61,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.errors import EyeError
-    from scm.eye.calibrate.told import views_told, write_report
+    from scm.eye.calibrate.report import views_report, write_report
 
     if bool(arguments.image) == (arguments.camera is not None):
         raise EyeError("expected pictures, or a film, or --camera N, and only one of these")
@@ -70,12 +70,12 @@ def _run(arguments: argparse.Namespace) -> int:
     owner = _owner(arguments)
     board, gathered = _gathered(arguments)
     if arguments.report:  # what follows may refuse them
-        write_report(views_told(board, gathered), arguments.report)
+        write_report(views_report(board, gathered), arguments.report)
     if not arguments.look:
         _measure(arguments, board, gathered, owner)
         return 0
     _progress("")
-    for line in gathered.said:
+    for line in gathered.remarks:
         print(line)
     print(f"{board.said}: in {len(gathered.views)} pictures")
     return 0
@@ -99,22 +99,22 @@ def _measure(
     arguments: argparse.Namespace, board: "Board", gathered: "Gathered", owner: "Camera | None"
 ) -> None:
     from scm.errors import EyeError
-    from scm.eye.calibrate.judge import judge
-    from scm.eye.calibrate.say import report
+    from scm.eye.calibrate.assessment import assess
+    from scm.eye.calibrate.report import lens_report, write_report
     from scm.eye.calibrate.solve import solve
-    from scm.eye.calibrate.told import lens_told, write_report
+    from scm.eye.calibrate.summary import report
     from scm.eye.calibration import calibrated
 
     solution = solve(gathered.views, gathered.size, arguments.fisheye, _progress)
-    verdict = judge(solution)
+    assessment = assess(solution)
     if arguments.report:
-        write_report(lens_told(board, gathered, solution, verdict), arguments.report)
+        write_report(lens_report(board, gathered, solution, assessment), arguments.report)
     _progress("")
-    for line in gathered.said:
+    for line in gathered.remarks:
         print(line)
-    print(report(solution, verdict))
-    if verdict.refused:
-        reasons = "".join(f"\n  {one}" for one in verdict.refused)
+    print(report(solution, assessment))
+    if assessment.refused:
+        reasons = "".join(f"\n  {one}" for one in assessment.refused)
         raise EyeError(f"refused, nothing written: these views do not tell the lens{reasons}")
     calibration = solution.calibration()
     if owner is not None:

@@ -38,7 +38,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.errors import EyeError
-    from scm.eye.calibrate.say import lens_lines
+    from scm.eye.calibrate.summary import lens_lines
     from scm.eye.calibration_files import read_calibration, write_calibration
 
     form: Format | None = arguments.format or _FORMATS.get(arguments.out.suffix.lower())

@@ -37,7 +37,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
     from scm.errors import EyeError
     from scm.eye.calibrate.locate import known_tags, locate, off_px
-    from scm.eye.calibrate.told import place_told, write_report
+    from scm.eye.calibrate.report import place_report, write_report
     from scm.eye.calibration import calibrated
     from scm.eye.calibration_files import read_calibration
     from scm.eye.camera import camera_of
@@ -80,7 +80,7 @@ def _run(arguments: argparse.Namespace) -> int:
     block = _block(located.places[0])
     print(block)
     if arguments.report:
-        write_report(place_told(in_force, tags, seen, located, block), arguments.report)
+        write_report(place_report(in_force, tags, seen, located, block), arguments.report)
     return 0
 
 

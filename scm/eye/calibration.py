@@ -1,4 +1,4 @@
-"""A lens as `scm eye calibrate` measured it: a small file, and the camera that looks through it."""
+"""A lens measured by `scm eye calibrate`: a small file, and the camera with this lens."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ LENS_NAMES = {
     "pinhole": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"),
     "fisheye": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4", "none"),
 }
-"""What the nine numbers of a lens are, in the order of its covariance."""
+"""Names of a lens's nine parameters, in the order of its covariance."""
 
 
 class Calibration(Record, kw_only=True, frozen=True):
@@ -24,10 +24,10 @@ class Calibration(Record, kw_only=True, frozen=True):
 
     Attributes:
         distortion: k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4, 0.
-        covariance: Of fx, fy, cx, cy and the distortion, nine rows of nine; a term that was left
-            out has zeros.
-        rms_px: Of what is left at the board's points, per point.
-        views: Pictures of the board it was made from.
+        covariance: Of fx, fy, cx, cy and the distortion, nine rows of nine; zeros for a term that
+            was left out.
+        rms_px: RMS residual at the board's points, per point.
+        views: Number of pictures of the board that were used.
     """
 
     lens: Literal["pinhole", "fisheye"]
@@ -44,17 +44,17 @@ class Calibration(Record, kw_only=True, frozen=True):
 
     @property
     def values(self) -> Floats:
-        """The nine numbers of the lens, (9,)."""
+        """The nine parameters of the lens, (9,)."""
         return np.array([self.fx_px, self.fy_px, self.cx_px, self.cy_px, *self.distortion])
 
     @property
     def lens_covariance(self) -> Floats:
-        """What `camera_model` takes as the lens' doubt, (9, 9)."""
+        """Covariance of the lens, for `camera_model`, (9, 9)."""
         return np.array(self.covariance)
 
     @property
     def deviations(self) -> Floats:
-        """Standard deviations of the nine numbers, (9,)."""
+        """Standard deviations of the nine parameters, (9,)."""
         deviations: Floats = np.sqrt(np.diag(self.lens_covariance))
         return deviations
 
@@ -86,7 +86,7 @@ class Calibration(Record, kw_only=True, frozen=True):
 
 
 def calibrated(camera: Camera, calibration: Calibration) -> Camera:
-    """Return a camera of a map file with a measured lens in place of its own.
+    """Return a camera of a map file with a measured lens instead of its own.
 
     Raises:
         EyeError: The lens was measured at another frame size.
@@ -114,7 +114,7 @@ def _numbers(row: tuple[float, ...]) -> str:
 
 
 def covariance_faults(rows: Sequence[Sequence[float]]) -> str:
-    """Return why rows are no covariance of a lens; empty: they are one."""
+    """Return why rows are no covariance of a lens; empty if they are one."""
     if len(rows) != LENS_PARAMETERS or any(len(row) != LENS_PARAMETERS for row in rows):
         return f"expected nine rows of nine, got {len(rows)} of {sorted({len(r) for r in rows})}"
     matrix = np.array(rows)

@@ -1,12 +1,12 @@
-"""Calibrations of a lens in files: our own TOML, ROS' `camera_info`, and OpenCV's FileStorage.
+"""Lens calibrations in files: our own TOML, ROS' `camera_info`, and OpenCV's FileStorage.
 
 ROS: the YAML of `camera_calibration`, or an echoed `CameraInfo` message; `plumb_bob`,
 `rational_polynomial` and `equidistant` (our fisheye). OpenCV: YAML, XML or JSON, by whatever
-common names the matrix, the coefficients and the frame's size are stored. Coefficients beyond five
-are fitted by five, which is refused where that leaves more than `RMS_SHARE` of the width.
+common names the matrix, the coefficients and the frame's size are stored. More than five
+coefficients are approximated by five, and refused if the residual exceeds `RMS_SHARE` of the width.
 
-These files hold no covariance. Instead one is taken that makes each ray uncertain by
-`ASSUMED_RAY_SHARE` of the frame's width, or by the reprojection error if that is larger.
+These files hold no covariance. The assumed one makes each ray uncertain by `ASSUMED_RAY_SHARE` of
+the frame's width, or by the reprojection error if that is larger.
 """
 
 import logging
@@ -22,20 +22,20 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import EyeError
-from scm.eye.anchor import STEPS, parameters
-from scm.eye.calibrate.judge import RMS_SHARE
+from scm.eye.calibrate.assessment import RMS_SHARE
 from scm.eye.calibration import LENS_NAMES, Calibration, covariance_faults
 from scm.eye.camera import LENS_PARAMETERS, CameraModel, camera_model
+from scm.eye.extrinsics import STEPS, parameters
 from scm.log import event
 from scm.yaml_file import read_yaml
 
 LOGGER = logging.getLogger(__name__)
 ASSUMED_RAY_SHARE = 5e-4
-"""Standard deviation of where a ray meets the picture, over the frame's width, of a lens whose file
-has no covariance: as much as `scm eye calibrate` lets pass at the board's points."""
+"""Assumed ray standard deviation over the frame's width, of a lens whose file has no covariance: as
+much as `scm eye calibrate` accepts at the board's points."""
 MAX_SKEW_SHARE = 1e-4
 GRID = 24
-"""Points along each side of the frame at which two lenses are compared."""
+"""Grid points along each side of the frame at which two lenses are compared."""
 EXPECTED = (
     "expected a lens: TOML of `scm eye calibrate`, a ROS camera_info YAML, or YAML, XML or JSON of "
     "OpenCV's FileStorage"
@@ -57,7 +57,7 @@ Five = tuple[float, float, float, float, float]
 
 
 def load_calibration(path: Path, size_px: tuple[int, int] | None = None) -> Calibration:
-    """Return the calibration in a file; what was taken instead of what it lacks is logged.
+    """Return the calibration in a file; log what was assumed for missing values.
 
     Args:
         path: The file.
@@ -75,10 +75,10 @@ def load_calibration(path: Path, size_px: tuple[int, int] | None = None) -> Cali
 def read_calibration(
     path: Path, size_px: tuple[int, int] | None = None
 ) -> tuple[Calibration, tuple[str, ...]]:
-    """Return the calibration in a file, and sentences on what was taken for what it lacks.
+    """Return the calibration in a file, and sentences on what was assumed for missing values.
 
     Raises:
-        EyeError: As of `load_calibration`.
+        EyeError: As `load_calibration`.
     """
     if not path.is_file():
         raise EyeError(f"{path}: found no file; {EXPECTED}")
@@ -122,7 +122,7 @@ def _xml(path: Path) -> Any:
 
 
 def _node(node: Any) -> Any:
-    """Return a node of OpenCV's FileStorage as plain data; None: of a kind that no lens needs."""
+    """Return a node of OpenCV's FileStorage as plain data; None for kinds that no lens needs."""
     if node.isMap():
         if "dt" in node.keys():  # noqa: SIM118  no mapping of Python's
             return node.mat().tolist()
@@ -135,7 +135,7 @@ def _node(node: Any) -> Any:
 
 
 class _Foreign:
-    """A file of ROS' or OpenCV's, by the usual names of what it holds."""
+    """A file of ROS or OpenCV, read by the usual names of its values."""
 
     def __init__(self, path: Path, read: Mapping[Any, Any]) -> None:
         self._path = path
@@ -143,7 +143,7 @@ class _Foreign:
         self._keys = ", ".join(str(key) for key in list(read)[:12])
 
     def calibration(self, size_px: tuple[int, int] | None) -> tuple[Calibration, tuple[str, ...]]:
-        """Return the lens, and what was taken for what the file lacks."""
+        """Return the lens, and sentences on what was assumed for missing values."""
         remarks: list[str] = []
         width, height = self._frame_size(size_px, remarks)
         fx, fy, cx, cy = self._focal(width)
@@ -163,15 +163,15 @@ class _Foreign:
         ray_px = max(ASSUMED_RAY_SHARE * width, rms)
         rows = tuple(map(tuple, _assumed_covariance(model, ray_px).tolist()))
         remarks.append(
-            f"it holds no covariance: taken so that each ray is known to {ray_px:.2f} px "
+            f"it has no covariance: each ray is assumed known to {ray_px:.2f} px "
             "(standard deviation); `scm eye calibrate` measures it"
         )
         return msgspec.structs.replace(made, covariance=rows), tuple(remarks)
 
     def _five(
-        self, numbers: Floats, focal: Mapping[str, float], size: tuple[int, int], said: list[str]
+        self, numbers: Floats, focal: Mapping[str, float], size: tuple[int, int], remarks: list[str]
     ) -> tuple[LensKind, Five]:
-        """Return the kind of the lens and the five numbers of its distortion."""
+        """Return the kind of the lens and its five distortion coefficients."""
         if self._is_fisheye():
             if 0 < len(numbers) < 4 or np.any(numbers[4:]):
                 raise self._fault("distortion coefficients", "4 of a fisheye", f"{len(numbers)}")
@@ -191,8 +191,9 @@ class _Foreign:
                 "again without the rational model, or as a fisheye)",
                 f"{len(numbers)} of them, {left:.2f} px RMS left",
             )
-        said.append(
-            f"its {len(numbers)} distortion coefficients are fitted by five: {left:.3f} px RMS left"
+        remarks.append(
+            f"its {len(numbers)} distortion coefficients are approximated by five: residual "
+            f"{left:.3f} px RMS"
         )
         k1, k2, p1, p2, k3 = five.tolist()
         return "pinhole", (k1, k2, p1, p2, k3)
@@ -207,7 +208,7 @@ class _Foreign:
         if size_px is None:
             raise self._fault("image_width and image_height", "the frame's size", "none")
         remarks.append(
-            f"it holds no frame size: taken as the camera's, {size_px[0]} x {size_px[1]}"
+            f"it has no frame size: assumed to be the camera's, {size_px[0]} x {size_px[1]}"
         )
         return size_px
 
@@ -244,13 +245,13 @@ class _Foreign:
         return float(numbers[0]) if len(numbers) else default
 
     def _numbers(self, names: Sequence[str]) -> Floats:
-        """Return the numbers of the first name there is, row by row, (n,); of none (0,)."""
+        """Return the numbers of the first name present, row by row, (n,); if none, (0,)."""
         value = self._get(names)
         if isinstance(value, dict):
             value = value.get("data")
         if value is None:
             return np.zeros(0)
-        try:  # YAML takes 1e-05 for a text
+        try:  # YAML reads 1e-05 as text
             numbers = np.array(value).astype(np.float64).reshape(-1)
         except (TypeError, ValueError) as error:
             raise self._fault(names[0], "numbers", f"{str(value)[:60]!r}") from error
@@ -278,7 +279,7 @@ def _grid(size: tuple[int, int]) -> Floats:
 def _fitted_by_five(
     numbers: Floats, focal: Mapping[str, float], size: tuple[int, int]
 ) -> tuple[Floats, float]:
-    """Return five coefficients that bend rays as these do, and what is left [px RMS]."""
+    """Return five coefficients that approximate these, and the residual [px RMS]."""
     fx, fy, cx, cy = (focal[name] for name in ("fx_px", "fy_px", "cx_px", "cy_px"))
     matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 400, 1e-12)
@@ -303,7 +304,7 @@ def _fitted_by_five(
 
 
 def _assumed_covariance(model: CameraModel, ray_px: float) -> Floats:
-    """Return the covariance of a lens, (9, 9), that makes its rays so uncertain in the mean."""
+    """Return the covariance of a lens, (9, 9), that gives this mean ray std."""
     camera = model.camera
     known = sum(name != "none" for name in LENS_NAMES[camera.lens])
     pixels = _grid((camera.width_px, camera.height_px))
@@ -326,7 +327,7 @@ def _assumed_covariance(model: CameraModel, ray_px: float) -> Floats:
 
 
 def _seen(rays: Floats, lens: str, values: Floats) -> Floats:
-    """Return where a lens of these nine numbers shows rays, (n, 3) to (n, 2) [px]."""
+    """Return where a lens with these nine parameters projects rays, (n, 3) to (n, 2) [px]."""
     fx, fy, cx, cy = values[:4]
     matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     zero = np.zeros(3)
@@ -342,7 +343,7 @@ def write_calibration(
 ) -> None:
     """Write a lens for another program: ROS' camera_info YAML or OpenCV's YAML; or as our own TOML.
 
-    ROS and OpenCV have no place for the covariance: only our own file keeps it.
+    ROS and OpenCV cannot store the covariance; only our own file contains it.
 
     Raises:
         EyeError: The file cannot be written.
@@ -408,6 +409,6 @@ def _opencv_matrix(name: str, rows: int, columns: int, data: Sequence[float]) ->
 
 
 def _numbers(values: Sequence[float]) -> str:
-    """Return numbers that YAML reads as such: with a point also where there is an exponent."""
+    """Return numbers that YAML reads as numbers: with a point even before an exponent."""
     texts = (repr(float(value)) for value in values)
     return ", ".join(one if "." in one else one.replace("e", ".0e") for one in texts)

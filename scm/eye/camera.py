@@ -24,9 +24,9 @@ from scm.v2x.key import check_name
 
 LARGEST_TILT_RAD = math.radians(45.0)
 LENS_PARAMETERS = 9
-"""fx, fy, cx, cy and the five of the distortion."""
+"""Number of lens parameters: fx, fy, cx, cy and five of the distortion."""
 WIDEST_RAD = math.radians(89.9)
-"""Rays further off the axis of a fisheye have no place in a pinhole's picture."""
+"""Rays further off a fisheye's axis cannot be represented by a pinhole."""
 _UNDISTORT_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 400, 1e-12)
 _NEWTON_STEPS = 4
 
@@ -36,12 +36,12 @@ class CameraModel:
     """A calibrated camera.
 
     Attributes:
-        camera: What the map file says.
+        camera: As in the map file.
         matrix: K, (3, 3) [px].
         distortion: k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4, 0; (5,).
         position: Optical centre in the map frame, (3,) [m].
         camera_R_map: Turns map directions into camera directions, (3, 3).
-        lens_covariance: Of fx, fy, cx, cy and the distortion, (9, 9); None: no doubt.
+        lens_covariance: Of fx, fy, cx, cy and the distortion, (9, 9); None: taken as exact.
     """
 
     camera: Camera
@@ -61,7 +61,7 @@ class CameraModel:
 
     @property
     def extrinsics(self) -> Floats:
-        """x, y, z [m], yaw, tilt x, tilt y [rad]: what `moved_to` takes, (6,)."""
+        """x, y, z [m], yaw, tilt x, tilt y [rad], as `moved_to` expects them, (6,)."""
         camera = self.camera
         tilts = camera.tilt_x_rad, camera.tilt_y_rad
         return np.array([camera.x_m, camera.y_m, camera.z_m, camera.yaw_rad, *tilts])
@@ -87,7 +87,7 @@ class CameraModel:
         return np.stack((camera.fx_px * x + camera.cx_px, camera.fy_px * y + camera.cy_px), axis=-1)
 
     def undistort(self, pixels: Floats) -> Floats:
-        """Return where a perfect pinhole of focal length 1 would see them: (..., 2) to (..., 2).
+        """Return the coordinates in a perfect pinhole of focal length 1: (..., 2) to (..., 2).
 
         NaN where a fisheye looks 90 deg or more off its axis, or shows nothing at all.
         """
@@ -140,11 +140,11 @@ def camera_model(camera: Camera, lens_covariance: Floats | None = None) -> Camer
     """Build the model of a map file's camera.
 
     Args:
-        camera: What the map file says, or `calibration.calibrated` of it.
+        camera: As in the map file, or from `calibration.calibrated`.
         lens_covariance: Of fx, fy, cx, cy and the distortion, (9, 9), if the lens was calibrated.
 
     Raises:
-        EyeError: naming every key that cannot be a camera's, with what was expected.
+        EyeError: naming every invalid key, with what was expected.
     """
     faults = _faults(camera, lens_covariance)
     if faults:
@@ -161,7 +161,7 @@ def camera_model(camera: Camera, lens_covariance: Floats | None = None) -> Camer
 
 
 def _bend_pinhole(seen: Floats, distortion: Floats) -> tuple[Floats, Floats]:
-    """Return where camera points (..., 3) appear through Brown's distortion, focal length 1."""
+    """Project camera points (..., 3) with Brown's distortion, focal length 1."""
     a, b = seen[..., 0] / seen[..., 2], seen[..., 1] / seen[..., 2]
     k1, k2, p1, p2, k3 = distortion
     r2 = a * a + b * b
@@ -172,7 +172,7 @@ def _bend_pinhole(seen: Floats, distortion: Floats) -> tuple[Floats, Floats]:
 
 
 def _bend_fisheye(seen: Floats, distortion: Floats) -> tuple[Floats, Floats]:
-    """Return where camera points (..., 3) appear through a fisheye, focal length 1."""
+    """Project camera points (..., 3) with a fisheye, focal length 1."""
     across = np.hypot(seen[..., 0], seen[..., 1])
     reach = _fisheye_reach(np.arctan2(across, seen[..., 2]), distortion)
     on_axis = across < 1e-12
@@ -181,7 +181,7 @@ def _bend_fisheye(seen: Floats, distortion: Floats) -> tuple[Floats, Floats]:
 
 
 def _fisheye_reach(angle: Floats, distortion: Floats) -> Floats:
-    """Return how far from the middle a ray so far off the axis appears, focal length 1."""
+    """Return the image radius of a ray at an angle off the axis, focal length 1."""
     k1, k2, k3, k4, _ = distortion
     t2 = angle * angle
     reach: Floats = angle * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
@@ -189,7 +189,7 @@ def _fisheye_reach(angle: Floats, distortion: Floats) -> Floats:
 
 
 def _straight(bent: Floats, distortion: Floats) -> Floats:
-    """Return the pinhole's place of a fisheye's points, (..., 2) to (..., 2), by Newton's steps."""
+    """Return a fisheye's points as pinhole points, (..., 2) to (..., 2), by Newton's method."""
     k1, k2, k3, k4, _ = distortion
     wanted = np.hypot(bent[..., 0], bent[..., 1])
     angles = np.linspace(0.0, math.pi, 400)
@@ -224,7 +224,7 @@ def _faults(camera: Camera, lens_covariance: Floats | None) -> list[str]:
     fifth, shape = camera.distortion[4], None if lens_covariance is None else lens_covariance.shape
     square = (LENS_PARAMETERS, LENS_PARAMETERS)
     checks: dict[str, tuple[object, bool, str]] = {
-        "name": (camera.name, _may_be_told(camera.name), "1 to 32 of a-z 0-9 _ -, and not pose"),
+        "name": (camera.name, _is_valid_name(camera.name), "1 to 32 of a-z 0-9 _ -, and not pose"),
         "width_px": (camera.width_px, camera.width_px >= 16, "at least 16"),
         "height_px": (camera.height_px, camera.height_px >= 16, "at least 16"),
         "fx_px": (camera.fx_px, camera.fx_px > 0.0, "above 0"),
@@ -251,8 +251,8 @@ def _faults(camera: Camera, lens_covariance: Floats | None) -> list[str]:
     ]
 
 
-def _may_be_told(name: str) -> bool:
-    """Return whether a camera of that name has keys of its own: `eye/pose/...` is the tracks'."""
+def _is_valid_name(name: str) -> bool:
+    """Return whether a camera may have this name: `eye/pose/...` is the tracks' key."""
     try:
         return check_name(name, "camera") != "pose"
     except MessageError:

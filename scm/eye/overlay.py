@@ -1,4 +1,4 @@
-"""The picture that people see of the Eye: the frame, with what was found in it drawn over it."""
+"""The preview of the Eye: the frame with the detections drawn over it."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,11 +11,11 @@ from scm.records.eye import TagSeen
 
 JPEG_QUALITY = 80
 FRACTION_BITS = 4
-FOUND, DOUBTED, EDGE = (90, 220, 60), (40, 140, 255), (20, 20, 20)
+FOUND, SUSPECT, EDGE = (90, 220, 60), (40, 140, 255), (20, 20, 20)
 FRONT = (255, 255, 255)
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 TEXT_PX = 720.0
-"""Rows of a picture whose text is of scale 0.5."""
+"""Height of a picture whose text has scale 0.5."""
 
 
 def preview(
@@ -27,9 +27,9 @@ def preview(
     """Return a frame as JPEG with its tags outlined, named, and the camera's complaints.
 
     Args:
-        image: (height, width, 3) blue, green, red, or (height, width) grey; it stays as it is.
+        image: (height, width, 3) blue, green, red, or (height, width) grey; not changed.
         tags: Found in it.
-        names: Of the vehicles by tag id; others are told by their id.
+        names: Of the vehicles by tag id; others are shown by their id.
         complaints: Sentences, one a line at the picture's foot.
     """
     grey = image.ndim == 2
@@ -37,12 +37,14 @@ def preview(
     scale = max(0.4, 0.5 * shown.shape[0] / TEXT_PX)
     thick = max(1, round(2.0 * scale))
     for tag in tags:
-        _outline(shown, tag, DOUBTED if complaints else FOUND, thick)
+        _outline(shown, tag, SUSPECT if complaints else FOUND, thick)
         name = names.get(tag.tag_id, f"tag {tag.tag_id}")
         x, y = np.min(tag.corners_px, axis=0)
         _text(shown, name, (round(x), round(y) - 4), scale, thick)
-    for line, said in enumerate(reversed(complaints)):
-        _text(shown, said, (8, shown.shape[0] - 10 - round(line * 44 * scale)), 1.2 * scale, thick)
+    for line, sentence in enumerate(reversed(complaints)):
+        _text(
+            shown, sentence, (8, shown.shape[0] - 10 - round(line * 44 * scale)), 1.2 * scale, thick
+        )
     return jpeg(shown)
 
 
@@ -50,7 +52,7 @@ def jpeg(image: Image) -> bytes:
     """Return a picture as a JPEG file.
 
     Raises:
-        EyeError: It cannot be one.
+        EyeError: It cannot be encoded.
     """
     good, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     if not good:
@@ -69,7 +71,7 @@ def _outline(shown: Image, tag: TagSeen, colour: tuple[int, int, int], thick: in
 
 
 def _text(shown: Image, text: str, at: tuple[int, int], scale: float, thick: int) -> None:
-    """Write text with a dark edge, so that it reads on any floor."""
+    """Write text with a dark edge, readable on any floor."""
     plain = text.encode("ascii", "replace").decode()
     cv2.putText(shown, plain, at, FONT, scale, EDGE, thick + 2, cv2.LINE_AA)
     cv2.putText(shown, plain, at, FONT, scale, FRONT, thick, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""A picture file, or a JPEG that came over the network, as an image; damaged ones are refused."""
+"""Reads a picture file, or a JPEG from the network, as an image; damaged ones are refused."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ def read_picture(path: Path) -> Image:
     """Return a picture file, (height, width, 3) blue, green, red.
 
     Raises:
-        EyeError: The file is missing, unreadable, no picture, cut short or smaller than any tag.
+        EyeError: The file is missing, unreadable, no picture, truncated or smaller than any tag.
     """
     if not path.is_file():
         raise EyeError(f"{path}: expected a picture, found no file")
@@ -32,14 +32,14 @@ def decode_picture(data: bytes, name: str) -> Image:
 
     Args:
         data: The file's content: JPEG, PNG, or whatever else OpenCV reads.
-        name: For errors: where it came from.
+        name: Source of the picture, for errors.
 
     Raises:
-        EyeError: It is no picture, cut short or smaller than any tag.
+        EyeError: It is no picture, truncated or smaller than any tag.
     """
-    # OpenCV fills what is missing of a JPEG with grey, and says so on stderr at most
+    # OpenCV fills the missing part of a JPEG with grey, and warns on stderr at most
     if data.startswith(_JPEG) and data.rfind(_END) < data.rfind(_SCAN):
-        raise EyeError(f"{name}: expected a whole JPEG, got one cut short after {len(data)} bytes")
+        raise EyeError(f"{name}: expected a whole JPEG, got one truncated after {len(data)} bytes")
     image = _decoded(data)
     if image is None:
         raise EyeError(f"{name}: expected a picture that OpenCV reads, got {len(data)} bytes")

@@ -1,22 +1,23 @@
 """From the corners of a roof tag to the pose of its car, with covariance.
 
-The roof's height is known, so nothing has to be guessed from the tag's few pixels in depth: the
-rays of the four corners are cut with the level plane at that height, and a square of the tag's size
-is laid onto the four points by least squares. The rear axle is then the tag's offset away, behind
-it along the car's own axis. So a camera may be tilted, and a square cannot be taken for its mirror
-image as in a free perspective-n-point solution.
+The roof's height is known, so the depth need not be estimated from the tag's few pixels: the rays
+of the four corners are intersected with the level plane at that height, and a square of the tag's
+size is fitted to the four points by least squares. The rear axle is then at the tag's offset,
+behind it along the car's own axis. So a camera may be tilted, and a square cannot be mistaken for
+its mirror image as in a free perspective-n-point solution.
 
-    yaw = atan2(sum c x q, sum c . q)      c: corners of the tag, q: points on the plane, middle off
+    yaw = atan2(sum c x q, sum c . q)      c: corners of the tag, q: points on the plane, centred
     axle = middle - R(yaw) offset
 
-The covariance is carried through: doubt of the corners, doubt of the camera's place and lens
-(shared by all cars of a frame, and by all frames), and the lean of the body, which moves the roof
-but cannot be seen. What the four points are off the square, over what corner noise explains, is the
-misfit. One corner that spoils an else good square is left out; a misfit that stays widens the
-covariance. Where a square of another size fits clearly better, the print has another size or the
-roof another height: middle and yaw are the same for any size, so there is a pose, `size_ratio` says
-how large the square looks, and beyond `SIZE_TOLERANCE` the covariance holds half the way by which
-another height would move the car. Corners that fit no square of any size (`REFUSED`) are no tag.
+The covariance is propagated: noise of the corners, covariance of the camera's place and lens
+(shared by all cars of a frame, and by all frames), and roll and pitch of the body, which move the
+roof but cannot be observed. The misfit is the distance of the four points from the square, relative
+to corner noise. One corner that spoils an otherwise good square is left out; a remaining misfit
+widens the covariance. Where a square of another size fits clearly better, the print has another
+size or the roof another height: centre and yaw are the same for any size, so there is a pose,
+`size_ratio` is the apparent size, and beyond `SIZE_TOLERANCE` the covariance includes half the
+shift that another height would cause. Corners that fit no square of any size (`REFUSED`) are no
+tag.
 """
 
 from collections.abc import Sequence
@@ -25,22 +26,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.eye.anchor import Anchor, by_place
 from scm.eye.camera import CameraModel
+from scm.eye.extrinsics import ExtrinsicsEstimator, by_place
 from scm.geometry import Pose2, wrap_angle
 from scm.scenery.bodies import CarBody
 from scm.scenery.tags import CORNERS
 
-LEAN_RAD = 0.003
-"""Standard deviation of roll and of pitch that a scaled car is trusted to stay within."""
+ROLL_PITCH_STD_RAD = 0.003
+"""Standard deviation of roll and of pitch of a scaled car."""
 MISFIT = 2.0
-"""Deviations, root mean square, that corner noise passes once in 1000 squares."""
+"""RMS deviation that corner noise exceeds for one in 1000 squares."""
 REFUSED = 20.0
 SIZE_TOLERANCE = 0.025
-"""A print that is larger or smaller by more is reported; printers keep 1 %, "fit to page" does not:
-A4 on Letter paper loses 3 to 7 %."""
+"""Larger size errors are reported; printers are accurate to 1 %, "fit to page" is not: A4 on Letter
+paper loses 3 to 7 %."""
 CLEARLY = 3.0
-"""A corner is to blame if the square without it fits so many times better than without others."""
+"""A corner is left out if the square fits this much better without it than without any other."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,17 +49,17 @@ class PoseEstimate:
     """Pose of the rear axle in the map frame, and covariance over x, y, yaw, (3, 3).
 
     Attributes:
-        shared: The part of it that all sightings by this camera have in common, (3, 3).
-        lean: The part of it that all cameras have in common while the body leans so, (3, 3).
-        misfit: How far the corners are from a square, over the noise of corners: about 1.
-        size_ratio: Edge of the square as it looks on this roof over that of the car file; 1 where
-            the car file's fits the corners as well.
+        shared: Part of it common to all sightings by this camera, (3, 3).
+        common_mode: Part of it common to all cameras, from roll and pitch of the body, (3, 3).
+        misfit: Deviation of the corners from a square, over corner noise: about 1.
+        size_ratio: Apparent edge of the square on this roof over that of the car file; 1 where
+            the car file's fits as well.
     """
 
     pose: Pose2
     covariance: Floats
     shared: Floats
-    lean: Floats
+    common_mode: Floats
     misfit: float
     size_ratio: float = 1.0
 
@@ -69,22 +70,22 @@ class PoseEstimate:
 
     @property
     def is_other_size(self) -> bool:
-        """Whether the square is larger or smaller than the car file's by more than prints are."""
+        """Whether the size differs from the car file's by more than printing errors."""
         return abs(self.size_ratio - 1.0) > SIZE_TOLERANCE
 
 
-def car_pose(anchor: Anchor, body: CarBody, corners: Floats) -> PoseEstimate:
-    """Return where the car is whose roof tag has these corners, (4, 2) [px]."""
-    return car_poses(anchor, [body], corners[None])[0]
+def car_pose(estimator: ExtrinsicsEstimator, body: CarBody, corners: Floats) -> PoseEstimate:
+    """Return the pose of the car whose roof tag has these corners, (4, 2) [px]."""
+    return car_poses(estimator, [body], corners[None])[0]
 
 
 def car_poses(
-    anchor: Anchor, bodies: Sequence[CarBody], corners: Floats
+    estimator: ExtrinsicsEstimator, bodies: Sequence[CarBody], corners: Floats
 ) -> tuple[PoseEstimate, ...]:
-    """Return where the cars of a frame are, whose roof tags have these corners, (n, 4, 2) [px]."""
+    """Return the poses of a frame's cars from their roof tags' corners, (n, 4, 2) [px]."""
     if not bodies:
         return ()
-    model, std = anchor.model, anchor.corner_std_px
+    model, std = estimator.model, estimator.corner_std_px
     offsets = np.array([body.tag_position for body in bodies])
     square = CORNERS * np.array([body.tag_size for body in bodies])[:, None, None]
     points = _on_roofs(model, model.undistort(corners), offsets[:, 2])
@@ -96,27 +97,35 @@ def car_poses(
     ratios = _resized(on, fit)
     by_corner = np.einsum("nkij,nijp->nkip", fit.slopes, by_pixel).reshape(-1, 3, 8)
     by_corner *= widened[:, None, None]
-    moved = -by_pixel @ anchor.by_parameter(points)
+    moved = -by_pixel @ estimator.by_parameter(points)
     by_camera = np.einsum("nkij,nijp->nkp", fit.slopes, moved)
-    shared = by_camera @ anchor.covariance @ by_camera.swapaxes(1, 2)
+    shared = by_camera @ estimator.covariance @ by_camera.swapaxes(1, 2)
     from_above = model.position - points.mean(axis=1)
     slant = np.hypot(from_above[:, 0], from_above[:, 1]) / from_above[:, 2]
-    shared[:, 2, 2] += (LEAN_RAD * slant / 2.0) ** 2  # a leaning square, seen aslant, looks turned
+    shared[:, 2, 2] += (
+        ROLL_PITCH_STD_RAD * slant / 2.0
+    ) ** 2  # roll and pitch, seen at an angle, look like yaw
     shared[:, :2, :2] += _by_height(from_above, ratios)
-    lean = np.zeros((len(bodies), 3, 3))
-    lean[:, [0, 1], [0, 1]] = ((offsets[:, 2] * LEAN_RAD) ** 2)[:, None]
-    covariance = by_corner @ by_corner.swapaxes(1, 2) + shared + lean
+    common_mode = np.zeros((len(bodies), 3, 3))
+    common_mode[:, [0, 1], [0, 1]] = ((offsets[:, 2] * ROLL_PITCH_STD_RAD) ** 2)[:, None]
+    covariance = by_corner @ by_corner.swapaxes(1, 2) + shared + common_mode
     covariance = (covariance + covariance.swapaxes(1, 2)) / 2.0
     return tuple(
         PoseEstimate(Pose2(float(x), float(y), wrap_angle(float(yaw))), *rest)
         for (x, y, yaw), *rest in zip(
-            fit.poses, covariance, shared, lean, fit.misfit.tolist(), ratios.tolist(), strict=True
+            fit.poses,
+            covariance,
+            shared,
+            common_mode,
+            fit.misfit.tolist(),
+            ratios.tolist(),
+            strict=True,
         )
     )
 
 
 def _by_height(from_above: Floats, ratios: Floats) -> Floats:
-    """Return the covariance of places in case it is the height that differs, (n, 2, 2) [m^2].
+    """Return the additional covariance if the height is what differs, (n, 2, 2) [m^2].
 
     Args:
         from_above: From the roofs' tags to the camera, (n, 3) [m].
@@ -129,11 +138,11 @@ def _by_height(from_above: Floats, ratios: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Square:
-    """What squares are laid onto.
+    """Points to which squares are fitted.
 
     Attributes:
         points: On the level plane, (n, 4, 2) [m].
-        by_metre: Change of pixels by a step of these, (n, 4, 2, 2).
+        by_metre: Derivative of pixels by these, (n, 4, 2, 2).
         square: Corners of the tags in their own frames, (n, 4, 2) [m].
         offsets: Of the tags before and left of the rear axle, (n, 2) [m].
         std: Of a corner coordinate [px].
@@ -146,14 +155,14 @@ class _Square:
     std: float
 
     def of(self, cars: Ints) -> "_Square":
-        """Return some of them."""
+        """Return a subset."""
         found = self.points[cars], self.by_metre[cars], self.square[cars], self.offsets[cars]
         return _Square(*found, self.std)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fit:
-    """Poses (n, 3) of rear axles, their change by each point (n, 3, 4, 2), and misfits (n,)."""
+    """Poses (n, 3) of rear axles, derivatives by each point (n, 3, 4, 2), and misfits (n,)."""
 
     poses: Floats
     slopes: Floats
@@ -161,7 +170,7 @@ class _Fit:
 
 
 def _patched(on: _Square) -> _Fit:
-    """Return the fits, each without the one corner that spoils it, if there is such a one."""
+    """Return the fits, each without its one bad corner, if there is one."""
     fit = _fitted(on, np.ones(4))
     bad = np.flatnonzero(fit.misfit > MISFIT)
     if not len(bad):
@@ -177,7 +186,7 @@ def _patched(on: _Square) -> _Fit:
 
 
 def _resized(on: _Square, fit: _Fit) -> Floats:
-    """Return the ratios of sizes, (n,), and take the misfits of squares that fit better so."""
+    """Return the size ratios, (n,), and use the misfits of resized squares that fit better."""
     ratios = np.ones(len(fit.misfit))
     bad = np.flatnonzero(fit.misfit > MISFIT)
     if not len(bad):
@@ -196,7 +205,7 @@ def _resized(on: _Square, fit: _Fit) -> Floats:
 
 
 def _fitted(on: _Square, weights: Floats) -> _Fit:
-    """Lay the squares onto their points, each corner counting as its weight says, (4,)."""
+    """Fit the squares to their points, with corner weights, (4,)."""
     share = weights / weights.sum()
     centre = np.einsum("i,nij->nj", share, on.square)
     middle = np.einsum("i,nij->nj", share, on.points)
@@ -222,7 +231,7 @@ def _fitted(on: _Square, weights: Floats) -> _Fit:
 
 
 def _on_roofs(model: CameraModel, ideal: Floats, heights: Floats) -> Floats:
-    """Return where rays (n, 4, 2) meet the levels of n roofs, (n, 4, 3) [m]."""
+    """Intersect rays (n, 4, 2) with the levels of n roofs, (n, 4, 3) [m]."""
     rays = np.concatenate((ideal, np.ones((*ideal.shape[:-1], 1))), axis=-1) @ model.camera_R_map
     reach = (heights - model.position[2])[:, None, None] / rays[..., 2:]
     met: Floats = model.position + reach * rays

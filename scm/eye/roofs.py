@@ -1,8 +1,8 @@
-"""Where the roof tags of cars should be in a frame, from where their tracks say that they are.
+"""Predicts where the roof tags of cars appear in a frame, from their tracks.
 
 A rolling shutter exposes rows one after the other: a car at 0.3 m/s is 3 mm further on in the last
-row than in the first of 10 ms, and its tag is bent. How fast a tag crosses the picture is foretold,
-so its corners can be put where they were when the middle row was exposed.
+row than in the first of 10 ms, and its tag is distorted. The image velocity of a tag is predicted,
+so its corners can be moved to where they were when the middle row was exposed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,18 +17,18 @@ from scm.scenery.bodies import NIGEL, CarBody
 from scm.scenery.tags import CORNERS
 
 NEAR_PX = 20.0
-"""A tag's middle may be so far outside the frame: part of it may still be in."""
+"""A tag's centre may be this far outside the frame: part of it may be inside."""
 
 
 def expected_tags(
     model: CameraModel, tracks: Sequence[Track], bodies: Mapping[str, CarBody]
 ) -> dict[int, Floats]:
-    """Return where tags should be, (4, 2) [px] by id, of the tracks that this camera may see.
+    """Return the predicted corners of tags, (4, 2) [px] by id, of tracks this camera may see.
 
     Args:
         model: The camera.
-        tracks: As they are when the frame is exposed.
-        bodies: Of the vehicles that are known; others are taken for Nigels.
+        tracks: At the time of the exposure.
+        bodies: Of the known vehicles; others are assumed to be Nigels.
     """
     if not tracks:
         return {}
@@ -51,12 +51,12 @@ def expected_tags(
 
 
 def at_middle_row(corners: Floats, pixels_per_s: Floats, camera: Camera) -> Floats:
-    """Return a moving tag's corners where they were when the frame's middle row was exposed.
+    """Return a moving tag's corners at the time when the middle row was exposed.
 
     Args:
-        corners: As found, (4, 2) [px].
-        pixels_per_s: How fast each crosses the picture, (4, 2).
-        camera: Whose rows are exposed one after the other.
+        corners: As detected, (4, 2) [px].
+        pixels_per_s: Image velocity of each, (4, 2).
+        camera: With a rolling shutter.
     """
     late_s = camera.rolling_s * ((corners[:, 1:] + 0.5) / camera.height_px - 0.5)
     return corners - late_s * pixels_per_s

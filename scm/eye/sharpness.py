@@ -1,4 +1,4 @@
-"""How sharp a tag is: the width of the step from its black square to its white margin."""
+"""Measures the sharpness of a tag: the width of the edge from its black square to the margin."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from scm.arrays import Floats, Image
 
 ALONG = np.linspace(0.2, 0.8, 12)
 REACH = 0.11
-"""How far to either side is looked, in sides of the tag: a little less than one of its cells."""
+"""Range to either side of an edge, in sides of the tag: slightly less than one of its cells."""
 SAMPLES = 41
 
 
@@ -23,7 +23,7 @@ class EdgeWidth(NamedTuple):
 def edge_width(grey: Image, corners: Floats) -> EdgeWidth:
     """Measure a tag's four outer edges in a grey frame; corners (4, 2) [px].
 
-    An edge with no step in it, or out of the frame, counts as wide as what was looked at.
+    An edge without a step, or out of the frame, counts as wide as the range searched.
     """
     ends = np.roll(corners, -1, axis=0)
     along = ends - corners

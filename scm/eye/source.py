@@ -16,7 +16,7 @@ Stamped = Literal["exposed", "arrived"]
 
 
 def grey_of(image: Image) -> Image:
-    """Return a picture in grey, (height, width), of one in grey or blue, green, red."""
+    """Convert a picture, grey or blue, green, red, to grey, (height, width)."""
     if image.ndim == 2:
         return image
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
@@ -27,9 +27,9 @@ class Frame:
     """One picture.
 
     Attributes:
-        t_ns: When it was exposed, as well as the source knows.
+        t_ns: When it was exposed, as far as the source knows.
         image: (height, width, 3) blue, green, red, or (height, width) grey.
-        stamped: What `t_ns` rests on: the camera's own time stamp, or only when the frame arrived.
+        stamped: Origin of `t_ns`: the camera's own time stamp, or only the frame's arrival.
     """
 
     t_ns: int
@@ -42,42 +42,42 @@ class Frame:
 
 
 class Source(Protocol):
-    """Where frames come from.
+    """A source of frames.
 
-    What cannot work at all is refused when a source is made. From the first `take` on nothing is
-    raised any more: a source says its trouble and comes back by itself.
+    What cannot work at all is refused when a source is created. After the first `read` nothing is
+    raised any more: a source reports its trouble and recovers by itself.
     """
 
     @property
     def trouble(self) -> str | None:
-        """What is wrong now, in words for a person; None: nothing."""
+        """What is wrong now, in words; None if nothing is."""
         ...
 
-    def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
-        """Return the newest frame not yet taken, None if there is none; times ascend.
+    def read(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
+        """Return the newest frame not yet read, None if there is none; times ascend.
 
         It does not wait for a camera.
 
         Args:
             now_ns: The present time.
-            light: What there is to see, for a source that has no lens of its own.
+            light: What is visible, for a source without a lens of its own.
         """
         ...
 
     def close(self) -> None:
-        """Let go of the camera or file; safe to call twice. Nothing can be taken any more."""
+        """Release the camera or file; safe to call twice. Afterwards nothing can be read."""
         ...
 
 
 @runtime_checkable
 class Listener(Source, Protocol):
-    """A source whose frames come over the bus: its part hears for it."""
+    """A source whose frames come over the bus: its part subscribes for it."""
 
     @property
     def subscriptions(self) -> Sequence[Subscription]:
-        """What the part must hear besides."""
+        """The subscriptions that the part needs for it."""
         ...
 
-    def hear(self, item: Incoming) -> None:
-        """Look at one thing of the part's inbox; what is not for this source is left alone."""
+    def receive(self, item: Incoming) -> None:
+        """Process one item of the part's inbox; unrelated items are ignored."""
         ...

@@ -1,4 +1,4 @@
-"""What an overhead camera's part is called on the bus."""
+"""Names of the overhead cameras' parts on the bus."""
 
 EYE = "eye"
 
@@ -6,6 +6,6 @@ EYE = "eye"
 def eye_station(camera: str, *, first: bool) -> str:
     """Return the station of a camera's part: `eye` for the map's first, `eye-<camera>` for others.
 
-    The first also tells where cars are by all cameras.
+    The first also publishes tracks from all cameras.
     """
     return EYE if first else f"{EYE}-{camera}"

@@ -10,7 +10,7 @@ from scm.v2x.router import Router, free_endpoint
 from scm.vehicles.car import load_car
 from tests.e2e.live_drives import FLOOR, Stage
 from tests.unit.calibrate.cable import Emulated
-from vehicle_agent.commands.calibrate import AGAIN
+from vehicle_agent.commands.calibrate import REPEAT_DRIVE
 from vehicle_agent.guard import GuardLimits, rectangle
 
 MOVED = Emulated(trim=0.04, gain=0.9, drive=0.9)
@@ -32,7 +32,7 @@ def stage(tmp_path):
 
 def test_a_real_nigel_is_calibrated_inside_its_rectangle(stage):
     code, said = stage.calibrate("--short", longest_s=LONGEST_S)
-    if AGAIN in said or NOT_DRIVEN in said:  # the computer was too busy, and it says so
+    if REPEAT_DRIVE in said or NOT_DRIVEN in said:  # the computer was too busy, and it says so
         code, said = stage.calibrate("--short", longest_s=LONGEST_S)
     limits = GuardLimits(rectangle(*FLOOR), margin_m=0.0)
     way = [item.message for item in stage.truth.drain()]

@@ -7,11 +7,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from scm.eye.anchor import Anchor, Tolerance
 from scm.eye.camera import CameraModel, camera_model
 from scm.eye.detect import PIXEL_ORIGIN_PX, Settings, detect_tags
+from scm.eye.extrinsics import ExtrinsicsEstimator, Tolerance
 from scm.eye.part import EyePart
-from scm.eye.pose import LEAN_RAD, car_pose
+from scm.eye.pose import ROLL_PITCH_STD_RAD, car_pose
 from scm.eye.render.car import tag_on_roof
 from scm.eye.render.motion import Driven
 from scm.eye.render.scene import camera_over
@@ -85,13 +85,13 @@ def level_shots():
     return shots
 
 
-def errors_of(anchor, shots, body=NIGEL, estimator=car_pose):
+def errors_of(camera, shots, body=NIGEL, find_pose=car_pose):
     """Errors (n, 3) over x, y [m], yaw [rad] of all cars in all shots."""
     errors = []
     for tick, shot in enumerate(shots):
-        anchor.see(shot.corners[0], tick)
+        camera.see(shot.corners[0], tick)
         for car in shot.cars:
-            pose = estimator(anchor, body, shot.corners[car.tag_id]).pose
+            pose = find_pose(camera, body, shot.corners[car.tag_id]).pose
             turn = math.remainder(pose.yaw - car.yaw_rad, 2.0 * math.pi)
             errors.append((pose.x - car.x_m, pose.y - car.y_m, turn))
     return np.array(errors)
@@ -127,15 +127,15 @@ def test_every_tag_that_nothing_hides_is_found(level_shots):
 
 
 def test_positions_are_right_to_a_millimetre_over_the_whole_floor(level_shots):
-    assert rmse_mm(errors_of(Anchor(TRUE_CAMERA, CITY.tag), level_shots)) < LIMIT_MM
+    assert rmse_mm(errors_of(ExtrinsicsEstimator(TRUE_CAMERA, CITY.tag), level_shots)) < LIMIT_MM
 
 
 def test_headings_are_right_to_a_fraction_of_a_degree(level_shots):
-    assert rmse_deg(errors_of(Anchor(TRUE_CAMERA, CITY.tag), level_shots)) < LIMIT_DEG
+    assert rmse_deg(errors_of(ExtrinsicsEstimator(TRUE_CAMERA, CITY.tag), level_shots)) < LIMIT_DEG
 
 
 def test_the_edges_of_the_floor_are_no_worse_than_its_middle_by_more_than_double(level_shots):
-    errors = errors_of(Anchor(TRUE_CAMERA, CITY.tag), level_shots)
+    errors = errors_of(ExtrinsicsEstimator(TRUE_CAMERA, CITY.tag), level_shots)
     away = np.array([abs(car.x_m - 1.384) for shot in level_shots for car in shot.cars])
     assert rmse_mm(errors[away > 1.0]) < 2.0 * max(rmse_mm(errors[away <= 1.0]), 0.2)
 
@@ -149,14 +149,16 @@ def test_the_librarys_own_pixel_origin_would_shift_every_corner_by_half_a_pixel(
 
 
 def test_an_offset_applied_along_the_map_instead_of_the_car_would_be_seen(level_shots):
-    def along_the_map(anchor, body, corners):
+    def along_the_map(estimator, body, corners):
         there = car_pose(
-            anchor, replace(body, tag_position=(0.0, 0.0, body.tag_position[2])), corners
+            estimator, replace(body, tag_position=(0.0, 0.0, body.tag_position[2])), corners
         )
         moved = Pose2(there.pose.x - body.tag_position[0], there.pose.y, there.pose.yaw)
         return replace(there, pose=moved)
 
-    errors = errors_of(Anchor(TRUE_CAMERA, CITY.tag), level_shots, estimator=along_the_map)
+    errors = errors_of(
+        ExtrinsicsEstimator(TRUE_CAMERA, CITY.tag), level_shots, find_pose=along_the_map
+    )
     assert rmse_mm(errors) > 1.5 * LIMIT_MM
 
 
@@ -165,13 +167,13 @@ def test_leaving_out_the_undistortion_would_be_seen(level_shots):
         TRUE_CAMERA.camera, TRUE_CAMERA.matrix, np.zeros(5), TRUE_CAMERA.position,
         TRUE_CAMERA.camera_R_map,
     )  # fmt: skip
-    errors = errors_of(Anchor(pinhole, CITY.tag), level_shots)
+    errors = errors_of(ExtrinsicsEstimator(pinhole, CITY.tag), level_shots)
     assert rmse_mm(errors) > 1.5 * LIMIT_MM
 
 
 def test_taking_the_roof_for_the_floor_would_be_seen(level_shots):
     flat = replace(NIGEL, tag_position=(NIGEL.tag_position[0], 0.0, 0.0))
-    errors = errors_of(Anchor(TRUE_CAMERA, CITY.tag), level_shots, body=flat)
+    errors = errors_of(ExtrinsicsEstimator(TRUE_CAMERA, CITY.tag), level_shots, body=flat)
     assert rmse_mm(errors) > 1.5 * LIMIT_MM
 
 
@@ -179,11 +181,11 @@ def test_the_maps_tag_makes_poses_better_than_the_calibration_alone(level_shots)
     off = np.array([0.004, -0.003, 0.001, 0.0015, 0.0003, -0.0003])
     calibrated = TRUE_CAMERA.moved_to(TRUE_CAMERA.extrinsics + off)
 
-    class Blind(Anchor):
+    class Blind(ExtrinsicsEstimator):
         def see(self, corners, t_ns):
             super().see(None, t_ns)
 
-    with_tag = errors_of(Anchor(calibrated, CITY.tag), level_shots)
+    with_tag = errors_of(ExtrinsicsEstimator(calibrated, CITY.tag), level_shots)
     without = errors_of(Blind(calibrated, CITY.tag), level_shots)
     assert rmse_mm(with_tag) < 0.6 * rmse_mm(without)
 
@@ -213,7 +215,7 @@ class Film:
     def __init__(self, shots):
         self._left = list(shots)
 
-    def take(self, now_ns, light):
+    def read(self, now_ns, light):
         del now_ns, light
         shot = self._left.pop(0)
         return Frame(shot.t_ns, shot.image)
@@ -228,7 +230,7 @@ def film_at(tilt_deg, look):
     camera = camera_over(OPEN_CITY, (1920, 1080), 2.5, math.radians(tilt_deg))
     studio = Studio(OPEN_CITY, camera, look)
     cars = tours(OPEN_CITY, CARS, SPEED_MPS, FILM_FRAMES / RATE_HZ, rng, on_lanes=False)
-    leans = LEAN_RAD * rng.standard_normal((CARS, 2))
+    leans = ROLL_PITCH_STD_RAD * rng.standard_normal((CARS, 2))
     shots = []
     for k in range(FILM_FRAMES):
         driven = []

@@ -486,9 +486,9 @@ def reasons_stand_in_the_order_of_the_checks(g):
 @claim
 def it_counts_how_often_each_limit_began_to_bite(g):
     made = seeing(g, throttle=0.4)
-    assert made.told == "pose 1"
+    assert made.summary == "pose 1"
     for i, throttle in enumerate((0.5, 0.5, 0.1, 0.5, math.nan, math.nan, 0.5)):
         made.pass_on(drive(throttle), T0 + i * STEP)
     assert made.counts == Counter(pose=1, limit=3, value=1)
-    assert made.told == "limit 3, pose 1, value 1"
-    assert g.RealGuard(limits(g)).told == ""
+    assert made.summary == "limit 3, pose 1, value 1"
+    assert g.RealGuard(limits(g)).summary == ""

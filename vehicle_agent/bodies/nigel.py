@@ -1,8 +1,8 @@
-"""A real Nigel: moved over a serial cable, its motion told by the overhead cameras.
+"""A real Nigel: commanded over a serial cable, its motion measured by the overhead cameras.
 
-The published firmware tells nothing of the car, so all that is known of its motion comes from the
-Eye, carried forward to now on the arc of its speed and yaw rate. What this one car needs to be told
-for what is wished, its dead-band, gains and trim, are numbers of its calibration: `nigel/undo.py`.
+The published firmware reports nothing about the car, so its motion comes from the Eye alone,
+extrapolated to now along the arc of its speed and yaw rate. Dead-band, gains and trim of this one
+car are parameters of its calibration and are corrected by `nigel/command_correction.py`.
 """
 
 import logging
@@ -24,17 +24,17 @@ from scm.vehicles.lights import Switches
 from scm.vehicles.pack import pack_of
 from vehicle_agent.body import Body, BodyKind, Motion, Obeyed, Wiring
 from vehicle_agent.lidar_port import LidarPort, open_lidar
-from vehicle_agent.nigel.helm import Helm
-from vehicle_agent.nigel.host import Wish
-from vehicle_agent.nigel.undo import DEADBAND, Undo, undo_of
+from vehicle_agent.nigel.command_correction import DEADBAND, CommandCorrection, correction_of
+from vehicle_agent.nigel.host import NigelCommand
+from vehicle_agent.nigel.watchdog_client import WatchdogClient
 
 STALE_NS = 250 * NS_PER_MS
 LIFTED_M = 0.25
-"""Farther from where it must be, a car was carried by hand: the Eye is right within 3 cm."""
+"""At a larger distance from its expected pose the car was carried: the Eye is right within 3 cm."""
 SMOOTH_S = 0.15
-"""Over so long the differences of the Eye's speeds are averaged: one is 5 mm/s unsure."""
+"""Averaging time of the Eye's speed differences: one alone is 5 mm/s uncertain."""
 LEVEL_MPS2 = 9.80665
-"""Upwards on a level floor: the firmware tells only what lies in the plane."""
+"""Upwards on a level floor: the firmware reports only accelerations in the plane."""
 
 _log = logging.getLogger(__name__)
 
@@ -44,40 +44,47 @@ class NigelBody:
 
     Args:
         car: Its file, calibrated.
-        helm: What gives wishes to the cable's keeper.
-        lidar: Its scanner; None: it has none.
-        raw: Whether commands go to the wheels as they are.
+        watchdog: Sends commands to the serial watchdog.
+        lidar: Its scanner; None if it has none.
+        raw: Whether commands go to the wheels uncorrected.
     """
 
     def __init__(
-        self, car: Car, helm: Helm, lidar: LidarPort | None = None, *, raw: bool = False
+        self,
+        car: Car,
+        watchdog: WatchdogClient,
+        lidar: LidarPort | None = None,
+        *,
+        raw: bool = False,
     ) -> None:
         self.limits = limits_of(car)
         self.wants_eye = True
-        self._undo = Undo() if raw else undo_of(car, self.limits.steer_limit)
-        if not (raw or self._undo.deadband):
+        self._correction = (
+            CommandCorrection() if raw else correction_of(car, self.limits.steer_limit)
+        )
+        if not (raw or self._correction.deadband):
             event(_log, "no_deadband", level=logging.WARNING, car=car.name, key=DEADBAND)
-        self._helm, self._lidar = helm, lidar
+        self._watchdog, self._lidar = watchdog, lidar
         self._pack, self._wheel_m = pack_of(car), car.value("wheel.radius_m")
         self._throttle = 0.0
         self._start = Pose2(0.0, 0.0, 0.0)
         self._track: EyeTrack | None = None
-        self._heard_ns = self._now_ns = 0
+        self._track_ns = self._now_ns = 0
         self._was_lifted = False
         self._lamps = 0
         self._wheels = self._wanted = self._accel = 0.0
         self._readings = 0
 
     def learn(self, city_map: CityMap, seed: int) -> None:
-        """Nothing: the real floor needs no model."""
+        """Do nothing: the real floor needs no model."""
 
     def place(self, pose: Pose2, now_ns: int) -> None:
-        """Be thought at a pose until the Eye tells better."""
+        """Assume a pose until the Eye reports one."""
         self._start, self._track, self._now_ns = pose, None, now_ns
         self.command(0.0, 0.0)
 
     def see(self, track: EyeTrack, now_ns: int) -> None:
-        """Learn where the Eye sees it; numbers that are none are not heard."""
+        """Receive a track from the Eye; one with a number that is not finite is ignored."""
         numbers = (track.x_m, track.y_m, track.yaw_rad, track.speed_mps, track.lateral_speed_mps)
         if not all(map(math.isfinite, (*numbers, track.yaw_rate_radps, track.age_s))):
             return
@@ -87,45 +94,47 @@ class NigelBody:
             old = self._pose(now_ns)
             away = math.hypot(track.x_m - old.x, track.y_m - old.y)
             self._was_lifted |= self._track is None or away > LIFTED_M
-        self._accel = 0.0 if track.stale else self._gained(track)
-        self._track, self._heard_ns = track, now_ns
+        self._accel = 0.0 if track.stale else self._acceleration(track)
+        self._track, self._track_ns = track, now_ns
 
     def was_lifted(self) -> bool:
         """Return, once, whether it was seen somewhere that it did not drive to."""
         lifted, self._was_lifted = self._was_lifted, False
         return lifted
 
-    def unfit(self, now_ns: int) -> str:
-        """Return why it must not move, in words; empty: it may."""
-        trouble = self._helm.trouble(now_ns)
+    def inhibit_reason(self, now_ns: int) -> str:
+        """Return why it must not move, in words; empty if it may."""
+        trouble = self._watchdog.trouble(now_ns)
         if trouble:
             return trouble
         if self._track is None:
             return "the Eye has not seen it yet"
-        age_ns = now_ns - self._heard_ns + round(1e9 * self._track.age_s)
+        age_ns = now_ns - self._track_ns + round(1e9 * self._track.age_s)
         if self._track.stale or age_ns > STALE_NS:
             return f"the Eye has not seen it for {seconds(age_ns):.1f} s"
         return ""
 
     def advance(self, now_ns: int) -> None:
-        """Turn the wheels, as they are thought to, up to now."""
+        """Advance the estimated wheel angle to now."""
         most = self.limits.steer_rate * seconds(max(0, now_ns - self._now_ns))
         self._wheels += min(most, max(-most, self._wanted - self._wheels))
         self._now_ns = now_ns
 
     def command(self, throttle: float, steering: float) -> None:
-        """Pass a command on; where it is unfit, whatever is commanded, zeros."""
-        if self.unfit(self._now_ns):
-            self._helm.steer(Wish(lamps=self._lamps), self._now_ns)
+        """Send a command on; zeros while the car must not move."""
+        if self.inhibit_reason(self._now_ns):
+            self._watchdog.command(NigelCommand(lamps=self._lamps), self._now_ns)
             self._wanted = self._throttle = 0.0
             return
         self._wanted, self._throttle = steering * self.limits.steer_limit, throttle
-        told = Wish(self._undo.throttle(throttle), self._undo.steering(steering), self._lamps)
-        self._helm.steer(told, self._now_ns)
+        corrected = NigelCommand(
+            self._correction.throttle(throttle), self._correction.steering(steering), self._lamps
+        )
+        self._watchdog.command(corrected, self._now_ns)
 
     def obeyed(self) -> list[Obeyed]:
-        """Return what the keeper of the cable wrote to the port, and when."""
-        return [Obeyed(one.t_ns, one.throttle, one.steering) for one in self._helm.written()]
+        """Return the commands that the watchdog wrote to the port, and when."""
+        return [Obeyed(one.t_ns, one.throttle, one.steering) for one in self._watchdog.written()]
 
     def show(self, switches: Switches) -> None:
         """Switch the lamps; the firmware does the flashing."""
@@ -134,14 +143,14 @@ class NigelBody:
         self._lamps = beams | sides
 
     def push(self, contact: Contact) -> None:
-        """Nothing: a real car feels real contacts."""
+        """Do nothing: a real car feels real contacts."""
 
     def motion(self) -> Motion:
-        """Return where the Eye saw it, carried forward to now."""
+        """Return the motion that the Eye measured, extrapolated to now."""
         track = self._track
         is_seen = track is not None and not track.stale
         speed = track.speed_mps if track is not None and is_seen else 0.0
-        volts = None if self._helm.told is None else self._helm.told.battery_v
+        volts = None if self._watchdog.report is None else self._watchdog.report.battery_v
         return Motion(
             pose=self._pose(self._now_ns),
             speed=speed,
@@ -157,22 +166,22 @@ class NigelBody:
     def sensors(
         self, vehicle: str, now_ns: int, *, wanted: bool = True
     ) -> Sequence[VehicleSensors | LidarScan]:
-        """Return the scanner's turns, and the newest telemetry of a firmware that has some."""
+        """Return the scanner's turns, and the newest telemetry if the firmware has some."""
         scans = [] if self._lidar is None else self._lidar.step(vehicle, now_ns)
         return [*scans, *self._telemetry(vehicle, now_ns)]
 
     def close(self) -> None:
-        """Have zeros sent, and let go of the cables."""
-        self._helm.close()
+        """Command zeros and release the cables."""
+        self._watchdog.close()
         if self._lidar is not None:
             self._lidar.close()
 
     def _telemetry(self, vehicle: str, now_ns: int) -> list[VehicleSensors]:
-        told = self._helm.told
-        if told is None or told.telemetry is None or told.readings == self._readings:
+        report = self._watchdog.report
+        if report is None or report.telemetry is None or report.readings == self._readings:
             return []
-        self._readings = told.readings
-        reading = told.telemetry
+        self._readings = report.readings
+        reading = report.telemetry
         if not reading.has_imu:
             return []
         return [
@@ -187,32 +196,32 @@ class NigelBody:
         ]
 
     def _charge(self, volts: float, speed: float) -> float | None:
-        """Return the charge that a voltage tells of, with what the car draws just now undone."""
+        """Return the charge for a voltage, corrected for the present current; None: no pack."""
         if self._pack is None:
             return None
         return self._pack.charge_at(volts, self._throttle, speed / self._wheel_m)
 
     def _pose(self, now_ns: int) -> Pose2:
-        """Return the last seen pose, carried forward by at most `STALE_NS`."""
+        """Return the last seen pose, extrapolated by at most `STALE_NS`."""
         track = self._track
         if track is None:
             return self._start
         seen = Pose2(track.x_m, track.y_m, track.yaw_rad)
         if track.stale:
             return seen
-        dt = seconds(min(max(0, now_ns - self._heard_ns), STALE_NS))
+        dt = seconds(min(max(0, now_ns - self._track_ns), STALE_NS))
         half = 0.5 * track.yaw_rate_radps * dt
         c, s = math.cos(half) * dt, math.sin(half) * dt
         vx, vy = track.speed_mps, track.lateral_speed_mps
         return seen @ Pose2(c * vx - s * vy, s * vx + c * vy, 2.0 * half)
 
-    def _gained(self, track: EyeTrack) -> float:
-        """Return the acceleration of the last tracks' speeds, smoothed [m/s^2]."""
+    def _acceleration(self, track: EyeTrack) -> float:
+        """Return the smoothed acceleration from the speeds of the last tracks [m/s^2]."""
         if self._track is None or self._track.stale:
             return 0.0
         dt = seconds(track.t_ns - self._track.t_ns)
-        gained = (track.speed_mps - self._track.speed_mps) / dt
-        return self._accel + (gained - self._accel) * dt / (dt + SMOOTH_S)
+        slope = (track.speed_mps - self._track.speed_mps) / dt
+        return self._accel + (slope - self._accel) * dt / (dt + SMOOTH_S)
 
 
 def _open(car: str, seed: int, wiring: Wiring) -> Body:
@@ -221,8 +230,8 @@ def _open(car: str, seed: int, wiring: Wiring) -> Body:
         msg = "body nigel: no serial port given; expected a path such as /dev/ttyUSB0"
         raise RunError(msg)
     lidar = open_lidar(wiring.lidar, wiring.lidar_kind) if wiring.lidar else None
-    helm = Helm(wiring.port, wiring.baud)
-    return NigelBody(load_car(wiring.calibration or car), helm, lidar, raw=wiring.raw)
+    watchdog = WatchdogClient(wiring.port, wiring.baud)
+    return NigelBody(load_car(wiring.calibration or car), watchdog, lidar, raw=wiring.raw)
 
 
 BODY = BodyKind(kind="real", open=_open)

@@ -1,7 +1,7 @@
-"""A body of one's own dynamics: a fleet of one, moved by the same kernel as the world's cars.
+"""A simulated body: a fleet of one, moved by the same kernel as the world's cars.
 
-It feels the floor and the wind of the city's map, as the world's cars do, every `FEEL_NS`. The
-body's time never jumps: after a stall of the process it has moved by at most 0.1 s.
+Every `GROUND_STEP_NS` it senses floor and wind of the city, as the world's cars do. The body's
+time never jumps: after a stall of the process it moves by at most 0.1 s.
 """
 
 import math
@@ -27,8 +27,8 @@ from scm.vehicles.sensed import ENCODERS, KINDS, sensors_message
 from scm.vehicles.sensor import Sensor
 from vehicle_agent.body import Body, BodyKind, Motion, Wiring
 
-LONGEST_NS = 100 * NS_PER_MS
-FEEL_NS = 5 * NS_PER_MS
+MAX_ADVANCE_NS = 100 * NS_PER_MS
+GROUND_STEP_NS = 5 * NS_PER_MS
 TICK_S = 0.02
 SENSORS = "scm.vehicles.sensors"
 
@@ -49,7 +49,7 @@ class SimulatedBody:
         self._newest: dict[str, Floats] = {}
 
     def learn(self, city_map: CityMap, seed: int) -> None:
-        """Know the city's floor and air."""
+        """Receive the city's floor and wind."""
         self._ground = Ground(city_map, seed)
         car = self._ground.fit(self._car)
         if car.terms != self._fleet.car.terms:
@@ -71,24 +71,24 @@ class SimulatedBody:
         self._now_ns = now_ns
 
     def see(self, track: EyeTrack, now_ns: int) -> None:
-        """Nothing: it knows better."""
+        """Do nothing: it knows its own pose."""
 
     def was_lifted(self) -> bool:
-        """Return that nobody can lift it."""
+        """Return False: nobody can lift it."""
         return False
 
-    def unfit(self, now_ns: int) -> str:
-        """Return that nothing keeps it."""
+    def inhibit_reason(self, now_ns: int) -> str:
+        """Return an empty reason: it may always move."""
         del now_ns
         return ""
 
     def advance(self, now_ns: int) -> None:
-        """Move by whole milliseconds up to now; what is left over is for the next time."""
-        if self._now_ns is None or now_ns - self._now_ns > LONGEST_NS:
-            self._now_ns = now_ns - (0 if self._now_ns is None else LONGEST_NS)
+        """Advance by whole milliseconds to now; the remainder waits for the next call."""
+        if self._now_ns is None or now_ns - self._now_ns > MAX_ADVANCE_NS:
+            self._now_ns = now_ns - (0 if self._now_ns is None else MAX_ADVANCE_NS)
         while now_ns - self._now_ns >= NS_PER_MS:
             whole_ns = (now_ns - self._now_ns) // NS_PER_MS * NS_PER_MS
-            step_ns = min(whole_ns, FEEL_NS)
+            step_ns = min(whole_ns, GROUND_STEP_NS)
             if self._ground is not None:
                 self._ground.feel(self._fleet, self._now_ns)
             self._fleet.advance(seconds(step_ns))
@@ -101,13 +101,13 @@ class SimulatedBody:
         self._fleet.steering[self._row] = steering
 
     def obeyed(self) -> None:
-        """Tell nothing: each command counts from the moment that it is given."""
+        """Return None: each command is applied when it is given."""
 
     def show(self, switches: Switches) -> None:
-        """Nothing: its lamps are those of its reports."""
+        """Do nothing: its lamps are those of its reports."""
 
     def push(self, contact: Contact) -> None:
-        """Change velocity and place as the contact did; the next readings feel it."""
+        """Apply the velocity and position changes of a contact; the next readings include them."""
         fleet, row, yaw = self._fleet, self._row, float(self._fleet.yaw[self._row])
         c, s = math.cos(yaw), math.sin(yaw)
         fleet.impact_x[row] += (c * contact.dvx_mps + s * contact.dvy_mps) / TICK_S
@@ -126,7 +126,7 @@ class SimulatedBody:
     def motion(self) -> Motion:
         """Return the kernel's state."""
         fleet, row = self._fleet, self._row
-        volts, charge = (float(told[row]) for told in (self._packs.volts, self._packs.charge))
+        volts, charge = (float(reading[row]) for reading in (self._packs.volts, self._packs.charge))
         return Motion(
             pose=fleet.pose(row),
             speed=float(fleet.speed[row]),
@@ -157,11 +157,11 @@ class SimulatedBody:
             self._newest.clear()
         fleet, row = self._fleet, self._row
         fleet.impact_x[row] = fleet.impact_y[row] = fleet.impact_yaw[row] = 0.0
-        said = [sensors_message(vehicle, t_ns, self._newest) for t_ns in counted[-1:]]
-        return [message for message in said if message is not None]
+        messages = [sensors_message(vehicle, t_ns, self._newest) for t_ns in counted[-1:]]
+        return [message for message in messages if message is not None]
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: it holds no resources."""
 
 
 def _open(car: str, seed: int, wiring: Wiring) -> Body:

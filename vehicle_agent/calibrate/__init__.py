@@ -1,4 +1,4 @@
-"""Calibration of a real car: drive a pattern, watch it with the Eye, fit what its car file lacks.
+"""Calibration of a real car: drive a pattern, observe it with the Eye, identify its parameters.
 
 pattern -> part (guards, record) -> recording -> fit -> car file
 """

@@ -1,4 +1,4 @@
-"""The given car file with the numbers that a calibration found, each with where it comes from."""
+"""Writes the given car file with the parameters of a calibration, and their sources."""
 
 import math
 from pathlib import Path
@@ -7,7 +7,7 @@ from scm.errors import CarError
 from scm.mismatch.report.car_file import term_names
 from scm.mismatch.report.toml_text import number, quoted, set_entry, set_list
 from scm.vehicles.car import Car, load_car
-from vehicle_agent.calibrate.fit import TERMS, WIDE, Fit
+from vehicle_agent.calibrate.fit import TERMS, Z_90, Fit
 
 COMMENT = "found by vehicle-agent calibrate"
 DELAYING = ("drive_delay", "steer_delay")
@@ -18,21 +18,21 @@ def write_car(car: Car, found: Fit, path: Path, drive: str, tag_id: int | None =
     """Write a car file, and return the car that it loads as.
 
     Args:
-        car: As given: all its text stays but for what was found.
-        found: What the drive says.
+        car: The given car; its text stays except for the new values.
+        found: Result of the fit.
         path: Of the new file.
-        drive: Name of the drive, for the numbers' sources.
-        tag_id: On the roof of the car that drove; None: not known.
+        drive: Name of the drive, for the sources.
+        tag_id: Of the tag on the car's roof; None: not known.
 
     Raises:
-        CarError: when the file cannot be written so that it loads again.
+        CarError: when the written file does not load with the same values.
     """
     names = term_names(car.with_terms((*TERMS, *DELAYING)))
     text = set_list(car.path.read_text(encoding="utf-8"), "terms", names, COMMENT)
     for key, one in found.numbers.items():
         section, _, name = key.partition(".")
         source = quoted(f"calibrated: {drive}, 90 % {one.low:.4g}..{one.high:.4g}")
-        value, std = number(one.value, DIGITS), number((one.high - one.low) / (2.0 * WIDE), 3)
+        value, std = number(one.value, DIGITS), number((one.high - one.low) / (2.0 * Z_90), 3)
         entry = f"{{ value = {value}, std = {std}, source = {source} }}"
         text = set_entry(text, section, name, entry)
     if tag_id is not None:

@@ -1,16 +1,16 @@
-"""A car's own numbers from its commands and the Eye's poses.
+"""Identifies a car's parameters from its commands and the Eye's poses.
 
-The drive is driven again by the car's own kernel, with other numbers in every row of one fleet,
-and cut into windows, a leg each. In each window the drive may lie wherever it fits best, so that
-errors of long ago do not count; what is left over is the residual. Gauss-Newton moves the numbers.
+The car's own kernel simulates the drive, with other parameters in every row of one fleet. The drive
+is cut into windows, a leg each. In each window the path is shifted to where it fits best, so that
+old errors do not count; the rest is the residual. Gauss-Newton moves the parameters.
 
-Intervals are 90 %: the wider of what white residuals say and of what the windows' own scatter says
-(a jackknife that leaves out a window at a time), so that an Eye whose errors last for a while does
-not make them too narrow; Student's t of as many windows as bear on a number. The numbers are those
-of the line that lies best through what a firmware that rounds makes of commands: added is what the
-published one's steps would do to this drive, of which legs that are all rounded alike show little;
-and to both gains that the Eye's metre is unsure. The Eye's own delay cannot be told from that of
-both actuators: the delays found are sums, and `eye_delay_s` of them is taken off as the Eye's.
+Intervals are 90 %: the wider of what white residuals give and of a jackknife over the windows, so
+that correlated errors of the Eye do not make them too narrow, with Student's t for the number of
+windows that inform a parameter. The parameters describe the best line through a firmware's rounded
+commands: the intervals include the effect of the published firmware's rounding on this drive, which
+legs that are all rounded alike hardly show, and for both gains the uncertainty of the Eye's scale.
+The Eye's delay cannot be separated from that of both actuators: the delays found are sums, from
+which `eye_delay_s` is subtracted.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,37 +26,48 @@ from scm.vehicles.fleet import Fleet
 from scm.vehicles.lanes import LANES
 
 TERMS = ("steer_trim", "steer_gain", "drive_deadband", "drive_gain")
-STEP_S = 0.001  # a servo at its rate moves by when it is told: coarser steps shift its delay
-KEPT = 10  # steps from pose to pose that is kept
-WINDOW_S = 2.5  # of what no rest parts
-SHORTEST_S, LONGEST_S = 1.0, 3.0
-LEAST_S = 20.0
+STEP_S = 0.001  # coarser steps shift the delay of a servo at its rate limit
+STEPS_PER_SAMPLE = 10  # integration steps from one stored pose to the next
+WINDOW_S = 2.5  # of driving without a rest
+MIN_WINDOW_S, MAX_WINDOW_S = 1.0, 3.0
+MIN_DRIVE_S = 20.0
 DELAYS = ("drive.delay_s", "steering.delay_s")
-PRIOR = 100.0  # steps of its derivative that a number may be from where it begins
-SILENT_S = 0.1  # without a command: who stalled does not know what the wheels were told meanwhile
-SETTLES_S = 0.2
-FEWEST = 5  # poses of a window that counts
-NEAREST = 0.05  # of those steps: nearer than that differences are the kernel's own rounding
-ROUNDS = 20
-SHARES = (1.0, 0.5, 0.2, 0.05)
-WIDE = 1.645  # standard deviations from the middle to the end of a 90 % interval
-TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild poses prove nothing
-OF_NORMAL = 0.7572  # mean of r^2 / (1 + r^2 / TAIL) over a normal r
-MANY = 1e6  # windows, where none bears on a number
-SCALE_STD = 2e-3  # of the Eye's metre: what all poses are wrong by alike, no residual shows
-METRES = ("steering.gain", "drive.gain")  # curvature and speed: numbers that are read off it
-STEPS = np.array([1.0 / 255.0, 1.0 / 30.0])  # of the published firmware: throttle, steering
-FIRMWARES = 8
-SETTLED = 0.01  # of half an interval that a last step may move a number
+PRIOR = 100.0  # prior std of a parameter, in steps of its derivative
+SILENT_S = 0.1  # longer without a command: the agent stalled, commands unknown
+STEER_TRANSIENT_S = 0.2
+MIN_WINDOW_POSES = 5  # fewer poses make a window useless
+MIN_DIFFERENCE = 0.05  # of those steps: smaller differences are rounding errors
+MAX_ITERATIONS = 20
+STEP_FRACTIONS = (1.0, 0.5, 0.2, 0.05)
+Z_90 = 1.645  # standard deviations from the middle to the end of a 90 % interval
+STUDENT_DOF = 8.0  # degrees of freedom of the Student-t loss: robust to outliers
+NORMAL_CONSISTENCY = 0.7572  # mean of r^2 / (1 + r^2 / STUDENT_DOF) over a normal r
+MAX_EFFECTIVE_WINDOWS = 1e6  # windows, for a parameter that none informs
+SCALE_STD = 2e-3  # of the Eye's scale: an error of all poses alike, which no residual shows
+EYE_SCALED = ("steering.gain", "drive.gain")  # curvature and speed depend on the Eye's scale
+FIRMWARE_STEPS = np.array(
+    [1.0 / 255.0, 1.0 / 30.0]
+)  # of the published firmware: throttle, steering
+ROUNDING_OFFSETS = 8
+CONVERGED = 0.01  # of half an interval: largest last step
 POSITION_STD_M, YAW_STD_RAD = 5e-3, 1e-2
+WIDEST = {
+    "steering.trim_rad": 0.01,
+    "steering.gain": 0.05,
+    "drive.deadband": 0.005,
+    "drive.gain": 0.02,
+}
+"""Half of a 90 % interval: three to five times what a short drive gives."""
+SILENT_SHARE = 0.25
+"""Maximum share of legs without commands to the board."""
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """One number that is fitted.
+    """One parameter of the fit.
 
     Attributes:
-        key: In the car file; `start`: where the fit begins, times the file's value if `scales`.
+        key: In the car file; `start`: initial value, times the file's value if `scales`.
         step: Of its derivative.
     """
 
@@ -81,7 +92,7 @@ NUMBERS = (
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One number as it was fitted, with its 90 % interval."""
+    """One fitted parameter with its 90 % interval."""
 
     value: float
     low: float
@@ -89,19 +100,19 @@ class Found:
 
     @property
     def std(self) -> float:
-        """Standard deviation of a normal belief with this interval."""
-        return (self.high - self.low) / (2.0 * WIDE)
+        """Standard deviation of a normal distribution with this interval."""
+        return (self.high - self.low) / (2.0 * Z_90)
 
 
 @dataclass(frozen=True, slots=True)
-class Again:
-    """The drive as seen, and driven again window by window by the file and by what was found.
+class Resimulation:
+    """The drive as measured, and simulated window by window with the file's and the new parameters.
 
     Attributes:
         commands: Time [s], throttle and steering from then on, (n, 3).
-        t: Of all poses that count [s], (m,).
-        paths: As seen, by the file (the delays found count there too), as found: poses that lie in
-            each window where they fit best [m, m, rad], (3, m, 3).
+        t: Of all poses used [s], (m,).
+        paths: As measured, by the file (with the delays found), as found: poses shifted to the best
+            fit in each window [m, m, rad], (3, m, 3).
     """
 
     commands: Floats
@@ -110,7 +121,7 @@ class Again:
 
     @property
     def missed_m(self) -> tuple[float, float]:
-        """Root mean square distance from what was seen [m]: by the file, and as found."""
+        """RMS distance from the measured path [m]: with the file's parameters, and with the new."""
         away = self.paths[1:, :, :2] - self.paths[0, :, :2]
         by_file, found = np.sqrt((away**2).sum(axis=2).mean(axis=1))
         return float(by_file), float(found)
@@ -118,14 +129,14 @@ class Again:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """What a drive says.
+    """Result of a calibration.
 
     Attributes:
         numbers: By key of the car file.
-        position_rms_m: What is left over; likewise `yaw_rms_rad`.
-        windows: How many counted.
-        silent: How many did not, because nothing was commanded for a while.
-        again: The drive, driven again.
+        position_rms_m: Residual; likewise `yaw_rms_rad`.
+        windows: Number of windows used.
+        silent: Number of windows not used, because nothing was commanded for a while.
+        resimulated: The drive, simulated again.
     """
 
     numbers: Mapping[str, Found]
@@ -133,11 +144,11 @@ class Fit:
     yaw_rms_rad: float
     windows: int
     silent: int
-    again: Again
+    resimulated: Resimulation
 
 
 class _Model:
-    """The drive by the car's kernel: residuals of many sets of numbers at once."""
+    """Simulates the drive with the car's kernel: residuals for many parameter sets at once."""
 
     def __init__(self, car: Car, commands: Floats, poses: Floats) -> None:
         self._car = car.with_terms(TERMS)
@@ -146,29 +157,34 @@ class _Model:
         self._poses = poses[inside].copy()
         self._poses[:, 3] = np.unwrap(self._poses[:, 3])
         self.begin_s = float(commands[0, 0])
-        steps = KEPT * int((commands[-1, 0] - self.begin_s) / (KEPT * STEP_S))
+        steps = STEPS_PER_SAMPLE * int(
+            (commands[-1, 0] - self.begin_s) / (STEPS_PER_SAMPLE * STEP_S)
+        )
         self._edges = self.begin_s + STEP_S * np.arange(steps + 1)
-        self._kept = self._edges[::KEPT]
+        self._sample_t = self._edges[::STEPS_PER_SAMPLE]
         t = self._poses[:, 0]
         which = np.searchsorted(_window_edges(commands), t, side="right")
         parts = [np.flatnonzero(which == w) for w in np.unique(which)]
-        told = np.diff(commands[:, 0])
-        silent = commands[:-1, 0][told > SILENT_S], commands[1:, 0][told > SILENT_S] + SETTLES_S
-        whole = [part for part in parts if len(part) >= FEWEST]
+        gaps = np.diff(commands[:, 0])
+        silent = (
+            commands[:-1, 0][gaps > SILENT_S],
+            commands[1:, 0][gaps > SILENT_S] + STEER_TRANSIENT_S,
+        )
+        whole = [part for part in parts if len(part) >= MIN_WINDOW_POSES]
         self.windows = [
             part for part in whole
             if not ((t[part[0]] < silent[1]) & (t[part[-1]] > silent[0])).any()
         ]  # fmt: skip
         self.silent = len(whole) - len(self.windows)
         self.stds = np.array([POSITION_STD_M, POSITION_STD_M, YAW_STD_RAD])
-        row = np.searchsorted(self._kept, t, side="right") - 1
-        self._row = np.clip(row, 0, len(self._kept) - 2)
-        since = (t - self._kept[self._row]) / (KEPT * STEP_S)
+        row = np.searchsorted(self._sample_t, t, side="right") - 1
+        self._row = np.clip(row, 0, len(self._sample_t) - 2)
+        since = (t - self._sample_t[self._row]) / (STEPS_PER_SAMPLE * STEP_S)
         self._since = np.clip(since, 0.0, 1.0)[:, None]
         self._fleet = Fleet(self._car, LANES)
 
     def values(self, z: Floats) -> Floats:
-        """Return the numbers of the car file for numbers in units of their steps."""
+        """Return the car file's values for parameters in units of their steps."""
         own = [self._car.value(n.key) if n.scales else 1.0 for n in NUMBERS]
         scaled = [n.start + n.step * each for n, each in zip(NUMBERS, z, strict=True)]
         return np.asarray(np.array(scaled) * np.array(own))
@@ -179,8 +195,8 @@ class _Model:
         """Return the residuals of each set, window by window, in standard deviations.
 
         Args:
-            sets: Numbers in units of their steps, LANES sets at most.
-            commands: Of each set; empty: all obey those of the drive.
+            sets: Parameters in units of their steps, at most LANES sets.
+            commands: Of each set; empty: those of the drive for all.
         """
         values = np.array([self.values(z) for z in sets])
         driven = self._drive(values, commands or [self.commands] * len(sets))
@@ -189,8 +205,8 @@ class _Model:
         left = [self._left(paths[part], self._poses[part, None, 1:]) for part in self.windows]
         return [[window[:, row] for window in left] for row in range(len(sets))]
 
-    def again(self, z: Floats) -> Again:
-        """Return the drive as seen, by the file's own numbers, and by these."""
+    def resimulated(self, z: Floats) -> Resimulation:
+        """Return the drive as measured, by the file's parameters, and by these."""
         by_file = z.copy()
         for i, n in enumerate(NUMBERS):
             if n.key not in DELAYS:
@@ -200,58 +216,63 @@ class _Model:
         seen = self._poses[which, 1:]
         left = [np.concatenate(each) for each in self.residuals([np.array(by_file), z])]
         paths = np.array([seen, *(seen - self.stds * each for each in left)])
-        return Again(self.commands, self._poses[which, 0], paths)
+        return Resimulation(self.commands, self._poses[which, 0], paths)
 
     def rounded(self, offset: float) -> Floats:
-        """Return the commands as a firmware obeys them that cuts off behind each of its steps.
+        """Return the commands as applied by a firmware that truncates to its steps.
 
         Args:
-            offset: Of its steps from the commands, 0 to 1 of one; the mean is put back.
+            offset: Of its steps from the commands, 0 to 1 of one; the mean is restored.
         """
-        told = self.commands[:, 1:]
-        cut = STEPS * (np.floor(told / STEPS + offset) + 0.5 - offset)
-        rests = (told == 0.0) & np.array([True, False])
+        commands = self.commands[:, 1:]
+        cut = FIRMWARE_STEPS * (np.floor(commands / FIRMWARE_STEPS + offset) + 0.5 - offset)
+        rests = (commands == 0.0) & np.array([True, False])
         return np.column_stack([self.commands[:, 0], np.where(rests, 0.0, cut)])
 
     def _drive(self, values: Floats, commands: Sequence[Floats]) -> list[Floats]:
-        """Return x, y and yaw of each row's car at the times that are kept, (kept, rows)."""
+        """Return x, y and yaw of each row's car at the stored times, (times, rows)."""
         fleet, rows = self._fleet, len(values)
         at = {n.key: i for i, n in enumerate(NUMBERS)}
         start = Pose2(*self._poses[0, 1:])
-        late = []
+        delayed = []
         for column, key in enumerate(DELAYS, start=1):
-            late.append(np.zeros((len(self._edges) - 1, LANES)))
+            delayed.append(np.zeros((len(self._edges) - 1, LANES)))
             known = dict[tuple[int, float], Floats]()
-            for row, told in enumerate(commands):
-                which = id(told), float(values[row, at[key]])
+            for row, each in enumerate(commands):
+                which = id(each), float(values[row, at[key]])
                 if which not in known:
-                    known[which] = self._late(told, column, which[1])
-                late[-1][:, row] = known[which]
+                    known[which] = self._delayed(each, column, which[1])
+                delayed[-1][:, row] = known[which]
         for row in range(LANES):
             fleet.remove(row)
         for row in range(rows):
             fleet.add(start)
             for key in at.keys() - set(DELAYS):
                 fleet.set_parameter(row, key, float(values[row, at[key]]))
-        done = fleet.rollout(late[0], late[1], STEP_S, ("x", "y", "yaw"))
+        done = fleet.rollout(delayed[0], delayed[1], STEP_S, ("x", "y", "yaw"))
         x, y, yaw = (
-            np.vstack([np.full((1, rows), at_start), done[name][KEPT - 1 :: KEPT, :rows]])
+            np.vstack(
+                [
+                    np.full((1, rows), at_start),
+                    done[name][STEPS_PER_SAMPLE - 1 :: STEPS_PER_SAMPLE, :rows],
+                ]
+            )
             for name, at_start in zip(("x", "y", "yaw"), start, strict=True)
         )
         return [x, y, np.unwrap(yaw, axis=0)]
 
-    def _late(self, commands: Floats, column: int, delay_s: float) -> Floats:
-        """Return the mean of a command over each step, so much later, (steps,)."""
+    def _delayed(self, commands: Floats, column: int, delay_s: float) -> Floats:
+        """Return the mean of a delayed command over each step, (steps,)."""
         t, held = commands[:, 0], commands[:-1, column]
         whole = np.concatenate([[0.0], np.cumsum(held * np.diff(t))])
         return np.asarray(np.diff(np.interp(self._edges - delay_s, t, whole)) / STEP_S)
 
     def _left(self, paths: Floats, seen: Floats) -> Floats:
-        """Return what is left over once each path lies where it fits best, (n, paths, 3).
+        """Return the residual of each path, shifted to where it fits best, (n, paths, 3).
 
         Args:
             paths: (n, paths, 3).
-            seen: What each is to lie on, (n, 1, 3).
+            seen: Measured path, (n, 1, 3).
         """
         away = paths[..., :2] - paths[..., :2].mean(axis=0)
         there = seen[..., :2] - seen[..., :2].mean(axis=0)
@@ -270,20 +291,20 @@ class _Model:
 
 
 def fit(car: Car, commands: Floats, poses: Floats, eye_delay_s: float = 0.0) -> Fit:
-    """Return the numbers that a drive shows.
+    """Return the parameters identified from a drive.
 
     Args:
-        car: Whose file is to be made better.
+        car: The car to calibrate.
         commands: Time [s], throttle and steering from then on, (n, 3).
         poses: Time [s] and pose of the rear axle [m, m, rad], (m, 4), on the same clock.
-        eye_delay_s: Of the delays found so much is the Eye's.
+        eye_delay_s: Share of the delays found that is the Eye's.
 
     Raises:
-        RecordingError: when the drive is too short to say anything.
+        RecordingError: when the drive is too short.
     """
     length_s = float(commands[-1, 0] - commands[0, 0]) if len(commands) else 0.0
-    if length_s < LEAST_S:
-        msg = f"calibration: got a drive of {length_s:.1f} s, expected at least {LEAST_S:g} s"
+    if length_s < MIN_DRIVE_S:
+        msg = f"calibration: got a drive of {length_s:.1f} s, expected at least {MIN_DRIVE_S:g} s"
         raise RecordingError(msg)
     model = _Model(car, commands, poses)
     if len(model.windows) <= len(NUMBERS):
@@ -293,41 +314,41 @@ def fit(car: Car, commands: Floats, poses: Floats, eye_delay_s: float = 0.0) -> 
         )
         raise RecordingError(msg)
     z, apart = np.zeros(len(NUMBERS)), np.ones(len(NUMBERS))
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         left, slopes = _slopes(model, z, apart)
         step, halves = _solve(left, slopes, z)
         moved = _stepped(model, z, step) - z
         z = z + moved
         model.stds = model.stds * _rms(left)
-        apart = np.clip(halves, NEAREST, 1.0)
-        if (np.abs(moved) < SETTLED * halves).all():
+        apart = np.clip(halves, MIN_DIFFERENCE, 1.0)
+        if (np.abs(moved) < CONVERGED * halves).all():
             break
     left, slopes = _slopes(model, z, apart)
     _, halves = _solve(left, slopes, z)
-    halves = np.hypot(halves, WIDE * _rounding(model, z, left, slopes))
-    return _told(model, z, halves, left, eye_delay_s)
+    halves = np.hypot(halves, Z_90 * _rounding(model, z, left, slopes))
+    return _result(model, z, halves, left, eye_delay_s)
 
 
 def _window_edges(commands: Floats) -> list[float]:
-    """Return where windows begin: with each leg, for what a rounded command is wrong by lasts one.
+    """Return where windows begin: with each leg, since the error of a rounded command lasts one.
 
-    A leg begins where throttle follows upon none; what lasts longer without is cut by the clock.
+    A leg begins where throttle follows zero throttle; longer stretches without are cut by time.
     """
     t, throttle = commands[:, 0], commands[:, 1]
     begins = t[1:][(throttle[:-1] == 0.0) & (throttle[1:] != 0.0)]
     edges = [float(t[0])]
     for begin in (*begins.tolist(), float(t[-1])):
-        while begin - edges[-1] > LONGEST_S:
+        while begin - edges[-1] > MAX_WINDOW_S:
             edges.append(edges[-1] + WINDOW_S)
-        if begin - edges[-1] >= SHORTEST_S:
+        if begin - edges[-1] >= MIN_WINDOW_S:
             edges.append(begin)
     return edges
 
 
 def _slopes(model: _Model, z: Floats, apart: Floats) -> tuple[list[Floats], list[Floats]]:
-    """Return residuals and their derivatives, window by window, (3 n,) and (3 n, numbers).
+    """Return residuals and their derivatives, window by window, (3 n,) and (3 n, parameters).
 
-    Derivatives are differences between numbers `apart` on either side, in units of their steps.
+    Derivatives are central differences over `apart` on either side, in units of the steps.
     """
     units = np.diag(apart)
     driven = model.residuals([z, *(z + units), *(z - units)])
@@ -347,7 +368,7 @@ def _solve(left: Sequence[Floats], slopes: Sequence[Floats], z: Floats) -> tuple
     count, total = 0, 0.0
     for rest, slope in zip(left, slopes, strict=True):
         r = rest.ravel()
-        weight = 1.0 / (1.0 + r * r / TAIL)
+        weight = 1.0 / (1.0 + r * r / STUDENT_DOF)
         normals.append((slope * weight[:, None]).T @ slope)
         pulls.append(slope.T @ (weight * r))
         count, total = count + len(r) - 3, total + float((weight * r * r).sum())
@@ -355,67 +376,67 @@ def _solve(left: Sequence[Floats], slopes: Sequence[Floats], z: Floats) -> tuple
     inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     white = inverse.diagonal() * max(1.0, total / (count - len(z)))
     without = [np.linalg.solve(normal - n, p) for n, p in zip(normals, pulls, strict=True)]
-    scatter = (len(left) - 1) * np.var(without, axis=0)
+    jackknife = (len(left) - 1) * np.var(without, axis=0)
     share = np.array([(inverse @ n @ inverse).diagonal() for n in normals]) / inverse.diagonal()
-    free = 1.0 / np.maximum((share * share).sum(axis=0), 1.0 / MANY) - 1.0
-    halves = np.maximum(WIDE * np.sqrt(white), _student(free) * np.sqrt(scatter))
+    free = 1.0 / np.maximum((share * share).sum(axis=0), 1.0 / MAX_EFFECTIVE_WINDOWS) - 1.0
+    halves = np.maximum(Z_90 * np.sqrt(white), _student(free) * np.sqrt(jackknife))
     return -inverse @ (prior @ z + sum(pulls)), halves
 
 
 def _rounding(model: _Model, z: Floats, left: Sequence[Floats], slopes: Sequence[Floats]) -> Floats:
-    """Return how far off the numbers are where the firmware rounds, in units of their steps (rms).
+    """Return the RMS error of the parameters from a firmware's rounding, in units of their steps.
 
-    Each of several firmwares moves the residuals, and so the numbers by one Gauss-Newton step.
+    Each of several roundings changes the residuals, and so the parameters by one Gauss-Newton step.
     """
     slope = np.concatenate(slopes)
-    weight = 1.0 / (1.0 + np.concatenate([rest.ravel() for rest in left]) ** 2 / TAIL)
+    weight = 1.0 / (1.0 + np.concatenate([rest.ravel() for rest in left]) ** 2 / STUDENT_DOF)
     normal = np.eye(len(z)) / PRIOR**2 + (slope * weight[:, None]).T @ slope
     before = np.concatenate([rest.ravel() for rest in left])
-    offsets = (np.arange(FIRMWARES) + 0.5) / FIRMWARES
+    offsets = (np.arange(ROUNDING_OFFSETS) + 0.5) / ROUNDING_OFFSETS
     firmwares = [model.rounded(float(offset)) for offset in offsets]
     shifts = []
-    for after in model.residuals([z] * FIRMWARES, firmwares):
+    for after in model.residuals([z] * ROUNDING_OFFSETS, firmwares):
         moved = np.concatenate([rest.ravel() for rest in after]) - before
         shifts.append(np.linalg.solve(normal, slope.T @ (weight * moved)))
     return np.asarray(np.sqrt(np.mean(np.square(shifts), axis=0)))
 
 
 def _student(free: Floats) -> Floats:
-    """Return the 95 % point of Student's t, by its expansion about the normal's; two at least."""
-    n, z = np.maximum(free, 2.0), WIDE
+    """Return the 95 % point of Student's t, by its expansion about the normal's; at least two."""
+    n, z = np.maximum(free, 2.0), Z_90
     second = (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0
     third = (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0
     return np.asarray(z + (z**3 + z) / (4.0 * n) + second / n**2 + third / n**3)
 
 
 def _stepped(model: _Model, z: Floats, step: Floats) -> Floats:
-    """Return the best of several lengths of a step, none included."""
+    """Return the best of several step lengths, zero included."""
     low = np.array([(n.low - n.start) / n.step for n in NUMBERS])
     high = np.array([(n.high - n.start) / n.step for n in NUMBERS])
-    trials = [np.clip(z + share * step, low + 1.0, high - 1.0) for share in SHARES]
+    trials = [np.clip(z + share * step, low + 1.0, high - 1.0) for share in STEP_FRACTIONS]
     losses = [_loss(windows) for windows in model.residuals([z, *trials])]
     return [z, *trials][int(np.argmin(losses))]
 
 
 def _loss(windows: Sequence[Floats]) -> float:
-    return float(sum(TAIL * np.log1p(rest * rest / TAIL).sum() for rest in windows))
+    return float(sum(STUDENT_DOF * np.log1p(rest * rest / STUDENT_DOF).sum() for rest in windows))
 
 
 def _rms(left: Sequence[Floats]) -> Floats:
-    """Return the root mean square of what is left over, in x and y together and in yaw, (3,)."""
+    """Return the RMS of the residuals, in x and y together and in yaw, (3,)."""
     rest = np.concatenate(left)
-    weighted = rest * rest / (1.0 + rest * rest / TAIL)
+    weighted = rest * rest / (1.0 + rest * rest / STUDENT_DOF)
     mean = weighted.mean(axis=0)
     position = (mean[0] + mean[1]) / 2.0
-    return np.asarray(np.sqrt(np.array([position, position, mean[2]]) / OF_NORMAL))
+    return np.asarray(np.sqrt(np.array([position, position, mean[2]]) / NORMAL_CONSISTENCY))
 
 
-def _told(
+def _result(
     model: _Model, z: Floats, halves: Floats, left: Sequence[Floats], eye_delay_s: float
 ) -> Fit:
     values = model.values(z)
-    scale = [WIDE * SCALE_STD * v / n.step for v, n in zip(values, NUMBERS, strict=True)]
-    metres = np.array([n.key in METRES for n in NUMBERS])
+    scale = [Z_90 * SCALE_STD * v / n.step for v, n in zip(values, NUMBERS, strict=True)]
+    metres = np.array([n.key in EYE_SCALED for n in NUMBERS])
     halves = np.hypot(halves, metres * scale)
     ends = [model.values(z + way * halves) for way in (-1.0, 1.0)]
     found = {}
@@ -424,4 +445,21 @@ def _told(
         value, low, high = (float(number) - off for number in numbers)
         found[n.key] = Found(max(0.0, value) if n.key in DELAYS else value, low, high)
     position, _, yaw = model.stds * _rms(left)
-    return Fit(found, float(position), float(yaw), len(left), model.silent, model.again(z))
+    return Fit(found, float(position), float(yaw), len(left), model.silent, model.resimulated(z))
+
+
+def unsure(found: Fit) -> list[str]:
+    """Return what is wrong with a drive, a line each; empty: its parameters may be used."""
+    lines = []
+    legs = found.windows + found.silent
+    if found.silent > SILENT_SHARE * legs:
+        lines.append(
+            f"in {found.silent} of {legs} legs no command left for the board for 0.1 s: "
+            "the computer was too busy, or the cable was disconnected"
+        )
+    for key, widest in WIDEST.items():
+        one = found.numbers[key]
+        half = (one.high - one.low) / 2.0
+        if half > widest:
+            lines.append(f"{key} is known to {half:.3g} only, expected {widest:g}")
+    return lines

@@ -1,14 +1,14 @@
-"""The drive that shows how a car steers and moves: short legs, small throttles first.
+"""The drive pattern that identifies steering and drive: short legs, small throttles first.
 
 Pure: poses and seconds in, commands out. A leg is a throttle and two steering commands, one for
-each half, so that the wheels turn while it moves; between legs the car rests. Of the legs that are
-left at one throttle the next is the one that ends farthest inside the fence, and a leg ends early
-where the car could not stop inside.
+each half, so that the wheels turn while it moves; between legs the car rests. Of the remaining legs
+at one throttle the next is the one that ends farthest inside the fence, and a leg ends early where
+the car could not stop inside.
 
-No leg holds its commands: each is a little less throttle and a little more or less steering for
-every piece of it, spread evenly over several steps of any firmware that rounds. A firmware that
-cuts a servo's angle off to whole degrees steers half a degree to one side in the mean: that is a
-trim, and only commands between its steps show it. At rest too: a swing of the wheels begins there.
+Commands vary within a leg: in every piece slightly less throttle and slightly different steering,
+spread evenly over several steps of any firmware that rounds. A firmware that truncates a servo's
+angle to whole degrees steers half a degree to one side on average: that is a trim, and only
+commands between its steps show it. Also at rest, since a swing of the wheels begins there.
 """
 
 import math
@@ -20,23 +20,23 @@ from vehicle_agent.guard import GuardLimits, along
 STEERINGS = ((0.0, 0.0), (0.5, 0.5), (-0.5, -0.5), (1.0, -1.0), (-1.0, 1.0))
 PIECE_S = 0.12
 THROTTLE_SPREAD = 0.02
-"""So much less at most: five steps of an 8-bit timer."""
+"""Largest reduction of the throttle: five steps of an 8-bit timer."""
 STEERING_SPREAD = 0.1
-"""From the least to the most: three degrees of a servo."""
-EVEN = (0.7548776662, 0.1458980338)
-"""Steps whose multiples' fractions are spread evenly: irrational, of throttle and of steering."""
-AHEAD_S = 0.2
-"""How far ahead of the guard the pattern gives way."""
-NEARER_M = 1e-3
+"""Range of the steering variation: three degrees of a servo."""
+EVEN_SEQUENCE = (0.7548776662, 0.1458980338)
+"""Irrational steps, of throttle and of steering: fractions of their multiples are evenly spread."""
+LOOKAHEAD_S = 0.2
+"""How much earlier than the guard the pattern ends a leg."""
+MIN_RETURN_M = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """How much is driven.
+    """Extent of the drive.
 
     Attributes:
-        shares: Of the throttle that the car may have.
-        leg_s: How long a leg lasts at most; likewise `rest_s` between two.
+        shares: Of the maximum throttle, one a level.
+        leg_s: Maximum duration of a leg; likewise `rest_s` between two.
     """
 
     shares: tuple[float, ...]
@@ -50,14 +50,14 @@ SHORT = Plan((0.4, 0.8), 1.0, 0.3)
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One way: throttle, and steering of its first and its second half."""
+    """One leg: throttle, and steering of its first and its second half."""
 
     throttle: float
     steering: tuple[float, float]
 
 
 class Pattern:
-    """Where a calibration has got to."""
+    """Progress of a calibration drive."""
 
     def __init__(self, limits: GuardLimits, plan: Plan = FULL) -> None:
         self._limits, self._plan = limits, plan
@@ -73,11 +73,11 @@ class Pattern:
 
     @property
     def progress(self) -> float:
-        """Share of the legs that are driven or under way, 0 to 1."""
+        """Share of the legs that are driven or in progress, 0 to 1."""
         return 1.0 - sum(map(len, self._levels)) / self._all
 
     def step(self, pose: Pose2, t_s: float) -> tuple[float, float] | None:
-        """Return throttle and steering at a pose and a time [s]; None: the drive is over."""
+        """Return throttle and steering at a pose and a time [s]; None: the drive is complete."""
         if self._ended_s is None:
             self._ended_s = t_s
         if self._leg is None:
@@ -96,7 +96,7 @@ class Pattern:
         return throttle, steering
 
     def give_up(self, t_s: float) -> None:
-        """End the leg: the car is not where it drove to [s]."""
+        """End the leg: the car is not where it drove to; `t_s` is the time [s]."""
         self._end_leg(t_s)
 
     def _between(self, leg: Leg, since_s: float) -> tuple[float, float]:
@@ -104,12 +104,14 @@ class Pattern:
         piece = self._pieces + 1 + int(since_s / PIECE_S)
         steering = leg.steering[since_s >= self._plan.leg_s / 2.0]
         middle = math.copysign(min(abs(steering), 1.0 - STEERING_SPREAD / 2.0), steering)
-        less = EVEN[0] * piece % 1.0 * THROTTLE_SPREAD
+        less = EVEN_SEQUENCE[0] * piece % 1.0 * THROTTLE_SPREAD
         throttle = math.copysign(max(0.0, abs(leg.throttle) - less), leg.throttle)
         return throttle, middle + self._spread(piece)
 
     def _spread(self, piece: int) -> float:
-        to_and_fro = abs(2.0 * (EVEN[1] * piece % 1.0) - 1.0)  # a jump would take the servo long
+        to_and_fro = abs(
+            2.0 * (EVEN_SEQUENCE[1] * piece % 1.0) - 1.0
+        )  # no jumps: they would delay the servo
         return (to_and_fro - 0.5) * STEERING_SPREAD
 
     def _end_leg(self, t_s: float) -> None:
@@ -136,7 +138,7 @@ class Pattern:
     def _has_room(self, pose: Pose2, throttle: float, steering: float) -> bool:
         limits = self._limits
         speed = throttle * limits.top_speed_mps
-        ahead_m = speed * (limits.reaction_s + AHEAD_S)
+        ahead_m = speed * (limits.reaction_s + LOOKAHEAD_S)
         ahead_m += math.copysign(speed * speed / (2.0 * limits.decel_mps2), speed)
         there = limits.outside_m(along(pose, limits.curvature_per_m * steering, ahead_m))
-        return there <= 0.0 or there < limits.outside_m(pose) - NEARER_M
+        return there <= 0.0 or there < limits.outside_m(pose) - MIN_RETURN_M

@@ -1,7 +1,7 @@
-"""What a calibration found, in one picture: how fast at which throttle, how bent at which steering.
+"""The result of a calibration as a picture: speed over throttle, and curvature over steering.
 
-Dots are what the Eye saw of legs that settled; the dashed line is the car as its file had it, the
-full one as it was found. Both lines are driven by the kernel with the very commands of the drive.
+Dots are legs as the Eye measured them at steady state; the dashed line is the car as its file had
+it, the full one as identified. The kernel simulates both lines with the commands of the drive.
 """
 
 from collections.abc import Iterator
@@ -14,29 +14,29 @@ import numpy as np
 from scm.arrays import Floats
 from scm.maps.svg import element
 from scm.mismatch.report.plot import Picture, frame, grid, legend, line, picture_svg, span_of, text
-from vehicle_agent.calibrate.fit import Again, Fit
+from vehicle_agent.calibrate.fit import Fit, Resimulation
 
 WIDTH, HEIGHT, HEAD = 440.0, 300.0, 26.0
-SHOWN_S = 0.5
-"""Of a leg: its end, when motor and wheels have settled."""
-SLEWED_S = 0.2
-"""Of a leg: its begin, in which the guard lets the steering grow."""
-LEAST_M = 0.008
-BENT = "steering told, + left", "curvature of the way [1/m], + left"
-SAME = 0.11
-"""Steering that stays within as much is one steering."""
-LEVELS = (0.05, 0.25)
-"""Throttles and steerings so near are one level: lines go through the levels' means."""
+LEG_END_S = 0.5
+"""The end of a leg, when motor and wheels are at steady state."""
+STEERING_SLEW_S = 0.2
+"""The begin of a leg, while the guard limits the rate of the steering."""
+MIN_TRAVEL_M = 0.008
+CURVATURE_LABELS = "steering told, + left", "curvature of the way [1/m], + left"
+MAX_STEERING_SPREAD = 0.11
+"""Maximum spread of a leg's steering that counts as constant."""
+LEVEL_WIDTHS = (0.05, 0.25)
+"""Widths of throttle and steering levels: lines go through the levels' means."""
 
 
 @dataclass(frozen=True, slots=True)
-class Settled:
-    """The ends of legs: what was told, and what came of it.
+class SteadyLegs:
+    """The ends of legs: command and resulting motion.
 
     Attributes:
-        throttle: Told in the mean, (legs,); likewise `steering`.
-        speed: Of the car as seen, as its file had it, and as found [m/s], (3, legs).
-        bend: Of its way, likewise [1/m].
+        throttle: WatchdogReport in the mean, (legs,); likewise `steering`.
+        speed: Of the car as measured, as its file had it, and as found [m/s], (3, legs).
+        bend: Curvature of its path, likewise [1/m].
     """
 
     throttle: Floats
@@ -45,28 +45,30 @@ class Settled:
     bend: Floats
 
 
-def settled(again: Again) -> Settled:
-    """Return the ends of all legs that held one steering."""
+def steady_legs(resimulated: Resimulation) -> SteadyLegs:
+    """Return the ends of all legs with constant steering."""
     rows = []
-    for first, last in _legs(again.commands):
-        told = again.commands[first:last]
-        end_s = again.commands[last, 0]
-        late = told[told[:, 0] >= end_s - SHOWN_S]
-        steady = told[told[:, 0] >= told[0, 0] + SLEWED_S, 2]
-        if end_s - told[0, 0] < 1.5 * SHOWN_S or np.ptp(steady) > SAME:
+    for first, last in _legs(resimulated.commands):
+        commanded = resimulated.commands[first:last]
+        end_s = resimulated.commands[last, 0]
+        late = commanded[commanded[:, 0] >= end_s - LEG_END_S]
+        steady = commanded[commanded[:, 0] >= commanded[0, 0] + STEERING_SLEW_S, 2]
+        if end_s - commanded[0, 0] < 1.5 * LEG_END_S or np.ptp(steady) > MAX_STEERING_SPREAD:
             continue
-        seen = (again.t >= end_s - SHOWN_S) & (again.t <= end_s)
+        seen = (resimulated.t >= end_s - LEG_END_S) & (resimulated.t <= end_s)
         moved = (
-            [_moved(again.t[seen], path[seen]) for path in again.paths] if seen.sum() > 2 else []
+            [_moved(resimulated.t[seen], path[seen]) for path in resimulated.paths]
+            if seen.sum() > 2
+            else []
         )
         if moved and all(np.isfinite(each).all() for each in moved):
             rows.append([late[:, 1].mean(), late[:, 2].mean(), *np.ravel(moved)])
     table = np.array(rows).reshape(-1, 8)
-    return Settled(table[:, 0], table[:, 1], table[:, 2::2].T, table[:, 3::2].T)
+    return SteadyLegs(table[:, 0], table[:, 1], table[:, 2::2].T, table[:, 3::2].T)
 
 
 def _legs(commands: Floats) -> Iterator[tuple[int, int]]:
-    """Yield where a throttle of one sign begins, and where it is over."""
+    """Yield where a throttle of one sign begins and ends."""
     sign = np.sign(commands[:, 1])
     edges = np.flatnonzero(np.diff(sign)) + 1
     for first, last in pairwise(edges):
@@ -75,27 +77,27 @@ def _legs(commands: Floats) -> Iterator[tuple[int, int]]:
 
 
 def _moved(t: Floats, path: Floats) -> tuple[float, float]:
-    """Return speed along the heading [m/s] and curvature [1/m], NaN where it hardly moved."""
+    """Return speed along the heading [m/s] and curvature [1/m], NaN if it hardly moved."""
     steps = np.diff(path[:, :2], axis=0)
     heading = 0.5 * (path[1:, 2] + path[:-1, 2])
     way = float((steps[:, 0] * np.cos(heading) + steps[:, 1] * np.sin(heading)).sum())
     turn = float(path[-1, 2] - path[0, 2])
-    return way / float(t[-1] - t[0]), turn / way if abs(way) > LEAST_M else np.nan
+    return way / float(t[-1] - t[0]), turn / way if abs(way) > MIN_TRAVEL_M else np.nan
 
 
 def write_picture(found: Fit, deadband: float, path: Path) -> None:
-    """Write the picture as SVG; nothing is drawn of a drive without a leg that settled.
+    """Write the picture as SVG; without a steady leg only the axes are drawn.
 
     Args:
-        found: What the drive says.
+        found: Result of the fit.
         deadband: Of the car's file.
         path: Of the picture.
     """
-    legs = settled(found.again)
+    legs = steady_legs(found.resimulated)
     bands = deadband, found.numbers["drive.deadband"].value
     panels = (
-        (legs.throttle, legs.speed, "throttle told", "speed [m/s]", LEVELS[0], bands),
-        (legs.steering, legs.bend, *BENT, LEVELS[1], None),
+        (legs.throttle, legs.speed, "throttle told", "speed [m/s]", LEVEL_WIDTHS[0], bands),
+        (legs.steering, legs.bend, *CURVATURE_LABELS, LEVEL_WIDTHS[1], None),
     )
     parts = [*legend(62.0, 20.0, (("before", "as its file had it"), ("after", "as found")))]
     parts += [element("circle", cx=355.0, cy=16.0, r="3.5", class_="dot")]
@@ -107,20 +109,20 @@ def write_picture(found: Fit, deadband: float, path: Path) -> None:
 
 
 def _panel(
-    told: Floats, came: Floats, across: str, up: str, level: float,
+    commanded: Floats, came: Floats, across: str, up: str, level: float,
     bands: tuple[float, float] | None, left: float,
 ) -> Iterator[str]:  # fmt: skip
-    """Yield one panel: dots as seen, and both lines, (legs,) and (3, legs), zero within a band."""
-    of = frame(span_of(told, through_zero=True), span_of(came), (WIDTH, HEIGHT), (left, HEAD))
+    """Yield one panel: measured dots, and both lines, (legs,) and (3, legs), zero within a band."""
+    of = frame(span_of(commanded, through_zero=True), span_of(came), (WIDTH, HEIGHT), (left, HEAD))
     yield from grid(of, across, up)
-    levels = np.round(told / level)
+    levels = np.round(commanded / level)
     which = [levels == one for one in np.unique(levels)]
     for row, kind in enumerate(("before", "after"), start=1):
-        points = [(told[w].mean(), came[row, w].mean()) for w in which]
+        points = [(commanded[w].mean(), came[row, w].mean()) for w in which]
         if bands is not None:
             points += [(-bands[row - 1], 0.0), (bands[row - 1], 0.0)]
         x, y = np.array(sorted(points)).reshape(-1, 2).T
         yield line(of, x, y, kind)
-    for one, other in zip(told.tolist(), came[0].tolist(), strict=True):
+    for one, other in zip(commanded.tolist(), came[0].tolist(), strict=True):
         at = {"cx": of.across.at(one), "cy": of.up.at(other)}
         yield element("circle", **at, r="3.5", class_="dot")

@@ -1,4 +1,4 @@
-"""What a calibration drive leaves: commands and poses, as tables that every tool here reads."""
+"""The recording of a calibration drive: commands and poses as tables."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -33,35 +33,35 @@ tables:
 class Recorded:
     """Commands that passed the guard, (t, throttle, steering), and poses, (t, x, y, yaw).
 
-    Poses are the cameras' own as soon as one comes: a track is smoothed, overshoots where the car
-    stops, and makes a leg a percent too long.
+    Camera poses replace tracks as soon as one arrives: a track is smoothed, overshoots where the
+    car stops, and makes a leg a percent too long.
     """
 
     command: list[tuple[float, float, float]] = field(default_factory=list)
     pose: list[tuple[float, float, float, float]] = field(default_factory=list)
     first_ns: int | None = None
-    is_sighted: bool = False
+    has_eye_poses: bool = False
 
     def at(self, t_ns: int) -> float:
-        """Return a time since the first that was asked for [s]."""
+        """Return the time since the first one requested [s]."""
         if self.first_ns is None:
             self.first_ns = t_ns
         return seconds(t_ns - self.first_ns)
 
     def commanded(self, t_ns: int, throttle: float, steering: float) -> None:
-        """Note what the actuators are told from then on; never back in time."""
+        """Record a command to the actuators; never back in time."""
         at_s = self.at(t_ns)
         if not self.command or at_s > self.command[-1][0]:
             self.command.append((at_s, throttle, steering))
 
-    def seen(self, told: EyeTrack | EyePose) -> None:
-        """Note a pose, once."""
-        if isinstance(told, EyePose) and not self.is_sighted:
-            self.is_sighted = True
+    def seen(self, message: EyeTrack | EyePose) -> None:
+        """Record a pose, once."""
+        if isinstance(message, EyePose) and not self.has_eye_poses:
+            self.has_eye_poses = True
             self.pose.clear()
-        if isinstance(told, EyeTrack) and self.is_sighted:
+        if isinstance(message, EyeTrack) and self.has_eye_poses:
             return
-        row = self.at(told.t_ns), told.x_m, told.y_m, told.yaw_rad
+        row = self.at(message.t_ns), message.x_m, message.y_m, message.yaw_rad
         if not self.pose or row[0] > self.pose[-1][0]:
             self.pose.append(row)
 
@@ -70,7 +70,7 @@ class Recorded:
         return np.array(self.command).reshape(-1, 3), np.array(self.pose).reshape(-1, 4)
 
     def write(self, folder: Path, car: str) -> None:
-        """Write `recording.yaml` and its tables; the folder is made."""
+        """Write `recording.yaml` and its tables; create the folder."""
         folder.mkdir(parents=True, exist_ok=True)
         _write(folder / "command.csv", "t,throttle,steering", self.command)
         _write(folder / "pose.csv", "t,x,y,yaw", self.pose)

@@ -1,4 +1,4 @@
-"""`vehicle-agent calibrate`: drive a pattern under the Eye, and fit the car's own numbers."""
+"""`vehicle-agent calibrate`: drive a pattern under the Eye, and identify the car's parameters."""
 
 import argparse
 import math
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from vehicle_agent.guard import GuardLimits
 
 TAG = "tag-"
-"""What the Eye puts before the id of a tag that it knows no vehicle for."""
+"""Prefix of the Eye's name for a tag without a known vehicle."""
 ADVICE = {
-    "pose": "the Eye tells no pose of that name; a car that has not joined is called tag-ID",
-    "doubt": "the Eye sees it and is not sure: is the tag flat, whole and in the light?",
+    "pose": "the Eye reports no pose of that name; a car that has not joined is called tag-ID",
+    "doubt": "the Eye sees it but its pose is uncertain: is the tag flat, intact and lit?",
     "stop": "the red button is pressed",
     "outside the floor": "put it inside the rectangle of --floor, bumpers and all",
 }
-AGAIN = "drive again"
-"""What a drive is told by that leaves too much unsure."""
-LONG_SIDE, SHORT_SIDE = 4.0, 3.3
+REPEAT_DRIVE = "drive again"
+"""Printed after a drive that leaves too much uncertain."""
+MIN_LONG_SIDE, MIN_SHORT_SIDE = 4.0, 3.3
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -86,35 +86,37 @@ def _run(arguments: argparse.Namespace) -> int:
     limits = _limits(arguments)
     _check_floor(arguments, limits)
     credentials = credentials_of(arguments, arguments.name)
-    wish, clock = stop_on_signal(), WallClock()
+    stop_requested, clock = stop_on_signal(), WallClock()
     with ZenohBus(
         arguments.city, arguments.name, arguments.connect, clock=clock, credentials=credentials
     ) as bus:
         plan = SHORT if arguments.short else FULL
-        part = CalibrationPart(arguments.name, _body(arguments), limits, wish, plan, _Console())
+        part = CalibrationPart(
+            arguments.name, _body(arguments), limits, stop_requested, plan, _Console()
+        )
         try:
             print(f"waits for the Eye to see {arguments.name}; Ctrl-C ends the drive", flush=True)
-            run(part, bus, clock, wish)
+            run(part, bus, clock, stop_requested)
         finally:
             part.close()
             if part.recorded.command:
                 part.recorded.write(out / "drive", car.name)
-                print(_said(part, out / "drive"), flush=True)
+                print(_drive_summary(part, out / "drive"), flush=True)
     return _fit(arguments, part, out)
 
 
 class _Console:
-    """What is printed while it drives: each reason to wait once, and every tenth of the way."""
+    """Prints the progress: each reason to wait once, and every tenth of the drive."""
 
     def __init__(self) -> None:
-        self._said = ""
+        self._logged = ""
 
     def __call__(self, doing: str) -> None:
         percent, is_driven, _ = doing.partition(" % driven")
         line = f"{int(percent) // 10 * 10}{is_driven}" if is_driven else doing
-        if line == self._said:
+        if line == self._logged:
             return
-        self._said = line
+        self._logged = line
         why = doing.removeprefix("waits (").removesuffix(")")
         advice = [words for reason, words in ADVICE.items() if reason in why.split(", ")]
         print(": ".join([line, *advice]), flush=True)
@@ -132,8 +134,8 @@ def _body(arguments: argparse.Namespace) -> "Body":
     return kind.open(arguments.car, 0, wiring)
 
 
-def _is_of_nobody(name: str) -> bool:
-    """Return whether the Eye calls a car so by the tag that it sees, for want of a vehicle."""
+def _is_tag_name(name: str) -> bool:
+    """Return whether a name is the Eye's name for a tag without a vehicle."""
     return name.startswith(TAG) and name[len(TAG) :].isdecimal()
 
 
@@ -151,12 +153,12 @@ def _limits(arguments: argparse.Namespace) -> "GuardLimits":
         front_m=own.front,
         rear_m=own.rear,
         width_m=own.width,
-        harmless=frozenset({"unknown"} if _is_of_nobody(arguments.name) else ()),
+        harmless=frozenset({"unknown"} if _is_tag_name(arguments.name) else ()),
     )
 
 
 def _check_floor(arguments: argparse.Namespace, limits: "GuardLimits") -> None:
-    """Refuse a floor on which hardly a leg has room.
+    """Refuse a floor that is too small for the legs.
 
     Raises:
         RunError: naming both sizes.
@@ -166,37 +168,37 @@ def _check_floor(arguments: argparse.Namespace, limits: "GuardLimits") -> None:
     x0, y0, x1, y1 = arguments.floor
     short, long = sorted((abs(x1 - x0), abs(y1 - y0)))
     length = limits.front_m + limits.rear_m
-    if short < SHORT_SIDE * length or long < LONG_SIDE * length:
+    if short < MIN_SHORT_SIDE * length or long < MIN_LONG_SIDE * length:
         msg = (
             f"--floor: got {long:.2f} m by {short:.2f} m, expected at least "
-            f"{LONG_SIDE * length:.2f} m by {SHORT_SIDE * length:.2f} m: room for this car to turn"
+            f"{MIN_LONG_SIDE * length:.2f} m by {MIN_SHORT_SIDE * length:.2f} m: "
+            "room for this car to turn"
         )
         raise RunError(msg)
 
 
-def _said(part: "CalibrationPart", drive: Path) -> str:
-    held = part.guard.told or "never"
-    seen, told = len(part.recorded.pose), len(part.recorded.command)
-    return f"{drive}: {told} commands, {seen} poses; the guard held the car up: {held}"
+def _drive_summary(part: "CalibrationPart", drive: Path) -> str:
+    held = part.guard.summary or "never"
+    seen, commands = len(part.recorded.pose), len(part.recorded.command)
+    return f"{drive}: {commands} commands, {seen} poses; the guard limited the car: {held}"
 
 
 def _fit(arguments: argparse.Namespace, part: "CalibrationPart", out: Path) -> int:
     from scm.vehicles.car import load_car
     from vehicle_agent.calibrate.car_file import write_car
-    from vehicle_agent.calibrate.fit import fit
+    from vehicle_agent.calibrate.fit import fit, unsure
     from vehicle_agent.calibrate.picture import write_picture
-    from vehicle_agent.calibrate.unsure import unsure
 
     car = load_car(arguments.car)
     found = fit(car, *part.recorded.arrays(), arguments.eye_delay_ms / 1000.0)
     path = out / "car.toml"
-    tag_id = int(arguments.name[len(TAG) :]) if _is_of_nobody(arguments.name) else None
+    tag_id = int(arguments.name[len(TAG) :]) if _is_tag_name(arguments.name) else None
     write_car(car, found, path, f"{arguments.name}, {found.windows} windows", tag_id)
     deadband = car.value("drive.deadband") if car.has("drive.deadband") else 0.0
     write_picture(found, deadband, out / "fit.svg")
     print(_table(car, found))
     for line in unsure(found):
-        print(f"{AGAIN}: {line}")
+        print(f"{REPEAT_DRIVE}: {line}")
     print(f"{path}: for `vehicle-agent join --calibration`; {out / 'fit.svg'} shows the fit")
     print(f"`scm replay {out / 'drive'} --car {path}` shows how well it drives again")
     return 0
@@ -207,11 +209,11 @@ def _table(car: "Car", found: "Fit") -> str:
     for key, one in found.numbers.items():
         given = f"{car.value(key):.4f}" if car.has(key) else "-"
         rows.append(f"  {key:<22}{given:>9}{one.value:>9.4f}   {one.low:.4f} .. {one.high:.4f}")
-    before, after = (1e3 * missed for missed in found.again.missed_m)
-    left = f"left over: {1e3 * found.position_rms_m:.1f} mm, {1e3 * found.yaw_rms_rad:.1f} mrad"
+    before, after = (1e3 * missed for missed in found.resimulated.missed_m)
+    left = f"residual: {1e3 * found.position_rms_m:.1f} mm, {1e3 * found.yaw_rms_rad:.1f} mrad"
     rows += [
-        f"  each leg driven again misses what was seen by {before:.1f} mm with the file's numbers,"
-        f" by {after:.1f} mm with those found (rms)",
+        f"  each leg simulated again deviates from the measured poses by {before:.1f} mm with"
+        f" the file's numbers, by {after:.1f} mm with those found (rms)",
         f"  {left} (rms, the Eye's noise included)",
     ]
     return "\n".join(rows)

@@ -119,20 +119,20 @@ def _run(arguments: argparse.Namespace) -> int:
         packet=arguments.packet,
     )
     gap_ns = round(NS_PER_S / arguments.max_hz) if arguments.max_hz else 0
-    wish, done, clock = stop_on_signal(), threading.Event(), WallClock()
+    stop_requested, done, clock = stop_on_signal(), threading.Event(), WallClock()
     with ZenohBus(
         arguments.city, name, arguments.connect, clock=clock, credentials=credentials
     ) as bus:
         part = DevkitPart(name, wanted, bus.session)
         address = (arguments.script_host, arguments.script_port)
-        script = ScriptSocket(address, part.packet, part.said, clock, gap_ns)
-        part.meet(script)
+        script = ScriptSocket(address, part.packet, part.on_reply, clock, gap_ns)
+        part.connect(script)
         script.start()
         try:
-            run(Leaving(part, wish, done), bus, clock, done)
+            run(Leaving(part, stop_requested, done), bus, clock, done)
         finally:
             script.stop()
-    gc.freeze()  # taking the compiler's objects apart one by one would take a quarter of a second
+    gc.freeze()  # freeing the compiler's objects one by one would take a quarter of a second
     return 0
 
 

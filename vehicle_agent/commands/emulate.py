@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from scm.clock import Clock
     from vehicle_agent.emulate.device import Device
 
-EVERY_NS = 2 * NS_PER_MS
-"""Without a city: how late a pin may be told."""
+POLL_NS = 2 * NS_PER_MS
+"""Without a city: poll period, which bounds the delay of a printed pin change."""
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,23 +77,23 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _device(arguments: argparse.Namespace, sketch: Sketch, clock: "Clock") -> "Device":
     from vehicle_agent.emulate.device import Device
-    from vehicle_agent.emulate.faults import Spoiler, read_faults
+    from vehicle_agent.emulate.faults import FaultInjector, read_faults
     from vehicle_agent.emulate.firmware import Firmware
     from vehicle_agent.emulate.pty import Cable
 
     now_ns = clock.now_ns()
-    spoiler = Spoiler(read_faults(arguments.faults), arguments.seed, now_ns)
-    return Device(Firmware(sketch, now_ns), Cable(arguments.link), spoiler)
+    injector = FaultInjector(read_faults(arguments.faults), arguments.seed, now_ns)
+    return Device(Firmware(sketch, now_ns), Cable(arguments.link), injector)
 
 
 def _serve(device: "Device", clock: "Clock", stop: "Event") -> None:
-    """Run without a city, and say whenever the pins change."""
-    told = None
-    while not clock.wait_until(clock.now_ns() + EVERY_NS, stop):
+    """Run without a city, and print each change of the pins."""
+    shown = None
+    while not clock.wait_until(clock.now_ns() + POLL_NS, stop):
         device.step(clock.now_ns())
         pins = device.firmware.outputs
-        if pins != told:
-            told = pins
+        if pins != shown:
+            shown = pins
             angles = " ".join(f"{angle:.1f}" for angle in pins.servos_deg) or "none"
             print(f"servo {angles}  DIR {pins.reverse}  BRK {pins.brake}  PWM {pins.pwm}",
                   flush=True)  # fmt: skip
@@ -119,7 +119,7 @@ def _join(
         arguments.city, station, arguments.connect, clock=clock, credentials=credentials
     ) as bus:
         run(part, bus, clock, stop)
-    gc.freeze()  # taking the compiler's objects apart one by one would take a quarter of a second
+    gc.freeze()  # freeing the compiler's objects one by one would take a quarter of a second
 
 
 COMMAND = Command(

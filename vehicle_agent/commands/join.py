@@ -57,10 +57,10 @@ def _real_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _tag_of(arguments: argparse.Namespace) -> int | None:
-    """Return the tag on the car's roof as told, else as this very car's file says it."""
+    """Return the tag on the car's roof as given, else as in this car's calibration file."""
     if arguments.tag is not None or not arguments.calibration:
-        told: int | None = arguments.tag
-        return told
+        tag_id: int | None = arguments.tag
+        return tag_id
     from scm.vehicles.car import load_car
 
     car = load_car(arguments.calibration)
@@ -80,7 +80,7 @@ def _run(arguments: argparse.Namespace) -> int:
     check_name(arguments.name, "--name")
     check_name(arguments.city, "--city")
     credentials = credentials_of(arguments, arguments.name)
-    wish, done, clock = stop_on_signal(), threading.Event(), WallClock()
+    stop_requested, done, clock = stop_on_signal(), threading.Event(), WallClock()
     with ZenohBus(
         arguments.city, arguments.name, arguments.connect, clock=clock, credentials=credentials
     ) as bus:
@@ -103,10 +103,10 @@ def _run(arguments: argparse.Namespace) -> int:
             _tag_of(arguments),
         )
         try:
-            run(Leaving(part, wish, done), bus, clock, done, on_tick=True)
+            run(Leaving(part, stop_requested, done), bus, clock, done, on_tick=True)
         finally:
             part.close()
-    gc.freeze()  # taking the compiler's objects apart one by one would take a quarter of a second
+    gc.freeze()  # freeing the compiler's objects one by one would take a quarter of a second
     return 0
 
 

@@ -1,7 +1,7 @@
 """A car that the script places itself: a remote one in the city, without dynamics of its own.
 
-The bridge joins for it and reports, 50 times a second, the pose that the script said last; speeds
-are how that pose moves. Others see it and run into it; it is not pushed by them.
+The bridge joins for it and reports, 50 times a second, the last pose from the script; speeds are
+derived from the poses. Other cars see it and collide with it; they do not push it.
 """
 
 import logging
@@ -16,9 +16,9 @@ from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 
 REPORT_NS = 20 * NS_PER_MS
-ASK_AGAIN_NS = NS_PER_S
-STANDS_NS = NS_PER_S // 2
-ASK_S = 1.0
+JOIN_RETRY_NS = NS_PER_S
+STANDSTILL_NS = NS_PER_S // 2
+REQUEST_TIMEOUT_S = 1.0
 
 Placed = tuple[float, float, float]
 
@@ -37,36 +37,36 @@ class CosimCar:
     def __init__(self, vehicle: str, car: str, session: str) -> None:
         self._vehicle, self._car, self._session = vehicle, car, session
         self._epoch: int | None = None
-        self._asked_ns: int | None = None
+        self._requested_ns: int | None = None
         self._attempt = 0
         self._pose: Placed = (0.0, 0.0, 0.0)
         self._placed_ns: int | None = None
         self._speeds: Placed = (0.0, 0.0, 0.0)
         self._report_ns = self._seq = 0
-        self._why = ""
+        self._last_refusal = ""
 
     @property
     def detail(self) -> str:
-        """How it stands with the car, in words."""
+        """State of the car, in words."""
         return f"{self._vehicle} is {'placed' if self._epoch is not None else 'about to join'}"
 
-    def place(self, pose: Placed, said_ns: int) -> None:
-        """Take where the script puts it: x, y [m] and yaw [rad] of the rear axle, map frame."""
-        if said_ns == self._placed_ns:
+    def place(self, pose: Placed, replied_ns: int) -> None:
+        """Set the script's pose: x, y [m] and yaw [rad] of the rear axle, map frame."""
+        if replied_ns == self._placed_ns:
             return
-        if self._placed_ns is not None and 0 < said_ns - self._placed_ns < STANDS_NS:
-            self._speeds = _speeds(self._pose, pose, seconds(said_ns - self._placed_ns))
+        if self._placed_ns is not None and 0 < replied_ns - self._placed_ns < STANDSTILL_NS:
+            self._speeds = _speeds(self._pose, pose, seconds(replied_ns - self._placed_ns))
         else:
             self._speeds = (0.0, 0.0, 0.0)
-        self._pose, self._placed_ns = pose, said_ns
+        self._pose, self._placed_ns = pose, replied_ns
 
     def step(self, now_ns: int) -> list[Outgoing]:
         """Join, and report."""
         if self._epoch is None:
-            if self._asked_ns is not None and now_ns - self._asked_ns < ASK_AGAIN_NS:
+            if self._requested_ns is not None and now_ns - self._requested_ns < JOIN_RETRY_NS:
                 return []
-            self._asked_ns, self._attempt = now_ns, self._attempt + 1
-            return [Call(self._join(now_ns), ASK_S)]
+            self._requested_ns, self._attempt = now_ns, self._attempt + 1
+            return [Call(self._join(now_ns), REQUEST_TIMEOUT_S)]
         if now_ns < self._report_ns:
             return []
         self._report_ns = now_ns + REPORT_NS
@@ -81,23 +81,23 @@ class CosimCar:
         )
 
     def replied(self, reply: Message) -> None:
-        """Hear what became of joining."""
+        """Process the reply to a join request."""
         if isinstance(reply, JoinReply):
             self._epoch = reply.epoch
             if self._placed_ns is None:
                 self._pose = (reply.x_m, reply.y_m, reply.yaw_rad)
-        elif isinstance(reply, Refused) and reply.detail != self._why:
-            self._why = reply.detail
+        elif isinstance(reply, Refused) and reply.detail != self._last_refusal:
+            self._last_refusal = reply.detail
             event(_log, "devkit_cosim", level=logging.WARNING, why=repr(reply.detail))
 
     def leave(self) -> list[Outgoing]:
-        """Return what takes it off the map."""
+        """Return the request that removes it."""
         joined, self._epoch = self._epoch is not None, None
-        return [Call(RemoveRequest(vehicle=self._vehicle), ASK_S)] if joined else []
+        return [Call(RemoveRequest(vehicle=self._vehicle), REQUEST_TIMEOUT_S)] if joined else []
 
     def _state(self, now_ns: int, epoch: int) -> VehicleState:
-        stands = self._placed_ns is None or now_ns - self._placed_ns > STANDS_NS
-        speed, lateral, turn = (0.0, 0.0, 0.0) if stands else self._speeds
+        is_still = self._placed_ns is None or now_ns - self._placed_ns > STANDSTILL_NS
+        speed, lateral, turn = (0.0, 0.0, 0.0) if is_still else self._speeds
         self._seq += 1
         x, y, yaw = self._pose
         return VehicleState(

@@ -1,14 +1,14 @@
 """A packet for a server that inflates: each piece is deflated once, however often it is sent.
 
-A script's server unmasks each byte that it is sent in Python, and inflates in C. Base64 carries six
-bits in eight, and lists of numbers far fewer: deflated (RFC 7692, permessage-deflate) a packet is
-the size of its JPEGs. Most of a packet is what the one before was, so a piece keeps its deflated
-form, and a packet is put together from such forms and stored blocks:
+A script's server unmasks each received byte in Python, and inflates in C. Base64 carries six bits
+in eight, and lists of numbers far fewer: deflated (RFC 7692, permessage-deflate) a packet is the
+size of its JPEGs. Most of a packet equals the one before, so a piece stores its deflated form, and
+a packet is assembled from such forms and stored blocks:
 
     stored 42 number ["Bridge",{ | piece | stored , | piece | ... | stored }] | a last head
 
 Each piece ends on a whole byte and refers to nothing outside itself. A server that does not know
-the extension declines it, and gets the same packet as text.
+the extension declines it, and receives the same packet as text.
 """
 
 import struct
@@ -25,7 +25,7 @@ from websockets.sync.client import ClientConnection
 from websockets.typing import ExtensionParameter
 
 LEVEL = 1
-LONGEST_STORED = 65_535
+MAX_STORED_BYTES = 65_535
 _LAST_HEAD = b"\x00"
 
 
@@ -34,7 +34,7 @@ class Piece:
 
     Args:
         text: ASCII.
-        is_picture: Whether nothing in it comes again but runs of one sign: a quarter of the time.
+        is_picture: Whether only runs of one byte repeat in it: deflates in a quarter of the time.
     """
 
     __slots__ = ("_deflated", "_strategy", "text")
@@ -46,7 +46,7 @@ class Piece:
 
     @property
     def deflated(self) -> bytes:
-        """Whole deflate blocks, none of them the last; made when they are first asked for."""
+        """Whole deflate blocks, none of them final; created on first use."""
         if self._deflated is None:
             packer = zlib.compressobj(
                 LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS, strategy=self._strategy
@@ -57,17 +57,17 @@ class Piece:
 
 
 class Deflated(bytes):
-    """A message's payload that is deflated already, its last four bytes left out."""
+    """A payload that is deflated already, without its last four bytes."""
 
     __slots__ = ()
 
 
 class Packet:
-    """What a script is sent at once.
+    """One packet for a script.
 
     Args:
         event: Name of the Socket.IO event.
-        pieces: Keys and values of one JSON object, without what stands between them.
+        pieces: Keys and values of one JSON object, without separators.
     """
 
     def __init__(self, event: str, pieces: Sequence[Piece]) -> None:
@@ -75,15 +75,15 @@ class Packet:
         self._pieces = pieces
 
     def text(self, number: int | None) -> str:
-        """Return the frame as text; its handler's return is confirmed by this number, if any."""
-        told = ",".join(piece.text for piece in self._pieces)
-        return f"{self._head(number)}{told}}}]"
+        """Return the frame as text; `number` requests a confirmation, None does not."""
+        body = ",".join(piece.text for piece in self._pieces)
+        return f"{self._head(number)}{body}}}]"
 
     def deflated(self, number: int | None) -> Deflated:
         """Return the same, deflated."""
         comma = _stored(",")
-        told = comma.join(piece.deflated for piece in self._pieces)
-        return Deflated(_stored(self._head(number)) + told + _stored("}]") + _LAST_HEAD)
+        body = comma.join(piece.deflated for piece in self._pieces)
+        return Deflated(_stored(self._head(number)) + body + _stored("}]") + _LAST_HEAD)
 
     def _head(self, number: int | None) -> str:
         return f'42{"" if number is None else number}["{self._event}",{{'
@@ -92,21 +92,21 @@ class Packet:
 def _stored(text: str) -> bytes:
     """Return a short text as a deflate block that holds it as it is."""
     data = text.encode("ascii")
-    return struct.pack("<BHH", 0, len(data), len(data) ^ LONGEST_STORED) + data
+    return struct.pack("<BHH", 0, len(data), len(data) ^ MAX_STORED_BYTES) + data
 
 
 class Inflating(PerMessageDeflate):
-    """The extension as agreed on: ours go as they were made, the server's are inflated."""
+    """The negotiated extension: sends deflated payloads as they are, inflates the server's."""
 
     def encode(self, frame: Frame) -> Frame:
-        """Mark what is deflated; the rest goes as text."""
+        """Mark deflated payloads; the rest goes as text."""
         if isinstance(frame.data, Deflated):
             return Frame(frame.opcode, frame.data, frame.fin, rsv1=True)
         return frame
 
 
 class OfferToDeflate(ClientPerMessageDeflateFactory):
-    """Asks the server whether it inflates; a piece may refer back as far as deflate can."""
+    """Offers compression to the server; a piece may refer back as far as deflate can."""
 
     def __init__(self) -> None:
         super().__init__(client_max_window_bits=None)
@@ -114,10 +114,10 @@ class OfferToDeflate(ClientPerMessageDeflateFactory):
     def process_response_params(
         self, params: Sequence[ExtensionParameter], accepted_extensions: Sequence[Extension]
     ) -> Inflating:
-        """Return the extension as agreed on.
+        """Return the negotiated extension.
 
         Raises:
-            NegotiationError: if the server wants what was not offered.
+            NegotiationError: if the server requests what was not offered.
         """
         agreed = super().process_response_params(params, accepted_extensions)
         return Inflating(

@@ -2,19 +2,19 @@
 
     text of a frame         what it is                      python-socketio 4.x     5.x
     0{"sid": ...}           Engine.IO: welcome              server                  server
-    40                      Socket.IO: connected            server, unasked         asked by ours
+    40                      Socket.IO: connected            server, at once         on request
     42["Bridge", {...}]     an event                        both                    both
-    4217["Bridge", {...}]   one that wants to be confirmed  ours                    ours
+    4217["Bridge", {...}]   one to be confirmed             ours                    ours
     4317[...]               its handler has returned        server                  server
-    2, answered by 3        still there?                    client asks             server asks
-    41, 1                   leaves                          server                  server
+    2, answered by 3        ping                            client                  server
+    41, 1                   disconnects                     server                  server
     44...                   refuses                         server                  server
 
-A server that says nothing for a second, as the Devkit's C++ and MATLAB examples, knows events
-alone: it is sent bare ones, and no pings.
+A server that is silent for a second, as the Devkit's C++ and MATLAB examples are, supports only
+events: it receives bare ones, and no pings.
 
-`Dialogue` is the protocol without a socket or a clock; `ScriptSocket` is the thread that keeps it
-up with one script: whichever starts first, and however often the script ends and comes back.
+`Dialogue` is the protocol without a socket or a clock; `ScriptSocket` is the thread that maintains
+the connection to one script: whichever starts first, and however often the script restarts.
 """
 
 import contextlib
@@ -37,30 +37,30 @@ from vehicle_agent.devkit.pingpong import PingPong
 EVENT = "Bridge"
 PING_EVERY_NS = 20 * NS_PER_S
 PONG_WITHIN_NS = 20 * NS_PER_S
-ASK_AFTER_NS = 200 * NS_PER_MS
+CONNECT_AFTER_NS = 200 * NS_PER_MS
 JOIN_WITHIN_NS = 5 * NS_PER_S
-SILENT_NS = NS_PER_S
+SILENT_SERVER_NS = NS_PER_S
 ANSWER_WITHIN_NS = 30 * NS_PER_S
 RETRY_NS = NS_PER_S // 2
-LOOK_NS = 50 * NS_PER_MS
-MOST_DIGITS = 40
-LONGEST_SPAN_MS = 86_400_000
-MOST_BYTES = 2**20
-OPEN_S = 5.0
+POLL_NS = 50 * NS_PER_MS
+MAX_SHOWN_CHARS = 40
+MAX_PING_MS = 86_400_000
+MAX_MESSAGE_BYTES = 2**20
+OPEN_TIMEOUT_S = 5.0
 
 _log = logging.getLogger(__name__)
 
 
 class Dialogue:
-    """One connection's protocol; it begins when the WebSocket is open.
+    """The protocol of one connection; it begins when the WebSocket is open.
 
     Attributes:
         is_open: Whether events may be sent.
-        ended: Why it is over, in words; empty: it is not.
-        generation: Of the server's protocol: 3, 4, or 0 while that is not known.
-        unread: What it last said that could not be read, in words; empty: nothing.
-        is_bare: Whether it said nothing, so that it is told bare events.
-        eaten: Number of the newest packet whose handler has returned, as far as told; 0: none.
+        ended: Why it is over, in words; empty while it is not.
+        generation: Of the server's protocol: 3, 4, or 0 while not known.
+        unread: The last frame that could not be read, in words; empty if none.
+        is_bare: Whether the server was silent, so that it gets bare events.
+        handled: Number of the newest packet that was confirmed as handled; 0: none.
     """
 
     def __init__(self, now_ns: int) -> None:
@@ -68,31 +68,31 @@ class Dialogue:
         self.ended = ""
         self.generation = 0
         self.unread = ""
-        self.eaten = 0
+        self.handled = 0
         self._began_ns = now_ns
         self._welcome_ns: int | None = None
         self._out: list[str] = []
-        self._asked = False
+        self._connect_sent = False
         self._alarm_ns = now_ns + JOIN_WITHIN_NS
-        self._server_asks_ns = 0
+        self._ping_timeout_ns = 0
         self._waits_for_pong = False
 
     @property
     def due_ns(self) -> int:
-        """When `due` has something to do without hearing anything [ns]."""
+        """When `due` has something to do even if nothing is received [ns]."""
         if self._out:
             return self._began_ns
-        if self._welcome_ns is not None and not self.is_open and not self._asked:
-            return min(self._alarm_ns, self._welcome_ns + ASK_AFTER_NS)
+        if self._welcome_ns is not None and not self.is_open and not self._connect_sent:
+            return min(self._alarm_ns, self._welcome_ns + CONNECT_AFTER_NS)
         if self._welcome_ns is None and not self.is_open:
-            return min(self._alarm_ns, self._began_ns + SILENT_NS)
+            return min(self._alarm_ns, self._began_ns + SILENT_SERVER_NS)
         return self._alarm_ns
 
     def due(self, now_ns: int) -> list[str]:
         """Return the frames to send now."""
-        if not self.is_open and not self._asked and self._welcome_ns is not None:
-            if self.generation == 4 or now_ns - self._welcome_ns >= ASK_AFTER_NS:
-                self._asked, self.generation = True, 4
+        if not self.is_open and not self._connect_sent and self._welcome_ns is not None:
+            if self.generation == 4 or now_ns - self._welcome_ns >= CONNECT_AFTER_NS:
+                self._connect_sent, self.generation = True, 4
                 self._out.append("40")
         elif self._is_silent(now_ns):
             self.is_open = self.is_bare = True
@@ -104,14 +104,14 @@ class Dialogue:
 
     def _is_silent(self, now_ns: int) -> bool:
         unheard = self._welcome_ns is None and not self.is_open
-        return unheard and now_ns - self._began_ns >= SILENT_NS
+        return unheard and now_ns - self._began_ns >= SILENT_SERVER_NS
 
     def _ring(self, now_ns: int) -> None:
         if not self.is_open or self.is_bare:
             waited_s = seconds(now_ns - self._began_ns)
             self.ended = f"it is no socket.io server, or does not answer: waited {waited_s:.0f} s"
         elif self.generation == 4:
-            self.ended = "it has not asked whether we are still there"
+            self.ended = "it sends no pings"
         elif self._waits_for_pong:
             self.ended = "it does not answer our ping"
         else:
@@ -119,79 +119,79 @@ class Dialogue:
             self._waits_for_pong = True
             self._alarm_ns = now_ns + PONG_WITHIN_NS
 
-    def take(self, text: str, now_ns: int) -> list[Any]:
-        """Read a frame; return the payloads of the Bridge events in it. Nothing makes it raise."""
+    def feed(self, text: str, now_ns: int) -> list[Any]:
+        """Process a frame; return the payloads of its Bridge events. Never raises."""
         kind, rest = text[:1], text[1:]
         if kind == "4":
-            return self._take_message(rest, now_ns)
+            return self._on_message(rest, now_ns)
         if kind == "0":
             self._welcome(rest, now_ns)
         elif kind == "1":
             self.ended = "it closed the connection"
         elif kind == "2":
             self._out.append("3" + rest)
-            self._alarm_ns = now_ns + self._server_asks_ns
+            self._alarm_ns = now_ns + self._ping_timeout_ns
         elif kind == "3" and self._waits_for_pong:
             self._waits_for_pong = False
             self._alarm_ns = now_ns + PING_EVERY_NS
         return []
 
     def _welcome(self, text: str, now_ns: int) -> None:
-        if self.is_bare:  # it was only slow
+        if self.is_bare:  # the server was only slow
             self.is_open = self.is_bare = False
             self._alarm_ns = now_ns + JOIN_WITHIN_NS
         self._welcome_ns = now_ns
-        told = self._decoded(text, dict, "its welcome") or {}
-        self.generation = 4 if "maxPayload" in told else 0
-        spans = [told.get(key) for key in ("pingInterval", "pingTimeout")]
+        values = self._decoded(text, dict, "its welcome") or {}
+        self.generation = 4 if "maxPayload" in values else 0
+        spans = [values.get(key) for key in ("pingInterval", "pingTimeout")]
         spans_ms = [
-            min(span, LONGEST_SPAN_MS)
-            for span in spans
-            if isinstance(span, int | float) and span > 0
+            min(span, MAX_PING_MS) for span in spans if isinstance(span, int | float) and span > 0
         ]
-        self._server_asks_ns = round((sum(spans_ms) or 45_000) * NS_PER_MS)
+        self._ping_timeout_ns = round((sum(spans_ms) or 45_000) * NS_PER_MS)
 
-    def _take_message(self, text: str, now_ns: int) -> list[Any]:
+    def _on_message(self, text: str, now_ns: int) -> list[Any]:
         kind, rest = text[:1], text[1:]
         if kind == "0":
             self.is_open = True
             self.generation = self.generation or 3
-            every_ns = PING_EVERY_NS if self.generation == 3 else self._server_asks_ns
+            every_ns = PING_EVERY_NS if self.generation == 3 else self._ping_timeout_ns
             self._alarm_ns = now_ns + every_ns
         elif kind == "1":
             self.ended = "it disconnected us"
         elif kind == "4":
-            self.ended = f"it refused us: {rest[:100] or 'it does not say why'}"
+            self.ended = f"it refused us: {rest[:100] or 'no reason given'}"
         elif kind == "2":
             if self.is_bare:
                 self._alarm_ns = now_ns + ANSWER_WITHIN_NS
-            return self._take_event(rest.lstrip("0123456789"))
+            return self._on_event(rest.lstrip("0123456789"))
         elif kind == "3":
-            number = rest[:MOST_DIGITS].partition("[")[0]
-            self.eaten = int(number) if number.isascii() and number.isdecimal() else self.eaten
+            number = rest[:MAX_SHOWN_CHARS].partition("[")[0]
+            self.handled = int(number) if number.isascii() and number.isdecimal() else self.handled
         return []
 
-    def _take_event(self, text: str) -> list[Any]:
-        told = self._decoded(text, list, "an event")
-        if told is None:
+    def _on_event(self, text: str) -> list[Any]:
+        values = self._decoded(text, list, "an event")
+        if values is None:
             return []
-        if len(told) > 1 and told[0] == EVENT:
-            return [told[1]]
-        name = told[0][:MOST_DIGITS] if told and isinstance(told[0], str) else ""
-        self.unread = f"an event {name!r} with {len(told[1:])} values, expected {EVENT!r} with one"
+        if len(values) > 1 and values[0] == EVENT:
+            return [values[1]]
+        name = values[0][:MAX_SHOWN_CHARS] if values and isinstance(values[0], str) else ""
+        self.unread = (
+            f"an event {name!r} with {len(values[1:])} values, expected {EVENT!r} with one"
+        )
         return []
 
     def _decoded(self, text: str, wanted: type, what: str) -> Any:
-        """Return what JSON says if it is of the wanted type; else None, and say so."""
-        told = _decoded(text)
-        if isinstance(told, wanted):
-            return told
-        self.unread = f"{what} is no JSON {wanted.__name__}: {text[:MOST_DIGITS]!r}"
+        """Return decoded JSON of the wanted type; else None, and set `unread`."""
+        value = _decoded(text)
+        if isinstance(value, wanted):
+            return value
+        self.unread = f"{what} is no JSON {wanted.__name__}: {text[:MAX_SHOWN_CHARS]!r}"
         return None
 
 
 def _decoded(text: str) -> Any:
-    """Return what JSON says, NaN and Infinity allowed as Python writes them; None: it is none."""
+    """Return decoded JSON, with NaN and Infinity as Python writes them; None if it is invalid."""
     try:
         return msgspec.json.decode(text)
     except (msgspec.DecodeError, UnicodeError, RecursionError):
@@ -209,13 +209,13 @@ def _reason(cause: Exception) -> str:
 
 
 def _answer_at_once(held: socket.socket) -> None:
-    """Let TCP confirm without delay: until then a script's next small frame is held back."""
+    """Acknowledge TCP at once: delayed acknowledgements hold back a script's next small frame."""
     if hasattr(socket, "TCP_QUICKACK"):
         held.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
 
 
 class _Straight(reconnect):
-    """A connection to the address that was asked for and to no other."""
+    """A connection that follows no redirect."""
 
     def process_redirect(self, exc: Exception) -> Exception:
         """Refuse to follow."""
@@ -223,19 +223,19 @@ class _Straight(reconnect):
 
 
 class ScriptSocket:
-    """Keeps up the conversation with one script, on a thread of its own.
+    """Maintains the connection to one script, on a thread of its own.
 
     Args:
         address: Host and port of the script's server.
-        packet: Returns the newest telemetry; None: there is nothing to tell yet.
-        on_reply: Takes what the script said, and when.
+        packet: Returns the newest telemetry; None if there is none yet.
+        on_reply: Receives the script's reply, and when it came.
         clock: Of this process.
-        gap_ns: Least time between two packets; 0: as fast as the script answers.
+        gap_ns: Minimum time between two packets; 0: as fast as the script answers.
 
     Attributes:
-        pace: Of the conversation that runs, or of the last one.
-        is_open: Whether a script is there.
-        failure: What ended the thread: a fault of ours; None: nothing did.
+        pace: Of the present connection, or of the last one.
+        is_open: Whether a script is connected.
+        failure: The exception that ended the thread; None if none did.
     """
 
     def __init__(
@@ -254,18 +254,18 @@ class ScriptSocket:
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._live, name="devkit-script", daemon=True)
         self._open: socket.socket | None = None
-        self._said = ""
+        self._state = ""
         self._was_unread = False
         self.pace = PingPong(gap_ns)
         self.is_open = False
         self.failure: Exception | None = None
 
     def start(self) -> None:
-        """Begin to look for the script."""
+        """Start to connect to the script."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Leave the script; a send that hangs on a frozen one is cut off."""
+        """Disconnect; a send that blocks on a frozen script is cut off."""
         self._stop.set()
         held = self._open
         if held is not None:
@@ -275,8 +275,8 @@ class ScriptSocket:
 
     @property
     def detail(self) -> str:
-        """How it stands with the script, in words."""
-        return self._said
+        """State of the connection, in words."""
+        return self._state
 
     def _live(self) -> None:
         try:
@@ -291,8 +291,9 @@ class ScriptSocket:
             why = "it went away"
             try:
                 with _Straight(
-                    url, compression=None, extensions=[OfferToDeflate()], max_size=MOST_BYTES,
-                    ping_interval=None, proxy=None, open_timeout=OPEN_S, close_timeout=1.0,
+                    url, compression=None, extensions=[OfferToDeflate()], ping_interval=None,
+                    max_size=MAX_MESSAGE_BYTES, proxy=None, open_timeout=OPEN_TIMEOUT_S,
+                    close_timeout=1.0,
                 ) as connection:  # fmt: skip
                     self._open = connection.socket
                     why = self._talk(connection)
@@ -305,17 +306,17 @@ class ScriptSocket:
             self._open, self.is_open = None, False
             if self._stop.is_set():
                 return
-            self._say(f"no script at {host}:{port}: {why}; looks again every half second")
+            self._set_state(f"no script at {host}:{port}: {why}; retries every half second")
             self._clock.wait_until(self._clock.now_ns() + RETRY_NS, self._stop)
 
-    def _say(self, what: str) -> None:
-        if what != self._said:
-            self._said = what
+    def _set_state(self, what: str) -> None:
+        if what != self._state:
+            self._state = what
             level = logging.INFO if self.is_open else logging.WARNING
             event(_log, "devkit_script", level=level, state=repr(what))
 
     def _talk(self, connection: ClientConnection) -> str:
-        """Converse until it is over; return why it is."""
+        """Exchange frames until the connection is over; return why it is."""
         dialogue = Dialogue(self._clock.now_ns())
         self.pace, self._was_unread = PingPong(self._gap_ns), False
         while not self._stop.is_set() and not dialogue.ended:
@@ -331,15 +332,15 @@ class ScriptSocket:
             except TimeoutError:
                 continue
             if isinstance(got, str):
-                self._hear(dialogue, got)
+                self._receive(dialogue, got)
             else:
                 dialogue.unread = f"{len(got)} bytes that are no text"
-            self._tell_unread(dialogue)
+            self._log_unread(dialogue)
             _answer_at_once(connection.socket)
         return dialogue.ended
 
     def _push(self, connection: ClientConnection, is_bare: bool, now_ns: int) -> int:
-        """Send a packet if one is due; return when to look again [ns]."""
+        """Send a packet if one is due; return when to check again [ns]."""
         due_ns = self.pace.due_ns(now_ns)
         if due_ns > now_ns:
             return due_ns
@@ -349,7 +350,7 @@ class ScriptSocket:
             self.failure = cause
             raise
         if packet is None:
-            return now_ns + LOOK_NS
+            return now_ns + POLL_NS
         number = None if is_bare else self.pace.packets + 1
         if inflates(connection):
             connection.send(packet.deflated(number), text=True)
@@ -358,21 +359,21 @@ class ScriptSocket:
         self.pace.sent(now_ns)
         return self.pace.due_ns(now_ns)
 
-    def _hear(self, dialogue: Dialogue, text: str) -> None:
+    def _receive(self, dialogue: Dialogue, text: str) -> None:
         now_ns = self._clock.now_ns()
-        eaten = dialogue.eaten
-        for told in dialogue.take(text, now_ns):
+        handled = dialogue.handled
+        for payload in dialogue.feed(text, now_ns):
             self.pace.replied(now_ns)
-            self._on_reply(told, now_ns)
-        if dialogue.eaten != eaten:
-            self.pace.eaten(min(dialogue.eaten, self.pace.packets))
+            self._on_reply(payload, now_ns)
+        if dialogue.handled != handled:
+            self.pace.handled(min(dialogue.handled, self.pace.packets))
         if dialogue.is_open and not self.is_open:
             self.is_open = True
             host, port = self._address
             protocol = "events alone" if dialogue.is_bare else f"protocol {dialogue.generation}"
-            self._say(f"talks with the script at {host}:{port}, {protocol}")
+            self._set_state(f"talks with the script at {host}:{port}, {protocol}")
 
-    def _tell_unread(self, dialogue: Dialogue) -> None:
+    def _log_unread(self, dialogue: Dialogue) -> None:
         if dialogue.unread and not self._was_unread:
             self._was_unread = True
             event(_log, "devkit_unread", level=logging.WARNING, why=repr(dialogue.unread))

@@ -1,6 +1,6 @@
-"""What a script is told: every key of the simulator's packet, in every packet, as strings.
+"""A script's packet: every key of the simulator's, in every packet, as strings.
 
-    V1 Throttle                  what the motors are told, -1 to 1
+    V1 Throttle                  command to the motors, -1 to 1
     V1 Steering                  mean angle of the front wheels [rad], + = left
     V1 Speed                     along the car [m/s], + = forward
     V1 Encoder Ticks, Angles     "left right", counts and wheel angle [rad]
@@ -13,12 +13,12 @@
     V1 Front, Rear Camera Image  JPEG in base64; a black one where none comes
     TL1 State                    0 off, 1 red, 2 yellow, 3 green
 
-Of the simulator's versions 0.1 has keys without `V1` and tells of no lights; the newest packs the
+Of the simulator's versions 0.1 has keys without `V1` and no lights; the newest compresses the
 ranges: one a line, gzip, base64.
 
 Position is the rear axle's, not the roof's: in a log of the simulator the course fits a point
 0.002 m ahead of the axle, at the height of a wheel's radius; the roof's tag is 0.035 m ahead.
-Of everything the newest is held and nothing else; what has not changed is not written anew.
+Only the newest of each message is stored; unchanged pieces are not written again.
 """
 
 import base64
@@ -47,18 +47,18 @@ from vehicle_agent.devkit.engineio import EVENT
 
 INTENSITY = 47.0
 Version = Literal["0.1", "0.3", "newest"]
-"""Of which version of the simulator."""
+"""Version of the simulator."""
 
 FLASH_NS = 500 * NS_PER_MS
 CAMERAS = {"front": "Front Camera Image", "rear": "Rear Camera Image"}
-_DARK_PX = (1280, 720)
-_SHINE = f"{INTENSITY:.4f}"
+_BLACK_PX = (1280, 720)
+_INTENSITY_TEXT = f"{INTENSITY:.4f}"
 _COLOURS = {"red": 1, "yellow": 2, "green": 3, "dark": 0}
 
 
 @dataclass(slots=True)
-class _Kept:
-    """The newest message of a kind, and what it made of the packet."""
+class _Cached:
+    """The newest message of a kind, and its piece of the packet."""
 
     message: Message | None = None
     written: Message | None = None
@@ -83,23 +83,23 @@ class CarTelemetry:
         view_rad = _number(car, "lidar.field_of_view_rad", math.tau)
         beams = round(_number(car, "lidar.beams", BEAMS))
         self._nothing = ["inf"] * (beams if _is_part(view_rad, beams) else BEAMS)
-        self._own, self._scan = _Kept(), _Kept()
-        self._cameras = {camera: _Kept() for camera in CAMERAS}
+        self._own, self._scan = _Cached(), _Cached()
+        self._cameras = {camera: _Cached() for camera in CAMERAS}
         self._state: VehicleState | None = None
         self._sensors: VehicleSensors | None = None
 
     def forget_views(self) -> None:
-        """Forget the scan and the pictures: nothing keeps them new from now on."""
-        self._scan = _Kept()
-        self._cameras = {camera: _Kept() for camera in CAMERAS}
+        """Discard the scan and the pictures: they are no longer updated."""
+        self._scan = _Cached()
+        self._cameras = {camera: _Cached() for camera in CAMERAS}
 
     def unpictured(self, cameras: Sequence[str]) -> list[str]:
         """Return those of some cameras that the car has and that sent no picture yet."""
         own = (camera for camera in self._fitted if camera in cameras)
         return [camera for camera in own if self._cameras[camera].message is None]
 
-    def hear(self, message: Message) -> None:
-        """Take what the city says of the car; from any one thread."""
+    def update(self, message: Message) -> None:
+        """Store a message about the car; from any one thread."""
         if isinstance(message, VehicleState):
             self._state = self._own.message = message
         elif isinstance(message, VehicleSensors):
@@ -115,23 +115,23 @@ class CarTelemetry:
         own, scan = self._own, self._scan
         newest = own.message
         if state is not None and newest is not own.written:
-            own.piece, own.written = self._tell_own(state, sensors), newest
+            own.piece, own.written = self._own_piece(state, sensors), newest
         newest = scan.message
         if not scan.piece.text or newest is not scan.written:
-            scan.piece, scan.written = self._tell_scan(newest), newest
+            scan.piece, scan.written = self._scan_piece(newest), newest
         out = [own.piece, scan.piece]
-        for camera, kept in self._cameras.items():
-            newest = kept.message
-            if not kept.piece.text or newest is not kept.written:
-                kept.piece, kept.written = self._tell_picture(camera, newest), newest
-            out.append(kept.piece)
+        for camera, cached in self._cameras.items():
+            newest = cached.message
+            if not cached.piece.text or newest is not cached.written:
+                cached.piece, cached.written = self._picture_piece(camera, newest), newest
+            out.append(cached.piece)
         return out
 
-    def _pairs(self, told: Mapping[str, str], is_picture: bool = False) -> Piece:
-        pairs = (f'"{self._prefix}{key}":"{value}"' for key, value in told.items())
+    def _pairs(self, values: Mapping[str, str], is_picture: bool = False) -> Piece:
+        pairs = (f'"{self._prefix}{key}":"{value}"' for key, value in values.items())
         return Piece(",".join(pairs), is_picture)
 
-    def _tell_own(self, state: VehicleState, sensors: VehicleSensors | None) -> Piece:
+    def _own_piece(self, state: VehicleState, sensors: VehicleSensors | None) -> Piece:
         throttle, steering, ticks = state.throttle, state.steering_rad, (0, 0)
         rpy, rates, accel = (0.0, 0.0, state.yaw_rad), (0.0, 0.0, state.yaw_rate_radps), None
         if sensors is not None:
@@ -155,23 +155,23 @@ class CarTelemetry:
             }
         )
 
-    def _tell_scan(self, scan: Message | None) -> Piece:
-        listed = _listed(scan) if isinstance(scan, LidarScan) else self._nothing
-        ranges = " ".join(listed)
+    def _scan_piece(self, scan: Message | None) -> Piece:
+        texts = _range_texts(scan) if isinstance(scan, LidarScan) else self._nothing
+        ranges = " ".join(texts)
         return self._pairs(
             {
                 "LIDAR Scan Rate": _text(self._rate_hz),
-                "LIDAR Range Array": packed(ranges) if self._is_packed else ranges,
-                "LIDAR Intensity Array": " ".join([_SHINE] * len(listed)),
+                "LIDAR Range Array": gzipped(ranges) if self._is_packed else ranges,
+                "LIDAR Intensity Array": " ".join([_INTENSITY_TEXT] * len(texts)),
             }
         )
 
-    def _tell_picture(self, camera: str, frame: Message | None) -> Piece:
+    def _picture_piece(self, camera: str, frame: Message | None) -> Piece:
         if isinstance(frame, CameraFrame):
             jpeg = frame.payload
         else:
             has = self._car.has("camera.resolution_px")
-            size = self._car.vector("camera.resolution_px") if has else _DARK_PX
+            size = self._car.vector("camera.resolution_px") if has else _BLACK_PX
             jpeg = black_jpeg(round(size[0]), round(size[1]))
         return self._pairs({CAMERAS[camera]: base64.b64encode(jpeg).decode()}, is_picture=True)
 
@@ -181,7 +181,7 @@ class Telemetry:
 
     Args:
         names: Of the vehicles, in the order of V1, V2...
-        version: Which version of it.
+        version: Of the packet.
     """
 
     def __init__(self, names: Sequence[str], version: Version = "0.3") -> None:
@@ -193,34 +193,34 @@ class Telemetry:
         self._lights = Piece()
 
     def knows(self, vehicle: str, car_file: str) -> bool:
-        """Return whether a car is welcome already, as one of this file."""
+        """Return whether a car was added already, with this car file."""
         return self._files.get(vehicle) == car_file
 
-    def welcome(self, vehicle: str, car_file: str, car: Car) -> None:
-        """Learn what a car is; what it tells of itself follows."""
+    def add_car(self, vehicle: str, car_file: str, car: Car) -> None:
+        """Add a car; its messages follow."""
         self._files[vehicle] = car_file
         prefix = "" if self._version == "0.1" else f"V{self._names.index(vehicle) + 1} "
         is_packed = self._version == "newest"
         self._cars[vehicle] = CarTelemetry(prefix, car, is_packed=is_packed)
 
     def show_lights(self, heads: Sequence[tuple[str, str]]) -> None:
-        """Tell of these lights, by junction and group, as TL1, TL2..."""
+        """Set the lights, by junction and group, as TL1, TL2..."""
         self._heads = tuple(heads)
 
     def forget_views(self) -> None:
-        """Forget the scans and the pictures of all cars."""
+        """Discard the scans and the pictures of all cars."""
         for car in self._cars.values():
             car.forget_views()
 
-    def hear(self, message: Message) -> None:
-        """Take what the city says; what concerns nobody here is ignored."""
+    def update(self, message: Message) -> None:
+        """Store a message of the city; unrelated ones are ignored."""
         if isinstance(message, Spat):
             if any(junction == message.junction for junction, _ in self._heads or ()):
                 self._spats[message.junction] = message
             return
         car = self._cars.get(str(getattr(message, "vehicle", "")))
         if car is not None:
-            car.hear(message)
+            car.update(message)
 
     def unpictured(self, cameras: Sequence[str]) -> list[str]:
         """Return "n1 front" and so on: those of some cameras that sent no picture yet."""
@@ -233,7 +233,7 @@ class Telemetry:
 
     @property
     def unknown(self) -> list[str]:
-        """The cars that are not welcome yet."""
+        """The cars that were not added yet."""
         return [name for name in self._names if name not in self._cars]
 
     def packet(self) -> Packet | None:
@@ -242,11 +242,11 @@ class Telemetry:
             return None
         pieces = [piece for name in self._names for piece in self._cars[name].pieces()]
         if self._heads and self._version != "0.1":
-            pieces.append(self._tell_lights(self._heads))
+            pieces.append(self._lights_piece(self._heads))
         return Packet(EVENT, pieces)
 
-    def _tell_lights(self, heads: Sequence[tuple[str, str]]) -> Piece:
-        """Return what the lights show; the piece is the one before while they show the same."""
+    def _lights_piece(self, heads: Sequence[tuple[str, str]]) -> Piece:
+        """Return the lights' piece; it is reused while they show the same."""
         shown = enumerate((self._shown(*head) for head in heads), 1)
         text = ",".join(f'"TL{number} State":"{colour}"' for number, colour in shown)
         if text != self._lights.text:
@@ -268,7 +268,7 @@ def _number(car: Car, key: str, otherwise: float) -> float:
 
 
 def _text(*numbers: float) -> str:
-    """Return numbers with four decimals, apart by spaces; what is no number is 0."""
+    """Return numbers with four decimals, separated by spaces; NaN as 0."""
     return " ".join(f"{number if math.isfinite(number) else 0.0:.4f}" for number in numbers)
 
 
@@ -277,8 +277,8 @@ def _is_part(view_rad: float, beams: int) -> bool:
     return beams > 0 and view_rad + view_rad / beams < math.tau
 
 
-def _listed(scan: LidarScan) -> list[str]:
-    """Return the ranges as words; "inf" is none."""
+def _range_texts(scan: LidarScan) -> list[str]:
+    """Return the ranges as text; "inf" is none."""
     step_rad = scan.bearing_step_rad
     if step_rad is not None and _is_part(abs(step_rad) * (scan.beams - 1), scan.beams):
         payload = scan.payload[: len(scan.payload) // 4 * 4]
@@ -288,8 +288,8 @@ def _listed(scan: LidarScan) -> list[str]:
     return [f"{one:.4f}" if math.isfinite(one) else "inf" for one in ranges.tolist()]
 
 
-def packed(ranges: str) -> str:
-    """Return ranges as the newest simulator packs them."""
+def gzipped(ranges: str) -> str:
+    """Return ranges as the newest simulator compresses them."""
     lines = ranges.replace(" ", "\n").encode()
     return base64.b64encode(gzip.compress(lines, compresslevel=1, mtime=0)).decode()
 
@@ -307,10 +307,10 @@ def quaternion(rpy: tuple[float, float, float]) -> tuple[float, float, float, fl
 
 @lru_cache(maxsize=8)
 def black_jpeg(width_px: int, height_px: int) -> bytes:
-    """Return a black colour picture as a JPEG: of full size, for scripts that cut out a part.
+    """Return a black colour picture as a full-size JPEG, for scripts that crop it.
 
-    Progressive and with codes of its own it takes 6 kB instead of 15: a script's server unmasks
-    byte by byte.
+    Progressive and with optimised codes it has 6 kB instead of 15: a script's server unmasks each
+    byte in Python.
     """
     black = np.zeros((height_px, width_px, 3), np.uint8)
     small = [cv2.IMWRITE_JPEG_PROGRESSIVE, 1, cv2.IMWRITE_JPEG_OPTIMIZE, 1]

@@ -1,6 +1,6 @@
-"""Numbers as C has them on an 8-bit AVR: float of 32 bits, int of 16.
+"""C number types of an 8-bit AVR: float with 32 bits, int with 16.
 
-What C leaves open is as avr-libc does it, compared with its code run on a simulated ATmega328P.
+Where C leaves behaviour undefined it follows avr-libc, compared on a simulated ATmega328P.
 """
 
 import math
@@ -10,7 +10,7 @@ FLOAT_TO_LONG = 2.0**31
 
 
 def float32(value: float) -> float:
-    """Round to 32 bits; beyond them lies infinity."""
+    """Round to 32 bits; overflow gives infinity."""
     try:
         rounded: float = struct.unpack("<f", struct.pack("<f", value))[0]
     except OverflowError:
@@ -24,7 +24,7 @@ def int16(value: int) -> int:
 
 
 def int_of(value: float) -> int:
-    """Convert to int: cut off the fraction, keep 16 bits; 0 for what fills no long, and for NaN."""
+    """Convert to int: truncate, keep 16 bits; 0 for NaN and for values beyond a long."""
     if not abs(value) < FLOAT_TO_LONG:
         return 0
     return int16(int(value))

@@ -1,4 +1,4 @@
-"""What goes wrong on a cheap cable and a tired battery: by a plan, or at random by a seed.
+"""Faults of a cheap cable and a weak battery: planned, or random from a seed.
 
 noise=HZ  flip=P  lose=P  cut=P         random bytes per second; per byte; per burst
 reset=HZ  brownout=HZ  unplug=HZ        on average so often
@@ -22,11 +22,11 @@ UNPLUGGED_S = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One thing that happens to the whole device.
+    """A fault of the whole device.
 
     Attributes:
         at_s: After the start.
-        for_s: How long the cable is out, for `unplug`.
+        for_s: How long the cable is unplugged, for `unplug`.
     """
 
     at_s: float
@@ -48,10 +48,10 @@ class Faults:
 
 
 def read_faults(texts: Sequence[str]) -> Faults:
-    """Read a plan as the command line has it.
+    """Parse the plan of the command line.
 
     Raises:
-        RunError: naming the word that is none.
+        RunError: naming the invalid word.
     """
     rates, events = dict[str, float](), list[Event]()
     for text in texts:
@@ -87,8 +87,8 @@ def _refuse(text: str) -> None:
     raise RunError(msg)
 
 
-class Spoiler:
-    """A plan of faults, carried out.
+class FaultInjector:
+    """Injects the faults of a plan.
 
     Args:
         faults: The plan.
@@ -104,7 +104,7 @@ class Spoiler:
         self._next_s = {kind: self._wait(kind) for kind in PER_SECOND if self._rate(kind)}
 
     def due(self, now_ns: int) -> tuple[list[Event], bytes]:
-        """Return what happens to the device now, and the noise on the line since the last time."""
+        """Return the device faults due now, and the noise on the line since the last call."""
         now_s = seconds(now_ns - self._start_ns)
         happens, noise = list[Event](), bytearray()
         while self._planned and self._planned[0].at_s <= now_s:
@@ -118,8 +118,8 @@ class Spoiler:
                 self._next_s[kind] += self._wait(kind)
         return happens, bytes(noise)
 
-    def spoil(self, data: bytes) -> bytes:
-        """Return what arrives of a burst of bytes."""
+    def corrupt(self, data: bytes) -> bytes:
+        """Return a burst of bytes as it arrives."""
         if not data or not self._rates:
             return data
         if self._happens("cut"):
@@ -142,5 +142,5 @@ class Spoiler:
 
 
 def lasts_ns(event: Event) -> int:
-    """Return how long the cable is out [ns]."""
+    """Return how long the cable is unplugged [ns]."""
     return nanoseconds(event.for_s)

@@ -1,10 +1,10 @@
-"""The device: the published firmware on its Arduino, byte for byte and millisecond for millisecond.
+"""The published firmware on its Arduino, exact to the byte and the millisecond.
 
 No thread, no clock, no port: bytes and the present time in, bytes and the states of the pins out.
 
-    no power, or in the bootloader (2 s after each reset): pins at rest, deaf
+    no power, or in the bootloader (2 s after each reset): pins at rest, input ignored
     -- boots -->  servo straight, motor neither driven nor braked
-    -- a message -->  as it says, until the next one, for ever
+    -- a message -->  obeys it until the next one, for ever
 """
 
 from scm.clock import NS_PER_MS, NS_PER_S
@@ -13,10 +13,10 @@ from vehicle_agent.emulate.sketches import Outputs, Sketch
 from vehicle_agent.emulate.uart import Uart
 
 BOOT_NS = 2 * NS_PER_S
-"""For which the bootloader waits for a new sketch."""
-MOST_PAST = 1000
+"""How long the bootloader waits for a new sketch."""
+MAX_PAST = 1000
 LOOP_NS = NS_PER_MS
-"""The sketch's `delay(1)`; what it does between takes some ten microseconds."""
+"""The sketch's `delay(1)`; the rest of a loop takes some ten microseconds."""
 
 
 class Firmware:
@@ -24,8 +24,8 @@ class Firmware:
 
     Attributes:
         outputs: The pins now.
-        resets: How often it began anew since it was switched on.
-        past: Pins that commands have ended, and when [ns], oldest first; who has read them forgets.
+        resets: Number of resets since it was switched on.
+        past: Earlier pin states and when they ended [ns], oldest first; the reader clears it.
     """
 
     def __init__(self, sketch: Sketch, now_ns: int = 0) -> None:
@@ -37,7 +37,7 @@ class Firmware:
 
     @property
     def configured(self) -> bool:
-        """Whether the device believes that a host is there; it obeys either way."""
+        """Whether the device considers a host connected; it obeys either way."""
         return self._node.configured
 
     @property
@@ -47,20 +47,20 @@ class Firmware:
 
     @property
     def is_lost(self) -> bool:
-        """Whether it runs no code of its own any more, until the next reset; pins stay."""
-        return self._node.lost_itself
+        """Whether the sketch has crashed, until the next reset; pins stay."""
+        return self._node.has_crashed
 
     @property
     def lost_bytes(self) -> int:
-        """How many bytes it had no room for."""
+        """Number of bytes lost for lack of room."""
         return self._uart.lost
 
     def backlog_ns(self, now_ns: int) -> int:
-        """Return for how long the line is taken by what the host sent already."""
+        """Return how long the line is occupied by bytes that the host sent already."""
         return self._uart.backlog_ns(now_ns)
 
     def reset(self, now_ns: int) -> None:
-        """Begin anew: when a host opens the port (DTR), when the power comes back."""
+        """Reset: when a host opens the port (DTR), or the power returns."""
         self.resets += 1
         self.outputs = Outputs()
         self._runs = False
@@ -71,11 +71,11 @@ class Firmware:
         )
 
     def step(self, now_ns: int, data: bytes = b"") -> bytes:
-        """Bring the device up to now; return what has come out of it since the last time.
+        """Advance the device to now; return its output since the last call.
 
         Args:
             now_ns: The present time [ns].
-            data: What the host sends from now on, at the line's pace.
+            data: Bytes that the host sends from now on, at the line's rate.
         """
         while self._next_ns <= now_ns:
             self._loop()
@@ -100,4 +100,4 @@ class Firmware:
         respond = (self.sketch.steer, self.sketch.drive)[place]
         before, self.outputs = self.outputs, respond(self.outputs, data)
         if self.outputs != before:
-            self.past = [*self.past[-MOST_PAST:], (self._next_ns, before)]
+            self.past = [*self.past[-MAX_PAST:], (self._next_ns, before)]

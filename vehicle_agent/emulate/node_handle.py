@@ -1,7 +1,7 @@
-"""rosserial as the Arduino library does it: a parser of one byte at a time, and the handshake.
+"""rosserial as in the Arduino library: a parser of one byte at a time, and the handshake.
 
-Unlike a host's, it never looks back: of `FF FF FE ...` the second FF ends the first frame's hope
-and the frame behind it is lost, and a frame that fails a check takes all its bytes with it.
+Unlike a host's, it never looks back: in `FF FF FE ...` the second FF discards the first frame and
+the frame behind it is lost, and a frame that fails a check discards all its bytes.
 Source of the rules: ros-drivers/rosserial, noetic-devel, `node_handle.h`.
 """
 
@@ -25,12 +25,12 @@ from vehicle_agent.nigel.rosserial import (
 
 FIRST_TOPIC = 100
 FRAME_MS = 20
-ASK_TIME_MS = 2500
+TIME_REQUEST_MS = 2500
 FORGET_MS = 11000
 LAST_EMPTY = 126
-"""The last topic without a subscriber that is looked up where zeros lie: behind 25 subscribers
-come the parser's state and its count, both 0 when a frame is complete, and then its topic."""
-ASK_TIME = pack(Frame(TIME, bytes(8)))
+"""Up to this topic the library's lookup reads zeros: behind 25 subscribers lie the parser's state
+and its count, both 0 when a frame is complete, and then its topic."""
+TIME_REQUEST = pack(Frame(TIME, bytes(8)))
 
 FIRST_FF, VERSION, SIZE_L, SIZE_H, SIZE_CHECK, TOPIC_L, TOPIC_H, MESSAGE, CHECK = range(9)
 
@@ -41,14 +41,14 @@ class NodeHandle:
     Args:
         names: Of the subscribers, in the order in which the sketch subscribes.
         buffer: Of a message [bytes].
-        on_message: Is given a subscriber's place and its Float32; called whether a host is there
+        on_message: Called with a subscriber's index and its Float32, whether a host is connected
             or not.
         write: Sends bytes.
 
     Attributes:
-        configured: Whether a host has asked for the topics and still gives the time.
-        lost_itself: Whether it called a subscriber that was none, at an address made of its own
-            variables. Nobody can say what the real one does from there on.
+        configured: Whether a host has requested the topics and still sends the time.
+        has_crashed: Whether it called a subscriber that does not exist, at an address made of its
+            own variables. The behaviour from there on is undefined.
     """
 
     def __init__(
@@ -63,32 +63,32 @@ class NodeHandle:
             for at, name in enumerate(names)
         ]
         self._on_message, self._write = on_message, write
-        self.configured = self.lost_itself = False
+        self.configured = self.has_crashed = False
         self._message = bytearray(buffer)
         self._mode = FIRST_FF
         self._left = self._topic = self._index = self._sum = 0
-        self._synced_ms = self._asked_ms = self._until_ms = 0
+        self._synced_ms = self._time_requested_ms = self._until_ms = 0
 
     def spin(self, now_ms: int, read: Callable[[], int]) -> None:
-        """Read what there is, and see to the time: `spinOnce`.
+        """Read available bytes, and request the time when due: `spinOnce`.
 
         Args:
-            now_ms: Since the reset.
-            read: Gives the next byte, or -1.
+            now_ms: Time since the reset.
+            read: Returns the next byte, or -1.
         """
         if now_ms - self._synced_ms > FORGET_MS:
             self.configured = False
         if self._mode != FIRST_FF and now_ms > self._until_ms:
             self._mode = FIRST_FF
         while (byte := read()) != NOTHING:
-            if self._take(byte, now_ms) and self._dispatch(now_ms):
+            if self._parse(byte, now_ms) and self._dispatch(now_ms):
                 return
-        if self.configured and now_ms - self._asked_ms > ASK_TIME_MS:
-            self._write(ASK_TIME)
-            self._asked_ms = now_ms
+        if self.configured and now_ms - self._time_requested_ms > TIME_REQUEST_MS:
+            self._write(TIME_REQUEST)
+            self._time_requested_ms = now_ms
 
-    def _take(self, byte: int, now_ms: int) -> bool:
-        """Take one byte; return whether it completes a frame."""
+    def _parse(self, byte: int, now_ms: int) -> bool:
+        """Process one byte; return whether it completes a frame."""
         self._sum = int16(self._sum + byte)
         if self._mode == MESSAGE:
             self._store(byte)
@@ -98,12 +98,12 @@ class NodeHandle:
         elif self._mode == VERSION:
             self._check_version(byte)
         elif self._mode in (SIZE_L, SIZE_H, SIZE_CHECK):
-            self._take_size(byte)
+            self._parse_size(byte)
         elif self._mode == CHECK:
             self._mode = FIRST_FF
             return self._is_sum_right()
         else:
-            self._take_topic(byte)
+            self._parse_topic(byte)
         return False
 
     def _check_version(self, byte: int) -> None:
@@ -112,9 +112,9 @@ class NodeHandle:
             return
         self._mode = FIRST_FF
         if not self.configured:
-            self._write(ASK_TIME)
+            self._write(TIME_REQUEST)
 
-    def _take_size(self, byte: int) -> None:
+    def _parse_size(self, byte: int) -> None:
         if self._mode == SIZE_L:
             self._left, self._index, self._sum, self._mode = byte, 0, byte, SIZE_H
         elif self._mode == SIZE_H:
@@ -122,7 +122,7 @@ class NodeHandle:
         else:
             self._mode = TOPIC_L if self._is_sum_right() else FIRST_FF
 
-    def _take_topic(self, byte: int) -> None:
+    def _parse_topic(self, byte: int) -> None:
         if self._mode == TOPIC_L:
             self._topic, self._sum, self._mode = byte, byte, TOPIC_H
         else:
@@ -130,7 +130,7 @@ class NodeHandle:
             self._mode = MESSAGE if self._left else CHECK
 
     def _store(self, byte: int) -> None:
-        """Keep a byte; 20 ms are over long before the buffer's end, at any speed it runs at."""
+        """Store a byte; a frame times out after 20 ms, long before the buffer is full."""
         self._message[self._index] = byte
         self._index += 1
         self._left -= 1
@@ -141,7 +141,7 @@ class NodeHandle:
         return self._sum >= 0 and self._sum % 256 == 255  # C's % of a negative sum is never 255
 
     def _dispatch(self, now_ms: int) -> bool:
-        """Act on a frame; return whether `spinOnce` ends here, whatever else has come."""
+        """Process a frame; return whether `spinOnce` returns here, whatever else was received."""
         place = self._topic - FIRST_TOPIC
         if self._topic == PUBLISHER_INFO:
             self._negotiate(now_ms)
@@ -153,13 +153,13 @@ class NodeHandle:
         elif 0 <= place < len(self._infos):
             self._on_message(place, struct.unpack_from("<f", self._message)[0])
         elif not 0 < self._topic <= LAST_EMPTY:
-            self.lost_itself = True
+            self.has_crashed = True
             return True
         return False
 
     def _negotiate(self, now_ms: int) -> None:
-        self._write(ASK_TIME)
+        self._write(TIME_REQUEST)
         for info in self._infos:
             self._write(pack(Frame(SUBSCRIBER_INFO, pack_topic_info(info))))
         self.configured = True
-        self._synced_ms = self._asked_ms = now_ms
+        self._synced_ms = self._time_requested_ms = now_ms

@@ -1,6 +1,6 @@
-"""The emulated car on the city's bus: it learns the floor, and tells the emulated camera the truth.
+"""The emulated car on the city's bus: it receives the floor and publishes its true pose.
 
-Its board hears the serial line only. Nothing that goes over the bus can move it.
+Its board is connected to the serial line only. Nothing on the bus can move it.
 """
 
 import logging
@@ -23,9 +23,9 @@ from vehicle_agent.emulate.device import Device
 from vehicle_agent.emulate.wheels import Wheels
 
 STEP_NS = 5 * NS_PER_MS
-TELL_NS = 20 * NS_PER_MS
-LOOK_NS = 300 * NS_PER_MS
-"""For so long it looks where others stand: each tells it several times meanwhile."""
+PUBLISH_NS = 20 * NS_PER_MS
+SEARCH_NS = 300 * NS_PER_MS
+"""How long it collects the poses of other cars: each is published several times meanwhile."""
 
 _log = logging.getLogger(__name__)
 
@@ -36,16 +36,16 @@ def station_of(vehicle: str) -> str:
 
 
 def place_of(city_map: CityMap, spawn: str) -> Pose2:
-    """Return where the car is put down: at a spawn place or `X,Y,DEG`, else at the map's first.
+    """Return where the car starts: at a spawn place or `X,Y,DEG`, else at the map's first.
 
     Raises:
-        MapError: when the map has none of that name, or the coordinates lie off its floor.
+        MapError: when the map has no such place, or the coordinates lie off its floor.
     """
     return Roads(city_map).spawn_pose(spawn or city_map.spawns[0].name)
 
 
 def free_place(city_map: CityMap, others: Iterable[SnapshotVehicle | EmulatedPose]) -> Pose2 | None:
-    """Return the first spawn place where no car stands or soon may; None: there is none."""
+    """Return the first spawn place that is free and stays free; None if there is none."""
     cars = [(car.x_m, car.y_m, car.yaw_rad, car.speed_mps) for car in others]
     x, y, yaw, speed = np.array(cars, dtype=float).reshape(-1, 4).T
     roads = Roads(city_map)
@@ -64,15 +64,15 @@ class EmulatorPart(BasePart):
         self, vehicle: str, device: Device, wheels: Wheels, spawn: str = "", car: str = "nigel",
         tag_id: int | None = None,
     ) -> None:  # fmt: skip
-        """Prepare the car; it is put down when the city's map is known.
+        """Prepare the car; it is placed when the city's map is known.
 
         Args:
-            vehicle: Whose car this is.
+            vehicle: Name of the car.
             device: Its board and cable.
-            wheels: What the board moves.
-            spawn: Spawn place or `X,Y,DEG`; empty: the first at which no other car stands.
+            wheels: The car that the board moves.
+            spawn: Spawn place or `X,Y,DEG`; empty: the first free one.
             car: Car file's name.
-            tag_id: Printed on its roof; None: the one that the city gives to the vehicle.
+            tag_id: Of the tag on its roof; None: as the city assigns it.
         """
         self.name = station_of(vehicle)
         self._vehicle, self._device, self._wheels = vehicle, device, wheels
@@ -84,12 +84,12 @@ class EmulatorPart(BasePart):
         self._defined_ns: int | None = None
         self._snapshot: WorldSnapshot | None = None
         self._emulated: dict[str, EmulatedPose] = {}
-        self._looks_since_ns: int | None = None
+        self._search_since_ns: int | None = None
         self._is_full = self._is_placed = False
-        self._told_ns = 0
+        self._published_ns = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Let the board run, the car roll; tell where it is, 50 times a second."""
+        """Run the board and move the car; publish its pose 50 times a second."""
         for item in inbox:
             if isinstance(item.message, WorldDefinition):
                 self._learn(item.message)
@@ -102,26 +102,26 @@ class EmulatorPart(BasePart):
             self._put_down(now_ns)
             return []
         self._wheels.follow(self._device.firmware, now_ns)
-        if now_ns - self._told_ns < TELL_NS - STEP_NS // 2:
+        if now_ns - self._published_ns < PUBLISH_NS - STEP_NS // 2:
             return []
-        self._told_ns = now_ns
+        self._published_ns = now_ns
         return [self._pose(now_ns)]
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Take the cable away."""
+        """Remove the cable."""
         del now_ns
         self._device.close()
         return []
 
     def _learn(self, world: WorldDefinition) -> None:
-        """Know the floor; a city that begins anew does not carry the car away."""
+        """Receive the floor; a restarted city does not move the car."""
         if world.t_ns == self._defined_ns:
             return
         self._defined_ns, self._map = world.t_ns, world.map
         self._wheels.learn(world.map, world.seed)
 
     def _put_down(self, now_ns: int) -> None:
-        """Put the car at its place, or look for a free one until there is one."""
+        """Put the car at its place, or search for a free one."""
         if self._map is None:
             return
         pose = place_of(self._map, self._spawn) if self._spawn else self._found(self._map, now_ns)
@@ -134,9 +134,9 @@ class EmulatorPart(BasePart):
     def _found(self, city_map: CityMap, now_ns: int) -> Pose2 | None:
         if self._snapshot is None:
             return None
-        if self._looks_since_ns is None:
-            self._looks_since_ns = now_ns
-        if now_ns - self._looks_since_ns < LOOK_NS:
+        if self._search_since_ns is None:
+            self._search_since_ns = now_ns
+        if now_ns - self._search_since_ns < SEARCH_NS:
             return None
         seen = {car.vehicle: car for car in self._snapshot.vehicles} | self._emulated
         seen.pop(self._vehicle, None)

@@ -1,4 +1,4 @@
-"""The cable: a pseudo-terminal behind a path that stays the same, as `/dev/ttyUSB0` would."""
+"""The cable: a pseudo-terminal behind a constant path, like `/dev/ttyUSB0`."""
 
 import errno
 import fcntl
@@ -13,19 +13,19 @@ from scm.errors import LinkError
 AT_ONCE = 4096
 TCGETS2 = 0x802C542A
 TERMIOS2 = struct.Struct("=4IB19s2I")
-"""Linux's ioctl that tells speeds which have no name in termios, and what it fills in."""
+"""Linux's ioctl for speeds without a name in termios, and its data structure."""
 
 
 class Cable:
     """A pseudo-terminal and the link to it.
 
-    The far end is only open while a host has it open, so that one sees it come and go.
+    The far end is only open while a host has it open, so that connections are detected.
 
     Args:
-        link: Path for hosts. A link that is left over there is replaced.
+        link: Path for hosts. An existing link is replaced.
 
     Raises:
-        LinkError: when the path is taken by something else, or cannot be written.
+        LinkError: when the path exists as something else, or cannot be written.
     """
 
     def __init__(self, link: Path) -> None:
@@ -40,7 +40,7 @@ class Cable:
 
     @property
     def is_plugged(self) -> bool:
-        """Whether the path leads anywhere."""
+        """Whether the cable is plugged in."""
         return self._master is not None
 
     @property
@@ -60,7 +60,7 @@ class Cable:
         return speed
 
     def plug(self) -> None:
-        """Make a new pseudo-terminal, and let the path lead to it."""
+        """Create a new pseudo-terminal and link the path to it."""
         if self._master is not None:
             return
         self._master, far = os.openpty()
@@ -78,7 +78,7 @@ class Cable:
             raise LinkError(msg) from cause
 
     def pull(self) -> None:
-        """Take it away: a host that has it open gets an error, and the path is gone."""
+        """Unplug: a host that has it open gets an error, and the path is removed."""
         if self._master is None:
             return
         if self.link.is_symlink() and str(self.link.readlink()) == self.target:
@@ -88,7 +88,7 @@ class Cable:
         self._master = None
 
     def read(self, most: int = AT_ONCE) -> bytes:
-        """Return what the host has sent, if anything."""
+        """Return received bytes, if any."""
         if self._master is None or most <= 0:
             return b""
         try:
@@ -99,7 +99,7 @@ class Cable:
             raise
 
     def write(self, data: bytes) -> None:
-        """Send to the host; what it has not read for too long is lost."""
+        """Send to the host; bytes beyond the terminal's buffer are lost."""
         if self._master is None or not data:
             return
         try:

@@ -1,8 +1,8 @@
-"""What the two published sketches do with a command: bytes of a Float32 in, states of pins out.
+"""The two published sketches' handling of commands: a Float32 in, pin states out.
 
-Neither clamps, neither has a watchdog: what was written last stays.
+Neither limits its input, neither has a watchdog: the last value stays.
 Source: AutoDRIVE repository, `Firmware.ino` of the two-wheel-drive Nigel and `Firmware2WS.ino` of
-the four-wheel-drive one (which drives through a TB6612 and works out Ackermann's angles itself).
+the four-wheel-drive one (which drives a TB6612 and computes the Ackermann angles itself).
 """
 
 import math
@@ -12,21 +12,21 @@ from dataclasses import dataclass, replace
 from vehicle_agent.emulate.avr import float32, int16, int_of, plus, times
 
 DEADBAND = 0.2
-"""Duty below which a real Nigel's motor does not turn, about: its authors add so much."""
+"""Duty below which a real Nigel's motor does not turn, approximately: its authors add as much."""
 SHORTEST_US, LONGEST_US = 544, 2400
-"""Pulses that Arduino's Servo gives, for 0 and 180 degrees."""
+"""Pulses of Arduino's Servo for 0 and 180 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """What the pins say.
+    """State of the pins.
 
     Attributes:
         servos_us: Pulse of each steering servo [us]: one, or front left and front right; none
             before the sketch runs.
         reverse: DIR: 0 forward, 1 reverse.
         brake: BRK: 1 shorts the motor.
-        pwm: The 8 bits that the timer compares with.
+        pwm: The timer's 8-bit compare value.
         duty: Share of the time that the motor is switched on.
     """
 
@@ -51,7 +51,7 @@ class Sketch:
         baud: Of its serial port.
         buffer: Of a message in either direction [bytes].
         topics: Names of its two subscribers, steering first.
-        at_setup: The pins once it runs.
+        at_setup: The pins after setup.
         steer, drive: The pins after a message, of those before it.
     """
 
@@ -64,16 +64,16 @@ class Sketch:
 
 
 def servo_pulse(value: int) -> int:
-    """Return what Arduino's `Servo.write` makes of an int [us]: from 544 on it is no angle."""
+    """Return the pulse of Arduino's `Servo.write` for an int [us]: from 544 on it is no angle."""
     if value < SHORTEST_US:
         value = SHORTEST_US + max(value, 0) * (LONGEST_US - SHORTEST_US) // 180
     return min(value, LONGEST_US)
 
 
 def analog_write(value: int) -> tuple[int, float]:
-    """Return what Arduino's `analogWrite` makes of an int: the timer's 8 bits, and the duty.
+    """Return the timer's 8 bits, and the duty, of Arduino's `analogWrite` for an int.
 
-    0 switches the pin off; of any other number, whatever its size, the timer gets 8 bits.
+    0 switches the pin off; of any other number the timer gets the low 8 bits.
     """
     if value == 0:
         return 0, 0.0
@@ -104,7 +104,7 @@ def _steer_4wd(pins: Outputs, data: float) -> Outputs:
 
 
 def ackermann(angle_deg: int) -> tuple[int, int]:
-    """Return the left and right wheel's angle as the sketch works them out [deg], + = left."""
+    """Return the left and right wheel's angle as the sketch computes them [deg], + = left."""
     rise = float32(math.tan(float32(RAD * angle_deg)))
     ahead = 2.0 * WHEELBASE_MM
     turned = [
@@ -124,7 +124,7 @@ def _drive_4wd(pins: Outputs, data: float) -> Outputs:
 
 
 def _tb6612(pins: Outputs, speed: int) -> Outputs:
-    """Drive all motors; between its pulses the chip shorts them, at speed 0 for good."""
+    """Drive all motors; between pulses, and at speed 0, the chip shorts them."""
     pwm, duty = analog_write(speed if speed >= 0 else int16(-speed))
     return replace(pins, reverse=int(speed < 0), brake=int(speed == 0), pwm=pwm, duty=duty)
 
@@ -140,4 +140,4 @@ SKETCHES = {
         Outputs(servos_us=(servo_pulse(90), servo_pulse(90))), _steer_4wd, _drive_4wd,
     ),
 }  # fmt: skip
-"""By what the car's wheels are driven."""
+"""By the number of driven wheels."""

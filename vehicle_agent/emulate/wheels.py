@@ -1,11 +1,10 @@
-"""From the pins to the floor: what servo and motor make of the pins, and the kernel of that.
+"""From the pins to the floor: how servo and motor respond to the pins, simulated by the kernel.
 
     throttle = duty - clip(duty, 0, deadband), with the sign of DIR
     steering = mean road-wheel angle / greatest one
 
-The dead-band's law is that of the effect `drive_deadband`. Nothing turns the 120:1 gears from
-outside, so a motor that is off holds the car, as the paper says, with BRK (which comes with PWM 0)
-and without.
+The dead-band is that of the effect `drive_deadband`. The 120:1 gears are self-locking, so a motor
+that is off holds the car, as the paper says, with BRK (which comes with PWM 0) and without.
 """
 
 import math
@@ -20,11 +19,11 @@ from vehicle_agent.emulate.sketches import DEADBAND, Outputs
 
 SLICE_NS = 50 * NS_PER_MS
 LONGEST_NS = 10 * NS_PER_S
-"""A real car rolls on while a computer stalls: so long a stall is caught up with."""
+"""A real car continues to roll while a computer stalls: up to this stall is simulated."""
 
 
 def throttle_of(pins: Outputs, deadband: float) -> float:
-    """Return what is left of the motor's command, -1 to 1, + forward."""
+    """Return the effective throttle, -1 to 1, + forward."""
     live = pins.duty - min(pins.duty, deadband)
     return -live if pins.reverse else live
 
@@ -33,8 +32,8 @@ def wheel_angle(pins: Outputs, straight: Outputs) -> float | None:
     """Return the mean road-wheel angle [rad], + = left; None: the servos get no pulses.
 
     Args:
-        pins: Now.
-        straight: With the wheels straight ahead.
+        pins: Present state.
+        straight: State with the wheels straight ahead.
     """
     turned = [a - b for a, b in zip(pins.servos_deg, straight.servos_deg, strict=False)]
     if not turned:
@@ -48,7 +47,7 @@ def wheel_angle(pins: Outputs, straight: Outputs) -> float | None:
 
 
 class Wheels:
-    """A simulated car under the pins of a board.
+    """A simulated car moved by the pins of a board.
 
     Args:
         straight: The pins with its wheels straight ahead.
@@ -63,16 +62,16 @@ class Wheels:
         self._now_ns: int | None = None
 
     def learn(self, city_map: CityMap, seed: int) -> None:
-        """Know the city's floor and air."""
+        """Receive the city's floor and wind."""
         self._body.learn(city_map, seed)
 
     def place(self, pose: Pose2, now_ns: int) -> None:
-        """Be put down somewhere, at rest."""
+        """Place the car at rest."""
         self._now_ns = now_ns
         self._body.place(pose, now_ns)
 
     def advance(self, pins: Outputs, now_ns: int) -> None:
-        """Move as the pins were until now; a servo without pulses stays where it is."""
+        """Move with constant pins to now; a servo without pulses stays where it is."""
         angle = wheel_angle(pins, self._straight)
         if angle is not None:
             self._steering = max(-1.0, min(1.0, angle / self._body.limits.steer_limit))
@@ -84,7 +83,7 @@ class Wheels:
         self._now_ns = now_ns
 
     def follow(self, firmware: Firmware, now_ns: int) -> None:
-        """Move up to now, each pin for as long as it was so."""
+        """Move to now, with each recorded pin state for its duration."""
         past, firmware.past = firmware.past, []
         for ended_ns, pins in past:
             if self._now_ns is None or ended_ns > self._now_ns:
@@ -92,5 +91,5 @@ class Wheels:
         self.advance(firmware.outputs, now_ns)
 
     def motion(self) -> Motion:
-        """Return how the car truly moves now."""
+        """Return the car's true motion."""
         return self._body.motion()

@@ -5,10 +5,10 @@
     node        quality << 2 | not S << 1 | S,  angle << 1 | 1 (u16, 1/64 deg, clockwise),
                 distance (u16, 1/4 mm; 0: no answer)
 
-S marks the first node of a turn. The two bits that must differ and the one that must be set are
-all that a node can be checked by: after a byte was lost, `SURE` in a row must fit.
+S marks the first node of a turn. A node can only be checked by the two bits that must differ and
+the one that must be set: after a lost byte, `SYNC_NODES` in a row must be valid.
 On its USB adapter the motor turns while DTR is low.
-The pause is said in zeros, which begin no request: 24 take 2 ms at this rate.
+The pause is sent as zeros, which begin no request: 24 take 2 ms at this rate.
 Source: the protocol that its maker publishes, and its SDK's structures. The angle is the scanner's
 own, clockwise from its front: mount it with its front forward.
 """
@@ -21,67 +21,70 @@ from vehicle_agent.lidar import Lidar, LidarKind, Turn
 STOP, SCAN = b"\xa5\x25", b"\xa5\x20"
 PAUSE = bytes(24)
 DESCRIPTOR = bytes.fromhex("a55a0500004081")
-NODE = 5
-SURE = 8
-LONGEST = 2000
-"""Nodes of one turn: 2000 samples a second, one turn at least."""
+NODE_BYTES = 5
+SYNC_NODES = 8
+MAX_TURN_NODES = 2000
+"""Nodes of one turn: 2000 samples a second, at least one turn a second."""
 
 
 class RplidarA1:
     """One scanner.
 
     Attributes:
-        skipped: Bytes that made no sense.
+        skipped: Number of invalid bytes.
     """
 
     def __init__(self) -> None:
         self.skipped = 0
-        self._held = bytearray()
-        self._is_in_step = False
+        self._buffer = bytearray()
+        self._is_synchronised = False
         self._turn: list[bytes] = []
         self._has_begun = False
 
     def begin(self) -> bytes:
-        """Return: stop whatever runs, then scan."""
+        """Return the bytes that stop the scanner and start a scan."""
         return STOP + PAUSE + SCAN
 
-    def hear(self, data: bytes) -> list[Turn]:
-        """Take what came; return the turns that it completes."""
-        self._held += data
+    def feed(self, data: bytes) -> list[Turn]:
+        """Process received bytes; return the turns they complete."""
+        self._buffer += data
         turns: list[Turn] = []
-        while self._is_in_step or self._get_in_step():
-            node = bytes(self._held[:NODE])
-            if len(node) < NODE:
+        while self._is_synchronised or self._synchronise():
+            node = bytes(self._buffer[:NODE_BYTES])
+            if len(node) < NODE_BYTES:
                 break
             if not _is_node(node):
-                self._is_in_step, self._has_begun, self._turn = False, False, []
+                self._is_synchronised, self._has_begun, self._turn = False, False, []
                 continue
-            del self._held[:NODE]
+            del self._buffer[:NODE_BYTES]
             turns += self._add(node)
         return turns
 
     def end(self) -> bytes:
-        """Return: stop."""
+        """Return the bytes that stop the scanner."""
         return STOP
 
-    def _get_in_step(self) -> bool:
-        """Drop bytes until `SURE` nodes in a row fit; False while too few are there."""
-        while len(self._held) >= SURE * NODE:
-            if self._held.startswith(DESCRIPTOR):
-                del self._held[: len(DESCRIPTOR)]
+    def _synchronise(self) -> bool:
+        """Drop bytes until `SYNC_NODES` nodes in a row are valid; False while too few are there."""
+        while len(self._buffer) >= SYNC_NODES * NODE_BYTES:
+            if self._buffer.startswith(DESCRIPTOR):
+                del self._buffer[: len(DESCRIPTOR)]
                 continue
-            nodes = [self._held[at : at + NODE] for at in range(0, SURE * NODE, NODE)]
+            nodes = [
+                self._buffer[at : at + NODE_BYTES]
+                for at in range(0, SYNC_NODES * NODE_BYTES, NODE_BYTES)
+            ]
             if all(map(_is_node, nodes)):
-                self._is_in_step = True
+                self._is_synchronised = True
                 return True
-            del self._held[0]
+            del self._buffer[0]
             self.skipped += 1
         return False
 
     def _add(self, node: bytes) -> list[Turn]:
-        """Add a node to its turn; return the turn that it ends, if it ends one."""
+        """Add a node to its turn; return the turn it completes, if any."""
         ended: list[Turn] = []
-        if node[0] & 1 or len(self._turn) >= LONGEST:
+        if node[0] & 1 or len(self._turn) >= MAX_TURN_NODES:
             if self._has_begun and self._turn:
                 ended = [_turn_of(b"".join(self._turn))]
             self._turn, self._has_begun = [], bool(node[0] & 1)
@@ -95,7 +98,7 @@ def _is_node(node: bytes | bytearray) -> bool:
 
 def _turn_of(nodes: bytes) -> Turn:
     """Return the nodes (n x 5 bytes) as bearings and ranges."""
-    rows = np.frombuffer(nodes, dtype=np.uint8).reshape(-1, NODE).astype(np.float64)
+    rows = np.frombuffer(nodes, dtype=np.uint8).reshape(-1, NODE_BYTES).astype(np.float64)
     degrees: Floats = ((rows[:, 1] + 256.0 * rows[:, 2]) // 2.0) / 64.0
     metres: Floats = (rows[:, 3] + 256.0 * rows[:, 4]) / 4000.0
     return Turn(-np.radians(degrees), np.where(metres > 0.0, metres, np.inf))

@@ -1,1 +1,1 @@
-"""The real Nigel: rosserial over a cable, the driver of it, and what the firmware tells."""
+"""The real Nigel: rosserial over a cable, its driver, and its telemetry."""

@@ -1,7 +1,7 @@
-"""A serial port that may be pulled, plugged back, busy, forbidden or not there yet; never waits.
+"""A serial port that may be unplugged, busy, forbidden or missing; nothing here blocks.
 
-What cannot be written at once is not kept, but for the rest of a frame that was begun: a command
-that waited would be an old one.
+What cannot be written at once is dropped, except the rest of a frame that was begun: a delayed
+command would be an old one.
 """
 
 import errno
@@ -19,14 +19,14 @@ from scm.clock import NS_PER_MS
 REOPEN_NS = 500 * NS_PER_MS
 READ_BYTES = 4096
 FULL_BYTES = 128
-"""So much unsent in the driver is 22 ms at 57600 baud: nothing is added."""
+"""Above this backlog in the driver nothing is added: 128 bytes take 22 ms at 57600 baud."""
 
 FAILURES = (OSError, ValueError, termios.error)
 GONE = select.POLLHUP | select.POLLERR | select.POLLNVAL
 
 
 class Port(Protocol):
-    """What is used of pyserial's port."""
+    """The part of pyserial's port that is used."""
 
     fd: int
     out_waiting: int
@@ -36,12 +36,12 @@ class Port(Protocol):
         ...
 
     def reset_output_buffer(self) -> None:
-        """Throw away what was not sent yet."""
+        """Discard what was not sent yet."""
         ...
 
 
 class Opens(Protocol):
-    """How a port is opened."""
+    """Opens a port."""
 
     def __call__(self, path: str, baud: int) -> Port:
         """Return an open port; serial.SerialException where that fails."""
@@ -55,7 +55,7 @@ def open_serial(path: str, baud: int, *, dtr: bool = True, exclusive: bool = Tru
         path: Of the port.
         baud: Of the line.
         dtr: Whether to raise DTR, which resets an Arduino.
-        exclusive: Whether for ourselves alone.
+        exclusive: Whether to lock the port for this process.
     """
     port = serial.Serial(baudrate=baud, timeout=0, write_timeout=0, exclusive=exclusive)
     port.port, port.dtr = path, dtr
@@ -68,9 +68,9 @@ class Cable:
     """One serial port by its path.
 
     Attributes:
-        trouble: Why it is not open, in words; empty: it is.
-        opened: How often it was opened: whoever talks over it begins anew at each change.
-        held_back: Frames that found no room.
+        trouble: Why it is not open, in words; empty if it is open.
+        opened: How often it was opened; protocols restart at each change.
+        held_back: Number of frames dropped for lack of room.
     """
 
     def __init__(self, path: str, baud: int, opens: Opens = open_serial) -> None:
@@ -88,20 +88,20 @@ class Cable:
         return None if self._port is None else self._port.fd
 
     def keep_open(self, now_ns: int) -> bool:
-        """Open the port if that is due; return whether it is open."""
+        """Open the port if a retry is due; return whether it is open."""
         if self._port is None and self._is_due(now_ns):
             self._tried_ns, self._rest = now_ns, b""
             try:
                 self._port = self._opens(self._path, self._baud)
             except FAILURES as cause:
-                self.trouble = f"{self._path}: {_said(cause, self._baud)}"
+                self.trouble = f"{self._path}: {_explain(cause, self._baud)}"
             else:
                 self.trouble = ""
                 self.opened += 1
         return self._port is not None
 
     def read(self) -> bytes:
-        """Return what has come; nothing where the port was pulled just now."""
+        """Return received bytes; none if the port was just unplugged."""
         if self._port is None:
             return b""
         try:
@@ -116,18 +116,18 @@ class Cable:
             return b""
 
     def write(self, frames: Sequence[bytes]) -> None:
-        """Send whole frames, in order; what finds no room is dropped and counted."""
+        """Send whole frames, in order; frames without room are dropped and counted."""
         for at, frame in enumerate(frames):
             if not self._write_one(frame):
                 self.held_back += len(frames) - at
                 return
 
     def is_drained(self) -> bool:
-        """Return whether all that was written has left the driver, as far as it says so."""
+        """Return whether the driver reports that everything was sent."""
         return self._port is None or (not self._rest and self._unsent(self._port) == 0)
 
     def close(self) -> None:
-        """Close at once; what the driver could not send by now is thrown away."""
+        """Close at once; unsent bytes are discarded."""
         if self._port is not None:
             with suppress(*FAILURES):
                 if not self.is_drained():
@@ -162,9 +162,9 @@ class Cable:
 
     @staticmethod
     def _is_gone(fd: int) -> bool:
-        watch = select.poll()
-        watch.register(fd, select.POLLIN)
-        return any(event & GONE for _, event in watch.poll(0))
+        poll = select.poll()
+        poll.register(fd, select.POLLIN)
+        return any(event & GONE for _, event in poll.poll(0))
 
     @staticmethod
     def _unsent(port: Port) -> int:
@@ -174,8 +174,8 @@ class Cable:
             return 0
 
 
-def _said(cause: Exception, baud: int) -> str:
-    """Return in words, with the way out, why a port does not open."""
+def _explain(cause: Exception, baud: int) -> str:
+    """Return why a port does not open, and what to do, in words."""
     number = cause.errno if isinstance(cause, OSError) else None
     if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
         return "no such device: is the cable plugged in? `ls /dev/serial/by-id` shows what is"

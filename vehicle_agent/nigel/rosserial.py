@@ -1,4 +1,4 @@
-"""rosserial's frames, as bytes: what Nigel's Arduino and its host say to each other.
+"""rosserial's frames as bytes, between Nigel's Arduino and its host.
 
     FF FE | length, u16 | 255 - sum of the length's bytes | topic, u16 | payload
           | 255 - sum of the topic's and the payload's bytes
@@ -13,19 +13,19 @@ from scm.clock import NS_PER_MS
 from scm.errors import MessageError
 
 PUBLISHER_INFO, SUBSCRIBER_INFO, PARAMETER, LOG, TIME, TX_STOP = 0, 1, 6, 7, 10, 11
-"""Topics with a meaning of their own."""
+"""Topics with a fixed meaning."""
 
 FLOAT32 = "std_msgs/Float32"
 FLOAT32_MD5 = "73fcbf46b49191e672908e50842a83d4"
 
 SYNC = b"\xff\xfe"
-HEAD = 5
-AROUND = 8
-LONGEST = 1024
-"""Of a payload [bytes]: twice the largest buffer of the published firmwares (Mega: 512)."""
+HEADER_BYTES = 5
+OVERHEAD_BYTES = 8
+MAX_PAYLOAD_BYTES = 1024
+"""Twice the largest buffer of the published firmwares (Mega: 512)."""
 
-PATIENCE_NS = 50 * NS_PER_MS
-"""For the rest of a frame: 280 bytes take 49 ms at 57600 baud."""
+FRAME_TIMEOUT_NS = 50 * NS_PER_MS
+"""Maximum time for the rest of a frame: 280 bytes take 49 ms at 57600 baud."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +38,11 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class TopicInfo:
-    """What a device tells of one of its topics.
+    """A device's announcement of one of its topics.
 
     Attributes:
         number: In its frames; subscribers count from 100, publishers from 125.
-        buffer: The longest message that it takes [bytes].
+        buffer: Size of the longest message [bytes].
     """
 
     number: int
@@ -60,12 +60,12 @@ def pack(frame: Frame) -> bytes:
     """Return a frame's bytes.
 
     Raises:
-        MessageError: when the payload is longer than `LONGEST` or the topic is no u16.
+        MessageError: when the payload is longer than `MAX_PAYLOAD_BYTES` or the topic is no u16.
     """
-    if len(frame.payload) > LONGEST or not 0 <= frame.topic <= 0xFFFF:
+    if len(frame.payload) > MAX_PAYLOAD_BYTES or not 0 <= frame.topic <= 0xFFFF:
         msg = (
             f"rosserial frame: got topic {frame.topic} with {len(frame.payload)} bytes, "
-            f"expected a topic of 0 to 65535 and at most {LONGEST} bytes"
+            f"expected a topic of 0 to 65535 and at most {MAX_PAYLOAD_BYTES} bytes"
         )
         raise MessageError(msg)
     length = struct.pack("<H", len(frame.payload))
@@ -104,7 +104,7 @@ def unpack_topic_info(payload: bytes) -> TopicInfo:
     """Read an announcement.
 
     Raises:
-        MessageError: when it is cut, has bytes too many or holds no text.
+        MessageError: when it is truncated, too long or not text.
     """
     try:
         number, at, texts = struct.unpack_from("<H", payload)[0], 2, list[str]()
@@ -125,62 +125,62 @@ def unpack_topic_info(payload: bytes) -> TopicInfo:
 
 @dataclass(slots=True)
 class Decoder:
-    """Frames out of a stream of bytes, whatever else is in it.
+    """Extracts frames from a stream of bytes with anything else in it.
 
-    A frame that fails a check is given up by one byte only, so nothing that begins inside it is
-    lost. One whose end does not come in time is given up as well.
+    After a frame that fails a check only one byte is skipped, so a frame that begins inside it is
+    found. A frame whose end does not arrive in time is skipped as well.
 
     Attributes:
-        skipped: Bytes that belonged to no frame.
+        skipped: Number of bytes outside frames.
     """
 
     skipped: int = 0
-    _held: bytearray = field(default_factory=bytearray)
+    _buffer: bytearray = field(default_factory=bytearray)
     _came_ns: list[int] = field(default_factory=list)
 
     def feed(self, data: bytes, now_ns: int) -> list[Frame]:
-        """Take bytes that came at `now_ns`; return the frames that they complete."""
-        self._held += data
+        """Process bytes received at `now_ns`; return the frames they complete."""
+        self._buffer += data
         self._came_ns += [now_ns] * len(data)
         frames = list[Frame]()
         while self._find_sync():
             size = self._size()
             if size == 0:
                 self._drop(1)
-            elif len(self._held) < size:
-                if now_ns - self._came_ns[0] < PATIENCE_NS:
+            elif len(self._buffer) < size:
+                if now_ns - self._came_ns[0] < FRAME_TIMEOUT_NS:
                     break
                 self._drop(1)
-            elif self._held[size - 1 : size] != _check(self._held[HEAD : size - 1]):
+            elif self._buffer[size - 1 : size] != _check(self._buffer[HEADER_BYTES : size - 1]):
                 self._drop(1)
             else:
-                topic = struct.unpack_from("<H", self._held, HEAD)[0]
-                frames.append(Frame(topic, bytes(self._held[HEAD + 2 : size - 1])))
-                self._take(size)
+                topic = struct.unpack_from("<H", self._buffer, HEADER_BYTES)[0]
+                frames.append(Frame(topic, bytes(self._buffer[HEADER_BYTES + 2 : size - 1])))
+                self._consume(size)
         return frames
 
     def _find_sync(self) -> bool:
-        """Drop what no frame begins in; return whether anything is left."""
-        at = self._held.find(SYNC)
+        """Drop bytes before the next sync; return whether anything is left."""
+        at = self._buffer.find(SYNC)
         if at < 0:
-            at = len(self._held) - self._held.endswith(SYNC[:1])
+            at = len(self._buffer) - self._buffer.endswith(SYNC[:1])
         self._drop(at)
-        return bool(self._held)
+        return bool(self._buffer)
 
     def _size(self) -> int:
-        """Return how long the frame at the front is, as far as one knows; 0: it is none."""
-        if len(self._held) < HEAD:
-            return HEAD
-        length: int = struct.unpack_from("<H", self._held, 2)[0]
-        is_one = self._held[4:5] == _check(self._held[2:4]) and length <= LONGEST
-        return AROUND + length if is_one else 0
+        """Return the length of the frame at the front, as far as known; 0 if there is none."""
+        if len(self._buffer) < HEADER_BYTES:
+            return HEADER_BYTES
+        length: int = struct.unpack_from("<H", self._buffer, 2)[0]
+        is_one = self._buffer[4:5] == _check(self._buffer[2:4]) and length <= MAX_PAYLOAD_BYTES
+        return OVERHEAD_BYTES + length if is_one else 0
 
     def _drop(self, count: int) -> None:
-        self._take(count)
+        self._consume(count)
         self.skipped += count
 
-    def _take(self, count: int) -> None:
-        del self._held[:count], self._came_ns[:count]
+    def _consume(self, count: int) -> None:
+        del self._buffer[:count], self._came_ns[:count]
 
 
 def _check(data: bytes | bytearray) -> bytes:

@@ -1,10 +1,10 @@
-"""The keeper of the cable: a process of its own between the agent and the Arduino.
+"""The serial watchdog: a process of its own between the agent and the Arduino.
 
-The published firmware obeys its last command for ever, so somebody must be there to say zero when
-the agent is not. A thread of the agent would be killed, stopped and held up together with it; this
-process is not. It holds the port, talks rosserial, and passes wishes on; when no wish of the last
-150 ms is there it sends zeros, and when the agent is gone it sends them again and again, waits
-until they are out, and ends. It never reads the bus and decides nothing else.
+The published firmware obeys its last command for ever, so somebody must send zeros when the agent
+does not. A thread of the agent would be killed, stopped and delayed together with it; this process
+is not. It holds the port, speaks rosserial, and forwards commands. Without a command of the last
+150 ms it sends zeros; when the agent is gone it sends zeros repeatedly, waits until they are out,
+and ends. It never reads the bus and decides nothing else.
 
     python -m vehicle_agent.nigel.serial_watchdog PATH BAUD FD
 
@@ -24,25 +24,25 @@ import msgspec
 from scm.clock import NS_PER_MS, Clock, WallClock
 from scm.log import event
 from vehicle_agent.nigel.cable import Cable
-from vehicle_agent.nigel.host import REST, Host, Phase, Wish, limited
+from vehicle_agent.nigel.host import REST, Host, NigelCommand, Phase, clamped
 from vehicle_agent.nigel.telemetry import Telemetry
 
-PATIENCE_NS = 150 * NS_PER_MS
-"""As the guard's: for so long a wish holds."""
-TURN_NS = 5 * NS_PER_MS
+COMMAND_TIMEOUT_NS = 150 * NS_PER_MS
+"""As in the guard: how long a command stays valid."""
+LOOP_NS = 5 * NS_PER_MS
 GOODBYES = 5
 GOODBYE_NS = 20 * NS_PER_MS
 DRAIN_NS = 200 * NS_PER_MS
-LONGEST = 65536
+MAX_PACKET_BYTES = 65536
 
 _log = logging.getLogger(__name__)
 
 
-class Asked(msgspec.Struct, frozen=True, array_like=True):
-    """What the agent sends: a wish, and when it was made, on its clock [ns]."""
+class WatchdogCommand(msgspec.Struct, frozen=True, array_like=True):
+    """From the agent: a command, and when it was made, on its clock [ns]."""
 
     t_ns: int
-    wish: Wish
+    command: NigelCommand
 
 
 class Written(msgspec.Struct, frozen=True, array_like=True):
@@ -53,14 +53,14 @@ class Written(msgspec.Struct, frozen=True, array_like=True):
     steering: float
 
 
-class Told(msgspec.Struct, frozen=True, array_like=True):
-    """What the keeper sends.
+class WatchdogReport(msgspec.Struct, frozen=True, array_like=True):
+    """The watchdog's report to the agent.
 
     Attributes:
-        trouble: What keeps the car from being driven, in words; empty: nothing.
-        readings: How many telemetries have come.
-        rest: Frames that say zero to the Arduino as it is now; empty: it could not be told.
-        written: All since the last report, oldest first.
+        trouble: What prevents driving, in words; empty if nothing does.
+        readings: Number of telemetry readings received.
+        rest: Frames with zero commands for the Arduino; empty if it cannot be commanded.
+        written: Commands since the last report, oldest first.
     """
 
     phase: Phase
@@ -73,42 +73,44 @@ class Told(msgspec.Struct, frozen=True, array_like=True):
     written: tuple[Written, ...] = ()
 
 
-_asked = msgspec.msgpack.Decoder(Asked)
+_command_decoder = msgspec.msgpack.Decoder(WatchdogCommand)
 
 
-class Keeper:
-    """One cable, one conversation, and the last word on how old a wish may be."""
+class SerialWatchdog:
+    """One cable, one rosserial connection, and the limit on the age of commands."""
 
     def __init__(self, cable: Cable, host: Host) -> None:
         self._cable, self._host = cable, host
-        self._asked = Asked(0, REST)
+        self._newest = WatchdogCommand(0, REST)
         self._opened = 0
         self._reported: tuple[str, str, int] | None = None
-        self._owes = False
+        self._must_reply = False
         self._written: list[Written] = []
 
-    def step(self, now_ns: int, asked: Asked | None = None) -> None:
-        """Read, answer, command; `asked` is what the agent said since the last step."""
-        if asked is not None:
-            self._asked, self._owes = asked, True
+    def step(self, now_ns: int, command: WatchdogCommand | None = None) -> None:
+        """Read, answer, command; `command` is the newest from the agent since the last step."""
+        if command is not None:
+            self._newest, self._must_reply = command, True
         if self._cable.keep_open(now_ns) and self._cable.opened != self._opened:
             self._opened = self._cable.opened
             self._host.open(now_ns)
-        answers = self._host.hear(self._cable.read(), now_ns)
+        answers = self._host.receive(self._cable.read(), now_ns)
         if self._cable.fd is None:
             self._host.close()
         else:
-            self._write(answers + self._host.say(self._wish(now_ns), now_ns), now_ns)
+            self._write(
+                answers + self._host.frames_due(self._valid_command(now_ns), now_ns), now_ns
+            )
 
-    def report(self) -> Told | None:
-        """Return what the agent is to know: at each change, and as an answer to each wish."""
+    def report(self) -> WatchdogReport | None:
+        """Return a report: at each change, and as an answer to each command; else None."""
         trouble = self._cable.trouble or self._host.trouble
         news = (self._host.phase, trouble, self._host.readings)
-        if news == self._reported and not self._owes:
+        if news == self._reported and not self._must_reply:
             return None
-        self._reported, self._owes = news, False
+        self._reported, self._must_reply = news, False
         written, self._written = tuple(self._written), []
-        return Told(
+        return WatchdogReport(
             phase=self._host.phase,
             trouble=trouble,
             opened=self._opened,
@@ -120,26 +122,28 @@ class Keeper:
         )
 
     def finish(self, clock: Clock) -> None:
-        """Send zeros again and again, wait until they have left, and close; never for long."""
+        """Send zeros repeatedly, wait until they have left, and close; bounded in time."""
         never = threading.Event()
         for _ in range(GOODBYES):
             self._cable.write(self._host.rest())
             clock.wait_until(clock.now_ns() + GOODBYE_NS, never)
         end_ns = clock.now_ns() + DRAIN_NS
         while not self._cable.is_drained() and clock.now_ns() < end_ns:
-            clock.wait_until(clock.now_ns() + TURN_NS, never)
+            clock.wait_until(clock.now_ns() + LOOP_NS, never)
         self._cable.close()
 
     def _write(self, frames: Sequence[bytes], now_ns: int) -> None:
-        """Send frames, and note the command among them if all found room."""
-        held_back, command = self._cable.held_back, self._host.commanded
+        """Send frames, and record the command in them if all found room."""
+        held_back, commanded = self._cable.held_back, self._host.commanded
         self._cable.write(frames)
-        if command is not None and self._cable.held_back == held_back:
-            said = limited(command.throttle), limited(command.steering)
-            self._written.append(Written(now_ns, *said))
+        if commanded is not None and self._cable.held_back == held_back:
+            throttle, steering = clamped(commanded.throttle), clamped(commanded.steering)
+            self._written.append(Written(now_ns, throttle, steering))
 
-    def _wish(self, now_ns: int) -> Wish:
-        return self._asked.wish if abs(now_ns - self._asked.t_ns) <= PATIENCE_NS else REST
+    def _valid_command(self, now_ns: int) -> NigelCommand:
+        return (
+            self._newest.command if abs(now_ns - self._newest.t_ns) <= COMMAND_TIMEOUT_NS else REST
+        )
 
 
 class _Agent:
@@ -153,12 +157,12 @@ class _Agent:
     def fileno(self) -> int:
         return self._line.fileno()
 
-    def newest(self) -> Asked | None:
-        """Return the last of all that has come, None where nothing has."""
-        newest: Asked | None = None
+    def newest(self) -> WatchdogCommand | None:
+        """Return the newest received command, None if there is none."""
+        newest: WatchdogCommand | None = None
         while not self.is_gone:
             try:
-                data = self._line.recv(LONGEST)
+                data = self._line.recv(MAX_PACKET_BYTES)
             except BlockingIOError:
                 break
             except OSError:
@@ -166,37 +170,39 @@ class _Agent:
             if not data:
                 self.is_gone = True
                 break
-            newest = _asked.decode(data)
+            newest = _command_decoder.decode(data)
         return newest
 
-    def tell(self, told: Told | None) -> None:
-        """Send a report; one that finds no room is as old as the next is new."""
-        if told is None:
+    def send(self, report: WatchdogReport | None) -> None:
+        """Send a report; drop it if there is no room, since the next one replaces it."""
+        if report is None:
             return
         try:
-            self._line.send(msgspec.msgpack.encode(told))
+            self._line.send(msgspec.msgpack.encode(report))
         except BlockingIOError:
             return
         except OSError:
             self.is_gone = True
 
 
-def serve(keeper: Keeper, agent: _Agent, cable: Cable, clock: Clock, ended: list[int]) -> None:
-    """Keep the cable until the agent is gone or a signal was noted; zeros go out at the end."""
+def serve(
+    watchdog: SerialWatchdog, agent: _Agent, cable: Cable, clock: Clock, ended: list[int]
+) -> None:
+    """Run until the agent is gone or a signal arrives; zeros go out at the end."""
     try:
         while not agent.is_gone and not ended:
             watched = [agent.fileno(), *([] if cable.fd is None else [cable.fd])]
-            select.select(watched, [], [], TURN_NS / 1e9)
-            asked = agent.newest()
+            select.select(watched, [], [], LOOP_NS / 1e9)
+            command = agent.newest()
             now_ns = clock.now_ns()
-            keeper.step(now_ns, asked)
-            agent.tell(keeper.report())
+            watchdog.step(now_ns, command)
+            agent.send(watchdog.report())
     finally:
-        keeper.finish(clock)
+        watchdog.finish(clock)
 
 
 def note_signals() -> list[int]:
-    """Return a list that gets the number of each signal that asks to end."""
+    """Return a list that collects the numbers of termination signals."""
     ended: list[int] = []
     note: Callable[[int, object], None] = lambda number, _frame: ended.append(number)  # noqa: E731
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
@@ -205,15 +211,15 @@ def note_signals() -> list[int]:
 
 
 def main(argv: Sequence[str]) -> None:
-    """Keep the cable at `argv[0]`, `argv[1]` baud, for the agent behind socket `argv[2]`."""
+    """Run for the port `argv[0]` at `argv[1]` baud, for the agent behind socket `argv[2]`."""
     path, baud, number = argv[0], int(argv[1]), int(argv[2])
     ended = note_signals()
     cable, host = Cable(path, baud), Host(baud)
     agent = _Agent(socket.socket(fileno=number))
     try:
-        serve(Keeper(cable, host), agent, cable, WallClock(), ended)
+        serve(SerialWatchdog(cable, host), agent, cable, WallClock(), ended)
     except Exception as fault:
-        event(_log, "keeper_failed", level=logging.ERROR, path=path, reason=repr(fault))
+        event(_log, "watchdog_failed", level=logging.ERROR, path=path, reason=repr(fault))
         raise
 
 

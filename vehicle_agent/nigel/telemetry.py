@@ -1,4 +1,4 @@
-"""What our own firmware tells, as a std_msgs/Float32MultiArray; the published one tells nothing."""
+"""Telemetry of our own firmware, a std_msgs/Float32MultiArray; the published one sends none."""
 
 import math
 import struct
@@ -21,11 +21,11 @@ class Telemetry:
 
     Attributes:
         left: Encoder counts since the start, + = forward; likewise `right`.
-        gyro_radps: About z, + = left. Not a number: there is no IMU; likewise `accel_mps2`.
+        gyro_radps: About z, + = left. NaN: there is no IMU; likewise `accel_mps2`.
         accel_mps2: Along x forward and y left.
-        battery_v: Not a number: not measured.
+        battery_v: NaN: not measured.
         version: Of the firmware.
-        command_age_ms: Since it last got a command.
+        command_age_ms: Time since its last command.
     """
 
     left: int
@@ -38,15 +38,15 @@ class Telemetry:
 
     @property
     def has_imu(self) -> bool:
-        """Whether gyro and accelerometer were read."""
+        """Whether gyro and accelerometer have values."""
         return all(math.isfinite(value) for value in (self.gyro_radps, *self.accel_mps2))
 
 
 def unpack_floats(payload: bytes) -> tuple[float, ...]:
-    """Read a std_msgs/Float32MultiArray; its layout is read over.
+    """Decode a std_msgs/Float32MultiArray; its layout is ignored.
 
     Raises:
-        MessageError: when it is cut or has bytes too many.
+        MessageError: when it is truncated or too long.
     """
     try:
         (dimensions,), at = struct.unpack_from("<I", payload), 4
@@ -63,7 +63,7 @@ def unpack_floats(payload: bytes) -> tuple[float, ...]:
 
 
 def telemetry_of(values: Sequence[float]) -> Telemetry:
-    """Return what eight values mean.
+    """Return eight values as a reading.
 
     Raises:
         MessageError: when there are fewer, or ticks that are no counts.
@@ -75,8 +75,8 @@ def telemetry_of(values: Sequence[float]) -> Telemetry:
     return Telemetry(int(left), int(right), gyro, (ax, ay), volts, version, age_ms)
 
 
-def carried_on(reading: Telemetry, before: Telemetry | None) -> Telemetry:
-    """Return a reading whose counts go on from those before, where the firmware's have wrapped."""
+def unwrapped(reading: Telemetry, before: Telemetry | None) -> Telemetry:
+    """Return a reading with counts unwrapped from the one before: the firmware's wrap around."""
     if before is None:
         return reading
     left, right = (

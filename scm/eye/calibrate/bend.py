@@ -1,9 +1,9 @@
-"""What a lens that bends a tag's sides does to its corners as they are found.
+"""The error of a tag's detected corners caused by lens distortion of its sides.
 
-A tag's corners are where straight lines through its sides meet. Seen through a wide lens a side is
-a bow, and its line lies inside of its ends. With a lens that is nearly right that can be foretold:
-straight lines are laid through the sides as the lens shows them, and what they meet off the true
-corners is taken off the corners found.
+A tag's corners are detected where straight lines through its sides meet. Through a wide lens a side
+is curved, and its line lies inside of its ends. With an approximate lens this error can be
+predicted: straight lines are fitted to the sides as the lens projects them, and the difference of
+their intersections from the true corners is subtracted from the detected corners.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from scm.arrays import Floats
 from scm.eye.calibrate.board import View
 
 _PLACES = (np.arange(16) + 1.0) / 17.0
-"""Along a side, where the library looks at it."""
+"""Positions along a side where the library samples it."""
 
 
 def along_sides(points: Floats) -> Floats:
@@ -23,7 +23,7 @@ def along_sides(points: Floats) -> Floats:
 
 
 def met(sides: Floats) -> Floats:
-    """Return where straight lines through pixels along sides (n, 4, m, 2) meet, (n, 4, 2) [px]."""
+    """Return intersections of lines fitted to pixels along sides (n, 4, m, 2), (n, 4, 2) [px]."""
     middle = sides.mean(axis=2)
     spread = sides - middle[:, :, None]
     normal = np.linalg.eigh(spread.swapaxes(2, 3) @ spread)[1][..., 0]
@@ -34,12 +34,12 @@ def met(sides: Floats) -> Floats:
 
 
 def unbent(view: View, corners: Floats, sides: Floats) -> View:
-    """Return a view of tags with its corners where the lens truly shows them.
+    """Return a view of tags with its corners corrected for curved sides.
 
     Args:
-        view: As found.
-        corners: Where a lens that is nearly right shows its points, (4 n, 2) [px].
-        sides: Where it shows the places along its tags' sides, (n, 4, 16, 2) [px].
+        view: As detected.
+        corners: Projected by an approximate lens, (4 n, 2) [px].
+        sides: Points along the tags' sides, likewise projected, (n, 4, 16, 2) [px].
     """
     off = met(sides).reshape(-1, 2) - corners
     return View(view.name, view.points, view.pixels - off, view.tags)

@@ -1,8 +1,8 @@
-"""Finding the board that was printed to calibrate with in a picture.
+"""Finds the printed calibration board in a picture.
 
 The board's frame lies in its plane: x to the print's right, y to its top, z out of the print for a
 grid of tags; OpenCV's boards count y downwards. Only distances matter to a calibration, so each
-kind keeps its own.
+kind uses its own.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from scm.scenery.board import Board, charuco_board
 from scm.scenery.tags import tag_corners
 
 LEAST_POINTS = 8
-"""In one picture: a view has six unknowns of its own."""
+"""Minimum in one picture: a view has six unknowns of its own."""
 _FIND = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
 
 
@@ -28,8 +28,8 @@ class View:
     Attributes:
         name: Of the picture, for reports.
         points: Places on the board, (n, 3) [m], z 0.
-        pixels: Where they were found, (n, 2) [px].
-        tags: Whether each four are where straight lines through the sides of a tag meet.
+        pixels: Where they were detected, (n, 2) [px].
+        tags: Whether each four are intersections of lines through the sides of a tag.
     """
 
     name: str
@@ -39,7 +39,7 @@ class View:
 
 
 def find_board(board: Board, grey: Image, name: str) -> View | None:
-    """Return the board in a grey picture (height, width); None: not to be seen, or too little."""
+    """Return the board in a grey picture (height, width); None if too little is found."""
     if board.kind == "chessboard":
         found = _find_chessboard(board, grey)
     elif board.kind == "charuco":

@@ -1,7 +1,7 @@
-"""Views of a board out of pictures, a film or a live camera.
+"""Views of a board from pictures, a film or a live camera.
 
-Of pictures all are taken. Of a film or a camera those in which the board is somewhere new and held
-still: a board in motion is smeared, and a rolling shutter bends it.
+All pictures are used. Of a film or a camera only frames in which the board is at a new place and
+still: a moving board is blurred, and a rolling shutter distorts it.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -20,22 +20,22 @@ from scm.scenery.board import Board
 
 FILMS = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mjpeg")
 NEW_SHARE = 0.05
-"""Of the frame's width, that the board must have gone on from every view kept."""
+"""Minimum distance from every view used so far, over the frame's width."""
 STILL_SHARE = 0.002
-"""Likewise, that it may have gone since the frame looked at before."""
+"""Maximum movement since the previous frame, likewise."""
 LOOKS_HZ = 10.0
-MOST_VIEWS = 80
+MAX_VIEWS = 80
 
 Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Gathered:
-    """Views, the size of their frames [px], and what was left out, in words."""
+    """Views, the size of their frames [px], and remarks on what was left out."""
 
     views: tuple[View, ...]
     size: tuple[int, int]
-    said: tuple[str, ...]
+    remarks: tuple[str, ...]
 
 
 def from_files(board: Board, paths: Sequence[Path], progress: Progress) -> Gathered:
@@ -52,12 +52,12 @@ def from_files(board: Board, paths: Sequence[Path], progress: Progress) -> Gathe
     if not films[0].is_file():
         raise EyeError(f"{films[0]}: expected a film, found no file")
     film = cv2.VideoCapture(str(films[0]))
-    stride = max(1, round(film.get(cv2.CAP_PROP_FPS) / LOOKS_HZ))
-    return _from_frames(board, str(films[0]), _frames(film, stride), MOST_VIEWS, progress)
+    step = max(1, round(film.get(cv2.CAP_PROP_FPS) / LOOKS_HZ))
+    return _from_frames(board, str(films[0]), _frames(film, step), MAX_VIEWS, progress)
 
 
 def from_camera(board: Board, number: int, wanted: int, progress: Progress) -> Gathered:
-    """Return so many views from a live camera; Ctrl-C ends the session with those there are.
+    """Return `wanted` views from a live camera; Ctrl-C ends the session with those there are.
 
     Raises:
         EyeError: There is no such camera, or it did not see the board.
@@ -70,7 +70,7 @@ def from_camera(board: Board, number: int, wanted: int, progress: Progress) -> G
 
 def _from_pictures(board: Board, paths: Sequence[Path], progress: Progress) -> Gathered:
     views: list[View] = []
-    said: list[str] = []
+    remarks: list[str] = []
     size, first = (0, 0), None
     for i, path in enumerate(paths):
         progress(f"picture {i + 1} of {len(paths)}, board in {len(views)}")
@@ -82,12 +82,12 @@ def _from_pictures(board: Board, paths: Sequence[Path], progress: Progress) -> G
         size, first = got, first or path
         view = find_board(board, grey, str(path))
         if view is None:
-            said.append(f"{path}: no {board.said}")
+            remarks.append(f"{path}: no {board.said}")
         else:
             views.append(view)
     if not views:
         raise EyeError(_nothing(board, f"{len(paths)} pictures"))
-    return Gathered(tuple(views), size, tuple(said))
+    return Gathered(tuple(views), size, tuple(remarks))
 
 
 def _from_frames(
@@ -123,11 +123,11 @@ def _from_frames(
 
 def _is_new(view: View, last: View, views: Sequence[View], width: int) -> bool:
     still = _moved(view, last) <= STILL_SHARE * width
-    return still and all(_moved(view, kept) >= NEW_SHARE * width for kept in views)
+    return still and all(_moved(view, other) >= NEW_SHARE * width for other in views)
 
 
 def _moved(one: View, other: View) -> float:
-    """Return how far the points that two views share have gone, on average [px]."""
+    """Return the mean movement of the points that two views share [px]."""
     before = {tuple(p): at for p, at in zip(other.points.tolist(), other.pixels, strict=True)}
     gone = [
         float(np.hypot(*(at - before[tuple(p)])))
@@ -137,12 +137,12 @@ def _moved(one: View, other: View) -> float:
     return float(np.mean(gone)) if gone else float("inf")
 
 
-def _frames(capture: cv2.VideoCapture, stride: int) -> Iterator[tuple[int, Image]]:
-    """Yield every so many frames with their number, in grey."""
+def _frames(capture: cv2.VideoCapture, step: int) -> Iterator[tuple[int, Image]]:
+    """Yield every `step`-th frame with its number, in grey."""
     number = 0
     try:
         while capture.grab():
-            if number % stride == 0:
+            if number % step == 0:
                 good, image = capture.retrieve()
                 if good:
                     yield number, grey_of(np.asarray(image, dtype=np.uint8))

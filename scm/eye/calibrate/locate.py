@@ -1,13 +1,14 @@
-"""Where a camera hangs, from tags whose places on the map are known.
+"""Locates a camera from tags whose places on the map are known.
 
 The corners lie in one plane, the floor, so four of them fit two poses: the camera here, or on the
-other side leaning the other way. Both are taken to the bottom of the corners' errors (x, y, z, yaw
-and two tilts, Gauss-Newton) and weighed by how much worse one fits:
+other side tilted the other way. Both are refined to the minimum of the corners' errors (x, y, z,
+yaw and two tilts, Gauss-Newton) and weighted by their fit:
 
     weight ~ exp(-chi^2 / 2)        chi^2 = sum (error / corner noise)^2
 
-The covariance holds the noise of the corners and the doubt of the lens. Several tags, wide apart,
-make both the choice and the numbers sharp; one small tag tells height and tilt poorly, and says so.
+The covariance includes the noise of the corners and the covariance of the lens. Several tags, far
+apart, determine both the choice and the values well; one small tag determines height and tilt
+poorly, as the covariance shows.
 """
 
 import math
@@ -57,8 +58,8 @@ class Place:
     Attributes:
         model: The camera there.
         covariance: Of x, y, z [m], yaw, tilt x, tilt y [rad], (6, 6).
-        rms_px: Of what is left at the corners, per corner.
-        weight: Of this pose among those allowed, 0 to 1.
+        rms_px: RMS residual at the corners, per corner.
+        weight: Probability of this pose among those allowed, 0 to 1.
     """
 
     model: CameraModel
@@ -68,7 +69,7 @@ class Place:
 
     @property
     def deviations(self) -> Floats:
-        """Standard deviations of the six numbers, (6,)."""
+        """Standard deviations of the six values, (6,)."""
         deviations: Floats = np.sqrt(np.diag(self.covariance))
         return deviations
 
@@ -80,12 +81,12 @@ class Place:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Located:
-    """What a picture tells of its camera.
+    """The located camera of a picture.
 
     Attributes:
-        places: The poses allowed, the likeliest first.
-        used: Ids of the tags it rests on.
-        wrong: Ids of tags left out, for they are not where they were said to be.
+        places: The allowed poses, the most probable first.
+        used: Ids of the tags used.
+        wrong: Ids of tags left out, since they are not at their stated places.
     """
 
     places: tuple[Place, ...]
@@ -94,15 +95,15 @@ class Located:
 
     @property
     def is_sure(self) -> bool:
-        """Whether one pose outweighs the other."""
+        """Whether one pose is clearly more probable than the other."""
         return self.places[0].weight >= SURE
 
 
 def known_tags(city_map: CityMap, more: Path | None = None) -> dict[int, MapTag]:
-    """Return the tags whose places are known: the map's own, and those of a file of `[[tags]]`.
+    """Return the tags with known places: the map's own, and those in a file of `[[tags]]`.
 
     Raises:
-        EyeError: The file is missing or wrong, or gives a tag twice.
+        EyeError: The file is missing or invalid, or lists a tag twice.
     """
     tags = {city_map.tag.tag_id: city_map.tag}
     if more is None:
@@ -148,14 +149,14 @@ def locate(
     lens_covariance: Floats | None = None,
     corner_std_px: float = CORNER_STD_PX,
 ) -> Located:
-    """Return where the camera is that sees these tags.
+    """Return the pose of the camera that sees these tags.
 
     Args:
-        camera: Its lens and frame; where it says it hangs is not used.
-        tags: By id, where tags lie on the floor.
-        seen: In the picture; those not in `tags` are passed over.
+        camera: Its lens and frame; its stated place is not used.
+        tags: Tags on the floor, by id.
+        seen: In the picture; those not in `tags` are ignored.
         lens_covariance: Of the lens, (9, 9).
-        corner_std_px: Noise of a corner's coordinate; more is taken where the corners show more.
+        corner_std_px: Noise of a corner coordinate; more is assumed if the corners show more.
 
     Raises:
         EyeError: No known tag is seen, or no camera that looks down (below 45 deg) fits.
@@ -177,12 +178,12 @@ def locate(
 
 
 def off_px(model: CameraModel, tag: MapTag, corners: Floats) -> Floats:
-    """Return how far a tag's corners are from where a camera should see them, (4, 2) [px]."""
+    """Return the deviation of a tag's corners from their projection, (4, 2) [px]."""
     return corners - model.project(floor_corners(tag))
 
 
 def _levelled(camera: Camera) -> Camera:
-    """Return the lens at a place that is always valid: the map's own may be a placeholder."""
+    """Return the lens at a place that is always valid: the map's may be a placeholder."""
     place = {"x_m": 0.0, "y_m": 0.0, "z_m": 1.0}
     turn = {"yaw_rad": 0.0, "tilt_x_rad": 0.0, "tilt_y_rad": 0.0}
     return msgspec.structs.replace(camera, **place, **turn)
@@ -193,18 +194,18 @@ def _places(
 ) -> list[Place]:
     points = np.concatenate([floor_corners(tags[tag_id]) for tag_id in known])
     pixels = np.concatenate(list(known.values()))
-    settled: list[Floats] = []
+    solutions: list[Floats] = []
     for start in _starts(model, points, pixels):
-        end = _settle(model, points, pixels, start)
-        if end is not None and not any(np.abs(end - one).max() < 1e-4 for one in settled):
-            settled.append(end)
-    if not settled:
+        end = _refine(model, points, pixels, start)
+        if end is not None and not any(np.abs(end - one).max() < 1e-4 for one in solutions):
+            solutions.append(end)
+    if not solutions:
         raise EyeError(
             f"locate: no camera above the floor that looks down (below "
-            f"{math.degrees(LARGEST_TILT_RAD):.0f} deg) sees tags {sorted(known)} so; are sizes "
-            "and places right?"
+            f"{math.degrees(LARGEST_TILT_RAD):.0f} deg) sees tags {sorted(known)} like this; are "
+            "sizes and places right?"
         )
-    left = [float(((pixels - model.moved_to(at).project(points)) ** 2).sum()) for at in settled]
+    left = [float(((pixels - model.moved_to(at).project(points)) ** 2).sum()) for at in solutions]
     spare = max(2 * len(points) - 6, 1)
     noise = max(noise, math.sqrt(min(left) / spare))
     weights = np.exp(-0.5 * (np.array(left) - min(left)) / noise**2)
@@ -216,13 +217,13 @@ def _places(
             math.sqrt(rest / len(points)),
             float(weight),
         )
-        for at, rest, weight in zip(settled, left, weights, strict=True)
+        for at, rest, weight in zip(solutions, left, weights, strict=True)
     ]
     return sorted(places, key=lambda place: -place.weight)
 
 
 def _starts(model: CameraModel, points: Floats, pixels: Floats) -> list[Floats]:
-    """Return the poses that the flat problem allows, as extrinsics (6,)."""
+    """Return the poses that the planar problem allows, as extrinsics (6,)."""
     ideal = model.undistort(pixels)
     shown = np.isfinite(ideal).all(axis=1)
     if shown.sum() < 4:
@@ -240,7 +241,7 @@ def _starts(model: CameraModel, points: Floats, pixels: Floats) -> list[Floats]:
 
 
 def _extrinsics(rotation: Floats, position: Floats) -> Floats | None:
-    """Return camera_R_map and place as `CameraModel.extrinsics`; None: it does not look down."""
+    """Return camera_R_map and place as `CameraModel.extrinsics`; None if it does not look down."""
     yaw = math.atan2(rotation[1, 0], -rotation[1, 1])
     c, s = math.cos(yaw), math.sin(yaw)
     level = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
@@ -251,8 +252,8 @@ def _extrinsics(rotation: Floats, position: Floats) -> Floats | None:
     return np.array([*position, yaw, *tilts])
 
 
-def _settle(model: CameraModel, points: Floats, pixels: Floats, start: Floats) -> Floats | None:
-    """Return the extrinsics at the bottom of the corners' errors; None: out of bounds."""
+def _refine(model: CameraModel, points: Floats, pixels: Floats, start: Floats) -> Floats | None:
+    """Return the extrinsics that minimise the corners' errors; None if out of bounds."""
     at, damping = start, 1e-9
     cost = float(((pixels - model.moved_to(at).project(points)) ** 2).sum())
     for _ in range(_ITERATIONS):
@@ -276,7 +277,7 @@ def _settle(model: CameraModel, points: Floats, pixels: Floats, start: Floats) -
 
 
 def _by_place(model: CameraModel, points: Floats) -> Floats:
-    """Return the change of the pixels by each of the extrinsics, (2n, 6)."""
+    """Return the derivative of the pixels by the extrinsics, (2n, 6)."""
     at = model.extrinsics
     columns = [
         (model.moved_to(at + shift).project(points) - model.moved_to(at - shift).project(points))
@@ -286,7 +287,7 @@ def _by_place(model: CameraModel, points: Floats) -> Floats:
 
 
 def _by_lens(model: CameraModel, points: Floats) -> Floats:
-    """Return the change of the pixels by each number of the lens, (2n, 9)."""
+    """Return the derivative of the pixels by the lens parameters, (2n, 9)."""
     camera = model.camera
     values = np.array([camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, *camera.distortion])
     by_lens = np.zeros((2 * len(points), LENS_PARAMETERS))
@@ -318,7 +319,7 @@ def _covariance(model: CameraModel, points: Floats, noise: float) -> Floats:
 def _worst_tag(
     model: CameraModel, tags: Mapping[int, MapTag], known: Mapping[int, Floats], noise: float
 ) -> int | None:
-    """Return the tag that is not where it was said to be, if one sticks out of the others."""
+    """Return the tag that is not at its stated place, if one is an outlier."""
     off = {
         tag_id: float(np.hypot(*off_px(model, tags[tag_id], at).T).mean())
         for tag_id, at in known.items()

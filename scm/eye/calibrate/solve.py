@@ -1,15 +1,15 @@
-"""The lens that fits views of a flat board best, and how sure it is.
+"""Fits a lens to views of a flat board, with its covariance.
 
-OpenCV gives the start; from there damped Gauss-Newton over the nine numbers of the lens and the six
-of every view goes to the bottom. A view's own six are eliminated (Schur complement), so what is
-left is the information about the lens alone,
+OpenCV gives the start; from there damped Gauss-Newton over the nine lens parameters and the six of
+every view finds the minimum. A view's own six are eliminated (Schur complement), which leaves the
+information about the lens alone,
 
     I = sum over views of  A^T A - A^T B (B^T B)^-1 B^T A      A: by lens, B: by pose
 
-and s^2 I^-1 its covariance, where s is the noise of a corner's coordinate as the residuals show.
-Points and views far off the rest are taken out, the worst first. Corners of tags are then put right
-for the bow of their sides, and all is done once more. A distortion term that the views
-cannot tell better than +-1 is left out: no lens has one that large, and it would run wild outside.
+and s^2 I^-1 is its covariance, where s is the noise of a corner coordinate, estimated from the
+residuals. Outlier points and views are removed, the worst first. Corners of tags are then corrected
+for the curvature of their sides, and everything is repeated. A distortion term that the views
+determine no better than +-1 is left out: no lens has one that large, and it would diverge outside.
 """
 
 import math
@@ -27,24 +27,24 @@ from scm.eye.calibration import LENS_NAMES, Calibration
 from scm.eye.camera import LENS_PARAMETERS
 
 LEAST_CORNER_STD_PX = 0.02
-"""No board is printed and found better than that, however little is left at its points."""
+"""No board is printed and detected better than this, however small the residuals."""
 POINT_SIGMAS = 5.0
 VIEW_RATIO = 3.0
 BLUNDER_PX = 0.3
-MOST_OUT = 0.2
+MAX_OUT = 0.2
 _POINT_ROUNDS = 12
 WIDEST_TERM = 1.0
 _ITERATIONS = 60
-_SETTLED = 1e-10
+_CONVERGED = 1e-10
 _UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
 _OPTIONAL = {"pinhole": (8, 5, 4), "fisheye": (7, 6, 5, 4)}
 _FISHEYE_FOCALS = (0.32, 0.45, 0.65, 1.0)
-"""First guesses of the focal length in widths of the frame."""
+"""Initial guesses of the focal length in widths of the frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lens:
-    """Nine numbers in the order of `LENS_NAMES`, and which of them are sought."""
+    """Nine parameters in the order of `LENS_NAMES`, and which of them are estimated."""
 
     kind: str
     values: Floats
@@ -57,7 +57,7 @@ class Lens:
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
     def see(self, points: Floats, pose: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return pixels (n, 2), their change by lens (2n, 9) and by pose (2n, 6).
+        """Return pixels (n, 2), their derivatives by lens (2n, 9) and by pose (2n, 6).
 
         Args:
             points: In the frame of the board, (n, 3) [m].
@@ -80,16 +80,16 @@ class Lens:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """What the views say.
+    """The fitted lens and views.
 
     Attributes:
         poses: camera_T_board of each view as rotation vector and shift, (n, 6).
-        views: Those that were kept, without the points taken out.
+        views: Those used, without outlier points.
         size: Width and height of the frame [px].
         information: About the lens for corners of 1 px, (9, 9).
         corner_std_px: Noise of a corner's coordinate.
         depth_correlation: Of the focal length with the boards' mean distance.
-        said: What was taken or left out, in words.
+        remarks: What was left out, in words.
     """
 
     lens: Lens
@@ -99,16 +99,16 @@ class Solution:
     information: Floats = field(default_factory=lambda: np.zeros((9, 9)))
     corner_std_px: float = LEAST_CORNER_STD_PX
     depth_correlation: float = 0.0
-    said: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @property
     def covariance(self) -> Floats:
-        """Of the lens, (9, 9); infinite where the views say nothing."""
+        """Of the lens, (9, 9); infinite where it is undetermined."""
         return self.corner_std_px**2 * inverse(self.information, self.lens.free)
 
     @property
     def errors(self) -> tuple[Floats, ...]:
-        """What is left at the points of each view, (n, 2) [px]."""
+        """Residuals at the points of each view, (n, 2) [px]."""
         return tuple(
             view.pixels - self.lens.see(view.points, pose)[0]
             for view, pose in zip(self.views, self.poses, strict=True)
@@ -116,11 +116,11 @@ class Solution:
 
     @property
     def rms_px(self) -> float:
-        """Root mean square of what is left, per point."""
+        """RMS residual, per point."""
         return float(np.sqrt((np.concatenate(self.errors) ** 2).sum(axis=1).mean()))
 
     def calibration(self) -> Calibration:
-        """Return the lens as a file holds it."""
+        """Return the lens as a calibration file."""
         fx, fy, cx, cy, a, b, c, d, e = (float(value) for value in self.lens.values)
         return Calibration(
             lens="fisheye" if self.lens.kind == "fisheye" else "pinhole",
@@ -143,16 +143,16 @@ def solve(
     fisheye: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Solution:
-    """Return the lens that fits the views, blunders taken out.
+    """Fit a lens to the views, without outliers.
 
     Args:
         views: Of one board, at least two.
         size: Width and height of the frame [px].
-        fisheye: The lens is wide: OpenCV's fisheye in place of the pinhole.
-        progress: Is told what is being done.
+        fisheye: Whether to use OpenCV's fisheye for a wide lens.
+        progress: Called with the present activity.
 
     Raises:
-        EyeError: No lens fits, or far too many views do not fit the same one.
+        EyeError: No lens fits, or too many views do not fit the same one.
     """
     solution = _solved(tuple(views), size, fisheye, progress)
     if not any(view.tags for view in views):
@@ -164,21 +164,21 @@ def _solved(
     views: tuple[View, ...], size: tuple[int, int], fisheye: bool, progress: Callable[[str], None]
 ) -> Solution:
     progress("solving")
-    solution = _settle(_start(views, size, fisheye))
+    solution = _optimised(_start(views, size, fisheye))
     for term in _OPTIONAL[solution.lens.kind]:
         progress("solving")
         solution = _without_blunders(solution, len(views))
         if not np.sqrt(solution.covariance[term, term]) > WIDEST_TERM:
             break
-        solution = _settle(_without(solution, term))
+        solution = _optimised(_without(solution, term))
     solution = _without_blunders(solution, len(views))
-    return replace(solution, said=(*solution.said, *_points_out(solution, views)))
+    return replace(solution, remarks=(*solution.remarks, *_points_out(solution, views)))
 
 
 def _unbent(views: Sequence[View], solution: Solution) -> tuple[View, ...]:
-    """Return the views with the corners of tags where the lens shows them, as far as it is known.
+    """Return the views with tag corners corrected for curved sides, with the lens found so far.
 
-    A view that was taken out as a whole stays as it is.
+    A view that was removed as a whole stays as it is.
     """
     poses = dict(zip((view.name for view in solution.views), solution.poses, strict=True))
     changed = []
@@ -194,14 +194,14 @@ def _unbent(views: Sequence[View], solution: Solution) -> tuple[View, ...]:
 
 
 def inverse(information: Floats, free: Bools) -> Floats:
-    """Return the inverse over what is free, (9, 9): 0 for the rest, infinite where blind."""
+    """Return the inverse over free parameters, (9, 9): 0 for others, infinite if undetermined."""
     found = np.zeros_like(information)
     chosen = np.ix_(free, free)
     size = np.sqrt(np.maximum(np.diag(information)[free], 1e-300))
     values, vectors = np.linalg.eigh(information[chosen] / np.outer(size, size))
     blind = values < 1e-13
-    kept = vectors[:, ~blind] / np.sqrt(values[~blind])
-    known = (kept @ kept.T) / np.outer(size, size)
+    finite = vectors[:, ~blind] / np.sqrt(values[~blind])
+    known = (finite @ finite.T) / np.outer(size, size)
     unknown = (vectors[:, blind] ** 2).sum(axis=1) > 1e-6
     known[np.ix_(unknown, unknown)] = np.inf
     found[chosen] = known
@@ -209,22 +209,24 @@ def inverse(information: Floats, free: Bools) -> Floats:
 
 
 def eliminate(by_lens: Floats, by_pose: Floats) -> Floats:
-    """Return what one view says about the lens, its own pose unknown, (9, 9)."""
+    """Return one view's information about the lens, its pose eliminated, (9, 9)."""
     across = by_lens.T @ by_pose
-    told: Floats = by_lens.T @ by_lens - across @ np.linalg.solve(by_pose.T @ by_pose, across.T)
-    return told
+    information: Floats = by_lens.T @ by_lens - across @ np.linalg.solve(
+        by_pose.T @ by_pose, across.T
+    )
+    return information
 
 
-def _settle(solution: Solution) -> Solution:
-    """Go to the bottom; then tell what is known there."""
+def _optimised(solution: Solution) -> Solution:
+    """Find the minimum, and evaluate the information there."""
     return _known(_descend(solution))
 
 
 def _descend(solution: Solution) -> Solution:
-    """Go to the bottom by damped Gauss-Newton.
+    """Find the minimum by damped Gauss-Newton.
 
     Raises:
-        LinAlgError: from a start so far off that a board ran away beyond all measure.
+        LinAlgError: from a start that diverges.
     """
     lens, poses = solution.lens, solution.poses
     damping, cost = 1e-6, _cost(solution)
@@ -238,13 +240,13 @@ def _descend(solution: Solution) -> Solution:
         new = _cost(tried)
         if not new < cost:
             damping *= 10.0
-            if damping > 1e6 or abs(new - cost) <= _SETTLED * cost:
+            if damping > 1e6 or abs(new - cost) <= _CONVERGED * cost:
                 break
             continue
         gain = cost - new
         solution, lens, poses, cost = tried, tried.lens, tried.poses, new
         damping = max(damping / 10.0, 1e-12)
-        if gain <= _SETTLED * cost:
+        if gain <= _CONVERGED * cost:
             break
     return solution
 
@@ -258,7 +260,7 @@ def _cost(solution: Solution) -> float:
 
 
 def _step(solution: Solution, damping: float) -> tuple[Floats, Floats]:
-    """Return the changes of lens (9,) and poses (n, 6) that lead downhill."""
+    """Return the steps of lens (9,) and poses (n, 6)."""
     lens, parts = solution.lens, []
     normal, right = np.zeros((9, 9)), np.zeros(9)
     for view, pose in zip(solution.views, solution.poses, strict=True):
@@ -283,7 +285,7 @@ def _step(solution: Solution, damping: float) -> tuple[Floats, Floats]:
 
 
 def _known(solution: Solution) -> Solution:
-    """Return the solution with what its views say about the lens, and how noisy they are."""
+    """Return the solution with its information about the lens, and the corner noise."""
     lens, views = solution.lens, solution.views
     seen = [lens.see(v.points, pose) for v, pose in zip(views, solution.poses, strict=True)]
     information = np.sum([eliminate(by_lens, by_pose) for _, by_lens, by_pose in seen], axis=0)
@@ -296,7 +298,7 @@ def _known(solution: Solution) -> Solution:
 
 
 def _depth_correlation(solution: Solution, seen: Sequence[tuple[Floats, Floats, Floats]]) -> float:
-    """Return how the focal length and the boards' mean distance hang together, -1 to 1."""
+    """Return the correlation of focal length and the boards' mean distance, -1 to 1."""
     covariance = solution.covariance
     if not np.isfinite(covariance).all():
         return 1.0
@@ -309,7 +311,7 @@ def _depth_correlation(solution: Solution, seen: Sequence[tuple[Floats, Floats, 
         own += solution.corner_std_px**2 * float(normal[5, 5]) / len(seen) ** 2
     depth = float(by_lens @ covariance @ by_lens) + own
     spread = float(focal @ covariance @ focal) * depth
-    if not spread > 0.0:  # a view that tells no pose: nor do they tell the two apart
+    if not spread > 0.0:  # views without a pose do not separate the two
         return 1.0
     return float(focal @ covariance @ by_lens) / math.sqrt(spread)
 
@@ -320,51 +322,51 @@ def _without(solution: Solution, term: int) -> Solution:
     values, free = lens.values.copy(), lens.free.copy()
     values[term], free[term] = 0.0, False
     name = LENS_NAMES[lens.kind][term]
-    words = f"distortion {name} left out: these views tell it no better than +-{WIDEST_TERM:g}"
+    words = f"distortion {name} left out: these views determine it no better than +-{WIDEST_TERM:g}"
     return replace(
-        solution, lens=replace(lens, values=values, free=free), said=(*solution.said, words)
+        solution, lens=replace(lens, values=values, free=free), remarks=(*solution.remarks, words)
     )
 
 
 def _without_blunders(solution: Solution, views: int) -> Solution:
-    """Return the solution settled without points and views that are far off, the worst first."""
+    """Return the optimised solution without outlier points and views, the worst first."""
     while (worst := _worst_view(solution)) is not None:
         index, ratio = worst
         name = solution.views[index].name
-        words = f"{name}: the whole view is off, {ratio:.1f} times the usual; taken out"
-        solution = _settle(_drop(solution, index, words))
-        if len(solution.views) < (1.0 - MOST_OUT) * views:
+        words = f"{name}: the whole view is an outlier, {ratio:.1f} times the usual error; removed"
+        solution = _optimised(_drop(solution, index, words))
+        if len(solution.views) < (1.0 - MAX_OUT) * views:
             raise EyeError(
                 f"calibration: more than a fifth of {views} views do not fit one lens (last: "
                 f"{name}); is the board flat, --squares right, the frame size and zoom the same?"
             )
     for _ in range(_POINT_ROUNDS):
-        kept = _without_points(solution)
-        if kept == solution.views:
+        remaining = _without_points(solution)
+        if remaining == solution.views:
             break
-        solution = _settle(replace(solution, views=kept))
+        solution = _optimised(replace(solution, views=remaining))
     return solution
 
 
 def _without_points(solution: Solution) -> tuple[View, ...]:
-    """Return the views without the worst of their points that are far off.
+    """Return the views without their worst outlier points.
 
-    The worst only, because they draw the view's pose towards them, and so good points off.
+    Only the worst, because outliers pull the view's pose, and make good points look bad.
     """
-    kept, errors = list(solution.views), solution.errors
+    remaining, errors = list(solution.views), solution.errors
     noise = 1.4826 * float(np.median(np.abs(np.concatenate(errors))))
     for i, (view, error) in enumerate(zip(solution.views, errors, strict=True)):
         off = np.hypot(error[:, 0], error[:, 1])
         good = off <= max(POINT_SIGMAS * noise, BLUNDER_PX, 0.7 * float(off.max()))
         if not good.all() and good.sum() >= LEAST_POINTS:
-            kept[i] = replace(view, points=view.points[good], pixels=view.pixels[good])
-    return tuple(kept)
+            remaining[i] = replace(view, points=view.points[good], pixels=view.pixels[good])
+    return tuple(remaining)
 
 
 def _points_out(solution: Solution, views: Sequence[View]) -> list[str]:
     had = {view.name: len(view.points) for view in views}
     gone = {view.name: had[view.name] - len(view.points) for view in solution.views}
-    return [f"{name}: {n} point{'s' * (n > 1)} taken out" for name, n in gone.items() if n]
+    return [f"{name}: {n} point{'s' * (n > 1)} removed" for name, n in gone.items() if n]
 
 
 def _worst_view(solution: Solution) -> tuple[int, float] | None:
@@ -378,7 +380,7 @@ def _worst_view(solution: Solution) -> tuple[int, float] | None:
 def _drop(solution: Solution, index: int, words: str) -> Solution:
     views = tuple(view for i, view in enumerate(solution.views) if i != index)
     poses = np.delete(solution.poses, index, axis=0)
-    return replace(solution, views=views, poses=poses, said=(*solution.said, words))
+    return replace(solution, views=views, poses=poses, remarks=(*solution.remarks, words))
 
 
 def _start(views: tuple[View, ...], size: tuple[int, int], fisheye: bool) -> Solution:
@@ -397,7 +399,7 @@ def _pinhole_starts(views: tuple[View, ...], size: tuple[int, int]) -> list[Solu
     pixels = [view.pixels.astype(np.float32) for view in views]
     free = np.ones(LENS_PARAMETERS, dtype=np.bool_)
     starts = []
-    # with k3 free a handful of views leads OpenCV astray; it comes in with our own steps
+    # with k3 free OpenCV fails on few views; our own steps include it
     for focal in (None, 0.9, 2.5):
         guess, flags = None, cv2.CALIB_FIX_K3
         if focal is not None:
@@ -420,7 +422,7 @@ def _pinhole_starts(views: tuple[View, ...], size: tuple[int, int]) -> list[Solu
 
 
 def _fisheye_starts(views: tuple[View, ...], size: tuple[int, int]) -> list[Solution]:
-    """Return starts from guessed focal lengths: OpenCV's own fisheye solver gives up too easily."""
+    """Return starts from guessed focal lengths: OpenCV's own fisheye solver fails too easily."""
     free = np.arange(LENS_PARAMETERS) < 8
     starts = []
     for focal in _FISHEYE_FOCALS:
@@ -433,10 +435,10 @@ def _fisheye_starts(views: tuple[View, ...], size: tuple[int, int]) -> list[Solu
         started = Solution(lens, np.array(poses), views, size)
         first = replace(started, lens=replace(lens, free=np.arange(LENS_PARAMETERS) < 5))
         try:
-            settled = _descend(first)
+            descended = _descend(first)
         except np.linalg.LinAlgError:
             continue
-        starts.append(replace(settled, lens=replace(settled.lens, free=free)))
+        starts.append(replace(descended, lens=replace(descended.lens, free=free)))
     return starts
 
 

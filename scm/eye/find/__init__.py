@@ -1,1 +1,1 @@
-"""Finding tags frame after frame: known ones measured where they should be, the rest by strips."""
+"""Finds tags frame after frame: measures known ones at predicted places, searches for others."""

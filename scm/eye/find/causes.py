@@ -1,7 +1,7 @@
-"""Why no tags are found: the picture is mirrored, or what was printed is no tag36h11 as ours.
+"""Finds out why tags are missing: a mirrored picture, or prints that are not our tag36h11.
 
-Each guess is tried on a whole frame, so they are for frames in which tags are missing: all of them
-at once on a single picture (`cause_of`), one at a time and rarely in a stream (`Causes`).
+Each guess is tried on a whole frame, for frames with missing tags: all of them at once on a single
+picture (`cause_of`), one at a time and rarely in a stream (`Causes`).
 """
 
 from collections.abc import Callable, Sequence
@@ -17,14 +17,14 @@ from scm.eye.detect import Settings, look
 from scm.v2x.messages.eye_status import Complaint
 
 MISSING_NS = 2 * NS_PER_S
-"""So long may tags be missing before the first guess is tried."""
+"""How long tags are missing before the first guess is tried."""
 BETWEEN_NS = NS_PER_S // 2
 AGAIN_NS, SURE_NS = 60 * NS_PER_S, 10 * NS_PER_S
-"""After all guesses were tried in vain, and after one was right, until it is tried again."""
+"""Pause after all guesses failed, and after one was right."""
 LONGEST_PX = 1280
-"""A larger frame is made smaller first: guesses are about tags that are large enough."""
+"""Larger frames are downscaled: guesses are about large tags."""
 COARSE_PX = 800
-"""In a larger frame squares are sought in a picture of half the size, which is quick."""
+"""In larger frames squares are sought at half the resolution, which is fast."""
 LEAST_SIDE_PX = 12.0
 FAMILIES = {
     "tag25h9": cv2.aruco.DICT_APRILTAG_25h9,
@@ -43,21 +43,21 @@ _EXACT = Settings(max_hamming=0, min_margin=30.0)
 
 @dataclass(frozen=True, slots=True)
 class _Guess:
-    """One guess: its code, what finds tags if it is right, and what to say of their ids."""
+    """One guess: its code, a function that finds tags if it is right, and its sentence."""
 
     code: str
     find: Callable[[Image], Sequence[int]]
-    said: str
+    text: str
 
 
 def cause_of(grey: Image) -> Complaint | None:
-    """Return why no tag36h11 is found in a grey picture, (height, width); None: no guess fits."""
+    """Return why no tag36h11 is found in a grey picture, (height, width); None: unknown."""
     small = _smaller(grey)
-    return next((said for guess in _guesses() if (said := _tried(guess, small))), None)
+    return next((text for guess in _guesses() if (text := _tried(guess, small))), None)
 
 
 class Causes:
-    """The guesses, one after the other, while tags are missing in one camera's frames."""
+    """Tries the guesses one after the other, while tags are missing in a camera's frames."""
 
     def __init__(self) -> None:
         self._missing_ns: int | None = None
@@ -67,7 +67,7 @@ class Causes:
         self._reported: set[str] = set()
 
     def see(self, t_ns: int, grey: Image, *, missing: bool) -> None:
-        """Take a frame, (height, width), in which tags are missing, or not."""
+        """Process a frame, (height, width), in which tags are missing, or not."""
         if not missing:
             self._missing_ns, self._found, self._next = None, None, 0
             return
@@ -122,8 +122,8 @@ def _tried(guess: _Guess, grey: Image) -> Complaint | None:
     if not ids:
         return None
     shown = ", ".join(str(one) for one in ids[:8])
-    said = guess.said.format(reprint=REPRINT)
-    return Complaint(code=guess.code, said=f"{said} (seen so: {shown})")
+    text = guess.text.format(reprint=REPRINT)
+    return Complaint(code=guess.code, said=f"{text} (seen so: {shown})")
 
 
 def _smaller(grey: Image) -> Image:
@@ -141,7 +141,7 @@ def _ours(grey: object) -> list[int]:
 
 
 def _finder(dictionary: int, border_cells: int = 1) -> Callable[[Image], Sequence[int]]:
-    """Return what finds markers of OpenCV's dictionaries, without a single wrong bit."""
+    """Return a function that finds markers of an OpenCV dictionary, without bit errors."""
     family = cv2.aruco.getPredefinedDictionary(dictionary)
 
     def find(grey: Image) -> list[int]:
@@ -151,7 +151,7 @@ def _finder(dictionary: int, border_cells: int = 1) -> Callable[[Image], Sequenc
         settings.maxErroneousBitsInBorderRate = 0.04
         settings.minMarkerPerimeterRate = 4.0 * LEAST_SIDE_PX / max(grey.shape)
         corners, ids, _ = cv2.aruco.ArucoDetector(family, settings).detectMarkers(grey)
-        numbers = np.ravel(ids) if corners else ()  # they are None where there are no corners
+        numbers = np.ravel(ids) if corners else ()  # None if there are no corners
         return [
             int(one) for one, square in zip(numbers, corners, strict=True)
             if _side(np.asarray(square, dtype=np.float64).reshape(4, 2)) >= LEAST_SIDE_PX

@@ -1,4 +1,4 @@
-"""What the tags of the family tag36h11 show: 8 x 8 cells each, the black border among them."""
+"""The cells of the tags of the family tag36h11: 8 x 8 each, with the black border."""
 
 from functools import cache
 

@@ -1,12 +1,12 @@
-"""Where the sides of a tag are, to hundredths of a pixel, from where they should be.
+"""Locates the sides of a tag, to hundredths of a pixel, from their predicted places.
 
-Three looks. The whole tag is shifted to where its four sides show the strongest step from black to
-white. Each side is then laid through the steepest places along it. At last its offset is taken from
-the area below the grey between the middles of the border and of the margin, on either side of it:
+In three passes. The whole tag is shifted to where its four sides show the strongest step from black
+to white. Each side is then fitted to the steepest places along it. Finally its offset is computed
+from the mean grey between the centres of the border and of the margin:
 
     e = 2 h (mid - mean) / (white - black)      mean: of the grey over [-h, h] along the normal
 
-That is exact for any blur that is the same to both sides, of a lens, of pixels or of motion.
+This is exact for any symmetric blur, of a lens, of pixels or of motion.
 """
 
 import math
@@ -16,16 +16,16 @@ from scm.eye.find.lines import cell_px, look_across, move_sides
 from scm.vehicles.jit import array_kernel
 
 SAMPLES = 24
-"""Places looked at along each side."""
-LONGEST = 96
-"""Most grey values along a normal."""
+"""Sample positions along each side."""
+MAX_PROFILE = 96
+"""Maximum number of grey values along a normal."""
 WORK_ROWS = 8
-"""To work in: so many rows of LONGEST."""
+"""Rows of the work array."""
 
 _SPAN = 0.80
-"""Share of a side that is looked at; its ends belong to the corners."""
+"""Share of a side that is sampled; its ends belong to the corners."""
 _SQUEEZE = 2
-"""How far opposite sides may be shifted against each other in the first look [px]."""
+"""Maximum relative shift of opposite sides in the first pass [px]."""
 _FINE_STEPS = 8
 _LEAST_INLIERS = 0.6
 _LEAST_STEP = 4.0
@@ -34,13 +34,13 @@ _NO_EDGE = 1.0e3
 
 @array_kernel
 def shift_whole(grey: Image, quad: Floats, work: Floats, lines: Floats, ends: Floats) -> bool:
-    """Shift a tag to where its sides show the strongest steps outwards.
+    """Shift a tag to where its sides show the strongest outward steps.
 
-    Its corners are changed in place; `work` (WORK_ROWS, LONGEST), `lines` (4, 3) and `ends` (4, 2)
-    are to work in.
+    Its corners are changed in place; `work` (WORK_ROWS, MAX_PROFILE), `lines` (4, 3) and `ends`
+    (4, 2) are work arrays.
     """
     cell = cell_px(quad)
-    reach = int(min(max(5.0, 1.75 * cell), (LONGEST - 1) // 2 - 1))
+    reach = int(min(max(5.0, 1.75 * cell), (MAX_PROFILE - 1) // 2 - 1))
     count = 2 * reach + 1
     wide = max(1, int(0.3 * cell))
     for side in range(4):
@@ -66,7 +66,7 @@ def _mean_profile(
 
 @array_kernel
 def _steps(profile: Floats, spare: Floats, wide: int) -> None:
-    """Turn a profile into how much lighter it is outside of each place than inside."""
+    """Convert a profile to its step: how much lighter it is outside of each place than inside."""
     count = len(profile)
     for m in range(count):
         spare[m] = profile[m]
@@ -79,7 +79,7 @@ def _steps(profile: Floats, spare: Floats, wide: int) -> None:
 
 @array_kernel
 def _best_shift(one: Floats, other: Floats, here: Floats, there: Floats) -> None:
-    """Write the offsets of two opposite sides where they show most together."""
+    """Write the offsets of two opposite sides with the strongest combined step."""
     reach = (len(one) - 1) // 2
     best = -1.0e9
     for shift in range(-reach, reach + 1):
@@ -94,10 +94,10 @@ def _best_shift(one: Floats, other: Floats, here: Floats, there: Floats) -> None
 
 
 @array_kernel
-def lay_rough(
+def lay_coarse(
     grey: Image, quad: Floats, window: float, work: Floats, lines: Floats, ends: Floats
 ) -> bool:
-    """Lay each side through the steepest places within `window` cells of where it is."""
+    """Fit each side to the steepest places within `window` cells of its place."""
     cell = cell_px(quad)
     reach = min(max(2.0, window * cell), 40.0)
     count = 2 * math.ceil(reach) + 1
@@ -123,7 +123,7 @@ def lay_rough(
 
 @array_kernel
 def _steepest(steps: Floats) -> float:
-    """Return the place of the largest value, between places by a parabola."""
+    """Return the place of the largest value, interpolated by a parabola."""
     best = 0
     for m in range(len(steps)):
         if steps[m] > steps[best]:
@@ -137,7 +137,7 @@ def _steepest(steps: Floats) -> float:
 
 @array_kernel
 def _agreed_line(at: Floats, offset: Floats, near: float, ends: Floats) -> bool:
-    """Write the offsets at a side's ends of the line that most places agree on."""
+    """Write the end offsets of the line that most places agree on."""
     half = len(at) // 2
     most, a, b = 0, 0.0, 0.0
     for k in range(half):
@@ -169,7 +169,7 @@ def _agreed_line(at: Floats, offset: Floats, near: float, ends: Floats) -> bool:
 
 @array_kernel
 def lay_fine(grey: Image, quad: Floats, work: Floats, lines: Floats, ends: Floats) -> bool:
-    """Lay each side where the area below the grey across it says.
+    """Fit each side by the mean grey across it.
 
     Returns:
         Whether most of each side agrees on one line.
@@ -196,7 +196,7 @@ def lay_fine(grey: Image, quad: Floats, work: Floats, lines: Floats, ends: Float
 
 @array_kernel
 def _areas(low: Floats, high: Floats, mean: Floats, h: float, offset: Floats) -> None:
-    """Write each place's offset; black and white are those of it and its four neighbours."""
+    """Write each place's offset; black and white are means of it and its four neighbours."""
     count = len(low)
     for k in range(count):
         first, last = max(0, k - 2), min(count, k + 3)
@@ -214,7 +214,7 @@ def _areas(low: Floats, high: Floats, mean: Floats, h: float, offset: Floats) ->
 
 @array_kernel
 def _robust_line(at: Floats, offset: Floats, weight: Floats, away: Floats, ends: Floats) -> bool:
-    """Write the offsets at a side's ends of a line that outliers do not pull (Tukey's weights)."""
+    """Write the end offsets of a robust line fit (Tukey's weights)."""
     count = len(at)
     level, slope = _median(offset, away), 0.0
     for _ in range(4):
@@ -242,7 +242,7 @@ def _robust_line(at: Floats, offset: Floats, weight: Floats, away: Floats, ends:
 
 @array_kernel
 def _median(values: Floats, spare: Floats) -> float:
-    """Return the middle value, by sorting a copy."""
+    """Return the median, by sorting a copy."""
     for k in range(len(values)):
         value, m = values[k], k
         while m > 0 and spare[m - 1] > value:

@@ -1,9 +1,9 @@
-"""Tags frame after frame: fast where they are known, and nothing new missed for long.
+"""Finds tags frame after frame: fast where they are known, and nothing new missed for long.
 
-A tag whose place is expected is measured there, without a search. The library searches one upright
-strip of the frame each time, so that the whole frame passes within `scan_frames`. The first frame
-is searched whole, and one where most tags are lost. Two tags with the same id at two places are
-both told.
+A tag with a predicted place is measured there, without a search. The library searches one upright
+strip of the frame each time, so that the whole frame is covered within `scan_frames`. The first
+frame, and one in which most tags are lost, is searched completely. Two tags with the same id at two
+places are both returned.
 """
 
 import math
@@ -32,31 +32,31 @@ from scm.records.eye import TagSeen
 from scm.scenery.tags import TAG_COUNT
 
 DECIMATED_ROWS = 1080
-"""A taller frame is searched in a picture that is smaller by as much more."""
+"""Taller frames are downscaled in proportion for the search."""
 ENOUGH_PX = 14.0
-"""Side of a tag that is enough for the search: strips are made coarser by half at most, for it."""
+"""Sufficient side of a tag in the search: strips are downscaled to it, by 1.5 at most."""
 SEARCH_BLUR_PX = (3, 3)
-"""Mean taken before pixels are left out of the picture searched: a quarter of the time saved."""
+"""Blur before downscaling: saves a quarter of the time."""
 RESCUES = 6
-"""Cut-outs of lost tags that the library searches in one frame."""
+"""Maximum number of crops around lost tags searched per frame."""
 _RESCUE_MARGIN = 0.75
 MAX_BORDER = 2
-"""Wrong cells put up with in the border of a tag, of 28."""
+"""Maximum number of wrong cells in a tag's border, of 28."""
 _STRIP_OVERLAP = 1.9
-"""Columns that strips share, in sides of the largest tag: its diagonal, and a margin."""
+"""Overlap of strips, in sides of the largest tag: its diagonal, and a margin."""
 _USUAL_SIDE = 1.0 / 18.0
-"""Least side of a tag that strips are ready for, in heights of the frame."""
+"""Minimum side of a tag that strips must overlap for, in heights of the frame."""
 _NOTHING: Mapping[int, Floats] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Place:
-    """Where a tag should be.
+    """Predicted place of a tag.
 
     Attributes:
         tag_id: Which.
         corners: (4, 2) [px].
-        step: How the corners moved since the frame before, (4, 2) [px].
+        step: Movement of the corners since the previous frame, (4, 2) [px].
         middle: Mean of the corners [px].
         side: Of the tag [px].
     """
@@ -68,7 +68,7 @@ class _Place:
     side: float
 
     def is_near(self, other: "_Place") -> bool:
-        """Return whether it is the same id, less than a side away."""
+        """Return whether it has the same id and is less than a side away."""
         return self.tag_id == other.tag_id and math.dist(self.middle, other.middle) < self.side
 
 
@@ -83,8 +83,8 @@ class TagFinder:
     """Finds the tags of one camera's frames, given in order.
 
     Args:
-        settings: What counts as a tag, and how fine the search is at up to 1080 rows.
-        scan_frames: Within so many frames every part of the picture is searched.
+        settings: Of the search, at up to 1080 rows.
+        scan_frames: Number of frames in which the whole picture is searched.
     """
 
     def __init__(self, settings: Settings | None = None, scan_frames: int = 12) -> None:
@@ -97,13 +97,13 @@ class TagFinder:
         self._seen: list[_Place] = []
 
     def find(self, grey: Image, expected: Mapping[int, Floats] = _NOTHING) -> tuple[TagSeen, ...]:
-        """Return the tags in a frame, sorted by id, the clearer of twins first.
+        """Return the tags in a frame, sorted by id, the clearest first.
 
         Args:
             grey: The frame, (height, width).
-            expected: Where known tags should be: id to corners (4, 2) [px], in the order of
-                `TagSeen.corners_px`. Up to one and a half of a tag's cells off will do. Tags seen
-                in the frame before are looked for anyway.
+            expected: Predicted corners of known tags by id, (4, 2) [px], in the order of
+                `TagSeen.corners_px`; up to 1.5 of a tag's cells off. Tags of the previous frame are
+                tracked anyway.
         """
         if min(grey.shape) < LEAST_PX:
             return ()
@@ -115,11 +115,11 @@ class TagFinder:
         seen, lost = self._measured(frame, places)
         most_lost = len(places) > 0 and 2 * len(lost) >= len(places)
         whole = first or (most_lost and self._since_whole >= self._scan_frames)
-        rough = self._search(frame, places, whole=whole)
+        coarse = self._search(frame, places, whole=whole)
         if not whole:
             ids = {tag.tag_id for tag in seen}
-            rough += self._rescue(frame, [place for place in lost if place.tag_id not in ids])
-        for tag in rough:
+            coarse += self._rescue(frame, [place for place in lost if place.tag_id not in ids])
+        for tag in coarse:
             if not any(is_same(tag, other) for other in seen):
                 seen.append(self._exact(frame, tag))
         self._remember(seen)
@@ -131,36 +131,36 @@ class TagFinder:
             for tag_id, corners in expected.items()
             if 0 <= tag_id < TAG_COUNT and np.isfinite(corners).all()
         ]
-        told = {place.tag_id: place for place in known}
+        expected_by_id = {place.tag_id: place for place in known}
         for place in self._seen:
             now = _place(place.tag_id, place.corners + place.step, place.step)
-            if place.tag_id not in told or not now.is_near(told[place.tag_id]):
+            if place.tag_id not in expected_by_id or not now.is_near(expected_by_id[place.tag_id]):
                 known.append(now)
         return known
 
     def _measured(self, frame: Image, places: list[_Place]) -> tuple[list[TagSeen], list[_Place]]:
-        """Return what was measured where it should be, and what was not found there."""
+        """Return the tags measured at their predicted places, and the places without a tag."""
         if not places:
             return [], []
         white = tag_cells()[[place.tag_id for place in places]]
-        found, verdicts = measure(frame, np.array([place.corners for place in places]), white)
+        found, results = measure(frame, np.array([place.corners for place in places]), white)
         settings = self._settings
         good = (
-            (verdicts[:, BITS] <= settings.max_hamming)
-            & (verdicts[:, BORDER] <= MAX_BORDER)
-            & (verdicts[:, MARGIN] >= settings.min_margin)
+            (results[:, BITS] <= settings.max_hamming)
+            & (results[:, BORDER] <= MAX_BORDER)
+            & (results[:, MARGIN] >= settings.min_margin)
         )
         seen: list[TagSeen] = []
         lost: list[_Place] = []
         by_id: dict[int, list[TagSeen]] = {}
-        for place, corners, verdict, is_good in zip(places, found, verdicts, good, strict=True):
+        for place, corners, result, is_good in zip(places, found, results, good, strict=True):
             if not is_good:
                 lost.append(place)
                 continue
-            tag = _sighting(place.tag_id, corners, verdict)
-            twins = by_id.setdefault(place.tag_id, [])
-            if not any(is_same(tag, other) for other in twins):
-                twins.append(tag)
+            tag = _sighting(place.tag_id, corners, result)
+            same_id = by_id.setdefault(place.tag_id, [])
+            if not any(is_same(tag, other) for other in same_id):
+                same_id.append(tag)
                 seen.append(tag)
         return seen, lost
 
@@ -188,7 +188,7 @@ class TagFinder:
         return [moved(tag, left, 0.0) for tag in found]
 
     def _rescue(self, frame: Image, lost: list[_Place]) -> list[TagSeen]:
-        """Return what the library finds around lost tags; of many, some in each frame."""
+        """Return what the library finds around lost tags; if many, some in each frame."""
         count = min(RESCUES, len(lost))
         chosen = [lost[(self._turn + k) % len(lost)] for k in range(count)]
         self._turn += count
@@ -197,13 +197,13 @@ class TagFinder:
         )
         return [tag for cut in cuts for tag in cut]
 
-    def _exact(self, frame: Image, rough: TagSeen) -> TagSeen:
-        """Return a tag that the library found, measured as the others are if it can be."""
-        place = _place(rough.tag_id, np.array(rough.corners_px))
+    def _exact(self, frame: Image, coarse: TagSeen) -> TagSeen:
+        """Return a tag found by the library, measured like the others if possible."""
+        place = _place(coarse.tag_id, np.array(coarse.corners_px))
         seen, _ = self._measured(frame, [place])
-        if seen and is_same(seen[0], rough):
+        if seen and is_same(seen[0], coarse):
             return seen[0]
-        return measure_again(frame, self._settings, rough)
+        return measure_again(frame, self._settings, coarse)
 
     def _remember(self, seen: Iterable[TagSeen]) -> None:
         places: list[_Place] = []
@@ -219,8 +219,8 @@ class TagFinder:
         self._seen = places
 
 
-def _sighting(tag_id: int, corners: Floats, verdict: Floats) -> TagSeen:
-    """Return a tag of measured corners; its centre is where their diagonals meet."""
+def _sighting(tag_id: int, corners: Floats, result: Floats) -> TagSeen:
+    """Return a tag from measured corners; its centre is the intersection of its diagonals."""
     a, b, c, d = ((x, y) for x, y in corners.tolist())
     ux, uy, vx, vy = c[0] - a[0], c[1] - a[1], d[0] - b[0], d[1] - b[1]
     share = ((b[0] - a[0]) * vy - (b[1] - a[1]) * vx) / (ux * vy - uy * vx)
@@ -229,6 +229,6 @@ def _sighting(tag_id: int, corners: Floats, verdict: Floats) -> TagSeen:
         tag_id=tag_id,
         centre_px=centre,
         corners_px=(a, b, c, d),
-        margin=float(verdict[MARGIN]),
-        hamming=int(verdict[BITS]),
+        margin=float(result[MARGIN]),
+        hamming=int(result[BITS]),
     )

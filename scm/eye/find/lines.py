@@ -1,8 +1,8 @@
-"""Straight sides: grey along a side's normal, and what four lines make of a quadrilateral.
+"""Straight sides: grey values along a side's normal, and quadrilaterals from four lines.
 
 A quadrilateral's corners (4, 2) [px] go lower left, lower right, upper right, upper left of the
 print, so its outside lies on the right of each side in a picture with y down. Side i runs from
-corner i to the next; `offsets[i]` says how far its two ends are to be moved outwards [px].
+corner i to the next; `offsets[i]` are the outward shifts of its two ends [px].
 """
 
 import math
@@ -17,7 +17,7 @@ _ROUNDING = 1e-6
 
 @inlined
 def grey_at(grey: Image, x: float, y: float) -> float:
-    """Return the grey between four pixels; outside the frame, that of its edge."""
+    """Return the interpolated grey; outside the frame, its edge's."""
     height, width = grey.shape
     x = min(max(x, 0.0), width - 1.0)
     y = min(max(y, 0.0), height - 1.0)
@@ -31,7 +31,7 @@ def grey_at(grey: Image, x: float, y: float) -> float:
 
 @inlined
 def _grey_within(grey: Image, x: float, y: float) -> float:
-    """Return the grey between four pixels that are all in the frame."""
+    """Return the interpolated grey of four pixels inside the frame."""
     left, top = np.uint32(x), np.uint32(y)
     u, v = x - left, y - top
     upper = grey[top, left] + u * (grey[top, left + 1] - float(grey[top, left]))
@@ -49,9 +49,9 @@ def look_across(
         grey: The frame.
         quad: Corners.
         side: Which.
-        along: Where on the side, 0 to 1 from its beginning.
-        reach: Half the length looked over [px].
-        out: Takes the grey, (m,).
+        along: Position on the side, 0 to 1 from its start.
+        reach: Half the length sampled [px].
+        out: Receives the grey, (m,).
     """
     end = (side + 1) % 4
     dx, dy = quad[end, 0] - quad[side, 0], quad[end, 1] - quad[side, 1]
@@ -73,15 +73,15 @@ def look_across(
 
 @array_kernel
 def move_sides(quad: Floats, offsets: Floats, lines: Floats) -> bool:
-    """Move the sides outwards and the corners to where they then meet.
+    """Move the sides outwards and the corners to their intersections.
 
     Args:
         quad: Corners, changed in place.
-        offsets: Of the beginning and the end of each side [px], (4, 2).
-        lines: To work in, (4, 3).
+        offsets: Of the start and the end of each side [px], (4, 2).
+        lines: Work array, (4, 3).
 
     Returns:
-        Whether they still make a convex quadrilateral the same way round.
+        Whether they still form a convex quadrilateral of the same orientation.
     """
     for i in range(4):
         j = (i + 1) % 4
@@ -106,7 +106,7 @@ def move_sides(quad: Floats, offsets: Floats, lines: Floats) -> bool:
 
 @array_kernel
 def cell_px(quad: Floats) -> float:
-    """Return the mean edge of a tag's cell [px]; 0 for a quadrilateral the wrong way round."""
+    """Return the mean edge of a tag's cell [px]; 0 for the wrong orientation."""
     ax, ay = quad[2, 0] - quad[0, 0], quad[2, 1] - quad[0, 1]
     bx, by = quad[3, 0] - quad[1, 0], quad[3, 1] - quad[1, 1]
     area = 0.5 * (ay * bx - ax * by)

@@ -1,22 +1,22 @@
-"""Tags measured where they should be, without a search of the frame."""
+"""Measures tags at their predicted places, without a search of the frame."""
 
 import numpy as np
 
 from scm.arrays import Bools, Floats, Image
-from scm.eye.find.edges import LONGEST, WORK_ROWS, lay_fine, lay_rough, shift_whole
+from scm.eye.find.edges import MAX_PROFILE, WORK_ROWS, lay_coarse, lay_fine, shift_whole
 from scm.eye.find.lines import cell_px
 from scm.eye.find.read import RING, is_whole, judge, read_cells
 from scm.vehicles.jit import array_kernel
 
 BITS, BORDER, MARGIN = range(3)
-"""Columns of a verdict: wrong bits of 36, wrong border cells of 28, decision margin [grey]."""
+"""Columns of a result: wrong bits of 36, wrong border cells of 28, decision margin [grey]."""
 _LEAST_CELL_PX = 1.5
 FINE_ROUNDS = 2
 _NOT_FOUND = 99.0
 
 
 def measure(grey: Image, corners: Floats, white: Bools) -> tuple[Floats, Floats]:
-    """Measure tags from where they should be, a cell and a half off at most.
+    """Measure tags from predicted places, at most 1.5 cells off.
 
     Args:
         grey: The frame, contiguous.
@@ -24,12 +24,12 @@ def measure(grey: Image, corners: Floats, white: Bools) -> tuple[Floats, Floats]
         white: Which cells of each are white, (n, 8, 8), row from the bottom.
 
     Returns:
-        The corners found, (n, 4, 2), and a verdict on each, (n, 3); 99 wrong bits where no tag's
-        sides were found.
+        The measured corners, (n, 4, 2), and a result for each, (n, 3); 99 wrong bits if no sides
+        were found.
     """
     found = np.array(corners, dtype=np.float64, order="C")
     verdicts = np.empty((len(found), 3))
-    work, lines, ends = np.empty((WORK_ROWS, LONGEST)), np.empty((4, 3)), np.empty((4, 2))
+    work, lines, ends = np.empty((WORK_ROWS, MAX_PROFILE)), np.empty((4, 3)), np.empty((4, 2))
     codes, cells = np.ascontiguousarray(white), np.empty((RING, RING))
     _measure_all(grey, found, codes, work, lines, ends, cells, verdicts)
     return found, verdicts
@@ -53,9 +53,9 @@ def _measure_one(grey: Image, quad: Floats, work: Floats, lines: Floats, ends: F
         return False
     if not shift_whole(grey, quad, work, lines, ends):
         return False
-    if not lay_rough(grey, quad, 1.0, work, lines, ends):
+    if not lay_coarse(grey, quad, 1.0, work, lines, ends):
         return False
-    if not lay_rough(grey, quad, 0.6, work, lines, ends):
+    if not lay_coarse(grey, quad, 0.6, work, lines, ends):
         return False
     for _ in range(FINE_ROUNDS):
         if not lay_fine(grey, quad, work, lines, ends):

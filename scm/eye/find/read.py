@@ -1,4 +1,4 @@
-"""What a tag says: its cells read through the homography of its corners, against a known code."""
+"""Reads a tag's cells through the homography of its corners, and compares them with a code."""
 
 import math
 
@@ -9,18 +9,18 @@ from scm.vehicles.jit import array_kernel
 RING = 10
 """Cells along a print: the tag's 8 and a white margin of one on either side."""
 _OFF_CENTRE = 0.22
-"""Of a cell's nine points, from its middle [cells]."""
+"""Distance of a cell's nine sample points from its centre [cells]."""
 
 
 @array_kernel
 def read_cells(grey: Image, quad: Floats, h: Floats, cells: Floats) -> None:
-    """Write the mean grey in the middle of each cell, margin included, (10, 10) from lower left.
+    """Write the mean grey in the centre of each cell, margin included, (10, 10) from lower left.
 
     Args:
         grey: The frame.
         quad: Corners of the black square.
-        h: To work in, 8 at least.
-        cells: Takes the grey.
+        h: Work array, at least 8.
+        cells: Receives the grey.
     """
     _homography(quad, h)
     for row in range(RING):
@@ -39,7 +39,7 @@ def read_cells(grey: Image, quad: Floats, h: Floats, cells: Floats) -> None:
 
 @array_kernel
 def _homography(quad: Floats, h: Floats) -> None:
-    """Write the eight numbers that take (0, 0), (1, 0), (1, 1), (0, 1) to the corners."""
+    """Write the homography from (0, 0), (1, 0), (1, 1), (0, 1) to the corners, 8 numbers."""
     sx = quad[0, 0] - quad[1, 0] + quad[2, 0] - quad[3, 0]
     sy = quad[0, 1] - quad[1, 1] + quad[2, 1] - quad[3, 1]
     ax, ay = quad[1, 0] - quad[2, 0], quad[1, 1] - quad[2, 1]
@@ -53,17 +53,17 @@ def _homography(quad: Floats, h: Floats) -> None:
 
 @array_kernel
 def judge(cells: Floats, white: Bools, plane: Floats, verdict: Floats) -> None:
-    """Compare the cells with those of a code; write wrong bits, wrong border cells and margin.
+    """Compare the cells with a code; write wrong bits, wrong border cells and margin.
 
-    Black is a plane of grey through the border, white one through the margin around it; between the
-    two lies each cell's threshold. The decision margin is the mean distance from it [grey levels],
-    of the white bits or of the black ones, whichever is less.
+    Black is a plane of grey through the border, white one through the margin around it; each cell's
+    threshold is between the two. The decision margin is the mean distance from it [grey levels], of
+    the white bits or of the black ones, whichever is smaller.
 
     Args:
         cells: Grey, (10, 10).
         white: Which of the tag's cells are white, (8, 8), row from the bottom.
-        plane: To work in, (2, 3) at least.
-        verdict: Takes the three.
+        plane: Work array, at least (2, 3).
+        verdict: Receives the three.
     """
     _ring_plane(cells, 1, plane[0])
     _ring_plane(cells, 0, plane[1])
@@ -109,7 +109,7 @@ def _ring_plane(cells: Floats, ring: int, plane: Floats) -> None:
 
 @array_kernel
 def is_whole(grey: Image, quad: Floats) -> bool:
-    """Return whether all corners are numbers and lie in the frame."""
+    """Return whether all corners are finite and in the frame."""
     height, width = grey.shape
     for i in range(4):
         x, y = quad[i, 0], quad[i, 1]

@@ -1,5 +1,5 @@
-"""Drawing the city as the overhead camera sees it.
+"""Renders the city as the overhead camera sees it.
 
-floor       what lies still: ground, roads, paint, walls and boxes, drawn once
-car         the shape of a car with its wheels, shadow and roof tag
+floor       static scenery: ground, roads, paint, walls and boxes, drawn once
+car         a car with its wheels, shadow and roof tag
 """

@@ -1,4 +1,4 @@
-"""A car from above: body, glass, lamps, turned front wheels, shadow, and the tag on its roof."""
+"""Draws a car from above: body, glass, lamps, steered wheels, shadow, and the roof tag."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -30,7 +30,7 @@ SHADOW_BLUR_PX = 11
 
 
 def tag_on_roof(car: SnapshotVehicle, scale: float = 1.0) -> Floats:
-    """Return where the corners of the roof's tag are in the map frame, (4, 3) [m].
+    """Return the corners of the roof tag in the map frame, (4, 3) [m].
 
     Args:
         car: At its pose.
@@ -45,7 +45,7 @@ def tag_on_roof(car: SnapshotVehicle, scale: float = 1.0) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LaidOut:
-    """A car where the lens sees it; pixels as `CameraModel.project` has them.
+    """A projected car; pixels as from `CameraModel.project`.
 
     Attributes:
         car: At its pose.
@@ -67,7 +67,7 @@ class LaidOut:
 
 
 def lay_out(model: CameraModel, car: SnapshotVehicle) -> LaidOut:
-    """Return where the lens sees a car's parts."""
+    """Project a car's parts."""
     rotation, origin = car_rotation(car), np.array([car.x_m, car.y_m, 0.0])
     body = car_body(car.car)
     shape = _shape(body, colour_of_car(car), round(car.steering_rad, 2), frozenset(car.lights))
@@ -81,7 +81,7 @@ def lay_out(model: CameraModel, car: SnapshotVehicle) -> LaidOut:
 
 
 def draw_car(frame: Image, model: CameraModel, scenery: Scenery, car: SnapshotVehicle) -> None:
-    """Paint one car into a frame, and over it whatever stands between it and the camera."""
+    """Paint one car into a frame, and over it the obstacles in front of it."""
     placed = lay_out(model, car)
     canvas = paint_car(frame, placed, gain_at(scenery, placed.foot))
     if canvas is not None:
@@ -89,7 +89,7 @@ def draw_car(frame: Image, model: CameraModel, scenery: Scenery, car: SnapshotVe
 
 
 def paint_car(frame: Image, placed: LaidOut, gain: float) -> Canvas | None:
-    """Paint a car with its shadow; return the window around its solids, None if it is outside.
+    """Paint a car with its shadow; return the window around its solids, None if outside.
 
     Args:
         frame: (height, width, 3); changed.
@@ -112,7 +112,7 @@ def paint_car(frame: Image, placed: LaidOut, gain: float) -> Canvas | None:
 
 
 def gain_at(scenery: Scenery, pixel: Floats) -> float:
-    """Return how bright the light is at a pixel (2,), to two digits; outside: at the edge."""
+    """Return the brightness at a pixel (2,), to two digits; outside: at the edge."""
     height, width = scenery.light.shape
     x = min(width - 1, max(0, round(float(pixel[0]))))
     y = min(height - 1, max(0, round(float(pixel[1]))))
@@ -122,12 +122,12 @@ def gain_at(scenery: Scenery, pixel: Floats) -> float:
 def hide_behind(
     window: Image, corner: Floats, scenery: Scenery, outline: Floats, model: CameraModel
 ) -> None:
-    """Put back over a car what stands between it and the camera.
+    """Restore over a car the obstacles between it and the camera.
 
     Args:
         window: Part of a frame; changed.
         corner: Its first column and row in the frame, (2,).
-        scenery: What stands.
+        scenery: With the obstacles.
         outline: Of the car on the floor, (n, 2) [m].
         model: The camera.
     """

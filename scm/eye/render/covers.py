@@ -1,4 +1,4 @@
-"""Hands and cables between the camera and the floor: how they look, and what they hide."""
+"""Hands and cables between the camera and the floor: their appearance, and what they hide."""
 
 import math
 from dataclasses import dataclass
@@ -19,19 +19,19 @@ HAND_M = 0.19
 """From wrist to fingertip."""
 CABLE_M = 0.007
 REACH_S = 3.0
-"""A hand goes in and out once in this time."""
+"""Period of a hand's movement."""
 _FINGERS = ((-0.30, 0.84, -0.10), (-0.10, 1.00, -0.03), (0.10, 0.96, 0.03), (0.28, 0.80, 0.12))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """Something before the scene, in a window of the frame.
+    """Something in front of the scene, in a window of the frame.
 
     Attributes:
         corner: First column and row of its window; may lie outside the frame.
         colour: (h, w, 3).
-        solid: What share of each pixel it hides, (h, w), 0 to 1.
-        light: What its shadow leaves of the light beside it, (h, w), 0 to 1.
+        solid: Share of each pixel that it hides, (h, w), 0 to 1.
+        light: Share of the light left by its shadow, (h, w), 0 to 1.
     """
 
     corner: tuple[int, int]
@@ -40,7 +40,7 @@ class Layer:
     light: Floats
 
     def moved(self, x_px: int, y_px: int) -> "Layer":
-        """Return it elsewhere."""
+        """Return it shifted."""
         corner = self.corner[0] + x_px, self.corner[1] + y_px
         return Layer(corner, self.colour, self.solid, self.light)
 
@@ -63,7 +63,7 @@ class Layer:
 
 
 def common(one: Rect, other: Rect) -> tuple[tuple[slice, slice], tuple[slice, slice]] | None:
-    """Return what two rectangles share, as rows and columns of each; None if nothing."""
+    """Return the intersection of two rectangles, as rows and columns of each; None if empty."""
     left, top = max(one[0], other[0]), max(one[1], other[1])
     right, bottom = min(one[2], other[2]), min(one[3], other[3])
     if right <= left or bottom <= top:
@@ -75,12 +75,12 @@ def common(one: Rect, other: Rect) -> tuple[tuple[slice, slice], tuple[slice, sl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hand:
-    """An arm that reaches in from an edge, there and back again.
+    """An arm that reaches in from an edge and back.
 
     Attributes:
-        layer: With the fingertips where they are at their mean.
-        sway_px: How far it goes in and out of that, to the right and to the bottom.
-        phase_rad: Where in its motion it begins.
+        layer: With the fingertips at their mean place.
+        sway_px: Amplitude of its movement, to the right and to the bottom.
+        phase_rad: Phase of its movement at time 0.
     """
 
     layer: Layer
@@ -99,10 +99,10 @@ def make_hand(
     """Draw a hand with its forearm.
 
     Args:
-        tip: Where its middle finger ends, (2,) [px].
-        inwards_rad: Where it points, from the picture's right towards its bottom.
+        tip: Tip of its middle finger, (2,) [px].
+        inwards_rad: Its direction, from the picture's right towards its bottom.
         px_per_m: At its height.
-        length_px: From the fingertip to where the arm may end unseen.
+        length_px: From the fingertip to where the arm may end out of view.
         rng: Of its colours and motion.
     """
     unit = HAND_M * px_per_m * FINE
@@ -126,9 +126,9 @@ def make_hand(
     for across in (-0.09, 0.09, 0.0):
         start = palm + across * unit * side
         paint.stroke(start, start + 0.26 * unit * way, 0.34 * unit, skin)
-    for across, reach, lean in _FINGERS:
+    for across, reach, splay in _FINGERS:
         root = wrist + 0.42 * unit * way + 0.62 * across * unit * side
-        end = wrist + reach * unit * way + (across * 0.7 + lean) * unit * side
+        end = wrist + reach * unit * way + (across * 0.7 + splay) * unit * side
         paint.stroke(root, end, 0.14 * unit, skin)
     layer = paint.layer(shadow_px=0.12 * HAND_M * px_per_m)
     return Hand(layer, (float(sway[0]), float(sway[1])), float(rng.uniform(0.0, 2.0 * math.pi)))
@@ -151,7 +151,7 @@ def make_cable(
 
 
 class _Paint:
-    """A sheet of thick rounded strokes that are lighter along their middle."""
+    """A sheet of thick rounded strokes, lighter along their middle."""
 
     def __init__(self, corner: Floats, size: Floats) -> None:
         self._corner = corner
@@ -173,7 +173,7 @@ class _Paint:
         cv2.polylines(self._solid, [fixed], False, 255, max(1, round(thick)), cv2.LINE_AA, 4)
 
     def layer(self, shadow_px: float) -> Layer:
-        """Return what was drawn, with a soft shadow so far beside it [px]."""
+        """Return the drawing, with a soft shadow offset by [px]."""
         height, width = self._solid.shape[0] // FINE, self._solid.shape[1] // FINE
         full = self._solid > 0
         soft = cv2.GaussianBlur(self._colour, (0, 0), 1.2 * FINE)
@@ -183,7 +183,7 @@ class _Paint:
         small = cv2.resize(colour, (width, height), interpolation=cv2.INTER_AREA)
         hidden = cv2.resize(self._solid, (width, height), interpolation=cv2.INTER_AREA)
         solid = np.asarray(hidden, dtype=np.float64) / 255.0
-        # what is averaged with the empty sheet at the rim would darken it
+        # averaging with the empty sheet would darken the rim
         colour = np.clip(small / np.maximum(solid, 1e-3)[..., None], 0.0, 255.0).astype(np.uint8)
         shift = np.array([[1.0, 0.0, 1.3 * shadow_px], [0.0, 1.0, 1.0 * shadow_px]])
         cast = cv2.warpAffine(solid, shift, (width, height))

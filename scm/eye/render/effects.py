@@ -1,7 +1,7 @@
-"""What a real lens and sensor do to a picture: pure functions, image to image.
+"""Effects of a real lens and sensor on a picture: pure functions, image to image.
 
 Images are (height, width, 3) or (height, width), 0 to 255; none is changed in place. Brightness is
-taken as proportional to light, as the whole renderer does.
+assumed proportional to light, as in the whole renderer.
 """
 
 import math
@@ -22,13 +22,13 @@ _FINE = 8
 
 @dataclass(frozen=True, slots=True)
 class Glare:
-    """The mirror image of a lamp on whatever shines: a core that saturates, and a halo.
+    """The reflection of a lamp on a shiny surface: a core that saturates, and a halo.
 
     Attributes:
         x_px, y_px: Its middle.
         length_px, width_px: Of the core.
         angle_rad: Of its length, from the picture's right towards its bottom.
-        strength: What the core adds [grey levels].
+        strength: Grey levels added by the core.
     """
 
     x_px: float
@@ -45,8 +45,8 @@ class LampSpot:
 
     Attributes:
         x_px, y_px: The brightest place.
-        radius_px: Where its light is down to 60 %.
-        strength: What it adds to the light, as a share of it.
+        radius_px: Distance at which its light drops to 60 %.
+        strength: Light added, as a share.
     """
 
     x_px: float
@@ -130,10 +130,10 @@ def vignetting(image: Image, share: float) -> Image:
 
 
 def vignette_gain(width: int, height: int, share: float) -> Floats:
-    """Return what a lens lets through: 1 in the middle, `1 - share` at the corners' pixels.
+    """Return the transmission of a lens: 1 in the middle, `1 - share` at the corner pixels.
 
     Raises:
-        EyeError: The share is not one of light.
+        EyeError: The share is not within 0 to 1.
     """
     if not 0.0 <= share <= 1.0:
         raise EyeError(f"vignetting: expected a share from 0 to 1, got {share}")
@@ -180,7 +180,7 @@ def lit(image: Image, gain: Floats) -> Image:
 
 
 def glare(image: Image, spots: Sequence[Glare]) -> Image:
-    """Add the mirror images of lamps."""
+    """Add the reflections of lamps."""
     height, width = image.shape[:2]
     added = glare_light(width, height, spots)
     each = added if image.ndim == 2 else added[..., None]
@@ -188,7 +188,7 @@ def glare(image: Image, spots: Sequence[Glare]) -> Image:
 
 
 def glare_light(width: int, height: int, spots: Sequence[Glare]) -> Floats:
-    """Return what mirror images of lamps add at each pixel, (height, width) [grey levels]."""
+    """Return the light added by reflections of lamps, (height, width) [grey levels]."""
     added = np.zeros((height, width))
     for spot in spots:
         c, s = math.cos(spot.angle_rad), math.sin(spot.angle_rad)
@@ -214,13 +214,13 @@ def sensor_noise(
 
 
 class NoiseSheet:
-    """Noise drawn once and cut at a random place for every picture: fresh noise costs far more.
+    """Noise drawn once and used at a random offset for every picture: fresh noise costs far more.
 
     Args:
         width, height: Of the pictures.
         read_sigma, shot_sigma: As `sensor_noise` has them.
-        rng: Of the noise, and of where it is cut.
-        sheets: How many pictures' noise to draw.
+        rng: Of the noise and its offsets.
+        sheets: Size of the sheet in pictures.
     """
 
     def __init__(
@@ -254,7 +254,7 @@ class NoiseSheet:
 
 
 def jpeg(image: Image, quality: int) -> Image:
-    """Return what is left of a picture after JPEG at a quality from 1 to 100.
+    """Return a picture after JPEG compression at a quality from 1 to 100.
 
     Raises:
         EyeError: There is no such quality.

@@ -1,4 +1,4 @@
-"""What lies still under the camera, drawn once: ground, roads, paint, the map's tag, obstacles."""
+"""Static scenery, drawn once: ground, roads, paint, the map's tag, obstacles."""
 
 from dataclasses import dataclass
 
@@ -18,11 +18,11 @@ FINER = 2
 GRID_PX = 8
 STRIP_PX = 128
 AROUND_M = 3.0
-"""So much is drawn of what lies around a map's floor."""
+"""Width of the surroundings drawn around a map's floor."""
 LEAST_FALL = 0.02
-"""Rays that sink less than this for a length of 1 ahead are not followed down to the floor."""
+"""Rays that sink less than this per length of 1 ahead are not traced to the floor."""
 LOW_M = 0.1
-"""What is lower than this hides no roof."""
+"""Lower obstacles hide no roof."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +42,7 @@ class Obstacle:
     def is_before(self, points: Floats, eye: Floats) -> bool:
         """Return whether a line over the floor from `eye` (2,) to one of `points` (n, 2) meets it.
 
-        That is: seen from a camera above `eye`, whether it stands before something there.
+        That is whether, seen from a camera above `eye`, it stands in front of something there.
         """
         edge = np.roll(self.foot, -1, axis=0) - self.foot
         line = (points - eye)[:, None]
@@ -57,7 +57,7 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scenery:
-    """The still picture, and what in it stands up.
+    """The static picture, and its obstacles.
 
     Attributes:
         picture: (height, width, 3).
@@ -88,13 +88,13 @@ def draw_scenery(city_map: CityMap, model: CameraModel, rng: np.random.Generator
 
 
 def draw_box(frame: Image, model: CameraModel, box: Box, at: Pose2) -> None:
-    """Paint a box that can be pushed where it stands now."""
+    """Paint a movable box at its present pose."""
     foot = rectangle(at.x, at.y, box.length_m, box.width_m, at.yaw)
     _draw_obstacle(frame, model, prism(foot, 0.0, box.height_m, CARD))
 
 
 def draw_map_tag(frame: Image, model: CameraModel, tag: MapTag) -> None:
-    """Paint the tag on the floor that fixes the map's frame."""
+    """Paint the tag on the floor that defines the map's frame."""
     pose = Pose2(tag.x_m, tag.y_m, tag.yaw_rad)
     corners = [(*pose.apply(x, y), 0.0) for x, y in tag_corners(tag.size_m * PRINT_SCALE)]
     pixels = model.project(np.array(corners))
@@ -130,7 +130,7 @@ def _through_lens(city_map: CityMap, model: CameraModel, rng: np.random.Generato
 
 
 def _on_floor(city_map: CityMap, model: CameraModel, pixels: Floats) -> Floats:
-    """Return where pixels see the floor, (..., 2) [m]; what is far off or sky, at the far edge.
+    """Return where pixels see the floor, (..., 2) [m]; distant floor and sky are clipped.
 
     A tilted camera sees the floor out to its horizon: a sheet of all that would have no end.
     """
@@ -167,7 +167,7 @@ def _lit(picture: Image, light: Floats) -> Image:
 
 
 def _light(width: int, height: int) -> Floats:
-    """A lamp off the middle and a lens that is darker towards its corners."""
+    """Return the light of a lamp off the middle, and a lens that is darker towards its corners."""
     x = (np.arange(width) - 0.42 * width) / width
     y = (np.arange(height) - 0.4 * height) / width
     light: Floats = 1.08 - 0.5 * (x[None, :] ** 2 + y[:, None] ** 2)
@@ -189,7 +189,7 @@ def _standing(city_map: CityMap) -> list[Solid]:
 
 
 def _distance(solid: Solid, model: CameraModel) -> float:
-    """Return how far the foot is from the point below the camera [m], from its nearest edge."""
+    """Return the distance of the foot's nearest edge from the point below the camera [m]."""
     foot = solid.bottom[:, :2] - model.position[:2]
     span = np.roll(foot, -1, axis=0) - foot
     along = np.clip(-(foot * span).sum(axis=1) / (span * span).sum(axis=1), 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Cars that move while a frame is exposed: where they are when, and what each row gathers."""
+"""Cars that move while a frame is exposed: motion blur and rolling shutter."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from scm.scenery.tags import PRINT_SCALE
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 STILL_PX = 0.12
-"""What moves less in all the time that it is exposed is drawn once."""
+"""Cars that move less during the exposure are drawn once."""
 STEP_PX = 0.5
 MOST_STEPS = 64
 MARGIN_PX = 4
@@ -30,7 +30,7 @@ class Driven:
     """A car and how it moves.
 
     Attributes:
-        car: Where it is in the middle of the exposure of the middle row; speed along its x.
+        car: At the middle of the exposure of the middle row; speed along its x.
         yaw_rate_rad_s: + = turns left.
     """
 
@@ -43,7 +43,7 @@ class Driven:
         return Pose2(self.car.x_m, self.car.y_m, self.car.yaw_rad)
 
     def after(self, dt_s: float) -> SnapshotVehicle:
-        """Return the car at another time: speed and yaw rate stay as they are."""
+        """Return the car at another time, at constant speed and yaw rate."""
         if dt_s == 0.0:
             return self.car
         turn, gone = self.yaw_rate_rad_s * dt_s, self.car.speed_mps * dt_s
@@ -59,12 +59,12 @@ class Driven:
 
 @dataclass(frozen=True, slots=True)
 class Shutter:
-    """When a row gathers light: for `exposure_s`, around a time that goes on from row to row.
+    """When rows are exposed: for `exposure_s`, around a time that advances from row to row.
 
     Attributes:
-        exposure_s: How long each row gathers light.
+        exposure_s: Exposure of each row.
         rolling_s: From the first row to the last; 0: all at once.
-        height_px: How many rows.
+        height_px: Number of rows.
     """
 
     exposure_s: float
@@ -72,7 +72,7 @@ class Shutter:
     height_px: int
 
     def late(self, row: Floats | float) -> Floats:
-        """Return how long after the middle row the middle of a row's exposure is [s]."""
+        """Return the delay of a row's exposure relative to the middle row [s]."""
         last = max(self.height_px - 1, 1)
         inside = np.clip(np.asarray(row, dtype=np.float64), 0.0, last)
         found: Floats = (inside / last - 0.5) * self.rolling_s
@@ -80,13 +80,13 @@ class Shutter:
 
 
 def seen_at(model: CameraModel, driven: Driven, shutter: Shutter, at: Floats) -> Floats:
-    """Return where points of a car appear, each at the middle of the exposure of its own row.
+    """Return where points of a car appear, each at the middle of its own row's exposure.
 
     Args:
         model: The camera.
         driven: The car.
         shutter: Of the camera.
-        at: Points on the car as it is at the frame's time, map frame, (n, 3) [m].
+        at: Points on the car at the frame's time, map frame, (n, 3) [m].
 
     Returns:
         (n, 2) [px].
@@ -109,14 +109,14 @@ def _carried(driven: Driven, point: Floats, dt_s: float) -> tuple[float, float, 
 
 
 def gathered(times: Floats, middles: Floats, exposure_s: float) -> Floats:
-    """Return how much of each sample a row gathers, (rows, samples); each row sums to 1.
+    """Return each row's weight of each sample, (rows, samples); each row sums to 1.
 
-    Between samples the scene is taken to change linearly; rows outside them gather the nearest.
+    Between samples the scene is assumed to change linearly; rows outside use the nearest.
 
     Args:
         times: Of the samples, evenly spaced, (samples,) [s].
         middles: Of the rows' exposures, (rows,) [s].
-        exposure_s: How long each lasts.
+        exposure_s: Duration of each.
     """
     step = times[1] - times[0]
     half = max(exposure_s / step, 1e-6) / 2.0
@@ -135,11 +135,11 @@ def _under_hat(u: Floats) -> Floats:
     return np.where(inside < 0.0, 0.5 * (1.0 + inside) ** 2, 1.0 - 0.5 * (1.0 - inside) ** 2)
 
 
-class Easel:
-    """Where a moving car is drawn by itself: once on black and once on white.
+class CarLayer:
+    """Draws a moving car by itself: once on black and once on white.
 
-    The two tell its colour and how much of the ground it leaves to be seen, shadow and all; what a
-    row gathers is then an average of that picture along the car's way.
+    The two give its colour and its transparency, shadow included; a row's light is then an average
+    of that picture along the car's path.
     """
 
     def __init__(self, width: int, height: int) -> None:
@@ -147,7 +147,7 @@ class Easel:
         self._white: Image = np.full((height, width, 3), 255, dtype=np.uint8)
 
     def cut_out(self, placed: LaidOut, gain: float, rect: Rect) -> Image:
-        """Return blue, green, red and what it leaves of the ground, (h, w, 4)."""
+        """Return blue, green, red and transparency, (h, w, 4)."""
         left, top, right, bottom = rect
         parts = []
         for sheet, empty in ((self._black, 0), (self._white, 255)):
@@ -160,13 +160,18 @@ class Easel:
 
 
 def paint_moving(
-    frame: Image, easel: Easel, model: CameraModel, driven: Driven, shutter: Shutter, gain: float
+    frame: Image,
+    car_layer: CarLayer,
+    model: CameraModel,
+    driven: Driven,
+    shutter: Shutter,
+    gain: float,
 ) -> tuple[Rect, LaidOut] | None:
-    """Paint a car as a sensor gathers it while it moves; return where, None if outside the frame.
+    """Paint a moving car as a sensor records it; return its window, None if outside the frame.
 
     Args:
         frame: (height, width, 3); changed.
-        easel: Of the same size.
+        car_layer: Of the same size.
         model: The camera.
         driven: The car.
         shutter: Of the camera.
@@ -190,7 +195,7 @@ def paint_moving(
         paint_car(frame, placed, gain)
         return rect, placed
     times = np.linspace(first, last, min(MOST_STEPS, 2 + math.ceil(way_px / STEP_PX)))
-    layer = easel.cut_out(placed, gain, rect)
+    layer = car_layer.cut_out(placed, gain, rect)
     rows = shutter.late(np.arange(rect[1], rect[3], dtype=np.float64))
     weights = gathered(times, rows, shutter.exposure_s)
     total = _averaged(layer, [_shift(model, driven, placed, t, rect) for t in times], weights)
@@ -210,7 +215,7 @@ def _clipped(pixels: Floats, margin: int, frame: Image) -> Rect | None:
 
 
 def _shift(model: CameraModel, driven: Driven, placed: LaidOut, t_s: float, rect: Rect) -> Floats:
-    """Return what carries the cut-out to another time, after its tag: (2, 3), rect's pixels."""
+    """Return the transform of the cut-out to another time, by its tag: (2, 3), rect's pixels."""
     corner = np.array(rect[:2], dtype=np.float64)
     there = model.project(tag_on_roof(driven.after(float(t_s)), PRINT_SCALE)) - corner
     here = np.column_stack((placed.tag - corner, np.ones(4)))

@@ -1,4 +1,4 @@
-"""Where a rendered camera hangs, and how it is written down as a map's camera."""
+"""Places a rendered camera over a map, and writes it as a map's camera."""
 
 import math
 
@@ -10,7 +10,7 @@ from scm.eye.camera import CameraModel, camera_model
 from scm.records.city_map import Camera, CityMap, Floor, MapTag
 
 PINHOLE = (-0.12, 0.03, 0.0004, -0.0003, 0.0)
-"""What a cheap lens of 60 degrees bends."""
+"""Distortion of a cheap lens of 60 degrees."""
 FISHEYE = (-0.025, 0.004, -0.001, 0.0002, 0.0)
 EDGE_PX = 8.0
 
@@ -25,19 +25,19 @@ def camera_over(
     fisheye: bool = False,
     distortion: tuple[float, float, float, float, float] | None = None,
 ) -> CameraModel:
-    """Return a camera whose middle looks at the middle of a map's floor.
+    """Return a camera that looks at the middle of a map's floor.
 
     Args:
         city_map: Whose floor.
         size_px: Columns and rows.
         height_m: Of the lens above the floor.
         tilt_rad: From straight down, about the picture's x: the picture's top is farther away.
-        focal_px: None: just so wide that the whole floor is in the frame.
+        focal_px: None: the longest with the whole floor in the frame.
         fisheye: OpenCV's fisheye instead of its pinhole.
-        distortion: None: a usual lens of that kind.
+        distortion: None: a typical lens of that kind.
 
     Raises:
-        EyeError: There is no such camera, or none that sees the whole floor.
+        EyeError: The camera is invalid, or cannot see the whole floor.
     """
     width, height = size_px
     floor = city_map.floor
@@ -65,7 +65,7 @@ def camera_over(
 
 
 def _longest(model: CameraModel, city_map: CityMap) -> float:
-    """Return the longest focal length with which the whole floor is seen [px]."""
+    """Return the longest focal length that shows the whole floor [px]."""
     camera, floor = model.camera, city_map.floor
     along = np.linspace(0.0, 1.0, 21)
     x, y = np.meshgrid(*(low + (high - low) * along for low, high in (floor.x_m, floor.y_m)))
@@ -73,8 +73,9 @@ def _longest(model: CameraModel, city_map: CityMap) -> float:
     points = np.concatenate((points, points + np.array([0.0, 0.0, 0.15])))
     if ((points - model.position) @ model.camera_R_map[2] <= 0.0).any():
         raise EyeError(
-            f"map {city_map.name}: expected a camera before which the whole floor lies, got one at "
-            f"{camera.z_m} m tilted by {math.degrees(camera.tilt_x_rad):.0f} deg: hang it higher"
+            f"map {city_map.name}: expected a camera in front of which the whole floor lies, got "
+            f"one at {camera.z_m} m tilted by {math.degrees(camera.tilt_x_rad):.0f} deg: "
+            "hang it higher"
         )
     middle = np.array([camera.cx_px, camera.cy_px])
     reach = np.abs(model.project(points) - middle).max(axis=0) / camera.fx_px
@@ -89,17 +90,17 @@ def camera_toml(camera: Camera) -> str:
         if value is None:
             continue
         if isinstance(value, str):
-            said = f'"{value}"'
+            text = f'"{value}"'
         elif isinstance(value, tuple):
-            said = "[" + ", ".join(repr(float(one)) for one in value) + "]"
+            text = "[" + ", ".join(repr(float(one)) for one in value) + "]"
         else:
-            said = repr(value)
-        lines.append(f"{name} = {said}")
+            text = repr(value)
+        lines.append(f"{name} = {text}")
     return "\n".join(lines) + "\n"
 
 
 def bare_floor(length_m: float, width_m: float) -> CityMap:
-    """Return a map of nothing but a floor of that size and a tag in its lower left corner."""
+    """Return a map with only a floor of that size and a tag in its lower left corner."""
     return CityMap(
         map=1,
         name="bare_floor",

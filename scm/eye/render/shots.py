@@ -1,9 +1,9 @@
-"""Frames of an overhead camera with the truth beside each: what is where, and how much shows.
+"""Frames of an overhead camera with ground truth: where things are, and how much is visible.
 
     shots = Studio(load_map("driving_school"), camera, Look(exposure_s=0.004, noise_sigma=8.0))
     shot = shots.shoot([tour.at(t_s) for tour in tours(...)], t_ns)
 
-What stands still is drawn once; of a frame only the windows around cars and hands are drawn again.
+Static scenery is drawn once; per frame only the windows around cars and hands are redrawn.
 """
 
 import math
@@ -21,7 +21,7 @@ from scm.eye.render import effects
 from scm.eye.render.car import gain_at, hide_behind, tag_on_roof
 from scm.eye.render.covers import Hand, Layer, make_cable, make_hand
 from scm.eye.render.floor import Obstacle, draw_scenery
-from scm.eye.render.motion import Driven, Easel, Rect, Shutter, paint_moving, seen_at
+from scm.eye.render.motion import CarLayer, Driven, Rect, Shutter, paint_moving, seen_at
 from scm.eye.render.visible import Hiding, visible_share
 from scm.eye.source import grey_of
 from scm.geometry import Pose2
@@ -36,20 +36,20 @@ MID_GREY = 128.0
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What the camera, the light and the people around do to the picture; 0 each: nothing.
+    """Effects of camera, light and people on the picture; 0 each: none.
 
     Attributes:
-        exposure_s: How long each row gathers light.
+        exposure_s: Exposure of each row.
         rolling_s: From the first row's exposure to the last's.
-        blur_px: Smear of the whole picture, as of a camera that shakes, along `blur_rad`.
-        defocus_px: Radius of the disc that a point becomes.
-        vignetting: Share of the light that is missing at the corners.
+        blur_px: Motion blur of the whole picture, as of a shaking camera, along `blur_rad`.
+        defocus_px: Radius of the blur disc.
+        vignetting: Share of the light lost at the corners.
         gradient: How much brighter one side is than the other, as a share.
-        lamps: Lamps that light their surroundings more, at places drawn by chance.
-        glares: Mirror images of lamps on floor and tags, likewise.
+        lamps: Number of lamps that light their surroundings more, at random places.
+        glares: Number of reflections of lamps on floor and tags, likewise.
         noise_sigma: Noise of a pixel of grey 128, half its variance from the light; it is
             `sigma^2 = read^2 + shot^2 grey / 255` with both from that.
-        hands, cables: How many are in the way.
+        hands, cables: How many are in view.
         jpeg: Quality from 1 to 100; None: not compressed.
         colour: False: frames are grey, (height, width), which costs less.
     """
@@ -72,13 +72,13 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TagTruth:
-    """A tag as the picture shows it.
+    """Ground truth of a tag in the picture.
 
     Attributes:
         corners_px: As `TagSeen` orders them, each at the middle of the exposure of its own row;
             (4, 2), inside the frame or not.
-        visible: Share of its print, margin included, that is in the frame with nothing before it.
-        smear_px: How far it moves in the picture while a row is exposed.
+        visible: Visible share of its print, margin included.
+        smear_px: Its movement in the picture during a row's exposure.
     """
 
     corners_px: Floats
@@ -88,13 +88,13 @@ class TagTruth:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shot:
-    """A frame and its truth.
+    """A frame with its ground truth.
 
     Attributes:
         image: (height, width, 3) blue, green, red, or (height, width) grey.
         t_ns: The middle of the exposure of the middle row.
-        cars: Where each car is at `t_ns`, and how it moves.
-        tags: By id, the map's among them, also those out of sight.
+        cars: Each car's pose and motion at `t_ns`.
+        tags: By id, the map's included, also those out of view.
         camera: The true one.
     """
 
@@ -109,10 +109,10 @@ class Studio:
     """Takes pictures of cars on a map.
 
     Args:
-        city_map: Any; boxes that can be pushed stand where the map has them.
+        city_map: Any; movable boxes stand where the map has them.
         model: The camera.
-        look: What becomes of the picture.
-        seed: Of all that is drawn by chance.
+        look: Effects on the picture.
+        seed: Of all random choices.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class Studio:
         self._scenery = draw_scenery(fixed, model, floor_rng)
         self._raw = self._scenery.picture.copy()
         self._shutter = Shutter(self.look.exposure_s, self.look.rolling_s, height)
-        self._easel = Easel(width, height)
+        self._car_layer = CarLayer(width, height)
         self._kernel = _kernel(self.look)
         self._gain = _light(self.look, width, height, look_rng)
         self._added = _glares(self.look, width, height, look_rng)
@@ -139,7 +139,7 @@ class Studio:
         self._used: list[Rect] = []
 
     def shoot(self, cars: Sequence[Driven], t_ns: int = 0) -> Shot:
-        """Return a picture of cars as they are at that time; its image is the caller's to keep."""
+        """Return a picture of cars at a time; its image belongs to the caller."""
         for left, top, right, bottom in self._used:
             part = slice(top, bottom), slice(left, right)
             self._raw[part] = self._scenery.picture[part]
@@ -168,7 +168,9 @@ class Studio:
         for order, driven in enumerate(far_first):
             foot = self.model.project(np.array([driven.pose.x, driven.pose.y, 0.0]))
             gain = gain_at(self._scenery, foot)
-            painted = paint_moving(self._raw, self._easel, self.model, driven, self._shutter, gain)
+            painted = paint_moving(
+                self._raw, self._car_layer, self.model, driven, self._shutter, gain
+            )
             if painted is None:
                 continue
             (left, top, right, bottom), placed = painted
@@ -182,7 +184,7 @@ class Studio:
         return found
 
     def _develop(self, onto: Image, rect: Rect, layers: Sequence[Layer]) -> None:
-        """Put what is before the scene, lens and light on a window of the raw picture."""
+        """Apply covers, lens and light to a window of the raw picture."""
         left, top, right, bottom = rect
         window = onto[top:bottom, left:right]
         height, width = self._raw.shape[:2]
@@ -240,7 +242,7 @@ class Studio:
         return truths
 
     def _before(self, outline: Floats) -> list[Obstacle]:
-        """Return what stands between the camera and something of that outline, (n, 2) [m]."""
+        """Return the obstacles between the camera and an outline, (n, 2) [m]."""
         eye = self.model.position[:2]
         return [one for one in self._scenery.obstacles if one.is_before(outline, eye)]
 
@@ -257,7 +259,7 @@ def _inside(rect: Rect, pad: int, width: int, height: int) -> Rect | None:
 
 
 def _kernel(look: Look) -> Floats | None:
-    """Return the smear of shake and defocus together, None if there is neither."""
+    """Return the kernel of motion blur and defocus together, None if there is neither."""
     kernel: Floats | None = None
     if look.blur_px > 0.0:
         kernel = effects.line_kernel(look.blur_px, look.blur_rad)

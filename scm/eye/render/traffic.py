@@ -1,7 +1,7 @@
-"""Cars that drive by themselves for a picture: along a map's lanes, or round and round its floor.
+"""Cars that drive by themselves for a picture: along a map's lanes, or around its floor.
 
-No physics: each keeps its speed and follows its line exactly, so where it is at any time is known
-to the last digit. Cars start where none meets another for as long as the film lasts.
+No physics: each keeps its speed and follows its line exactly, so its pose at any time is known
+exactly. Cars start where none meets another for the length of the film.
 """
 
 import math
@@ -24,7 +24,7 @@ RING_STEP_M = 0.25
 TIGHTEST_M = 0.12
 LOOK_S = 0.1
 NEAR_M = 0.03
-"""Least gap from bumper to bumper."""
+"""Minimum gap from bumper to bumper."""
 TRIES = 200
 
 
@@ -33,9 +33,9 @@ class Tour:
     """A car on its line.
 
     Attributes:
-        line: Where its rear axle drives.
+        line: Path of its rear axle.
         start_m: Along the line, at time 0.
-        speed_mps: For ever.
+        speed_mps: Constant.
         tag_id: On its roof.
         car: Name of its car file.
     """
@@ -71,7 +71,7 @@ def tours(
     on_lanes: bool,
     car: str = "nigel",
 ) -> tuple[Tour, ...]:
-    """Return cars that never touch each other for so long, tags numbered as the map says.
+    """Return cars that never collide for that long, tags numbered as in the map.
 
     Args:
         city_map: Where.
@@ -79,11 +79,11 @@ def tours(
         speed_mps: Of all of them.
         duration_s: How long the film is.
         rng: Of where they start.
-        on_lanes: Along the map's lanes; otherwise round and round the floor, one ring in another.
+        on_lanes: Along the map's lanes; otherwise around the floor, one ring in another.
         car: Name of their car file.
 
     Raises:
-        EyeError: The map has no lanes, or not so much room.
+        EyeError: The map has no lanes, or too little room.
     """
     if on_lanes and not city_map.lanes:
         raise EyeError(f"map {city_map.name}: expected lanes to drive on, got a map without any")
@@ -108,7 +108,7 @@ def tours(
 def _places(
     lines: Sequence[Polyline], car: str, rng: np.random.Generator
 ) -> list[tuple[Polyline, float]]:
-    """Return where cars can start on closed lines, as many as there is room for."""
+    """Return start places on closed lines, as many as there is room for."""
     rear, front = car_body(car).x_span
     places = []
     for line in lines:
@@ -126,7 +126,7 @@ def _along_lanes(
     car: str,
     rng: np.random.Generator,
 ) -> list[Tour]:
-    """Return cars on lanes, at most one for each id: as many as there was room found for."""
+    """Return cars on lanes, at most one for each id: as many as fit."""
     lines = _lane_lines(city_map, speed_mps * duration_s, rng)
     times = np.arange(0.0, duration_s + LOOK_S, LOOK_S)
     found: list[tuple[Tour, Floats]] = []
@@ -140,33 +140,33 @@ def _along_lanes(
 
 def _free(
     lines: Sequence[Polyline],
-    taken: Sequence[tuple[Tour, Floats]],
+    others: Sequence[tuple[Tour, Floats]],
     times: Floats,
     speed_mps: float,
     tag_id: int,
     car: str,
     rng: np.random.Generator,
 ) -> tuple[Tour, Floats] | None:
-    """Return a start from which a car keeps clear of all others, and the room it takes up."""
+    """Return a start from which a car stays clear of all others, and the area it covers."""
     lengths = np.array([line.length_m for line in lines])
     anywhere = rng.uniform(0.0, 1.0, TRIES // 4)
-    in_turn = np.linspace(0.0, 1.0, TRIES, endpoint=False)  # where few places are left
+    in_turn = np.linspace(0.0, 1.0, TRIES, endpoint=False)  # for crowded lanes
     for share in (*anywhere, *in_turn):
         line = lines[int(rng.choice(len(lines), p=lengths / lengths.sum()))]
         start = float(share) * line.length_m
         if start + speed_mps * times[-1] > line.length_m:
             continue
         tour = Tour(line, start, speed_mps, tag_id, car)
-        if any(_too_close(tour, other) for other, _ in taken):
+        if any(_too_close(tour, other) for other, _ in others):
             continue
         discs = _discs(tour, times)
-        if all(other.line is line or _clear(discs, theirs, car) for other, theirs in taken):
+        if all(other.line is line or _clear(discs, theirs, car) for other, theirs in others):
             return tour, discs
     return None
 
 
 def _too_close(tour: Tour, other: Tour) -> bool:
-    """Return whether two cars on the same line would touch, the one behind the other."""
+    """Return whether two cars on the same line would touch."""
     if tour.line is not other.line:
         return False
     rear, front = car_body(tour.car).x_span
@@ -174,7 +174,7 @@ def _too_close(tour: Tour, other: Tour) -> bool:
 
 
 def _discs(tour: Tour, times: Floats) -> Floats:
-    """Return the middles of three discs that cover the car, at each time, (times, 3, 2) [m]."""
+    """Return the centres of three discs that cover the car, at each time, (times, 3, 2) [m]."""
     rear, front = car_body(tour.car).x_span
     length = front - rear
     along = [rear + length * share for share in (1 / 6, 1 / 2, 5 / 6)]
@@ -192,7 +192,7 @@ def _clear(discs: Floats, others: Floats, car: str) -> bool:
 
 
 def _lane_lines(city_map: CityMap, room_m: float, rng: np.random.Generator) -> list[Polyline]:
-    """Return from every lane the line of a drive, of the lane's length and the room it needs."""
+    """Return a drive's line from every lane, of the lane's length and the room it needs."""
     roads = Roads(city_map)
     lines = []
     for name in roads.lanes:
@@ -208,7 +208,7 @@ def _lane_lines(city_map: CityMap, room_m: float, rng: np.random.Generator) -> l
 
 
 def rings(floor: Floor) -> list[Polyline]:
-    """Return closed lines round a floor, one in another, every second one the other way round.
+    """Return closed lines around a floor, nested, every second one in the other direction.
 
     Raises:
         EyeError: The floor is too small for one.
@@ -226,7 +226,7 @@ def rings(floor: Floor) -> list[Polyline]:
 
 
 def _ring(x0: float, x1: float, y0: float, y1: float) -> Polyline:
-    """Return a rectangle with round corners, counter-clockwise, from its lower side's start."""
+    """Return a rectangle with rounded corners, counter-clockwise, from its lower side's start."""
     radius = max(TIGHTEST_M, min(0.45, (min(x1 - x0, y1 - y0)) / 2.0))
     across, up = x1 - x0 - 2.0 * radius, y1 - y0 - 2.0 * radius
     corner = Segment(radius_m=radius, angle_rad=math.pi / 2.0)

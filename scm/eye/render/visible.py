@@ -1,4 +1,4 @@
-"""How much of a print can be seen: in the frame, and with nothing before it."""
+"""Computes how much of a print is visible: in the frame, and not covered."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ FINE = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hiding:
-    """A painted car, for what is behind it.
+    """A painted car, which may hide others.
 
     Attributes:
-        order: Its number among the painted; later ones lie over earlier ones.
+        order: Its number in the order of painting; later ones cover earlier ones.
         rect: The window that it and its shadow are in.
         hull: Around its solids, (n, 2) [px].
         outline: Around its wheels on the floor, (k, 2) [m].
@@ -39,14 +39,14 @@ def visible_share(
     layers: Sequence[Layer],
     obstacles: Sequence[Obstacle] = (),
 ) -> float:
-    """Return the share of a print's area that shows, 0 to 1.
+    """Return the visible share of a print's area, 0 to 1.
 
     Args:
         corners: Of the whole print, (4, 2) [px].
         size_px: Columns and rows of the frame.
-        cars: Those that lie over it, if anywhere near.
-        layers: What is before the whole scene.
-        obstacles: What stands before it.
+        cars: Those painted over it.
+        layers: In front of the whole scene.
+        obstacles: In front of it.
     """
     low = np.floor(corners.min(axis=0)).astype(int) - 1
     high = np.ceil(corners.max(axis=0)).astype(int) + 2
@@ -78,7 +78,7 @@ def _meet(one: Rect, other: Rect) -> bool:
 
 
 def _filled(outline: Floats | NDArray[np.float32], rect: Rect) -> Floats:
-    """Return what share of each pixel of a window a convex outline covers, (h, w)."""
+    """Return the share of each pixel of a window that a convex outline covers, (h, w)."""
     width, height = rect[2] - rect[0], rect[3] - rect[1]
     fine = np.zeros((height * FINE, width * FINE), dtype=np.uint8)
     placed = (outline - np.array(rect[:2]) + 0.5) * FINE - 0.5

@@ -1,5 +1,5 @@
-"""Where frames come from; `choose` turns what a person types into one of them.
+"""Sources of frames; `choose` creates one from the command line's text.
 
-`synthetic` renders the world; `file` and `folder` play what was taken before; `bus` hears frames;
-`live` reads a camera that `device` or `mjpeg` opens, and `watch` checks what comes of it.
+`synthetic` renders the world; `file` and `folder` play recorded frames; `bus` receives frames;
+`live` reads a camera that `device` or `mjpeg` opens, and `frame_monitor` checks its frames.
 """

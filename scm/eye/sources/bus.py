@@ -1,11 +1,11 @@
-"""Frames that come over the bus, from a camera whose computer is somewhere else."""
+"""Frames from the bus, of a camera on another computer."""
 
 from scm.clock import nanoseconds
 from scm.errors import EyeError
 from scm.eye.picture import decode_picture
 from scm.eye.source import Frame
 from scm.eye.sources.capture import Grabbed
-from scm.eye.sources.watch import Tally, Watch
+from scm.eye.sources.frame_monitor import FrameMonitor, Tally
 from scm.runtime.part import Subscription
 from scm.v2x.exchange import Incoming
 from scm.v2x.key import check_name
@@ -14,51 +14,51 @@ from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 
 class BusSource:
-    """The pictures of one camera on the bus; only the newest is decoded, when it is taken.
+    """The pictures of one camera on the bus; only the newest is decoded, when it is read.
 
     Args:
-        camera: Whose, as in the key of `EyePictureIn`.
-        delay_s: From exposure to arrival at the least, where the sender's clock is not ours.
+        camera: Name of the camera, as in the key of `EyePictureIn`.
+        delay_s: Minimum delay from exposure to arrival, for senders with another clock.
 
     Attributes:
-        hears: What the part must hear for it.
+        subscriptions: The subscriptions that its part needs.
 
     Raises:
-        MessageError: The camera's name may not stand in a key.
+        MessageError: The camera's name is not valid in a key.
     """
 
     def __init__(self, camera: str, delay_s: float = 0.0) -> None:
         self.camera = check_name(camera, "camera")
         self.subscriptions = (Subscription(EyePictureIn, {"camera": camera}),)
-        self._watch = Watch(nanoseconds(delay_s))
+        self._monitor = FrameMonitor(nanoseconds(delay_s))
         self._newest: tuple[EyePictureIn, int] | None = None
         self._now_ns = 0
         self._closed = False
 
     @property
     def trouble(self) -> str | None:
-        """What was wrong at the last `take`, in words; None: nothing."""
-        said = self._watch.trouble(self._now_ns)
-        return f"bus:{self.camera}: {said}" if said else None
+        """What was wrong at the last `read`, in words; None if nothing was."""
+        text = self._monitor.trouble(self._now_ns)
+        return f"bus:{self.camera}: {text}" if text else None
 
     @property
     def tally(self) -> Tally:
         """Counts since the start."""
-        return self._watch.tally
+        return self._monitor.tally
 
-    def hear(self, item: Incoming) -> None:
-        """Keep the picture, if this is one of ours."""
+    def receive(self, item: Incoming) -> None:
+        """Store the picture, if it is this camera's."""
         message = item.message
         if isinstance(message, EyePictureIn) and message.camera == self.camera:
             if self._newest is not None:
-                self._watch.passed_over()
+                self._monitor.passed_over()
             self._newest = (message, item.t_ns)
 
-    def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
-        """Return the newest picture not yet taken, None if there is none."""
+    def read(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
+        """Return the newest picture not yet read, None if there is none."""
         del light
         self._now_ns = now_ns
-        self._watch.begin(now_ns)
+        self._monitor.begin(now_ns)
         newest, self._newest = self._newest, None
         if newest is None or self._closed:
             return None
@@ -66,12 +66,12 @@ class BusSource:
         try:
             image = decode_picture(picture.payload, "a frame")
         except EyeError as cause:
-            self._watch.damaged(str(cause), arrival_ns)
+            self._monitor.damaged(str(cause), arrival_ns)
             return None
         age_ns = arrival_ns - picture.t_ns if picture.shares_clock else None
-        return self._watch.accept(Grabbed(image, picture.t_ns, age_ns), arrival_ns)
+        return self._monitor.accept(Grabbed(image, picture.t_ns, age_ns), arrival_ns)
 
     def close(self) -> None:
-        """Take nothing more; safe to call twice."""
+        """Stop; safe to call twice."""
         self._closed = True
         self._newest = None

@@ -1,12 +1,12 @@
-"""A camera's own time stamps on our clock, by the least delay seen.
+"""Maps a camera's own time stamps to our clock, by the minimum delay.
 
-A frame that was exposed at `stamp` on the camera's clock arrives at `arrival` on ours. Their
-difference is the clocks' offset and the frame's delay together; delays vary, the offset hardly
-does, so the least difference lately seen is taken as the offset. The least delay itself cannot be
-told from it and stays in: frames seem that much younger than they are.
+A frame exposed at `stamp` on the camera's clock arrives at `arrival` on ours. The difference is the
+sum of clock offset and frame delay; delays vary, the offset hardly does, so the smallest recent
+difference is used as the offset. The minimum delay itself cannot be separated from it and remains:
+frames seem newer by that much.
 
-Clocks drift: the least differences of 5 s each, over 5 minutes, give the slope (Theil and Sen's
-median of all slopes, deaf to a few slow spans). Used after a minute, when it beats the jitter.
+Clocks drift: the smallest differences of 5 s each, over 5 minutes, give the slope (the Theil-Sen
+estimator, robust to outliers). It is used after a minute.
 """
 
 from collections import deque
@@ -25,10 +25,10 @@ HOLD_NS = 2 * NS_PER_S
 
 
 class CameraClock:
-    """The mapping of one camera's clock, from when it was opened on.
+    """The mapping of one camera's clock, since the camera was opened.
 
     Attributes:
-        drift: How much slower than ours the camera's clock runs, a share; 0 until known.
+        drift: Relative rate by which the camera's clock is slower than ours; 0 until known.
     """
 
     def __init__(self) -> None:
@@ -40,9 +40,9 @@ class CameraClock:
         self._jump: tuple[int, str] | None = None
 
     def exposed(self, stamp_ns: int, arrival_ns: int) -> int | None:
-        """Return when a frame was exposed [ns, our clock], at most its arrival.
+        """Return when a frame was exposed [ns, our clock], not after its arrival.
 
-        None: it has the stamp of the frame before, so it is the same frame.
+        None if its stamp equals the previous frame's, so that it is the same frame.
         """
         last_ns, self._stamp_ns = self._stamp_ns, stamp_ns
         if stamp_ns == last_ns:
@@ -61,23 +61,23 @@ class CameraClock:
 
     def trouble(self, now_ns: int) -> list[str]:
         """Return what is wrong with the camera's time stamps, in words."""
-        said = []
+        text = []
         if self._jump is not None and now_ns - self._jump[0] < HOLD_NS:
-            said.append(self._jump[1])
+            text.append(self._jump[1])
         if self._late_ns > LATE_NS:
-            said.append(f"frames come {seconds(self._late_ns):.1f} s later than the quickest")
+            text.append(f"frames come {seconds(self._late_ns):.1f} s later than the quickest")
         if abs(self.drift) > DRIFT_ODD:
             how = "slow" if self.drift > 0.0 else "fast"
-            said.append(f"the camera's clock runs {abs(self.drift) * 1e6:.0f} ppm {how}")
-        return said
+            text.append(f"the camera's clock runs {abs(self.drift) * 1e6:.0f} ppm {how}")
+        return text
 
-    def _restart(self, now_ns: int, said: str) -> None:
+    def _restart(self, now_ns: int, text: str) -> None:
         self._spans.clear()
         self.drift = 0.0
-        self._jump = (now_ns, said)
+        self._jump = (now_ns, text)
 
     def _note(self, arrival_ns: int, difference_ns: int) -> None:
-        """Keep the least difference of each span of time."""
+        """Store the smallest difference of each span of time."""
         span = arrival_ns // SPAN_NS
         if not self._spans or span != self._span:
             self._span = span

@@ -1,4 +1,4 @@
-"""What a live source needs of a camera that is open: wait for a frame, fetch it, let go."""
+"""The contract of an open camera: wait for a frame, fetch it, close."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -8,18 +8,18 @@ from scm.errors import EyeError
 
 
 class DamagedFrameError(EyeError):
-    """A frame came and cannot be used; the next one may be good."""
+    """A frame arrived damaged; the next one may be good."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grabbed:
-    """One frame as the camera gave it.
+    """One frame from the camera.
 
     Attributes:
         image: (height, width, 3) blue, green, red, or (height, width) grey.
-        stamp_ns: When it was exposed on the camera's own clock, whatever that counts from.
-        age_ns: How long before its arrival it was exposed, from a camera that shares our clock;
-            counts more than `stamp_ns`.
+        stamp_ns: Exposure time on the camera's own clock, with any origin.
+        age_ns: Time from exposure to arrival, from a camera that shares our clock; takes
+            precedence over `stamp_ns`.
     """
 
     image: Image
@@ -31,7 +31,7 @@ class Capture(Protocol):
     """An open camera. One thread waits, fetches and closes; any thread may interrupt."""
 
     def wait(self) -> None:
-        """Wait until a frame is there; seconds at the most.
+        """Wait until a frame arrives; a few seconds at most.
 
         Raises:
             EyeError: The camera is gone.
@@ -42,15 +42,15 @@ class Capture(Protocol):
         """Return the frame that `wait` found.
 
         Raises:
-            DamagedFrameError: It cannot be used.
+            DamagedFrameError: It is damaged.
             EyeError: The camera is gone.
         """
         ...
 
     def interrupt(self) -> None:
-        """Make a `wait` that another thread is in end soon, where the camera allows it."""
+        """Interrupt another thread's `wait`, if the camera allows it."""
         ...
 
     def close(self) -> None:
-        """Let go of the camera."""
+        """Release the camera."""
         ...

@@ -1,4 +1,4 @@
-"""What a person types after `--frames`, as a source."""
+"""Creates a source from the text of `--frames`."""
 
 import re
 from functools import partial
@@ -36,18 +36,18 @@ def source_of(
     loop: bool = False,
     delay_s: float = 0.0,
 ) -> Source:
-    """Return the source that a text names; a live one begins with its first `take`.
+    """Return the source for a text; a live one starts with its first `read`.
 
     Args:
         text: One of `FORMS`.
-        size_px: Width and height to ask a USB or CSI camera for.
-        rate_hz: Frames a second to ask such a camera for, or to play a folder without times at.
-        loop: Begin films and folders again when they are over.
-        delay_s: From exposure to arrival at the least, where a camera's stamps cannot tell.
+        size_px: Width and height to request from a USB or CSI camera.
+        rate_hz: Frame rate to request from such a camera, or to play a folder without times.
+        loop: Whether films and folders restart at their end.
+        delay_s: Minimum delay from exposure to arrival, for cameras without usable stamps.
 
     Raises:
-        EyeError: It names nothing that can be one, now or later.
-        MessageError: `bus:` and a name that may not stand in a key.
+        EyeError: It names no possible source.
+        MessageError: `bus:` with a name that is not valid in a key.
     """
     if not 0.0 <= delay_s < LONGEST_DELAY_S:
         longest = round(LONGEST_DELAY_S * 1e3)
@@ -95,10 +95,10 @@ def _csi_number(text: str) -> int:
 
 
 def _without_password(address: str) -> str:
-    """Return an address that may be shown to anybody.
+    """Return an address without its password.
 
     Raises:
-        EyeError: It has no host, or a port that is none.
+        EyeError: It has no host, or an invalid port.
     """
     try:
         url = urlsplit(address)

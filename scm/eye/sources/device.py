@@ -22,7 +22,7 @@ _TEGRA = Path("/etc/nv_tegra_release")
 
 
 class VideoCapture(Protocol):
-    """What we use of `cv2.VideoCapture`."""
+    """The part of `cv2.VideoCapture` that is used."""
 
     def isOpened(self) -> bool: ...  # noqa: N802, D102  OpenCV's name
 
@@ -42,7 +42,7 @@ class DeviceCapture:
 
     Args:
         video: The opened device.
-        is_local: Whether its time stamps are the kernel's, on the clock that `monotonic_ns` reads.
+        is_local: Whether its time stamps are the kernel's, on the clock of `monotonic_ns`.
         monotonic_ns: That clock.
     """
 
@@ -58,13 +58,13 @@ class DeviceCapture:
         self._arrival_ns = 0
 
     def wait(self) -> None:
-        """Wait for a frame; as long as the driver's own time limit at the most."""
+        """Wait for a frame, at most for the driver's own time limit."""
         if not self._video.grab():
-            raise EyeError("it gives no frames any more")
+            raise EyeError("it delivers no more frames")
         self._arrival_ns = self._monotonic_ns()
 
     def fetch(self) -> Grabbed:
-        """Return the frame, with the time stamp the driver gave it."""
+        """Return the frame with the driver's time stamp."""
         good, image = self._video.retrieve()
         if not good or image is None:
             raise DamagedFrameError("a frame that cannot be decoded")
@@ -79,15 +79,15 @@ class DeviceCapture:
         """Do nothing: OpenCV cannot be interrupted, its time limits end every wait."""
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Release the device."""
         self._video.release()
 
 
 def open_usb(device: str, size_px: tuple[int, int] | None, rate_hz: float | None) -> DeviceCapture:
-    """Open a V4L2 camera; frames come as the camera's own JPEGs where it has such.
+    """Open a V4L2 camera; frames are the camera's own JPEGs if it has them.
 
     Raises:
-        EyeError: It is not there, not ours to read, or no camera.
+        EyeError: It does not exist, may not be read, or is no camera.
     """
     path = Path(device)
     if not path.exists():
@@ -96,16 +96,16 @@ def open_usb(device: str, size_px: tuple[int, int] | None, rate_hz: float | None
         raise EyeError("no permission to read and write it (on Linux: join the group video)")
     os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")
     video = cv2.VideoCapture(device, cv2.CAP_V4L2)
-    _check_opened(video, "it is no camera, or somebody else has it open")
+    _check_opened(video, "it is no camera, or in use by another program")
     set_up(video, size_px, rate_hz)
     return DeviceCapture(video, is_local=True)
 
 
 def set_up(video: VideoCapture, size_px: tuple[int, int] | None, rate_hz: float | None) -> None:
-    """Ask a USB camera for JPEGs of a size and rate; it may give something else.
+    """Request JPEGs of a size and rate from a USB camera; it may deliver something else.
 
-    A USB 2 cable carries 1080p at 30 Hz only as JPEG. We decode them ourselves: OpenCV fills with
-    grey what is missing of a frame cut short.
+    A USB 2 cable carries 1080p at 30 Hz only as JPEG. We decode them ourselves: OpenCV fills the
+    missing part of a truncated frame with grey.
     """
     video.set(cv2.CAP_PROP_FOURCC, MJPG)
     if size_px is not None:
@@ -121,14 +121,14 @@ def open_rtsp(address: str) -> DeviceCapture:
     """Open an IP camera's stream.
 
     Raises:
-        EyeError: Nobody answers, or with something else.
+        EyeError: No answer, or no readable stream.
     """
     limits = [
         *(cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, OPEN_TIMEOUT_MS),
         *(cv2.CAP_PROP_READ_TIMEOUT_MSEC, READ_TIMEOUT_MS),
     ]
     video = cv2.VideoCapture(address, cv2.CAP_FFMPEG, limits)
-    _check_opened(video, "nobody answers there, or not with a stream that FFmpeg reads")
+    _check_opened(video, "no answer, or no stream that FFmpeg reads")
     return DeviceCapture(video, is_local=False)
 
 
@@ -168,14 +168,14 @@ def has_gstreamer() -> bool:
     return bool(re.search(r"GStreamer:\s+YES", cv2.getBuildInformation()))
 
 
-def _check_opened(video: VideoCapture, said: str) -> None:
+def _check_opened(video: VideoCapture, text: str) -> None:
     if not video.isOpened():
         video.release()
-        raise EyeError(said)
+        raise EyeError(text)
 
 
 def _decoded(image: Image) -> Image:
-    """Return the picture; a device that was asked not to convert gives its JPEG as one row."""
+    """Return the picture; without conversion a device delivers its JPEG as one row."""
     if 1 not in image.shape[:2]:
         return image
     try:

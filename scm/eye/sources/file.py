@@ -1,4 +1,4 @@
-"""Frames from a film or a still picture, at the film's own pace."""
+"""Frames from a film or a still picture, at the film's own rate."""
 
 from pathlib import Path
 
@@ -14,14 +14,14 @@ from scm.eye.sources.player import Player, Reel
 
 
 class FileSource(Player):
-    """Plays a file: a film's frames are exposed by its own time stamps from the first `take` on.
+    """Plays a file: a film's frames follow its own time stamps from the first `read` on.
 
     Args:
         path: Any picture or film that OpenCV reads; a picture is one frame.
-        loop: Begin again when it is over, time going on.
+        loop: Whether to restart at the end; time continues.
 
     Raises:
-        EyeError: The file is missing, cut short or cannot be read.
+        EyeError: The file is missing, truncated or unreadable.
     """
 
     def __init__(self, path: Path, loop: bool = False) -> None:
@@ -38,7 +38,7 @@ def _reel(path: Path) -> Reel:
 
 
 class FilmReel:
-    """A film, one frame read ahead: its time is known only then.
+    """A film, read one frame ahead, since only that gives its time.
 
     Args:
         path: Any film that OpenCV reads.
@@ -68,7 +68,7 @@ class FilmReel:
         return None if self._next_ns is None else self._next_ns + self._period_ns
 
     def skip(self) -> None:
-        """Leave the next frame out."""
+        """Skip the next frame."""
         self._next_ns = self._ahead(self._next_ns)
 
     def show(self) -> Image:
@@ -83,7 +83,7 @@ class FilmReel:
         return np.asarray(image, dtype=np.uint8)
 
     def rewind(self) -> int:
-        """Go back to the first frame; return how long after the first one this was [ns]."""
+        """Go back to the first frame; return how long after the previous first it is [ns]."""
         length_ns = self._last_ns + self._period_ns
         self._film.release()
         self._film = cv2.VideoCapture(str(self._path))
@@ -95,10 +95,10 @@ class FilmReel:
         self._film.release()
 
     def _ahead(self, before_ns: int | None) -> int | None:
-        """Read one frame and return its time [ns]; where times do not ascend, by the film's rate.
+        """Read one frame and return its time [ns]; by the film's rate if times do not ascend.
 
         Args:
-            before_ns: The time of the frame before, None if this is the first.
+            before_ns: Time of the previous frame, None for the first.
         """
         try:
             good = self._film.grab()

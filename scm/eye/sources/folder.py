@@ -24,15 +24,15 @@ _EPOCH = re.compile(r"(\d{16}|\d{19})$")
 class FolderSource(Player):
     """Plays the pictures of a folder.
 
-    Their times come from `timestamps.csv` (columns `file`, `t_s`) where the folder has one, which
-    then also chooses the pictures; else from their names where every one ends in seconds with a
-    point (`cam_12.050.png`) or in 16 or 19 digits (microseconds, nanoseconds); else from the rate,
-    in the order that a person counts (`2` before `10`).
+    Their times come from `timestamps.csv` (columns `file`, `t_s`) if the folder has one, which
+    then also selects the pictures; else from their names if every one ends in decimal seconds
+    (`cam_12.050.png`) or in 16 or 19 digits (microseconds, nanoseconds); else from the rate, in
+    natural order (`2` before `10`).
 
     Args:
         path: The folder.
-        rate_hz: Where nothing else tells the times.
-        loop: Begin again when it is over, time going on.
+        rate_hz: If nothing else gives the times.
+        loop: Whether to restart at the end; time continues.
 
     Raises:
         EyeError: No folder, no pictures, or times that do not ascend; names file and line.
@@ -43,7 +43,7 @@ class FolderSource(Player):
             raise EyeError(f"{path}: expected a folder of pictures, found none")
         if not (math.isfinite(rate_hz) and rate_hz > 0.0):
             raise EyeError(f"{path}: expected a rate above 0 Hz, got {rate_hz:g}")
-        super().__init__(str(path), FolderReel(*_listed(path, rate_hz)), loop)
+        super().__init__(str(path), FolderReel(*_files_and_times(path, rate_hz)), loop)
 
 
 class FolderReel:
@@ -68,7 +68,7 @@ class FolderReel:
         return self._times_ns[self._at + 1] if self._at + 1 < len(self._files) else None
 
     def skip(self) -> None:
-        """Leave the next picture out."""
+        """Skip the next picture."""
         self._at += 1
 
     def show(self) -> Image:
@@ -77,17 +77,17 @@ class FolderReel:
         return read_picture(self._files[self._at - 1])
 
     def rewind(self) -> int:
-        """Go back to the first picture; return how long after the first one this was [ns]."""
+        """Go back to the first picture; return how long after the previous first it is [ns]."""
         self._at = 0
         count = len(self._files)
         mean_ns = self._times_ns[-1] // (count - 1) if count > 1 else round(NS_PER_S / RATE_HZ)
         return self._times_ns[-1] + mean_ns
 
     def close(self) -> None:
-        """Keep nothing open."""
+        """Do nothing: no file is open."""
 
 
-def _listed(path: Path, rate_hz: float) -> tuple[list[Path], list[int]]:
+def _files_and_times(path: Path, rate_hz: float) -> tuple[list[Path], list[int]]:
     if (path / TIMES).is_file():
         return _from_table(path)
     files = [file for file in path.iterdir() if file.suffix.lower() in STILLS and file.is_file()]
@@ -152,6 +152,6 @@ def _named_ns(file: Path) -> int | None:
 
 
 def _as_counted(file: Path) -> list[tuple[int, int, str]]:
-    """Return a key that sorts `2` before `10`."""
+    """Return a sort key for natural order: `2` before `10`."""
     chunks = re.split(r"(\d+)", file.name.lower())
     return [(1, int(chunk), chunk) if chunk.isdigit() else (0, 0, chunk) for chunk in chunks]

@@ -1,7 +1,7 @@
-"""Frames of a live camera: read in a thread of its own that keeps only the newest.
+"""Frames of a live camera, read in a thread of its own that stores only the newest.
 
-The thread opens the camera, reads it until it is gone, and opens it again after a pause that
-doubles from 0.5 s to 5 s, until the source is closed. Whatever a driver raises becomes trouble.
+The thread opens the camera, reads it until it fails, and opens it again after a pause that doubles
+from 0.5 s to 5 s, until the source is closed. Any exception of a driver becomes trouble.
 """
 
 import threading
@@ -11,7 +11,7 @@ from contextlib import suppress
 from scm.clock import Clock, WallClock, nanoseconds
 from scm.eye.source import Frame
 from scm.eye.sources.capture import Capture, DamagedFrameError
-from scm.eye.sources.watch import Tally, Watch
+from scm.eye.sources.frame_monitor import FrameMonitor, Tally
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 PAUSES_S = (0.5, 5.0)
@@ -22,11 +22,11 @@ class LiveSource:
     """A camera that may come and go.
 
     Args:
-        name: For what is said: `/dev/video0`, `rtsp://...` without its password.
-        open_camera: Opens it; raises an `EyeError` that says why it cannot.
-        delay_s: From exposure to arrival at the least, where the camera's stamps cannot tell.
-        clock: Of arrivals; need not be the clock that `take` is called by.
-        pauses_s: Before the first and before the last tries to open it again.
+        name: For messages: `/dev/video0`, `rtsp://...` without its password.
+        open_camera: Opens it; raises an `EyeError` with the reason if it cannot.
+        delay_s: Minimum delay from exposure to arrival, for cameras without usable stamps.
+        clock: Of arrivals; may differ from the clock of `read`.
+        pauses_s: First and longest pause before it is opened again.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class LiveSource:
         self._open = open_camera
         self._clock = clock or WallClock()
         self._pauses_s = pauses_s
-        self._watch = Watch(nanoseconds(delay_s))
+        self._monitor = FrameMonitor(nanoseconds(delay_s))
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
@@ -52,19 +52,19 @@ class LiveSource:
 
     @property
     def trouble(self) -> str | None:
-        """What is wrong now, in words; None: nothing."""
+        """What is wrong now, in words; None if nothing is."""
         with self._lock:
-            said = self._watch.trouble(self._clock.now_ns()) if self._thread else None
-        return f"{self.name}: {said}" if said else None
+            text = self._monitor.trouble(self._clock.now_ns()) if self._thread else None
+        return f"{self.name}: {text}" if text else None
 
     @property
     def tally(self) -> Tally:
         """Counts since the start."""
         with self._lock:
-            return self._watch.tally
+            return self._monitor.tally
 
-    def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
-        """Return the newest frame not yet taken, None if there is none; never waits."""
+    def read(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
+        """Return the newest frame not yet read, None if there is none; never waits."""
         del light
         self._begin()
         self._follow(now_ns - self._clock.now_ns())
@@ -79,10 +79,10 @@ class LiveSource:
         return Frame(t_ns, newest.image, newest.stamped)
 
     def close(self) -> None:
-        """End the thread and let go of the camera; safe to call twice.
+        """End the thread and release the camera; safe to call twice.
 
-        A driver that will not return is waited for at most `CLOSE_S`; its thread then ends as soon
-        as it does.
+        Waits for a blocked driver for at most `CLOSE_S`; its thread ends as soon as the driver
+        returns.
         """
         self._stop.set()
         with self._lock:
@@ -95,13 +95,13 @@ class LiveSource:
 
     def _begin(self) -> None:
         if self._thread is None and not self._stop.is_set():
-            self._watch.begin(self._clock.now_ns())
+            self._monitor.begin(self._clock.now_ns())
             name = f"frames of {self.name}"
             self._thread = threading.Thread(target=self._run, name=name, daemon=True)
             self._thread.start()
 
     def _follow(self, lead_ns: int) -> None:
-        """Learn how far the caller's clock is ahead of ours: he read his before he called."""
+        """Estimate how far the caller's clock is ahead of ours; it was read before the call."""
         if self._lead_ns is None or lead_ns > self._lead_ns:
             self._lead_ns = lead_ns
 
@@ -109,24 +109,24 @@ class LiveSource:
         first_s, longest_s = self._pauses_s
         pause_s = first_s
         while not self._stop.is_set():
-            good = self._watch.tally.good
-            said = self._session()
+            good = self._monitor.tally.good
+            text = self._session()
             with self._lock:
-                self._watch.gone(said)
-            if self._watch.tally.good > good:
+                self._monitor.gone(text)
+            if self._monitor.tally.good > good:
                 pause_s = first_s
             self._stop.wait(pause_s)
             pause_s = min(2.0 * pause_s, longest_s)
 
     def _session(self) -> str:
-        """Open the camera and read it until it is gone; return why it is."""
+        """Open the camera and read it until it fails; return why."""
         try:
             capture = self._open()
-        except Exception as cause:  # noqa: BLE001  a driver may raise anything; the eye must live
+        except Exception as cause:  # noqa: BLE001  a driver may raise anything; the Eye must survive
             return f"cannot open it: {cause}"
         with self._lock:
             self._capture = capture
-            self._watch.opened()
+            self._monitor.opened()
         try:
             while not self._stop.is_set():
                 self._read(capture)
@@ -146,12 +146,12 @@ class LiveSource:
             grabbed = capture.fetch()
         except DamagedFrameError as cause:
             with self._lock:
-                self._watch.damaged(str(cause), arrival_ns)
+                self._monitor.damaged(str(cause), arrival_ns)
             return
         with self._lock:
-            frame = self._watch.accept(grabbed, arrival_ns)
+            frame = self._monitor.accept(grabbed, arrival_ns)
             if frame is None or self._stop.is_set():
                 return
             if self._newest is not None:
-                self._watch.passed_over()
+                self._monitor.passed_over()
             self._newest = frame

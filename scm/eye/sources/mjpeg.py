@@ -1,8 +1,8 @@
-"""Frames of an IP camera over HTTP: JPEGs one after the other in one answer that never ends.
+"""Frames of an IP camera over HTTP: JPEGs one after the other in one endless response.
 
-`multipart/x-mixed-replace`: each part has a few header lines and one JPEG. `Content-Length` tells
-its size where the camera says it, else the JPEG lasts until the next boundary. `X-Timestamp`, in
-seconds on the camera's clock, is the time stamp where there is one.
+`multipart/x-mixed-replace`: each part has a few header lines and one JPEG. `Content-Length` is its
+size if the camera sends it, else the JPEG ends at the next boundary. `X-Timestamp`, in seconds on
+the camera's clock, is the time stamp if there is one.
 """
 
 import base64
@@ -22,10 +22,10 @@ LONGEST_LINE, MOST_LINES, LARGEST = 65536, 64, 64 * 2**20
 
 
 class MjpegCapture:
-    """One answer of an IP camera.
+    """One response of an IP camera.
 
     Raises:
-        EyeError: Nobody answers, or not with a film of JPEGs.
+        EyeError: No answer, or no stream of JPEGs.
     """
 
     def __init__(self, address: str, timeout_s: float = TIMEOUT_S) -> None:
@@ -43,20 +43,20 @@ class MjpegCapture:
             self._boundary = _boundary(self._answer)
         except (OSError, HTTPException) as cause:
             self._connection.close()
-            raise EyeError(self._said(cause)) from cause
+            raise EyeError(self._explain(cause)) from cause
         except EyeError:
             self._connection.close()
             raise
 
     def wait(self) -> None:
-        """Read the next part; raises an `EyeError` when the camera is gone."""
+        """Read the next part; raises an `EyeError` if the camera is gone."""
         try:
             while not self._is_at_part:
                 self._is_at_part = self._is_boundary(self._line())
             self._is_at_part = False
             self._jpeg, self._stamp_ns = self._part()
         except (OSError, HTTPException, ValueError, AttributeError) as cause:
-            raise EyeError(self._said(cause)) from cause
+            raise EyeError(self._explain(cause)) from cause
 
     def fetch(self) -> Grabbed:
         """Return the part's picture."""
@@ -66,12 +66,12 @@ class MjpegCapture:
             raise DamagedFrameError(str(cause)) from cause
 
     def interrupt(self) -> None:
-        """End the connection: whoever waits for its data gets none."""
+        """Close the connection, which ends a wait for its data."""
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._answer.close()
         self._connection.close()
         self._socket.close()
@@ -103,7 +103,7 @@ class MjpegCapture:
         return data
 
     def _unsized(self) -> bytes:
-        """Return what comes before the next boundary, which is then already passed."""
+        """Return the data before the next boundary, which is consumed."""
         lines: list[bytes] = []
         size = 0
         while size <= LARGEST:
@@ -118,7 +118,7 @@ class MjpegCapture:
     def _is_boundary(self, line: bytes) -> bool:
         return line.startswith(b"--") and line.lstrip(b"-").startswith(self._boundary)
 
-    def _said(self, cause: Exception) -> str:
+    def _explain(self, cause: Exception) -> str:
         if isinstance(cause, TimeoutError):
             return f"no answer for {self._timeout_s:g} s"
         return str(cause) or type(cause).__name__
@@ -141,7 +141,7 @@ def _headers(url: SplitResult) -> dict[str, str]:
 
 
 def _boundary(answer: HTTPResponse) -> bytes:
-    """Return what begins a part, without its dashes."""
+    """Return the boundary of parts, without its dashes."""
     if answer.status != 200:
         raise EyeError(f"the camera answers {answer.status} {answer.reason}")
     headers: HTTPMessage = answer.headers

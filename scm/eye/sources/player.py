@@ -1,4 +1,4 @@
-"""Frames that were taken before, played at their own pace from the first `take` on."""
+"""Plays recorded frames at their own rate from the first `read` on."""
 
 from typing import Protocol
 
@@ -8,13 +8,13 @@ from scm.errors import EyeError
 from scm.eye.source import Frame
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
-MOST_LEFT_OUT = 30
+MAX_SKIPPED = 30
 HOLD_NS = NS_PER_S
-"""A picture that cannot be used is told of so long, or nobody would hear of a single one."""
+"""How long trouble with a single unusable picture is reported."""
 
 
 class Reel(Protocol):
-    """Pictures in a row, each with its time since the first."""
+    """A sequence of pictures with their times since the first."""
 
     def next_ns(self) -> int | None:
         """Return the time of the next picture [ns], None at the end."""
@@ -25,19 +25,19 @@ class Reel(Protocol):
         ...
 
     def skip(self) -> None:
-        """Leave the next picture out."""
+        """Skip the next picture."""
         ...
 
     def show(self) -> Image:
-        """Return the next picture and go on to the one after.
+        """Return the next picture and advance.
 
         Raises:
-            EyeError: It cannot be read; the one after may be good.
+            EyeError: It cannot be read; the next one may be good.
         """
         ...
 
     def rewind(self) -> int:
-        """Go back to the first picture; return how long after the first one this was [ns]."""
+        """Go back to the first picture; return how long after the previous first it is [ns]."""
         ...
 
     def close(self) -> None:
@@ -48,16 +48,16 @@ class Reel(Protocol):
 class Player:
     """A source that plays a reel.
 
-    Pictures are decoded when they are taken, so the same calls give the same frames; of those
-    already late at most `MOST_LEFT_OUT` are left out in one `take`.
+    Pictures are decoded when they are read, so the same calls give the same frames; of those
+    already late at most `MAX_SKIPPED` are skipped in one `read`.
 
     Args:
-        name: For what is said.
+        name: For messages.
         reel: What to play.
-        loop: Begin again when it is over, time going on.
+        loop: Whether to restart at the end; time continues.
 
     Attributes:
-        trouble: What is wrong now, in words; None: nothing.
+        trouble: What is wrong now, in words; None if nothing is.
     """
 
     def __init__(self, name: str, reel: Reel, loop: bool) -> None:
@@ -67,17 +67,17 @@ class Player:
         self._loop = loop
         self._started_ns: int | None = None
         self._size: tuple[int, int] | None = None
-        self._spoiled_ns: int | None = None
+        self._fault_ns: int | None = None
         self._closed = False
 
-    def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
-        """Return the frame that is due, leaving out those already late; None when over."""
+    def read(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
+        """Return the frame that is due, skipping late ones; None at the end."""
         del light
         if self._closed:
             return None
         if self._started_ns is None:
             self._started_ns = now_ns
-        for _ in range(MOST_LEFT_OUT):
+        for _ in range(MAX_SKIPPED):
             following_ns = self._reel.following_ns()
             if following_ns is None or self._started_ns + following_ns > now_ns:
                 break
@@ -94,7 +94,7 @@ class Player:
         self._reel.close()
 
     def _next(self, started_ns: int) -> tuple[int, int | None]:
-        """Return when the reel was begun and when in it the next picture is, None when over."""
+        """Return the reel's start and the time in it of the next picture, None at the end."""
         next_ns = self._reel.next_ns()
         if next_ns is None and self._loop:
             started_ns += self._reel.rewind()
@@ -103,22 +103,22 @@ class Player:
             self.trouble = f"{self._name}: over"
         return started_ns, next_ns
 
-    def _spoil(self, said: str, t_ns: int) -> None:
-        self.trouble, self._spoiled_ns = said, t_ns
+    def _report_fault(self, text: str, t_ns: int) -> None:
+        self.trouble, self._fault_ns = text, t_ns
 
     def _show(self, t_ns: int) -> Frame | None:
         try:
             image = self._reel.show()
         except EyeError as cause:
-            self._spoil(str(cause), t_ns)
+            self._report_fault(str(cause), t_ns)
             return None
         size = (image.shape[1], image.shape[0])
         self._size = self._size or size
         if size != self._size:
             was, now = (f"{width} x {height}" for width, height in (self._size, size))
-            said = f"{self._name}: size changed from {was} to {now} px: frames left out"
-            self._spoil(said, t_ns)
+            text = f"{self._name}: size changed from {was} to {now} px: frames left out"
+            self._report_fault(text, t_ns)
             return None
-        if self._spoiled_ns is None or t_ns - self._spoiled_ns >= HOLD_NS:
+        if self._fault_ns is None or t_ns - self._fault_ns >= HOLD_NS:
             self.trouble = None
         return Frame(t_ns, image)

@@ -1,10 +1,10 @@
 """The emulated overhead camera: renders what a real one would see of a snapshot of the world.
 
-Emulated real cars it sees where they truly are, see `scm.eye.emulated`.
+Emulated real cars are rendered at their true poses, see `scm.eye.emulated`.
 
 Cars have height, so they shift outwards as in a real picture; tags go through the true lens; edges
-are averaged over each pixel's area; the sensor adds Gaussian noise. The noise is cut at a random
-place from a sheet that is drawn once: fresh noise would cost more than the whole picture.
+are antialiased; the sensor adds Gaussian noise. The noise is a random part of a sheet drawn once:
+fresh noise would cost more than the whole picture.
 """
 
 import math
@@ -27,16 +27,16 @@ from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 NOISE_SHEETS = 2
-EARLY = 0.7
-"""Of its period, a picture may come so soon after the one before."""
+MIN_PERIOD_SHARE = 0.7
+"""Minimum interval of pictures, as a share of the period."""
 
 
 class SyntheticSource:
-    """Frames of the world as `model` sees it; the model is the true camera, not a guess of it.
+    """Frames of the world as `model`, the true camera, sees it.
 
     Attributes:
-        trouble: None: nothing can go wrong.
-        hears: What tells it where emulated cars are.
+        trouble: Always None: nothing can go wrong.
+        subscriptions: The poses of emulated cars.
     """
 
     trouble: str | None = None
@@ -49,30 +49,30 @@ class SyntheticSource:
         self._boxes = {box.name: box for box in city_map.boxes if box.mass_kg is not None}
         self._frame: Image = self._scenery.picture.copy()
         self._brighter, self._darker = self._noise()
-        self._taken_ns: int | None = None
+        self._frame_ns: int | None = None
         self._emulated = EmulatedCars()
 
-    def hear(self, item: Incoming) -> None:
-        """Remember where an emulated car is."""
+    def receive(self, item: Incoming) -> None:
+        """Store the pose of an emulated car."""
         if isinstance(item.message, EmulatedPose):
-            self._emulated.hear(item.message)
+            self._emulated.update(item.message)
 
-    def take(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
-        """Return the picture at the snapshot's time, None if the camera took one just before."""
+    def read(self, now_ns: int, light: WorldSnapshot | None) -> Frame | None:
+        """Return the picture at the snapshot's time, None if none is due."""
         del now_ns
         if light is None or not self._is_due(light.t_ns):
             return None
-        self._taken_ns = light.t_ns
+        self._frame_ns = light.t_ns
         return Frame(light.t_ns, self.render(self._emulated.seen(light)))
 
     def _is_due(self, t_ns: int) -> bool:
-        """Say whether a camera of this rate takes a picture now; snapshots come as they like."""
-        if self._taken_ns is None or t_ns < self._taken_ns:
+        """Return whether a camera of this rate takes a picture now, whenever snapshots come."""
+        if self._frame_ns is None or t_ns < self._frame_ns:
             return True
-        return (t_ns - self._taken_ns) * self._model.camera.rate_hz > EARLY * NS_PER_S
+        return (t_ns - self._frame_ns) * self._model.camera.rate_hz > MIN_PERIOD_SHARE * NS_PER_S
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: no resource is held."""
 
     def render(self, light: WorldSnapshot) -> Image:
         """Return the picture of a snapshot, (height, width, 3); it is valid until the next one."""

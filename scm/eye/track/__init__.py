@@ -1,9 +1,9 @@
 """One estimate per car, from the sightings of one or several cameras.
 
-sighting    what a camera says of a car, and what is told of a track
+sighting    a camera's pose of a car, and a car's track
 motion      how cars move between sightings
 fleet       all tracks as arrays
-update      a frame of sightings taken in: gates, jumps, doubles
-tracks      late sightings put in their place; tracks told at any time
+update      a frame of sightings processed: gates, jumps, duplicates
+tracks      late sightings inserted in order; tracks evaluated at any time
 perception  tracks as a collective perception message
 """

@@ -10,7 +10,7 @@ from scm.eye.track.motion import OFFSET, STATES, predict, slip_std
 from scm.eye.track.sighting import ROOF_TAG_SIZE, Sighting
 
 KINDS = ("duplicate", "disagree", "wrong_id", "jumped", ROOF_TAG_SIZE)
-"""What may be said of a track for a while."""
+"""Temporary flags of a track."""
 FIRST_SPEED_MPS = 2.0
 FIRST_TURN_RAD_S = 2.0
 
@@ -29,16 +29,16 @@ class Fleet:
 
     Attributes:
         mean: (n, 6 + 3 c), as `motion.predict` has it; likewise `covariance`.
-        shared: What each camera's offset may be, (n, c, 3, 3).
-        lean: Doubt that no camera can lessen, (n, 3, 3).
-        t_ns: When `mean` holds, (n,): when the car was last seen.
+        shared: Covariance of each camera's offset, (n, c, 3, 3).
+        common_mode: Covariance common to all cameras, (n, 3, 3).
+        t_ns: Time of `mean`, (n,): when the car was last seen.
         seen_ns: When each camera last saw it, (n, c); 0 never.
-        count: How often it was seen, (n,).
-        came_ns: When it appeared where it is, (n,).
-        rival: Where sightings are that do not fit, (n, 3), when the last of them was, how many
-            of them agree, and whether fitting ones came between, (n, 3).
-        said_ns: Until when each of `KINDS` holds, (n, 5).
-        flags: What each camera last said is wrong with it.
+        count: Number of sightings, (n,).
+        came_ns: When it appeared at its present place, (n,).
+        outlier_pose: Pose of the last sighting that did not fit, (n, 3); `outlier`: its time, how
+            many agree, and whether fitting ones came between, (n, 3).
+        flagged_until_ns: Until when each of `KINDS` holds, (n, 5).
+        flags: Each camera's last flags.
     """
 
     vehicles: tuple[str, ...] = ()
@@ -47,14 +47,14 @@ class Fleet:
     mean: Floats = field(default_factory=lambda: _none(0, STATES))
     covariance: Floats = field(default_factory=lambda: _none(0, STATES, STATES))
     shared: Floats = field(default_factory=lambda: _none(0, 0, OFFSET, OFFSET))
-    lean: Floats = field(default_factory=lambda: _none(0, OFFSET, OFFSET))
+    common_mode: Floats = field(default_factory=lambda: _none(0, OFFSET, OFFSET))
     t_ns: Ints = field(default_factory=lambda: _counts(0))
     seen_ns: Ints = field(default_factory=lambda: _counts(0, 0))
     count: Ints = field(default_factory=lambda: _counts(0))
     came_ns: Ints = field(default_factory=lambda: _counts(0))
-    rival_pose: Floats = field(default_factory=lambda: _none(0, 3))
-    rival: Ints = field(default_factory=lambda: _counts(0, 3))
-    said_ns: Ints = field(default_factory=lambda: _counts(0, len(KINDS)))
+    outlier_pose: Floats = field(default_factory=lambda: _none(0, 3))
+    outlier: Ints = field(default_factory=lambda: _counts(0, 3))
+    flagged_until_ns: Ints = field(default_factory=lambda: _counts(0, len(KINDS)))
     flags: tuple[tuple[str, ...], ...] = ()
 
     def predicted(self, rows: Ints, t_ns: Ints) -> tuple[Floats, Floats]:
@@ -63,11 +63,11 @@ class Fleet:
         return predict(self.mean[rows], self.covariance[rows], self.shared[rows], dt)
 
     def place(self, camera: int) -> slice:
-        """Return where a camera's offset stands in the states."""
+        """Return the slice of a camera's offset in the states."""
         return slice(STATES + OFFSET * camera, STATES + OFFSET * (camera + 1))
 
     def with_camera(self, camera: str, flags: tuple[str, ...]) -> "Fleet":
-        """Return it with room for a camera's offsets, and with what the camera now says."""
+        """Return it with states for a camera's offset, and with the camera's present flags."""
         if camera in self.cameras:
             index = self.cameras.index(camera)
             if self.flags[index] == flags:
@@ -85,7 +85,7 @@ class Fleet:
         )
 
     def with_new(self, sightings: list[Sighting]) -> "Fleet":
-        """Return it with an empty row for each of these cars, not yet seen."""
+        """Return it with an empty row for each of these new cars."""
         n = len(sightings)
         grown: dict[str, Any] = {
             name: np.concatenate((old, np.zeros((n, *old.shape[1:]), dtype=old.dtype)))
@@ -104,23 +104,23 @@ class Fleet:
         keep = np.flatnonzero(self.t_ns >= older_ns)
         if len(keep) == len(self.t_ns):
             return self
-        kept: dict[str, Any] = {name: getattr(self, name)[keep] for name in ARRAYS}
+        selected: dict[str, Any] = {name: getattr(self, name)[keep] for name in ARRAYS}
         return replace(
             self,
             vehicles=tuple(self.vehicles[row] for row in keep),
             tag_ids=tuple(self.tag_ids[row] for row in keep),
-            **kept,
+            **selected,
         )
 
 
 ARRAYS = (
-    *("mean", "covariance", "shared", "lean", "t_ns", "seen_ns", "count", "came_ns"),
-    *("rival_pose", "rival", "said_ns"),
+    *("mean", "covariance", "shared", "common_mode", "t_ns", "seen_ns", "count", "came_ns"),
+    *("outlier_pose", "outlier", "flagged_until_ns"),
 )
 
 
 def first_covariance(pose: Floats) -> Floats:
-    """Return the doubt of a car just seen for the first time, (6, 6), of its pose's (3, 3)."""
+    """Return the covariance of a car seen for the first time, (6, 6), from its pose's (3, 3)."""
     covariance = np.zeros((STATES, STATES))
     covariance[:3, :3] = pose
     slip = float(slip_std(np.array([FIRST_SPEED_MPS]))[0])

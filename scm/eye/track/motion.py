@@ -1,14 +1,14 @@
-"""How a car moves while nobody looks: a few tenths of a second of steady driving.
+"""How a car moves between sightings: a few tenths of a second of steady driving.
 
     x' = v cos(yaw) - u sin(yaw)       v' = white noise      v: along the car, at its rear axle
     y' = v sin(yaw) + u cos(yaw)       u' = -u / SLIP_S + white noise           u: to its left
     yaw' = r                           r' = white noise
 
-The lateral speed is a state that decays, not nought: a rear axle does not slip at 0.26 m/s, but it
-does at 4 m/s, and a filter that forbids it puts the slip into the yaw. The noises grow with speed,
+The lateral speed is a decaying state, not zero: a rear axle does not slip at 0.26 m/s, but it does
+at 4 m/s, and a filter that forbids it puts the slip into the yaw. The noises grow with speed,
 because what cars do in a second grows with it: from a creeping Nigel to a racing F1TENTH.
 
-Each camera's offset from the truth is a state too, (x, y, yaw), for it does not average away: it
+Each camera's offset from the truth is a state too, (x, y, yaw), since it does not average out: it
 changes only as the car moves over the floor, within about `OFFSET_M`.
 """
 
@@ -20,9 +20,9 @@ STATES = 6
 OFFSET = 3
 SLIP_S = 0.15
 ACCEL_S = 0.2
-"""How long an acceleration lasts: turns its deviation into a density of white noise."""
+"""Duration of an acceleration: converts its deviation to a density of white noise."""
 OFFSET_M = 1.0
-LONGEST_S = 5.0
+MAX_PREDICTION_S = 5.0
 
 
 def predict(mean: Floats, covariance: Floats, shared: Floats, dt: Floats) -> tuple[Floats, Floats]:
@@ -31,10 +31,10 @@ def predict(mean: Floats, covariance: Floats, shared: Floats, dt: Floats) -> tup
     Args:
         mean: x, y, yaw, v, u, r, then three of each camera's offset.
         covariance: Of these.
-        shared: What each camera's offset may be where the car is, (n, cameras, 3, 3).
-        dt: Negative spans go back in time and add doubt as well.
+        shared: Covariance of each camera's offset at the car's place, (n, cameras, 3, 3).
+        dt: Negative spans go back in time and increase the covariance as well.
     """
-    dt = np.clip(dt, -LONGEST_S, LONGEST_S)
+    dt = np.clip(dt, -MAX_PREDICTION_S, MAX_PREDICTION_S)
     x, y, yaw, v, u, r = mean[:, :STATES].T
     mid = yaw + 0.5 * r * dt
     c, s = np.cos(mid), np.sin(mid)
@@ -59,7 +59,7 @@ def predict(mean: Floats, covariance: Floats, shared: Floats, dt: Floats) -> tup
     step[:, 2, 5] = dt
     step[:, 4, 4] = keep
     grown = step @ covariance @ step.swapaxes(1, 2)
-    _stir(grown, v, dt, c, s)
+    _add_process_noise(grown, v, dt, c, s)
     changed = (1.0 - held**2)[:, None, None]
     for camera in range(shared.shape[1]):
         place = slice(STATES + OFFSET * camera, STATES + OFFSET * (camera + 1))
@@ -68,13 +68,13 @@ def predict(mean: Floats, covariance: Floats, shared: Floats, dt: Floats) -> tup
 
 
 def slip_std(speed: Floats) -> Floats:
-    """Return how large a lateral speed is usual [m/s]."""
+    """Return the standard deviation of the lateral speed [m/s]."""
     found: Floats = 0.004 + 0.06 * np.abs(speed)
     return found
 
 
-def _stir(covariance: Floats, v: Floats, dt: Floats, c: Floats, s: Floats) -> None:
-    """Add what the driver and the floor may have done meanwhile."""
+def _add_process_noise(covariance: Floats, v: Floats, dt: Floats, c: Floats, s: Floats) -> None:
+    """Add process noise: what the driver and the floor may have done meanwhile."""
     span, fast = np.abs(dt), np.abs(v)
     push = 2.0 * ACCEL_S * (0.2 + 0.6 * fast) ** 2
     turn = 2.0 * ACCEL_S * np.minimum(0.4 + 2.0 * fast, 7.0) ** 2

@@ -1,4 +1,4 @@
-"""Tracks as a collective perception message: what a roadside unit with cameras tells cars."""
+"""Tracks as a collective perception message, as a roadside unit with cameras sends it."""
 
 import math
 from collections.abc import Sequence
@@ -30,8 +30,8 @@ from scm.v2x.etsi.cpm import (
 from scm.v2x.etsi.parts import PROTOCOL_VERSION, ReferencePosition
 from scm.v2x.messages.cpm_tx import CpmTx
 
-SURELY = 1.96
-"""Deviations within which 95 % lie."""
+SIGMAS_95 = 1.96
+"""Number of standard deviations of a 95 % interval."""
 TURN_CLASSES_DEG = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 COORDINATE_LEAST, COORDINATE_MOST, COORDINATE_BEYOND = -131_072, 131_071, 4095
 VELOCITY_LEAST, VELOCITY_MOST = -16_383, 16_382
@@ -41,19 +41,19 @@ BEYOND, TURN_MOST, LENGTH_MOST = 126, 255, 255
 def collective_perception(
     tracks: Sequence[Track], station: str, t_ns: int, body: CarBody = NIGEL
 ) -> CpmTx:
-    """Return what a roadside unit sends of its tracks; stale and tentative ones are left out.
+    """Return a roadside unit's message; stale and tentative tracks are left out.
 
     Args:
-        tracks: As `Tracks.at` gives them; the surest 255 of them.
+        tracks: As `Tracks.at` gives them; at most the newest 255.
         station: Of the roadside unit, as on the bus.
         t_ns: The reference time.
-        body: The measures of the cars.
+        body: The dimensions of the cars.
     """
-    told = [one for one in tracks if not one.stale and "tentative" not in one.flags]
-    told = sorted(told, key=lambda one: one.age_s)[:MAX_OBJECTS]
-    cameras = sorted({name for one in told for name in one.cameras})
+    reported = [one for one in tracks if not one.stale and "tentative" not in one.flags]
+    reported = sorted(reported, key=lambda one: one.age_s)[:MAX_OBJECTS]
+    cameras = sorted({name for one in reported for name in one.cameras})
     sensors = tuple(SensorInformation(sensor_id=index) for index in range(len(cameras)))
-    objects = (_perceived(one, cameras, t_ns, body) for one in told)
+    objects = (_perceived(one, cameras, t_ns, body) for one in reported)
     container = ManagementContainer(
         reference_time=max(0, its_ms(t_ns)),
         reference_position=ReferencePosition(
@@ -94,12 +94,12 @@ def _perceived(track: Track, cameras: list[str], t_ns: int, body: CarBody) -> Pe
         angles=Angles(
             z_angle=Angle(
                 value=round((90.0 - math.degrees(track.yaw_rad)) * 10.0) % 3600,
-                confidence=_within(math.degrees(SURELY * std[2]) * 10.0, 1, BEYOND),
+                confidence=_within(math.degrees(SIGMAS_95 * std[2]) * 10.0, 1, BEYOND),
             )
         ),
         z_angular_velocity=AngularVelocity(
             value=_within(turn, -TURN_MOST, TURN_MOST),
-            confidence=sum(math.degrees(SURELY * std[5]) > most for most in TURN_CLASSES_DEG),
+            confidence=sum(math.degrees(SIGMAS_95 * std[5]) > most for most in TURN_CLASSES_DEG),
         ),
         object_dimension_x=_dimension(body.x_span),
         object_dimension_y=_dimension(body.y_span),
@@ -114,13 +114,13 @@ def _within(value: float, low: int, high: int) -> int:
 
 def _coordinate(value_m: float, std_m: float) -> Coordinate:
     value = _within(value_m * SCALE * 100.0, COORDINATE_LEAST, COORDINATE_MOST)
-    confidence = _within(SURELY * std_m * SCALE * 100.0, 1, COORDINATE_BEYOND)
+    confidence = _within(SIGMAS_95 * std_m * SCALE * 100.0, 1, COORDINATE_BEYOND)
     return Coordinate(value=value, confidence=confidence)
 
 
 def _velocity(value_mps: float, std_mps: float) -> VelocityComponent:
     value = _within(value_mps * SCALE * 100.0, VELOCITY_LEAST, VELOCITY_MOST)
-    confidence = _within(SURELY * std_mps * SCALE * 100.0, 1, BEYOND)
+    confidence = _within(SIGMAS_95 * std_mps * SCALE * 100.0, 1, BEYOND)
     return VelocityComponent(value=value, confidence=confidence)
 
 

@@ -1,4 +1,4 @@
-"""What a camera says of a car, and what is told of a track."""
+"""A camera's pose of a car, and a car's track."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,26 +10,26 @@ from scm.geometry import Pose2
 from scm.scenery.tags import TAG_COUNT
 
 ROOF_TAG_SIZE = "roof_tag_size"
-"""The flag of a sighting whose tag has another size than its car file says, and of its track."""
+"""Flag of a sighting whose tag has another size than its car file says, and of its track."""
 FARTHEST_M = 1e4
 LARGEST_STD = 100.0
 LEAST_STD = 1e-6
-"""Of a sighting's own noise, [m] and [rad]: with less, two that differ cannot both be true."""
+"""Minimum of a sighting's own noise, [m] and [rad]: below it, differing ones contradict."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighting:
-    """Where one camera saw one tag.
+    """One camera's pose of one tag's car.
 
     Attributes:
-        vehicle: The car whose tag it is; `tag-<id>` for a tag that belongs to nobody.
+        vehicle: The car whose tag it is; `tag-<id>` for an unknown tag.
         t_ns: When the frame was exposed.
         pose: Of the rear axle, map frame.
         covariance: Over x [m], y [m], yaw [rad], (3, 3).
-        shared: The part of it that all sightings by this camera have in common, (3, 3); None: all
-            of it, which averages nothing away.
-        lean: The part of it that all cameras have in common, (3, 3); None: nothing.
-        flags: What is wrong with the camera, and `ROOF_TAG_SIZE`; its tracks carry them on.
+        shared: Part of it common to all sightings by this camera, (3, 3); None: all of it, so that
+            nothing averages out.
+        common_mode: Part of it common to all cameras, (3, 3); None: nothing.
+        flags: Of the camera, and `ROOF_TAG_SIZE`; its tracks inherit them.
     """
 
     camera: str
@@ -39,49 +39,48 @@ class Sighting:
     pose: Pose2
     covariance: Floats
     shared: Floats | None = None
-    lean: Floats | None = None
+    common_mode: Floats | None = None
     flags: tuple[str, ...] = ()
 
-    def doubts(self) -> tuple[Floats, Floats, Floats]:
-        """Return what the covariance is made of, (3, 3) each: own noise, `shared` and `lean`.
+    def components(self) -> tuple[Floats, Floats, Floats]:
+        """Return the parts of the covariance, (3, 3) each: own noise, shared and common-mode.
 
-        A camera that does not tell its part is taken to have nearly all of it in common.
+        Without `shared`, nearly all of it is assumed to be common.
         """
-        lean = np.zeros((3, 3)) if self.lean is None else self.lean
-        shared = 0.98 * (self.covariance - lean) if self.shared is None else self.shared
-        return self.covariance - shared - lean, shared, lean
+        common_mode = np.zeros((3, 3)) if self.common_mode is None else self.common_mode
+        shared = 0.98 * (self.covariance - common_mode) if self.shared is None else self.shared
+        return self.covariance - shared - common_mode, shared, common_mode
 
 
 def usable(sightings: Sequence[Sighting]) -> Bools:
-    """Return which sightings are numbers that a filter can take, (n,); any may come over a bus."""
+    """Return which sightings are valid, (n,); those from the bus may hold anything."""
     if not sightings:
         return np.zeros(0, dtype=np.bool_)
     poses = np.array([one.pose for one in sightings], dtype=np.float64)
     with np.errstate(invalid="ignore", over="ignore"):
-        doubts = np.array([one.doubts() for one in sightings])
-        doubts = (doubts + doubts.swapaxes(2, 3)) / 2.0
+        components = np.array([one.components() for one in sightings])
+        components = (components + components.swapaxes(2, 3)) / 2.0
     good = np.isfinite(poses).all(axis=1) & (np.abs(poses) < FARTHEST_M).all(axis=1)
-    good &= (np.abs(doubts) < LARGEST_STD**2).all(axis=(1, 2, 3))
+    good &= (np.abs(components) < LARGEST_STD**2).all(axis=(1, 2, 3))
     good &= np.array([0 <= one.tag_id < TAG_COUNT for one in sightings])
-    least = np.linalg.eigvalsh(np.where(good[:, None, None, None], doubts, 0.0))[..., 0]
+    least = np.linalg.eigvalsh(np.where(good[:, None, None, None], components, 0.0))[..., 0]
     return np.asarray(good & (least > (LEAST_STD**2, -(LEAST_STD**2), -(LEAST_STD**2))).all(axis=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Where a car is now.
+    """Estimated motion of a car.
 
     Attributes:
-        t_ns: The time that it is told for.
+        t_ns: Time of the estimate.
         speed_mps: Of the rear axle along the car; `lateral_speed_mps` to its left.
         covariance: Over x, y, yaw, speed, lateral speed, yaw rate, (6, 6).
-        age_s: Since a camera last saw it.
-        stale: Not seen for longer than a track is to be trusted.
-        flags: `tentative` seen fewer than three times, `unknown` a tag of nobody, `duplicate` two
-            places claim its id, `disagree` two cameras see it a little apart, `wrong_id` it stands
-            where another car is, or its tag has changed, `jumped` it was put elsewhere,
-            `roof_tag_size` its tag has another size than its car file says; and those of its
-            cameras.
+        age_s: Time since a camera last saw it.
+        stale: Not seen for longer than a track can be trusted.
+        flags: `tentative` seen fewer than three times, `unknown` an unknown tag, `duplicate` two
+            places have its id, `disagree` two cameras see it slightly apart, `wrong_id` it is where
+            another car is, or its tag has changed, `jumped` it was put elsewhere, `roof_tag_size`
+            its tag has another size than its car file says; and those of its cameras.
         cameras: Those that saw it last, within `scm.eye.track.tracks.STALE_NS`.
     """
 

@@ -1,13 +1,13 @@
-"""A frame of one camera's sightings taken in.
+"""Processes a frame of one camera's sightings.
 
     seen = pose + offset of this camera + noise
 
-A sighting that does not fit is put aside as a rival. When three rivals agree and no fitting
+A sighting that does not fit is stored as an outlier. When three outliers agree and no fitting
 sighting came between, the car was carried there and the track jumps. When fitting ones do come
-between, two places claim the same id.
+between, two places have the same id.
 
-Two cameras are never quite agreed on where a car is. So that a car does not jump when one comes
-or goes, a camera that joins is first fitted to the track (`_joins`).
+Two cameras never agree exactly on where a car is. To avoid a jump of the car when one appears or
+disappears, a camera that joins is first fitted to the track (`_joins`).
 """
 
 import math
@@ -23,18 +23,18 @@ from scm.eye.track.motion import STATES
 from scm.eye.track.sighting import ROOF_TAG_SIZE, Sighting
 
 GATE = 30.0
-"""Squared distance in deviations, of three numbers; noise alone passes it once in a million."""
-AGREEING = 3
-RIVAL_NS = NS_PER_S // 2
+"""Squared Mahalanobis distance of three values, exceeded by noise once in a million."""
+MIN_AGREEING = 3
+OUTLIER_NS = NS_PER_S // 2
 NEAR_M, FASTEST_MPS = 0.03, 4.5
 APART_M = 0.1
-"""Rivals nearer than this are another camera's opinion, not another car."""
-SAID_NS = 2 * NS_PER_S
+"""Outliers nearer than this are another camera's estimate, not another car."""
+FLAG_NS = 2 * NS_PER_S
 STILL_M = 0.001
-"""A tag that moves less between frames shows its corners off by nearly the same again."""
+"""A tag that moves less between frames has nearly the same corner errors again."""
 
 
-def taken_in(fleet: Fleet, frame: Sequence[Sighting]) -> Fleet:
+def updated(fleet: Fleet, frame: Sequence[Sighting]) -> Fleet:
     """Return the tracks after one frame of one camera."""
     of_camera = tuple(flag for flag in frame[0].flags if flag != ROOF_TAG_SIZE)
     fleet = fleet.with_camera(frame[0].camera, of_camera)
@@ -54,21 +54,21 @@ def taken_in(fleet: Fleet, frame: Sequence[Sighting]) -> Fleet:
         _measure(fleet, np.array([rows[one.vehicle] for one in chosen]), chosen)
     for one in frame:
         if one.tag_id != fleet.tag_ids[rows[one.vehicle]]:
-            _say(fleet, rows[one.vehicle], "wrong_id", one.t_ns)
+            _flag(fleet, rows[one.vehicle], "wrong_id", one.t_ns)
         if ROOF_TAG_SIZE in one.flags:
-            _say(fleet, rows[one.vehicle], ROOF_TAG_SIZE, one.t_ns)
+            _flag(fleet, rows[one.vehicle], ROOF_TAG_SIZE, one.t_ns)
     return fleet
 
 
-def _say(fleet: Fleet, row: int, kind: str, t_ns: int) -> None:
-    fleet.said_ns[row, KINDS.index(kind)] = t_ns + SAID_NS
+def _flag(fleet: Fleet, row: int, kind: str, t_ns: int) -> None:
+    fleet.flagged_until_ns[row, KINDS.index(kind)] = t_ns + FLAG_NS
 
 
 def _begin(fleet: Fleet, row: int, sighting: Sighting) -> None:
-    """Start a track, or start it anew elsewhere."""
+    """Start a track, or restart it elsewhere."""
     camera = fleet.cameras.index(sighting.camera)
     place = fleet.place(camera)
-    white, shared, lean = sighting.doubts()
+    white, shared, common_mode = sighting.components()
     fleet.mean[row] = 0.0
     fleet.mean[row, :3] = sighting.pose
     fleet.covariance[row] = 0.0
@@ -79,12 +79,12 @@ def _begin(fleet: Fleet, row: int, sighting: Sighting) -> None:
     fleet.shared[row, camera] = shared
     fleet.seen_ns[row] = 0
     fleet.seen_ns[row, camera] = fleet.t_ns[row] = fleet.came_ns[row] = sighting.t_ns
-    fleet.lean[row] = lean
-    fleet.count[row], fleet.rival[row] = 1, 0
+    fleet.common_mode[row] = common_mode
+    fleet.count[row], fleet.outlier[row] = 1, 0
 
 
 def _nearest(fleet: Fleet, row: int, ones: list[Sighting]) -> Sighting:
-    """Return the sighting next to the track; two in one frame that are apart are two tags."""
+    """Return the sighting nearest to the track; distant ones in one frame are two tags."""
     if len(ones) == 1:
         return ones[0]
     dt = (ones[0].t_ns - int(fleet.t_ns[row])) * 1e-9
@@ -92,7 +92,7 @@ def _nearest(fleet: Fleet, row: int, ones: list[Sighting]) -> Sighting:
     x, y = x + v * dt * math.cos(yaw), y + v * dt * math.sin(yaw)
     ones = sorted(ones, key=lambda one: math.dist((x, y), one.pose[:2]))
     if math.dist(ones[0].pose[:2], ones[-1].pose[:2]) > APART_M:
-        _say(fleet, row, "duplicate", ones[0].t_ns)
+        _flag(fleet, row, "duplicate", ones[0].t_ns)
     return ones[0]
 
 
@@ -101,8 +101,8 @@ def _measure(fleet: Fleet, rows: Ints, frame: list[Sighting]) -> None:
     camera = fleet.cameras.index(frame[0].camera)
     times = np.array([one.t_ns for one in frame])
     mean, covariance = fleet.predicted(rows, times)
-    white, shared, lean = np.array([one.doubts() for one in frame]).swapaxes(0, 1)
-    _doubt_camera(fleet, rows, camera, covariance, shared)
+    white, shared, common_mode = np.array([one.components() for one in frame]).swapaxes(0, 1)
+    _grow_camera_covariance(fleet, rows, camera, covariance, shared)
     place = fleet.place(camera)
     seen = np.array([one.pose for one in frame])
     moved = np.hypot(*(mean[:, :2] - fleet.mean[rows, :2]).T) / STILL_M
@@ -111,16 +111,23 @@ def _measure(fleet: Fleet, rows: Ints, frame: list[Sighting]) -> None:
     off = seen - mean[:, :3] - mean[:, place]
     off[:, 2] = np.remainder(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi
     spread = covariance[:, :, :3] + covariance[:, :, place]
-    doubt = spread[:, :3] + spread[:, place] + noise
-    weighed = np.linalg.solve(doubt, np.concatenate((off[..., None], spread.swapaxes(1, 2)), -1))
+    innovation_covariance = spread[:, :3] + spread[:, place] + noise
+    weighed = np.linalg.solve(
+        innovation_covariance, np.concatenate((off[..., None], spread.swapaxes(1, 2)), -1)
+    )
     fits = (off * weighed[..., 0]).sum(1) < GATE
     gain = weighed[..., 1:].swapaxes(1, 2)
     joins = _joins(fleet, rows, camera, times)
     gain[joins] = 0.0
     gain[joins, place] = np.eye(3)
     mean = mean + (gain @ off[..., None])[..., 0]
-    taken = gain @ spread.swapaxes(1, 2)
-    covariance = covariance - taken - taken.swapaxes(1, 2) + gain @ doubt @ gain.swapaxes(1, 2)
+    change = gain @ spread.swapaxes(1, 2)
+    covariance = (
+        covariance
+        - change
+        - change.swapaxes(1, 2)
+        + gain @ innovation_covariance @ gain.swapaxes(1, 2)
+    )
     good = rows[fits]
     fleet.mean[good] = mean[fits]
     fleet.covariance[good] = ((covariance + covariance.swapaxes(1, 2)) / 2.0)[fits]
@@ -128,28 +135,28 @@ def _measure(fleet: Fleet, rows: Ints, frame: list[Sighting]) -> None:
     fleet.t_ns[good] = times[fits]
     fleet.seen_ns[good, camera] = times[fits]
     fleet.count[good] += 1
-    fleet.rival[good, 2] = 1
-    fleet.lean[good] = lean[fits]
+    fleet.outlier[good, 2] = 1
+    fleet.common_mode[good] = common_mode[fits]
     _put_aside(fleet, rows, frame, fits)
 
 
 def _joins(fleet: Fleet, rows: Ints, camera: int, times: Ints) -> Bools:
-    """Return for which tracks this camera comes to others that see the car already.
+    """Return for which tracks this camera joins others that see the car already.
 
-    Its first sighting then tells its own offset and leaves the car where it is: the average of two
-    cameras would be a little better, and a jump. It counts in full once the car has moved on.
+    Its first sighting then sets its own offset and leaves the car where it is: the average of two
+    cameras would be slightly better, but a jump. It counts fully once the car has moved on.
     """
     ago = times[:, None] - fleet.seen_ns[rows]
-    sees = (fleet.seen_ns[rows] > 0) & (ago < RIVAL_NS)
+    sees = (fleet.seen_ns[rows] > 0) & (ago < OUTLIER_NS)
     mine = sees[:, camera].copy()
     sees[:, camera] = False
     return np.asarray(sees.any(axis=1) & ~mine, dtype=np.bool_)
 
 
-def _doubt_camera(
+def _grow_camera_covariance(
     fleet: Fleet, rows: Ints, camera: int, covariance: Floats, shared: Floats
 ) -> None:
-    """Give a camera's offsets their doubt: the first time, and when the camera's own doubt grew."""
+    """Set the covariance of a camera's offsets: the first time, and when the camera's grew."""
     place = fleet.place(camera)
     before = fleet.shared[rows, camera] * (fleet.seen_ns[rows, camera] > 0)[:, None, None]
     more = np.diagonal(shared - before, axis1=1, axis2=2)
@@ -161,23 +168,23 @@ def _doubt_camera(
 
 
 def _put_aside(fleet: Fleet, rows: Ints, frame: list[Sighting], fits: Bools) -> None:
-    """Remember the sightings that do not fit; if enough of them agree, jump or say so."""
+    """Store the sightings that do not fit; if enough agree, restart or flag the track."""
     for index in np.flatnonzero(~fits):
         row, one = int(rows[index]), frame[index]
-        last_ns, count, _ = (int(value) for value in fleet.rival[row])
+        last_ns, count, _ = (int(value) for value in fleet.outlier[row])
         span = one.t_ns - last_ns
         reach = NEAR_M + FASTEST_MPS * abs(span) * 1e-9
-        near = math.dist(one.pose[:2], fleet.rival_pose[row, :2]) < reach
-        if count and span < RIVAL_NS and near:
-            fleet.rival[row, :2] = one.t_ns, count + 1
+        near = math.dist(one.pose[:2], fleet.outlier_pose[row, :2]) < reach
+        if count and span < OUTLIER_NS and near:
+            fleet.outlier[row, :2] = one.t_ns, count + 1
         else:
-            fleet.rival[row] = one.t_ns, 1, 0
-        fleet.rival_pose[row] = one.pose
-        if fleet.rival[row, 1] < AGREEING:
+            fleet.outlier[row] = one.t_ns, 1, 0
+        fleet.outlier_pose[row] = one.pose
+        if fleet.outlier[row, 1] < MIN_AGREEING:
             continue
-        if fleet.rival[row, 2]:
+        if fleet.outlier[row, 2]:
             away = math.dist(one.pose[:2], fleet.mean[row, :2])
-            _say(fleet, row, "duplicate" if away > APART_M else "disagree", one.t_ns)
+            _flag(fleet, row, "duplicate" if away > APART_M else "disagree", one.t_ns)
         else:
             _begin(fleet, row, one)
-            _say(fleet, row, "jumped", one.t_ns)
+            _flag(fleet, row, "jumped", one.t_ns)

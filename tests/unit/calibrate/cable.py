@@ -42,12 +42,12 @@ class Emulated:
     def numbers(self):
         """The line through what the firmware, which rounds, makes of all commands."""
         sketch, limit = SKETCHES[self.sketch], load_car("nigel").value("steering.limit_rad")
-        told = np.linspace(-1.0, 1.0, 20001)
-        angles = [wheel_angle(sketch.steer(sketch.at_setup, u), sketch.at_setup) for u in told]
-        per, straight = np.polyfit(told, np.array(angles) / limit, 1)
-        told = np.linspace(self.deadband + 0.03, 1.0, 20001)
-        duty = [throttle_of(sketch.drive(sketch.at_setup, u), 0.0) for u in told]
-        of, more = np.polyfit(told, duty, 1)
+        commanded = np.linspace(-1.0, 1.0, 20001)
+        angles = [wheel_angle(sketch.steer(sketch.at_setup, u), sketch.at_setup) for u in commanded]
+        per, straight = np.polyfit(commanded, np.array(angles) / limit, 1)
+        commanded = np.linspace(self.deadband + 0.03, 1.0, 20001)
+        duty = [throttle_of(sketch.drive(sketch.at_setup, u), 0.0) for u in commanded]
+        of, more = np.polyfit(commanded, duty, 1)
         return {
             "steering.trim_rad": self.trim + self.gain * limit * straight,
             "steering.gain": self.gain * per,
@@ -100,13 +100,13 @@ class Line:
         self.host, self.board = Host(sketch.baud), Firmware(sketch, T0)
         self.wheels = moved.wheels()
         self.host.open(T0)
-        self.wish, self.told, self._now_ns, self._back = REST, None, T0, b""
+        self.wish, self.summary, self._now_ns, self._back = REST, None, T0, b""
         self._written = []
 
     def trouble(self, now_ns):
         return self.host.trouble
 
-    def steer(self, wish, now_ns):
+    def command(self, wish, now_ns):
         self.wish = wish
 
     def written(self):
@@ -119,8 +119,8 @@ class Line:
     def run_to(self, now_ns):
         while self._now_ns < now_ns:
             self._now_ns += LINE_NS
-            frames = self.host.hear(self._back, self._now_ns)
-            frames += self.host.say(self.wish, self._now_ns)
+            frames = self.host.receive(self._back, self._now_ns)
+            frames += self.host.on_progress(self.wish, self._now_ns)
             if said := self.host.commanded:
                 self._written.append(Written(self._now_ns, said.throttle, said.steering))
             self._back = self.board.step(self._now_ns, b"".join(frames))

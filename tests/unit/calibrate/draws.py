@@ -32,10 +32,10 @@ def driven(seed, board, plan, eye):
 
 
 def main(*settings):
-    told = dict(each.split("=") for each in settings)
-    draws, first = int(told.pop("draws", 20)), int(told.pop("first", 1))
-    board, plan = told.pop("board", ""), PLANS[told.pop("plan", "full")]
-    eye = {key: float(value) for key, value in told.items()}
+    commanded = dict(each.split("=") for each in settings)
+    draws, first = int(commanded.pop("draws", 20)), int(commanded.pop("first", 1))
+    board, plan = commanded.pop("board", ""), PLANS[commanded.pop("plan", "full")]
+    eye = {key: float(value) for key, value in commanded.items()}
     errors, halves, held = {}, {}, {}
     for seed in range(first, first + draws):
         truths, recorded = driven(seed, board, plan, eye)

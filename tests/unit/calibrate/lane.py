@@ -22,7 +22,7 @@ from vehicle_agent.body import Wiring
 from vehicle_agent.calibrate.car_file import write_car
 from vehicle_agent.calibrate.fit import fit
 from vehicle_agent.emulate.part import place_of
-from vehicle_agent.session import Stay
+from vehicle_agent.session import CitySession
 
 LASTS_S = 70
 MOVES_MPS = 0.02
@@ -47,7 +47,9 @@ def distances(known):
     line.wheels.place(pose, T0)
     body = NigelBody(load_car(known), line)
     body.place(pose, T0)
-    stay = Stay("n7", "nigel", body, city_map, 1, T0, real_guard(body.limits, city_map, Wiring()))
+    stay = CitySession(
+        "n7", "nigel", body, city_map, 1, T0, real_guard(body.limits, city_map, Wiring())
+    )
     out = []
     for now_ns in range(T0 + STEP_NS, T0 + LASTS_S * NS_PER_S, STEP_NS):
         line.run_to(now_ns)

@@ -91,12 +91,12 @@ class HiddenBody:
     def advance(self, now_ns):
         while self._now_ns is not None and self._now_ns < now_ns:
             until_ns = now_ns
-            for actuator, delay_s, told in self._obeyed:
+            for actuator, delay_s, commanded in self._obeyed:
                 late_ns = round(delay_s * NS_PER_S)
-                while told and told[0][0] + late_ns <= self._now_ns:
-                    actuator[0] = told.popleft()[1]
-                if told:
-                    until_ns = min(until_ns, told[0][0] + late_ns)
+                while commanded and commanded[0][0] + late_ns <= self._now_ns:
+                    actuator[0] = commanded.popleft()[1]
+                if commanded:
+                    until_ns = min(until_ns, commanded[0][0] + late_ns)
             steps = -(-(until_ns - self._now_ns) // EXACT_NS)
             self.fleet.advance(steps * seconds(EXACT_NS))
             self._now_ns += steps * EXACT_NS
@@ -108,7 +108,7 @@ class HiddenBody:
     def was_lifted(self):
         return False
 
-    def unfit(self, now_ns):
+    def inhibit_reason(self, now_ns):
         return ""
 
     def obeyed(self):
@@ -118,8 +118,8 @@ class HiddenBody:
         self.is_closed = True
 
     def command(self, throttle, steering):
-        for (_, _, told), value in zip(self._obeyed, (throttle, steering), strict=True):
-            told.append((self._now_ns, value))
+        for (_, _, commanded), value in zip(self._obeyed, (throttle, steering), strict=True):
+            commanded.append((self._now_ns, value))
 
     @property
     def pose(self):
@@ -155,8 +155,8 @@ class Eye:
         dx, dy, turn = map(float, self._wrong())
         yaw = wrap_angle(pose.yaw + turn)
         variances = (h.position_std**2, h.position_std**2, h.yaw_std**2)
-        told = track(now_ns, pose.x + dx, pose.y + dy, yaw, speed, variances)
-        return [Incoming(told, now_ns)]
+        commanded = track(now_ns, pose.x + dx, pose.y + dy, yaw, speed, variances)
+        return [Incoming(commanded, now_ns)]
 
 
 def drive(part, body, eye, limits, blind=()):

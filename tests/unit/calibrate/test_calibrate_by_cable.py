@@ -45,12 +45,12 @@ def test_a_dead_band_that_its_file_has_already_is_not_undone_while_it_is_measure
     path.write_text(plain.replace("\n[drive]", f"\n[drive]\n{known}\n#"), encoding="utf-8")
     assert load_car(path).value("drive.deadband") == DEADBAND
     street = Street(path)
-    told = []
+    commanded = []
     for _ in range(300):
         street.step(1)
-        told.append((street.line.wish.throttle, street.line.wish.steering))
-    assert 0.28 < max(abs(throttle) for throttle, _ in told) <= 0.3
-    assert {row[1:] for row in street.part.recorded.command} <= {(0.0, 0.0), *told}
+        commanded.append((street.line.wish.throttle, street.line.wish.steering))
+    assert 0.28 < max(abs(throttle) for throttle, _ in commanded) <= 0.3
+    assert {row[1:] for row in street.part.recorded.command} <= {(0.0, 0.0), *commanded}
     assert max(row[1] for row in street.part.recorded.command) > 0.28
 
 

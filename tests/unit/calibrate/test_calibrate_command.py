@@ -79,8 +79,8 @@ def test_an_agent_asks_for_the_tag_of_its_own_file_unless_it_is_told_another(tmp
     (tmp_path / "other.toml").write_text(nigel)
     own, other = (("--calibration", str(tmp_path / name)) for name in ("car.toml", "other.toml"))
     of = ("join", "--name", "n7", "--connect", "tcp/127.0.0.1:1")
-    for told, tag_id in (((), None), (own, 7), ((*own, "--tag", "3"), 3), (other, None)):
-        assert join._tag_of(build_parser().parse_args([*of, *told])) == tag_id
+    for commanded, tag_id in (((), None), (own, 7), ((*own, "--tag", "3"), 3), (other, None)):
+        assert join._tag_of(build_parser().parse_args([*of, *commanded])) == tag_id
 
 
 @pytest.mark.parametrize("cause", [RuntimeError, KeyboardInterrupt])
@@ -113,11 +113,11 @@ def test_a_drive_that_was_cut_off_is_kept_and_its_fit_refused(
 
 
 def test_each_reason_to_wait_is_said_once_and_with_advice(capsys):
-    say = calibrate._Console()
+    on_progress = calibrate._Console()
     driven = [f"{percent} % driven" for percent in (3, 8, 12)]
     why = ["the Arduino starts", "slew, stop", "outside the floor"]
     for doing in ["waits (pose)", "waits (pose)", *driven, *(f"waits ({each})" for each in why)]:
-        say(doing)
+        on_progress(doing)
     said = capsys.readouterr().out.splitlines()
     assert said == [
         "waits (pose): the Eye tells no pose of that name; a car that has not joined is called "

@@ -11,10 +11,9 @@ from scm.recording.read import read_recordings
 from scm.vehicles.car import load_car
 from tests.unit.calibrate.rig import Hidden, calibrated
 from vehicle_agent.calibrate.car_file import write_car
-from vehicle_agent.calibrate.fit import NUMBERS, _Model, _student, _window_edges, fit
+from vehicle_agent.calibrate.fit import NUMBERS, _Model, _student, _window_edges, fit, unsure
 from vehicle_agent.calibrate.pattern import SHORT
-from vehicle_agent.calibrate.picture import settled
-from vehicle_agent.calibrate.unsure import unsure
+from vehicle_agent.calibrate.picture import steady_legs
 
 NEAR = {
     "steering.trim_rad": 0.002,
@@ -145,13 +144,13 @@ def test_few_windows_widen_an_interval_as_students_t_does():
 
 
 def test_each_leg_driven_again_lies_where_it_was_seen(found):
-    by_file, calibrated_m = found.again.missed_m
+    by_file, calibrated_m = found.resimulated.missed_m
     assert calibrated_m == pytest.approx(np.sqrt(2.0) * found.position_rms_m, rel=0.05)
     assert by_file > 5.0 * calibrated_m
 
 
 def test_the_ends_of_legs_show_the_dead_band_and_the_trim(found):
-    legs = settled(found.again)
+    legs = steady_legs(found.resimulated)
     assert len(legs.throttle) == 24  # of 40: in the others the steering swings
     speed, bend = legs.speed[0], legs.bend[0]
     assert (np.sign(speed) == np.sign(legs.throttle)).all()

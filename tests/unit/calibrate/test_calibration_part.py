@@ -15,12 +15,12 @@ class Wheels:
     wants_eye = False
 
     def __init__(self):
-        self.told = []
+        self.summary = []
 
     def was_lifted(self):
         return False
 
-    def unfit(self, now_ns):
+    def inhibit_reason(self, now_ns):
         return ""
 
     def obeyed(self):
@@ -30,7 +30,7 @@ class Wheels:
         pass
 
     def command(self, throttle, steering):
-        self.told.append((throttle, steering))
+        self.summary.append((throttle, steering))
 
 
 def stepped(part, count, first=0, more=()):
@@ -49,7 +49,7 @@ def test_without_a_pose_it_stands_and_records_nothing():
     wheels = Wheels()
     part = CalibrationPart("n7", wheels, LIMITS)
     sent = [each for i in range(200) for each in part.step(T0 + i * STEP_NS, [])]
-    assert set(wheels.told) == {(0.0, 0.0)}
+    assert set(wheels.summary) == {(0.0, 0.0)}
     assert part.recorded.command == []
     assert not part.done.is_set()
     assert sent[-1].detail == "calibrates: waits (pose); held up: pose 1"
@@ -59,26 +59,26 @@ def test_the_city_wide_stop_holds_it_and_it_goes_on_afterwards():
     wheels = Wheels()
     part = CalibrationPart("n7", wheels, LIMITS)
     stepped(part, 60)
-    assert wheels.told[-1][0] != 0.0
+    assert wheels.summary[-1][0] != 0.0
     sent = stepped(part, 200, 60, [CityStop(t_ns=0, engaged=True)])
-    assert {throttle for throttle, _ in wheels.told[60:]} == {0.0}
+    assert {throttle for throttle, _ in wheels.summary[60:]} == {0.0}
     assert sent[-1].detail.startswith("calibrates: waits (stop)")
     before = part._pattern.progress
     stepped(part, 30, 260, [CityStop(t_ns=0, engaged=False)])
-    assert wheels.told[-1][0] != 0.0
+    assert wheels.summary[-1][0] != 0.0
     assert part._pattern.progress == before
 
 
 def test_beyond_the_floor_it_waits_until_it_is_put_inside():
     wheels, said = Wheels(), []
-    part = CalibrationPart("n7", wheels, LIMITS, say=said.append)
+    part = CalibrationPart("n7", wheels, LIMITS, on_progress=said.append)
     for i in range(100):
         now_ns = T0 + i * STEP_NS
         part.step(now_ns, [Incoming(track(now_ns, 1.9, 0.7), now_ns)])
-    assert {throttle for throttle, _ in wheels.told} == {0.0}
+    assert {throttle for throttle, _ in wheels.summary} == {0.0}
     assert said[-1] == "waits (outside the floor)"
     stepped(part, 60, 100)
-    assert wheels.told[-1][0] != 0.0
+    assert wheels.summary[-1][0] != 0.0
     assert said[-1] == "3 % driven"
 
 
@@ -86,7 +86,7 @@ def test_what_is_recorded_is_what_passed_the_guard():
     wheels = Wheels()
     part = CalibrationPart("n7", wheels, LIMITS)
     stepped(part, 100)
-    assert [row[1:] for row in part.recorded.command] == wheels.told
+    assert [row[1:] for row in part.recorded.command] == wheels.summary
     assert [row[0] for row in part.recorded.command[:3]] == [0.0, 0.02, 0.04]
 
 
@@ -130,7 +130,7 @@ def test_it_ends_at_rest():
     part = CalibrationPart("n7", wheels, LIMITS)
     stepped(part, 100)
     part.finish(T0 + NS_PER_S)
-    assert wheels.told[-1] == (0.0, 0.0)
+    assert wheels.summary[-1] == (0.0, 0.0)
 
 
 def test_an_eye_that_is_blind_for_a_while_holds_it_up_for_as_long():

@@ -16,7 +16,7 @@ from vehicle_agent.calibrate.pattern import (
 )
 from vehicle_agent.guard import GuardLimits, rectangle
 
-WIDE = GuardLimits(rectangle(-100.0, -100.0, 100.0, 100.0), throttle=0.8)
+Z_90 = GuardLimits(rectangle(-100.0, -100.0, 100.0, 100.0), throttle=0.8)
 
 
 def driven(limits, pose, plan=FULL):
@@ -42,7 +42,7 @@ def meant(wishes):
 
 
 def test_every_throttle_is_driven_both_ways_with_every_steering_and_small_ones_first():
-    wishes, _ = driven(WIDE, Pose2(0.0, 0.0, 0.0))
+    wishes, _ = driven(Z_90, Pose2(0.0, 0.0, 0.0))
     moving = meant(wish for wish in wishes if wish[0])
     levels = [abs(throttle) for throttle, _ in moving]
     assert levels == sorted(levels)
@@ -59,35 +59,35 @@ def test_every_throttle_is_driven_both_ways_with_every_steering_and_small_ones_f
 
 
 def test_the_short_plan_drives_as_many_ways_in_half_a_minute():
-    wishes, _ = driven(WIDE, Pose2(0.0, 0.0, 0.0), SHORT)
+    wishes, _ = driven(Z_90, Pose2(0.0, 0.0, 0.0), SHORT)
     assert 20.0 < len(wishes) * 0.02 < 30.0
     assert len({(a > 0.0, b) for a, b in meant(wish for wish in wishes if wish[0])}) == 10
 
 
 def test_the_wheels_turn_while_it_moves():
-    wishes, _ = driven(WIDE, Pose2(0.0, 0.0, 0.0))
+    wishes, _ = driven(Z_90, Pose2(0.0, 0.0, 0.0))
     moving = meant(wish for wish in wishes if wish[0])
     turned = sum(a[0] == b[0] and a[1] == -b[1] != 0.0 for a, b in pairwise(moving))
     assert turned >= 2 * 2 * len(FULL.shares)
 
 
 def test_what_a_firmware_cuts_off_is_half_a_step_in_the_mean():
-    wishes = [wish for wish in driven(WIDE, Pose2(0.0, 0.0, 0.0))[0] if wish[0]]
+    wishes = [wish for wish in driven(Z_90, Pose2(0.0, 0.0, 0.0))[0] if wish[0]]
     for at, unspread, spread, steps in (
         (0, 0.8, THROTTLE_SPREAD, 255), (1, 1.0, STEERING_SPREAD, 30),
     ):  # fmt: skip
-        told = [wish[at] for wish in wishes]
-        assert max(map(abs, told)) <= unspread
-        cut = [steps * value % 1.0 for value in told]
+        commanded = [wish[at] for wish in wishes]
+        assert max(map(abs, commanded)) <= unspread
+        cut = [steps * value % 1.0 for value in commanded]
         assert sum(cut) / len(cut) == pytest.approx(0.5, abs=0.03)
         quarters = [sum(quarter == int(4.0 * each) for each in cut) for quarter in range(4)]
         assert min(quarters) > 0.2 * len(cut)
-        near = [abs(a - b[at]) for a, b in zip(told, meant(wishes), strict=True)]
+        near = [abs(a - b[at]) for a, b in zip(commanded, meant(wishes), strict=True)]
         assert max(near) <= spread + 1e-9
 
 
 def test_progress_never_falls_and_ends_at_one():
-    _, progress = driven(WIDE, Pose2(0.0, 0.0, 0.0))
+    _, progress = driven(Z_90, Pose2(0.0, 0.0, 0.0))
     assert progress == sorted(progress)
     assert (progress[0], progress[-1]) == (0.0, 1.0)
 

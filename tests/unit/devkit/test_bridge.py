@@ -27,7 +27,7 @@ from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.world.part import WorldPart
-from vehicle_agent.devkit.bridge import PICTURE_NS, DevkitPart, Wanted
+from vehicle_agent.devkit.bridge import FIRST_PICTURE_TIMEOUT_NS, DevkitPart, Wanted
 from vehicle_agent.devkit.heads import Heads
 
 S = 1_000_000_000
@@ -50,7 +50,7 @@ class Stage:
             parts += [TrafficPart(CITY), MonitorPart(CITY)]
         self.lockstep = Lockstep(parts)
         self.part = DevkitPart("devkit-4567", wanted, "session")
-        self.part.meet(self.script)
+        self.part.connect(self.script)
         self.snapshots = self.lockstep.subscribe(Subscription(WorldSnapshot))
         self.spats = self.lockstep.subscribe(Subscription(Spat))
         self.statuses = self.lockstep.subscribe(
@@ -66,7 +66,7 @@ class Stage:
         """Reply at a rate, as a script does; return the first car."""
         said = {key.replace("_", " "): str(value) for key, value in keys.items()}
         for _ in range(round(span_s / each_s)):
-            self.part.said(said, self.lockstep.now_ns)
+            self.part.on_reply(said, self.lockstep.now_ns)
             self.lockstep.run_for(each_s)
         return self.car()
 
@@ -225,18 +225,20 @@ def test_the_first_packet_has_a_picture_of_each_camera(stage):
 def test_without_any_picture_packets_are_black_in_the_end_and_the_bridge_says_so(stage, caplog):
     stage.wait(0.5)
     assert stage.part.packet() is None
-    stage.part.step(stage.lockstep.now_ns + PICTURE_NS, [])
+    stage.part.step(stage.lockstep.now_ns + FIRST_PICTURE_TIMEOUT_NS, [])
     assert "V1 Front Camera Image" in stage.part.packet().text(1)
     assert "n1 front: no picture for 10 s" in caplog.text
     assert "rear" not in caplog.text
 
 
 def test_nothing_costly_is_heard_while_no_script_is_there(stage):
-    kinds = {one.kind for one in stage.part.subscriptions}
+    kinds = {subscriptions.kind for subscriptions in stage.part.subscriptions}
     assert {LidarScan, CameraFrame} <= kinds
     stage.script.is_open = False
     stage.wait(0.1)
-    assert not {LidarScan, CameraFrame} & {one.kind for one in stage.part.subscriptions}
+    assert not {LidarScan, CameraFrame} & {
+        subscriptions.kind for subscriptions in stage.part.subscriptions
+    }
 
 
 @pytest.mark.parametrize("stage", [(Wanted(("n1",), cameras=("front",)),)], indirect=True)
@@ -308,7 +310,7 @@ def test_a_car_of_the_citys_own_is_not_reset(stage, caplog):
     stage.say(0.3, V1_Throttle=0.6, V1_Steering=0, V1_Reset=1)
     after = stage.car()
     assert math.hypot(after.x_m - before.x_m, after.y_m - before.y_m) < 0.2
-    assert caplog.text.count("was not brought by this bridge") == 1
+    assert caplog.text.count("was not spawned by this bridge") == 1
 
 
 @pytest.mark.parametrize("stage", [(Wanted(("n1",), spawns=()),)], indirect=True)
@@ -411,11 +413,11 @@ def test_a_script_can_place_a_car_itself(stage):
 
 def test_a_placed_car_is_told_to_its_script_though_the_city_lets_it_hear_nothing():
     part = DevkitPart("p1", Wanted(("p1",), cosim=True), "session")
-    part.meet(HeldScript())
-    welcome = JoinReply(vehicle="p1", x_m=1.0, y_m=2.0, yaw_rad=0.0, tag_id=1, epoch=1, t_ns=0)
+    part.connect(HeldScript())
+    add_car = JoinReply(vehicle="p1", x_m=1.0, y_m=2.0, yaw_rad=0.0, tag_id=1, epoch=1, t_ns=0)
     (call,) = [out for out in part.step(0, []) if isinstance(out, Call)]
     known = Incoming(WorldDefinition(t_ns=0, seed=0, map=CITY), 1)
-    part.step(1, [known, Incoming(welcome, 1, call)])
+    part.step(1, [known, Incoming(add_car, 1, call)])
     data = json.loads(part.packet().text(None)[2:])[1]
     assert data["V1 Position"].startswith("1.0000 2.0000")
 

@@ -20,33 +20,33 @@ REPLY = '42["Bridge",{"V1 Throttle":"0.5"}]'
 
 def opened(welcome):
     dialogue = Dialogue(0)
-    dialogue.take(welcome, 0)
+    dialogue.feed(welcome, 0)
     dialogue.due(0)
-    dialogue.take("40", 0)
+    dialogue.feed("40", 0)
     return dialogue
 
 
 def test_the_old_server_connects_us_unasked():
     dialogue = Dialogue(0)
-    assert dialogue.take(OLD, 0) == []
+    assert dialogue.feed(OLD, 0) == []
     assert dialogue.due(100 * NS_PER_MS) == []
-    dialogue.take("40", 100 * NS_PER_MS)
+    dialogue.feed("40", 100 * NS_PER_MS)
     assert (dialogue.is_open, dialogue.generation) == (True, 3)
     assert dialogue.due(300 * NS_PER_MS) == []
 
 
 def test_the_new_server_is_asked_at_once():
     dialogue = Dialogue(0)
-    dialogue.take(NEW, 0)
+    dialogue.feed(NEW, 0)
     assert dialogue.due(0) == ["40"]
     assert not dialogue.is_open
-    dialogue.take('40{"sid":"b"}', 1)
+    dialogue.feed('40{"sid":"b"}', 1)
     assert (dialogue.is_open, dialogue.generation) == (True, 4)
 
 
 def test_a_new_server_that_does_not_say_so_is_asked_a_moment_later():
     dialogue = Dialogue(0)
-    dialogue.take(OLD, 0)
+    dialogue.feed(OLD, 0)
     assert dialogue.due_ns == 200 * NS_PER_MS
     assert dialogue.due(200 * NS_PER_MS) == ["40"]
     assert dialogue.due(201 * NS_PER_MS) == []
@@ -57,7 +57,7 @@ def test_the_old_server_is_pinged_each_twenty_seconds():
     assert dialogue.due_ns == 20 * NS_PER_S
     assert dialogue.due(20 * NS_PER_S - 1) == []
     assert dialogue.due(20 * NS_PER_S) == ["2"]
-    dialogue.take("3", 21 * NS_PER_S)
+    dialogue.feed("3", 21 * NS_PER_S)
     assert dialogue.due_ns == 41 * NS_PER_S
     assert not dialogue.ended
 
@@ -71,7 +71,7 @@ def test_an_old_server_without_a_pong_is_given_up():
 
 def test_the_new_servers_ping_is_answered_and_missed():
     dialogue = opened(NEW)
-    dialogue.take("2", 25 * NS_PER_S)
+    dialogue.feed("2", 25 * NS_PER_S)
     assert dialogue.due(25 * NS_PER_S) == ["3"]
     assert dialogue.due(70 * NS_PER_S - 1) == []
     assert not dialogue.ended
@@ -81,11 +81,11 @@ def test_the_new_servers_ping_is_answered_and_missed():
 
 @pytest.mark.parametrize("text", [REPLY, '4213["Bridge",{"V1 Throttle":"0.5"}]'])
 def test_an_event_is_read_whether_it_wants_to_be_confirmed_or_not(text):
-    assert opened(OLD).take(text, 0) == [{"V1 Throttle": "0.5"}]
+    assert opened(OLD).feed(text, 0) == [{"V1 Throttle": "0.5"}]
 
 
 def test_an_event_with_a_nan_as_python_writes_it_is_an_event():
-    (told,) = opened(OLD).take('42["Bridge",{"V1 Throttle":NaN}]', 0)
+    (told,) = opened(OLD).feed('42["Bridge",{"V1 Throttle":NaN}]', 0)
     assert math.isnan(told["V1 Throttle"])
 
 
@@ -122,7 +122,7 @@ def test_a_fault_of_ours_on_the_thread_is_kept_for_the_other_one():
 )
 def test_what_is_no_event_is_none_and_harms_nothing(text):
     dialogue = opened(OLD)
-    assert dialogue.take(text, 0) == []
+    assert dialogue.feed(text, 0) == []
     assert not dialogue.ended
 
 
@@ -131,13 +131,13 @@ def test_what_is_no_event_is_none_and_harms_nothing(text):
 )
 def test_an_end_is_told_in_words(text, words):
     dialogue = opened(NEW)
-    dialogue.take(text, 0)
+    dialogue.feed(text, 0)
     assert words in dialogue.ended
 
 
 def test_who_welcomes_us_and_never_connects_us_is_given_up_after_five_seconds():
     dialogue = Dialogue(0)
-    dialogue.take(NEW, 0)
+    dialogue.feed(NEW, 0)
     dialogue.due(0)
     dialogue.due(5 * NS_PER_S - 1)
     assert not dialogue.ended
@@ -153,7 +153,7 @@ def test_a_server_that_says_nothing_is_told_bare_events_and_never_pinged():
     assert dialogue.due(NS_PER_S) == []
     assert (dialogue.is_open, dialogue.is_bare) == (True, True)
     for second in range(20, 100, 20):
-        assert dialogue.take(REPLY, second * NS_PER_S) == [{"V1 Throttle": "0.5"}]
+        assert dialogue.feed(REPLY, second * NS_PER_S) == [{"V1 Throttle": "0.5"}]
         assert dialogue.due((second + 20) * NS_PER_S) == []
     assert not dialogue.ended
 
@@ -170,10 +170,10 @@ def test_a_server_that_never_answers_a_bare_event_is_given_up():
 def test_a_server_that_was_only_slow_to_welcome_us_is_talked_to_as_ever():
     dialogue = Dialogue(0)
     dialogue.due(NS_PER_S)
-    dialogue.take(NEW, 3 * NS_PER_S)
+    dialogue.feed(NEW, 3 * NS_PER_S)
     assert (dialogue.is_open, dialogue.is_bare) == (False, False)
     assert dialogue.due(3 * NS_PER_S) == ["40"]
-    dialogue.take("40", 4 * NS_PER_S)
+    dialogue.feed("40", 4 * NS_PER_S)
     assert dialogue.is_open
 
 
@@ -228,7 +228,7 @@ class FakeScript:
 @pytest.mark.parametrize("spans", ["1e308", "1" + "0" * 400, "NaN", "Infinity"])
 def test_no_span_of_a_welcome_is_too_long(spans):
     dialogue = opened(f'0{{"pingInterval":{spans},"pingTimeout":{spans},"maxPayload":1}}')
-    dialogue.take("2", NS_PER_S)
+    dialogue.feed("2", NS_PER_S)
     assert dialogue.due(NS_PER_S) == ["3"]
     assert NS_PER_S < dialogue.due_ns <= (2 * 86_400 + 1) * NS_PER_S
 
@@ -238,18 +238,18 @@ def test_no_span_of_a_welcome_is_too_long(spans):
 )
 def test_what_cannot_be_read_is_said_and_cut(text):
     dialogue = opened(OLD)
-    dialogue.take(REPLY, 0)
+    dialogue.feed(REPLY, 0)
     assert dialogue.unread == ""
-    dialogue.take(text, 0)
+    dialogue.feed(text, 0)
     assert 0 < len(dialogue.unread) < 150
 
 
 def test_the_number_of_an_eaten_packet_is_read():
     dialogue = opened(OLD)
     for text in ("4317[]", "43[]", "43x[]"):
-        dialogue.take(text, 0)
-        assert dialogue.eaten == 17
-    dialogue.take("43" + "9" * 9999 + "[]", 0)
+        dialogue.feed(text, 0)
+        assert dialogue.handled == 17
+    dialogue.feed("43" + "9" * 9999 + "[]", 0)
 
 
 class Hostile:

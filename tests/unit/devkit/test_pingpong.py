@@ -113,7 +113,7 @@ def test_a_script_that_answers_twice_is_given_no_more_than_it_eats():
             lags.append(free_ns - now_ns)
         now_ns, is_end, number = heapq.heappop(events)
         if is_end:
-            pace.eaten(number)
+            pace.handled(number)
         else:
             pace.replied(now_ns)
     assert set(lags[12:]) == {2 * takes_ns}
@@ -125,7 +125,7 @@ def test_a_handler_that_is_not_told_of_any_more_is_waited_for_once():
     pace.sent(0)
     for _ in range(4):
         pace.replied(1)
-    pace.eaten(1)
+    pace.handled(1)
     pace.sent(2)
     pace.replied(3)
     assert pace.due_ns(3) == 3 + NS_PER_S

@@ -64,10 +64,10 @@ def telemetry(
     made = Telemetry(names, version)
     made.show_lights(heads)
     for name in names:
-        made.welcome(name, "nigel", load_car("nigel"))
-        made.hear(state(name))
+        made.add_car(name, "nigel", load_car("nigel"))
+        made.update(state(name))
     for message in messages:
-        made.hear(message)
+        made.update(message)
     return made
 
 
@@ -91,8 +91,8 @@ def told(*messages):
 
 def test_there_is_no_packet_before_the_lights_are_known():
     made = Telemetry(["n1"])
-    made.welcome("n1", "nigel", load_car("nigel"))
-    made.hear(state("n1"))
+    made.add_car("n1", "nigel", load_car("nigel"))
+    made.update(state("n1"))
     assert made.packet() is None
     made.show_lights([])
     assert made.packet() is not None
@@ -127,8 +127,8 @@ def test_every_car_and_light_has_its_number():
 
 def test_there_is_no_packet_before_all_cars_are_known():
     made = Telemetry(["n1", "n2"])
-    made.welcome("n1", "nigel", load_car("nigel"))
-    made.hear(state("n1"))
+    made.add_car("n1", "nigel", load_car("nigel"))
+    made.update(state("n1"))
     assert made.packet() is None
     assert made.unknown == ["n2"]
 
@@ -226,8 +226,8 @@ def test_a_scanner_of_part_of_a_circle_tells_its_own_beams_from_the_right(turns)
 def test_before_its_first_scan_an_f1tenth_has_as_many_beams_as_after():
     made = Telemetry(("n1",))
     made.show_lights(())
-    made.welcome("n1", "f1tenth", load_car("f1tenth"))
-    made.hear(state("n1"))
+    made.add_car("n1", "f1tenth", load_car("f1tenth"))
+    made.update(state("n1"))
     beams = load_car("f1tenth").value("lidar.beams")
     assert packet(made)["V1 LIDAR Range Array"].split(" ") == ["inf"] * round(beams)
 
@@ -270,9 +270,9 @@ def test_what_a_new_script_sees_is_not_the_last_ones_picture():
 def test_news_is_in_the_next_packet():
     made = telemetry()
     packet(made)
-    made.hear(state(speed_mps=0.25))
+    made.update(state(speed_mps=0.25))
     assert packet(made)["V1 Speed"] == "0.2500"
-    made.hear(sensors(encoder_left=5))
+    made.update(sensors(encoder_left=5))
     assert packet(made)["V1 Encoder Ticks"] == "5 -1920"
 
 
@@ -315,6 +315,6 @@ def test_deflated_a_packet_is_hardly_larger_than_its_pictures_and_numbers_are_fe
 def test_what_did_not_change_is_not_deflated_anew():
     made = telemetry(frame("front", b"jpeg"))
     before = [piece.deflated for piece in made.packet()._pieces]
-    made.hear(state(speed_mps=0.25))
+    made.update(state(speed_mps=0.25))
     after = [piece.deflated for piece in made.packet()._pieces]
     assert [a is b for a, b in zip(after, before, strict=True)] == [False, *[True] * 4]

@@ -8,7 +8,7 @@ import serial
 from scm.clock import NS_PER_MS
 from scm.errors import LinkError
 from vehicle_agent.emulate.device import Device
-from vehicle_agent.emulate.faults import Spoiler, read_faults
+from vehicle_agent.emulate.faults import FaultInjector, read_faults
 from vehicle_agent.emulate.firmware import Firmware
 from vehicle_agent.emulate.pty import Cable
 from vehicle_agent.emulate.sketches import SKETCHES, Outputs
@@ -32,7 +32,7 @@ class Desk:
         self.link = folder / "nigel"
         self.now_ns = 0
         self.board = Firmware(SKETCHES[kind])
-        self.device = Device(self.board, Cable(self.link), Spoiler(read_faults(faults), 1, 0))
+        self.device = Device(self.board, Cable(self.link), FaultInjector(read_faults(faults), 1, 0))
         self.baud = SKETCHES[kind].baud
         self.ports = []
 

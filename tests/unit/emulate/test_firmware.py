@@ -24,7 +24,7 @@ from vehicle_agent.nigel.rosserial import (
 
 STEER_HALF = bytes.fromhex("ff fe 04 00 fb 64 00 00 00 00 3f 5c")
 DRIVE_04 = bytes.fromhex("ff fe 04 00 fb 65 00 cd cc cc 3e f7")
-ASK_TIME = bytes.fromhex("ff fe 08 00 f7 0a 00 00 00 00 00 00 00 00 00 f5")
+TIME_REQUEST = bytes.fromhex("ff fe 08 00 f7 0a 00 00 00 00 00 00 00 00 00 f5")
 REST = SKETCHES["2wd"].at_setup
 HALF_LEFT = SKETCHES["2wd"].steer(REST, 0.5)
 
@@ -79,7 +79,7 @@ def test_topics_are_told_after_the_time_is_asked_for(kind):
         TopicInfo(100 + at, name, FLOAT32, FLOAT32_MD5, sketch.buffer)
         for at, name in enumerate(sketch.topics)
     ]
-    assert told == ASK_TIME + b"".join(pack(Frame(1, pack_topic_info(info))) for info in infos)
+    assert told == TIME_REQUEST + b"".join(pack(Frame(1, pack_topic_info(info))) for info in infos)
     assert bench.board.configured
 
 
@@ -93,7 +93,7 @@ def test_bytes_leave_at_the_pace_of_the_line():
 def test_a_host_is_asked_for_the_time_each_2500_ms():
     bench = Bench()
     bench.run(100, pack(REQUEST_TOPICS))
-    asked = [ms for ms in range(10_000) if bench.run(1, b"").endswith(ASK_TIME[-1:])]
+    asked = [ms for ms in range(10_000) if bench.run(1, b"").endswith(TIME_REQUEST[-1:])]
     gaps = [b - a for a, b in pairwise(asked)]
     assert len(asked) in (3, 4)
     assert gaps == [2501] * len(gaps)
@@ -169,7 +169,7 @@ def test_a_frame_must_be_whole_20_ms_after_its_first_byte():
 
 def test_an_ff_before_a_frame_loses_it_and_asks_for_the_time_while_unconfigured():
     bench = Bench()
-    assert bench.run(30, b"\xff" + STEER_HALF) == ASK_TIME
+    assert bench.run(30, b"\xff" + STEER_HALF) == TIME_REQUEST
     assert bench.pins == REST
     bench.run(100, pack(REQUEST_TOPICS))
     assert bench.run(30, b"\xff" + STEER_HALF) == b""

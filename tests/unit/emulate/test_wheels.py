@@ -177,8 +177,8 @@ def put_down(*cars, emulated=()):
     emulator, told = part(""), []
     seen = WorldSnapshot(t_ns=1, tick=1, vehicles=cars)
     for ms in range(0, 500, 5):
-        heard = [world(), Incoming(seen, 0), *(Incoming(one, 0) for one in emulated)]
-        told += emulator.step(ms * NS_PER_MS, heard)
+        received_bytes = [world(), Incoming(seen, 0), *(Incoming(one, 0) for one in emulated)]
+        told += emulator.step(ms * NS_PER_MS, received_bytes)
     return told[0] if told else None
 
 
@@ -207,7 +207,7 @@ def test_where_no_place_is_free_it_waits_and_says_so_once(caplog):
 def test_it_does_not_listen_to_other_cars_once_it_stands():
     emulator = part()
     emulator.step(0, [world()])
-    assert [one.kind for one in emulator.subscriptions] == [WorldDefinition]
+    assert [subscriptions.kind for subscriptions in emulator.subscriptions] == [WorldDefinition]
 
 
 def test_it_takes_the_cable_away_at_the_end():
@@ -221,9 +221,9 @@ def test_a_guarded_city_lets_it_say_the_truth_and_no_vehicle_hear_it():
     key = key.removeprefix(prefix("city"))
     rights = rights_of("emulator", station_of("n7"))
     assert any(fnmatchcase(key, pattern) for pattern in rights.publishes)
-    heard = [selector("city", wish.kind, wish.where) for wish in part().subscriptions]
-    assert [prefix("city") + pattern for pattern in rights.subscribes] == heard
+    received_bytes = [selector("city", wish.kind, wish.where) for wish in part().subscriptions]
+    assert [prefix("city") + pattern for pattern in rights.subscribes] == received_bytes
     assert not any(
-        fnmatchcase(key, pattern) for pattern in rights_of("vehicle", "n7").subscriptions
+        fnmatchcase(key, pattern) for pattern in rights_of("vehicle", "n7").subscribes
     )
-    assert any(fnmatchcase(key, pattern) for pattern in rights_of("part", "eye").subscriptions)
+    assert any(fnmatchcase(key, pattern) for pattern in rights_of("part", "eye").subscribes)

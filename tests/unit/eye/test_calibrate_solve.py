@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from scm.errors import EyeError
+from scm.eye.calibrate.assessment import assess
 from scm.eye.calibrate.board import View, chessboard_corners
-from scm.eye.calibrate.judge import judge
-from scm.eye.calibrate.say import report
 from scm.eye.calibrate.solve import Lens, solve
+from scm.eye.calibrate.summary import report
 from scm.scenery.board import Board
 
 SIZE = (1280, 720)
@@ -86,9 +86,9 @@ def test_exact_corners_give_the_lens_exactly(truth):
 @pytest.mark.parametrize("truth", [PINHOLE, FISHEYE], ids=lambda lens: lens.kind)
 def test_a_healthy_set_is_accepted(truth):
     views = views_through(truth, 12, 0, place=(0.05, 0.95), fill=(0.15, 0.6))
-    verdict = judge(solve(views, SIZE, truth.kind == "fisheye"))
-    assert verdict.refused == ()
-    assert verdict.ray_std_px.max() < 1.0
+    assessment = assess(solve(views, SIZE, truth.kind == "fisheye"))
+    assert assessment.refused == ()
+    assert assessment.ray_std_px.max() < 1.0
 
 
 @pytest.mark.parametrize(
@@ -98,37 +98,37 @@ def test_a_healthy_set_is_accepted(truth):
 def test_boards_parallel_to_the_picture_are_refused_for_focus_and_distance(truth, tilt, seed):
     views = views_through(truth, 12, seed, tilt=tilt, fill=(0.3, 0.35))
     solution = solve(views, SIZE, truth.kind == "fisheye")
-    verdict = judge(solution)
-    assert "focal length and distance cannot be told apart" in verdict.refused[0]
-    assert "parallel to the picture" in verdict.refused[0]
+    assessment = assess(solution)
+    assert "focal length and distance cannot be told apart" in assessment.refused[0]
+    assert "parallel to the picture" in assessment.refused[0]
     assert solution.depth_correlation > 0.99
-    assert any("by 35 deg" in shot for shot in verdict.shots)
+    assert any("by 35 deg" in shot for shot in assessment.shots)
 
 
 def test_a_refused_set_with_the_leaning_boards_added_is_accepted():
     flat = views_through(PINHOLE, 12, 0, tilt=0.02)
     more = [replace(view, name=f"more {view.name}") for view in views_through(PINHOLE, 8, 1)]
-    assert judge(solve(flat, SIZE)).refused
-    assert judge(solve([*flat, *more], SIZE)).refused == ()
+    assert assess(solve(flat, SIZE)).refused
+    assert assess(solve([*flat, *more], SIZE)).refused == ()
 
 
 def test_points_in_one_corner_are_refused_for_the_rest_of_the_frame():
     views = views_through(PINHOLE, 12, 0, fill=(0.2, 0.25), place=(0.15, 0.3))
-    verdict = judge(solve(views, SIZE))
-    assert any("of the frame (at least" in one for one in verdict.refused)
-    assert any("lower right is known to" in one for one in verdict.refused)
-    assert (verdict.cover[3:] == 0).all()
+    assessment = assess(solve(views, SIZE))
+    assert any("of the frame (at least" in one for one in assessment.refused)
+    assert any("lower right is known to" in one for one in assessment.refused)
+    assert (assessment.cover[3:] == 0).all()
 
 
 def test_too_few_views_are_refused_by_their_number():
-    verdict = judge(solve(views_through(PINHOLE, 4, 0), SIZE))
-    assert verdict.refused[0] == "too few views: expected at least 5, got 4"
-    assert verdict.shots
+    assessment = assess(solve(views_through(PINHOLE, 4, 0), SIZE))
+    assert assessment.refused[0] == "too few views: expected at least 5, got 4"
+    assert assessment.shots
 
 
 def test_a_wide_lens_taken_for_a_pinhole_is_refused():
     wide = views_through(FISHEYE, 12, 0)
-    assert any("--fisheye" in one for one in judge(solve(wide, SIZE, fisheye=False)).refused)
+    assert any("--fisheye" in one for one in assess(solve(wide, SIZE, fisheye=False)).refused)
 
 
 def test_points_and_a_view_that_are_far_off_are_taken_out_and_said():
@@ -139,8 +139,8 @@ def test_points_and_a_view_that_are_far_off_are_taken_out_and_said():
     bent = views[7].points[:, 0] ** 2 * 900.0
     views[7] = replace(views[7], pixels=views[7].pixels + np.column_stack((bent, -bent)))
     solution = solve(views, SIZE)
-    assert any(one.startswith("view 2: 2 points taken out") for one in solution.said)
-    assert any(one.startswith("view 7: the whole view is off") for one in solution.said)
+    assert any(one.startswith("view 2: 2 points taken out") for one in solution.remarks)
+    assert any(one.startswith("view 7: the whole view is off") for one in solution.remarks)
     assert len(solution.views) == 13
     off = np.abs(solution.lens.values - PINHOLE.values) / np.sqrt(np.diag(solution.covariance))
     assert off.max() < 4.0
@@ -155,13 +155,13 @@ def test_sets_of_two_different_lenses_are_refused():
 def test_a_term_that_the_views_cannot_tell_is_left_out_and_said():
     solution = solve(views_through(NARROW, 12, 0), SIZE)
     assert solution.lens.values[8] == 0.0
-    assert "distortion k3 left out" in solution.said[0]
-    assert judge(solution).refused == ()
+    assert "distortion k3 left out" in solution.remarks[0]
+    assert assess(solution).refused == ()
 
 
 def test_the_report_says_numbers_doubt_and_map():
     solution = solve(views_through(PINHOLE, 12, 1), SIZE)
-    text = report(solution, judge(solution))
+    text = report(solution, assess(solution))
     assert f"fx {solution.lens.values[0]:10.2f} +-" in text
     assert "points seen" in text
     assert "from 12 views with 648 points" in text

@@ -31,7 +31,7 @@ def light(*cars, t_ns=NOW_NS):
 def seen(told, snapshot):
     cars = EmulatedCars()
     for one in told:
-        cars.hear(one)
+        cars.update(one)
     return cars.seen(snapshot).vehicles
 
 

@@ -25,22 +25,22 @@ def test_a_still_is_one_frame(tmp_path):
     path = tmp_path / "still.png"
     cv2.imwrite(str(path), np.full((48, 64, 3), 7, dtype=np.uint8))
     source = FileSource(path)
-    frame = source.take(5, None)
+    frame = source.read(5, None)
     assert (frame.t_ns, frame.image.shape, int(frame.grey()[0, 0])) == (5, (48, 64, 3), 7)
-    assert source.take(6, None) is None
+    assert source.read(6, None) is None
 
 
 def test_a_film_plays_at_its_own_rate(film):
     source = FileSource(film)
-    taken = [source.take(1_000 + i * FRAME_NS // 2, None) for i in range(12)]
+    taken = [source.read(1_000 + i * FRAME_NS // 2, None) for i in range(12)]
     times = [frame.t_ns for frame in taken if frame]
     assert times == [1_000 + i * FRAME_NS for i in range(5)]
 
 
 def test_frames_already_late_are_left_out(film):
     source = FileSource(film)
-    source.take(0, None)
-    frame = source.take(3 * FRAME_NS, None)
+    source.read(0, None)
+    frame = source.read(3 * FRAME_NS, None)
     assert frame.t_ns == 3 * FRAME_NS
     assert float(frame.image.mean()) == pytest.approx(120.0, abs=4.0)
 
@@ -60,13 +60,13 @@ def test_a_file_that_is_no_picture_is_refused(tmp_path, capfd):
 def test_a_film_that_is_over_says_so(film):
     source = FileSource(film)
     assert source.trouble is None
-    assert [bool(source.take(i * FRAME_NS, None)) for i in range(6)] == [True] * 5 + [False]
+    assert [bool(source.read(i * FRAME_NS, None)) for i in range(6)] == [True] * 5 + [False]
     assert source.trouble == f"{film}: over"
 
 
 def test_a_film_in_a_loop_begins_again_and_time_goes_on(film):
     source = FileSource(film, loop=True)
-    frames = [source.take(7 + i * FRAME_NS, None) for i in range(13)]
+    frames = [source.read(7 + i * FRAME_NS, None) for i in range(13)]
     assert [frame.t_ns for frame in frames] == [7 + i * FRAME_NS for i in range(13)]
     levels = [round(float(frame.image.mean()) / 40.0) for frame in frames]
     assert levels == [0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 0, 1, 2]
@@ -101,7 +101,7 @@ def test_a_film_whose_frames_come_unevenly_keeps_their_times(tmp_path, monkeypat
     path.write_bytes(b"")
     monkeypatch.setattr(cv2, "VideoCapture", Uneven)
     source = FileSource(path)
-    taken = [source.take(i * FRAME_NS // 20, None) for i in range(101)]
+    taken = [source.read(i * FRAME_NS // 20, None) for i in range(101)]
     # the first is the start; the fourth has no time of its own, so the rate gives it one
     assert [frame.t_ns // 1_000_000 for frame in taken if frame] == [0, 100, 135, 235, 400]
 
@@ -110,7 +110,7 @@ def test_a_still_in_a_loop_is_shown_again_and_again(tmp_path):
     path = tmp_path / "still.png"
     cv2.imwrite(str(path), np.full((48, 64, 3), 7, dtype=np.uint8))
     source = FileSource(path, loop=True)
-    times = [source.take(i * FRAME_NS, None).t_ns for i in range(4)]
+    times = [source.read(i * FRAME_NS, None).t_ns for i in range(4)]
     assert times == [i * FRAME_NS for i in range(4)]
 
 
@@ -122,7 +122,7 @@ def test_a_film_cut_short_plays_what_there_is_and_says_it_is_over(tmp_path, capf
     writer.release()
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     source = FileSource(path)
-    shown = sum(source.take(i * FRAME_NS, None) is not None for i in range(30))
+    shown = sum(source.read(i * FRAME_NS, None) is not None for i in range(30))
     assert 5 <= shown <= 11
     assert source.trouble == f"{path}: over"
 
@@ -131,4 +131,4 @@ def test_nothing_comes_of_a_closed_film(film):
     source = FileSource(film)
     source.close()
     source.close()
-    assert source.take(0, None) is None
+    assert source.read(0, None) is None

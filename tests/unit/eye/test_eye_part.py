@@ -79,7 +79,7 @@ class Given:
     def __init__(self):
         self.frame = None
 
-    def take(self, now_ns, light):
+    def read(self, now_ns, light):
         frame, self.frame = self.frame, None
         return frame
 
@@ -144,9 +144,9 @@ def test_a_pose_comes_from_the_picture_and_not_from_the_snapshot(eye):
         def __init__(self, real):
             self.real = real
 
-        def take(self, now_ns, light):
+        def read(self, now_ns, light):
             moved = [msgspec.structs.replace(car, x_m=car.x_m + 0.5) for car in light.vehicles]
-            return self.real.take(now_ns, msgspec.structs.replace(light, vehicles=tuple(moved)))
+            return self.real.read(now_ns, msgspec.structs.replace(light, vehicles=tuple(moved)))
 
     blind = EyePart(CITY, source=Elsewhere(EyePart(CITY)._source))
     (pose,) = of(EyePose, see(blind, light(1, CAR)))
@@ -238,8 +238,8 @@ def test_a_tag_that_belongs_to_nobody_is_named_after_itself():
         def __init__(self, real):
             self.real = real
 
-        def take(self, now_ns, light):
-            return self.real.take(now_ns, msgspec.structs.replace(light, vehicles=(CAR,)))
+        def read(self, now_ns, light):
+            return self.real.read(now_ns, msgspec.structs.replace(light, vehicles=(CAR,)))
 
     eye = EyePart(CITY, source=Stranger(EyePart(CITY)._source))
     (pose,) = of(EyePose, see(eye, light(1)))

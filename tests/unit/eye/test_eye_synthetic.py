@@ -99,9 +99,9 @@ def test_a_car_half_outside_the_frame_is_drawn(still):
 
 
 def test_a_snapshot_is_taken_once(still):
-    assert still.take(0, light(t_ns=5)).t_ns == 5
-    assert still.take(0, light(t_ns=5)) is None
-    assert still.take(0, None) is None
+    assert still.read(0, light(t_ns=5)).t_ns == 5
+    assert still.read(0, light(t_ns=5)) is None
+    assert still.read(0, None) is None
 
 
 def test_front_wheels_turn_with_the_steering(still):

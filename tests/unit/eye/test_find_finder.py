@@ -83,7 +83,7 @@ def test_two_tags_with_one_id_are_both_told_in_every_frame(rng):
     for _ in range(9):
         assert ids_of(finder.find(grey, {5: tags[1][1]})) == [5, 5]
     assert ids_of(detect_tags(grey)) == [5]
-    assert ids_of(detect_tags(grey, twins=True)) == [5, 5]
+    assert ids_of(detect_tags(grey, duplicates=True)) == [5, 5]
 
 
 def test_another_tag_where_one_was_expected_is_told_by_its_own_id(rng):

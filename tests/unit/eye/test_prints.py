@@ -11,10 +11,10 @@ import pytest
 
 from scm.__main__ import main
 from scm.errors import EyeError
-from scm.eye.anchor import Anchor
 from scm.eye.calibrate.board import find_board
 from scm.eye.camera import camera_model
 from scm.eye.detect import detect_tags
+from scm.eye.extrinsics import ExtrinsicsEstimator
 from scm.eye.pose import car_pose
 from scm.maps.load import load_map
 from scm.records.city_map import VehicleTag
@@ -66,8 +66,8 @@ def test_a_printed_roof_tag_is_found_at_true_size_its_arrow_to_the_front():
             tilt_x_rad=0.0, tilt_y_rad=0.0, width_px=1400, height_px=1400, cx_px=699.5,
             cy_px=699.5, fx_px=px_per_m * above, fy_px=px_per_m * above, distortion=(0.0,) * 5,
         )  # fmt: skip
-        anchor = Anchor(camera_model(camera), CITY.tag)
-        found = car_pose(anchor, NIGEL, np.array(tag.corners_px))
+        estimator = ExtrinsicsEstimator(camera_model(camera), CITY.tag)
+        found = car_pose(estimator, NIGEL, np.array(tag.corners_px))
         assert math.remainder(found.pose.yaw - turn, math.tau) == pytest.approx(0.0, abs=0.01)
         assert found.size_ratio == pytest.approx(1.0, abs=0.005)
         assert not found.is_refused

@@ -81,7 +81,7 @@ def off_m(shots, camera, rolling_s):
     class Film:
         trouble = None
 
-        def take(self, now_ns, light):
+        def read(self, now_ns, light):
             return Frame(left[0].t_ns, left.pop(0).image)
 
     eye, off = EyePart(msgspec.structs.replace(CITY, cameras=(camera,)), source=Film()), []

@@ -39,7 +39,7 @@ def arrive(source, arrival_ns, t_ns, payload=None, camera="roof", shares_clock=T
         shares_clock=shares_clock,
         payload=jpeg(t_ns % 97) if payload is None else payload,
     )
-    source.hear(Incoming(message, arrival_ns))
+    source.receive(Incoming(message, arrival_ns))
 
 
 def test_a_picture_on_the_bus_is_heard_by_who_listens_for_its_camera():
@@ -54,8 +54,8 @@ def test_a_picture_on_the_bus_is_heard_by_who_listens_for_its_camera():
             mouth.publish(EyePictureIn(camera=camera, t_ns=NOW_NS - 5, payload=jpeg()))
         items = box.drain()
     assert len(items) == 1
-    source.hear(items[0])
-    frame = source.take(NOW_NS, None)
+    source.receive(items[0])
+    frame = source.read(NOW_NS, None)
     assert (frame.t_ns, frame.stamped, frame.image.shape) == (NOW_NS - 5, "exposed", (48, 64, 3))
 
 
@@ -64,8 +64,8 @@ def test_only_the_newest_counts_and_another_camera_is_not_ours():
     arrive(source, NOW_NS, NOW_NS - 30)
     arrive(source, NOW_NS, NOW_NS - 20)
     arrive(source, NOW_NS, NOW_NS - 10, camera="door")
-    assert source.take(NOW_NS, None).t_ns == NOW_NS - 20
-    assert source.take(NOW_NS, None) is None
+    assert source.read(NOW_NS, None).t_ns == NOW_NS - 20
+    assert source.read(NOW_NS, None) is None
     assert (source.tally.good, source.tally.passed_over) == (1, 1)
 
 
@@ -73,11 +73,11 @@ def test_only_the_newest_counts_and_another_camera_is_not_ours():
 def test_a_damaged_picture_is_counted_and_said_and_the_next_one_is_good(payload):
     source = BusSource("roof")
     arrive(source, NOW_NS, NOW_NS, payload)
-    assert source.take(NOW_NS, None) is None
+    assert source.read(NOW_NS, None) is None
     assert source.trouble.startswith("bus:roof: a frame: expected a ")
     assert source.trouble.endswith("(1 damaged so far)")
     arrive(source, NOW_NS + 1, NOW_NS + 1)
-    assert source.take(NOW_NS + 1, None)
+    assert source.read(NOW_NS + 1, None)
 
 
 def test_a_sender_with_another_clock_is_mapped_to_ours():
@@ -86,25 +86,25 @@ def test_a_sender_with_another_clock_is_mapped_to_ours():
     for i in range(20):
         arrival_ns = NOW_NS + i * 50 * NS_PER_MS + (i % 5) * 4 * NS_PER_MS
         arrive(source, arrival_ns, NOW_NS + (50 * i - 900) * NS_PER_MS, shares_clock=False)
-        times.append(source.take(arrival_ns, None).t_ns)
+        times.append(source.read(arrival_ns, None).t_ns)
     assert times == [NOW_NS + i * 50 * NS_PER_MS for i in range(20)]
 
 
 def test_a_clock_that_is_said_to_be_ours_and_is_ahead_is_not_believed():
     source = BusSource("roof")
     arrive(source, NOW_NS, NOW_NS + 3 * NS_PER_S)
-    assert source.take(NOW_NS, None).t_ns == NOW_NS
+    assert source.read(NOW_NS, None).t_ns == NOW_NS
 
 
 def test_silence_is_said_and_a_closed_source_gives_nothing():
     source = BusSource("roof")
-    source.take(NOW_NS, None)
+    source.read(NOW_NS, None)
     assert source.trouble is None
-    source.take(NOW_NS + 2 * NS_PER_S, None)
+    source.read(NOW_NS + 2 * NS_PER_S, None)
     assert source.trouble == "bus:roof: no frame for 2.0 s"
     source.close()
     arrive(source, NOW_NS + 2 * NS_PER_S, NOW_NS)
-    assert source.take(NOW_NS + 2 * NS_PER_S, None) is None
+    assert source.read(NOW_NS + 2 * NS_PER_S, None) is None
 
 
 def test_a_name_that_cannot_stand_in_a_key_is_refused():

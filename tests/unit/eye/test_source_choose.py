@@ -42,7 +42,7 @@ def test_a_folder_is_played_at_the_rate_that_is_asked_for_and_again_in_a_loop(tm
     for i in range(2):
         cv2.imwrite(str(tmp_path / f"{i}.png"), np.zeros((32, 32, 3), np.uint8))
     source = source_of(str(tmp_path), rate_hz=2.0, loop=True)
-    assert [source.take(i * 500_000_000, None).t_ns for i in range(3)] == [0, 5 * 10**8, 10**9]
+    assert [source.read(i * 500_000_000, None).t_ns for i in range(3)] == [0, 5 * 10**8, 10**9]
 
 
 def test_a_csi_camera_needs_gstreamer(monkeypatch):
@@ -74,7 +74,7 @@ def test_anything_else_is_refused_with_what_was_expected(text, said):
 def test_a_camera_that_is_not_there_yet_is_waited_for():
     source = source_of("/dev/video-none")
     try:
-        assert source.take(0, None) is None
+        assert source.read(0, None) is None
     finally:
         source.close()
 

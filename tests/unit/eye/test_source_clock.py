@@ -6,8 +6,7 @@ import pytest
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.eye.sources.camera_clock import CameraClock
 from scm.eye.sources.capture import Grabbed
-from scm.eye.sources.frame_check import FrameCheck
-from scm.eye.sources.watch import Watch
+from scm.eye.sources.frame_monitor import FrameCheck, FrameMonitor
 
 FRAME_NS = NS_PER_S // 30
 OFFSET_NS = 1_234_567 * NS_PER_S
@@ -129,33 +128,33 @@ def test_the_same_picture_for_a_second_is_frozen_until_it_changes():
 
 
 def test_a_frame_of_another_size_is_left_out_and_said_until_the_first_size_is_back():
-    watch = Watch()
-    assert watch.accept(Grabbed(noisy()), 0).stamped == "arrived"
-    assert watch.accept(Grabbed(noisy(shape=(240, 320, 3))), 10) is None
-    assert watch.trouble(10) == "size changed from 640 x 480 to 320 x 240 px: frames left out"
-    assert watch.accept(Grabbed(noisy(1)), 20).t_ns == 20
-    assert watch.trouble(20) is None
-    assert (watch.tally.good, watch.tally.resized) == (2, 1)
+    monitor = FrameMonitor()
+    assert monitor.accept(Grabbed(noisy()), 0).stamped == "arrived"
+    assert monitor.accept(Grabbed(noisy(shape=(240, 320, 3))), 10) is None
+    assert monitor.trouble(10) == "size changed from 640 x 480 to 320 x 240 px: frames left out"
+    assert monitor.accept(Grabbed(noisy(1)), 20).t_ns == 20
+    assert monitor.trouble(20) is None
+    assert (monitor.tally.good, monitor.tally.resized) == (2, 1)
 
 
 def test_a_known_age_counts_more_than_a_stamp_and_one_that_cannot_be_does_not():
-    frame = Watch().accept(Grabbed(noisy(), stamp_ns=7, age_ns=40), 1000)
+    frame = FrameMonitor().accept(Grabbed(noisy(), stamp_ns=7, age_ns=40), 1000)
     assert (frame.t_ns, frame.stamped) == (960, "exposed")
-    frame = Watch().accept(Grabbed(noisy(), stamp_ns=7, age_ns=-40), 1000)
+    frame = FrameMonitor().accept(Grabbed(noisy(), stamp_ns=7, age_ns=-40), 1000)
     assert (frame.t_ns, frame.stamped) == (1000, "exposed")
 
 
 def test_the_least_delay_is_taken_off_where_stamps_cannot_tell_it():
-    watch = Watch(delay_ns=30)
-    assert watch.accept(Grabbed(noisy()), 1000).t_ns == 970
-    assert watch.accept(Grabbed(noisy(), stamp_ns=7), 2000).t_ns == 1970
-    assert watch.accept(Grabbed(noisy(), stamp_ns=7, age_ns=5), 3000).t_ns == 2995
+    monitor = FrameMonitor(delay_ns=30)
+    assert monitor.accept(Grabbed(noisy()), 1000).t_ns == 970
+    assert monitor.accept(Grabbed(noisy(), stamp_ns=7), 2000).t_ns == 1970
+    assert monitor.accept(Grabbed(noisy(), stamp_ns=7, age_ns=5), 3000).t_ns == 2995
 
 
 def test_silence_is_said_with_its_length():
-    watch = Watch()
-    watch.begin(0)
-    assert watch.trouble(NS_PER_S) is None
-    assert watch.trouble(12 * NS_PER_S // 10) == "no frame for 1.2 s"
-    watch.accept(Grabbed(noisy()), 2 * NS_PER_S)
-    assert watch.trouble(2 * NS_PER_S) is None
+    monitor = FrameMonitor()
+    monitor.begin(0)
+    assert monitor.trouble(NS_PER_S) is None
+    assert monitor.trouble(12 * NS_PER_S // 10) == "no frame for 1.2 s"
+    monitor.accept(Grabbed(noisy()), 2 * NS_PER_S)
+    assert monitor.trouble(2 * NS_PER_S) is None

@@ -25,7 +25,7 @@ def folder(tmp_path):
 
 def play(source, steps, step_ns=NS_PER_S // 100):
     """Return (time since the start [ms], grey level) of each frame."""
-    taken = [source.take(START_NS + i * step_ns, None) for i in range(steps)]
+    taken = [source.read(START_NS + i * step_ns, None) for i in range(steps)]
     return [
         (round((frame.t_ns - START_NS) / NS_PER_MS), int(frame.image[0, 0, 0]))
         for frame in taken
@@ -72,12 +72,12 @@ def test_a_damaged_picture_is_said_and_the_next_one_is_shown(folder):
     path = folder(*(f"{i}.jpg" for i in range(12)))
     (path / "1.jpg").write_bytes((path / "1.jpg").read_bytes()[:-30])
     source = FolderSource(path, rate_hz=10.0)
-    assert source.take(0, None)
-    assert source.take(100 * NS_PER_MS, None) is None
+    assert source.read(0, None)
+    assert source.read(100 * NS_PER_MS, None) is None
     assert source.trouble.startswith(f"{path / '1.jpg'}: expected a whole JPEG, got one cut short")
-    assert source.take(200 * NS_PER_MS, None)
+    assert source.read(200 * NS_PER_MS, None)
     assert "cut short" in source.trouble  # long enough for a status that is told twice a second
-    assert source.take(1_100 * NS_PER_MS, None)
+    assert source.read(1_100 * NS_PER_MS, None)
     assert source.trouble is None
 
 
@@ -85,7 +85,7 @@ def test_a_picture_that_vanished_is_said(folder):
     path = folder("0.png", "1.png")
     source = FolderSource(path)
     (path / "0.png").unlink()
-    assert source.take(0, None) is None
+    assert source.read(0, None) is None
     assert "0.png: expected a picture, found no file" in source.trouble
 
 
@@ -95,8 +95,8 @@ def test_a_picture_of_another_size_is_left_out(folder):
     source = FolderSource(path)
     assert play(source, 20) == [(0, 0)]
     source = FolderSource(path)
-    source.take(0, None)
-    source.take(100 * NS_PER_MS, None)
+    source.read(0, None)
+    source.read(100 * NS_PER_MS, None)
     assert source.trouble == f"{path}: size changed from 32 x 32 to 48 x 16 px: frames left out"
 
 

@@ -106,8 +106,8 @@ def live():
     until_none_is_left()
 
 
-def take(source, ahead_ns=0):
-    return source.take(source._clock.now_ns() + ahead_ns, None)
+def read(source, ahead_ns=0):
+    return source.read(source._clock.now_ns() + ahead_ns, None)
 
 
 def until(condition, source=None):
@@ -115,7 +115,7 @@ def until(condition, source=None):
     frames, ends = [], time.monotonic() + DEADLINE_S
     while not condition():
         assert time.monotonic() < ends, "waited in vain"
-        frame = take(source) if source else None
+        frame = read(source) if source else None
         if frame is not None:
             frames.append(frame)
         time.sleep(0.001)
@@ -127,9 +127,9 @@ def until_none_is_left():
 
 
 def begin(source, camera, ahead_ns=0):
-    """Make the first `take`, which begins all, before the camera sends anything."""
+    """Make the first `read`, which begins all, before the camera sends anything."""
     camera.may_send.clear()
-    assert take(source, ahead_ns) is None
+    assert read(source, ahead_ns) is None
     camera.may_send.set()
 
 
@@ -145,7 +145,7 @@ def test_take_never_waits_for_a_camera_that_stalls_and_close_ends_it(live):
     (frame,) = until(lambda: source.tally.good and source._newest is None, source)
     assert frame.stamped == "arrived"
     began_s = time.monotonic()
-    assert all(take(source) is None for _ in range(100))
+    assert all(read(source) is None for _ in range(100))
     source.close()
     until_none_is_left()
     assert time.monotonic() - began_s < STALL_S / 2
@@ -157,10 +157,10 @@ def test_a_slow_consumer_gets_the_newest_frame_and_the_others_are_counted(live):
     source = live(camera)
     begin(source, camera)
     until(lambda: source.tally.good == 9)
-    frame = take(source)
+    frame = read(source)
     np.testing.assert_array_equal(frame.image, picture(9))
     assert source.tally.passed_over == 8
-    assert take(source) is None
+    assert read(source) is None
 
 
 def test_a_camera_that_disappears_comes_back_by_itself(live):
@@ -197,7 +197,7 @@ def test_closing_does_not_wait_for_a_pause(live):
     until(lambda: source.trouble is not None, source)
     source.close()
     source.close()
-    assert take(source) is None
+    assert read(source) is None
     until_none_is_left()  # well before the pause is over
 
 
@@ -228,7 +228,7 @@ def test_frames_are_on_the_callers_clock_whatever_ours_says(live):
     begin(source, camera, ahead_ns)
     until(lambda: source.tally.good == 1)
     arrived_ns = source._newest.t_ns
-    assert take(source, ahead_ns).t_ns - arrived_ns == ahead_ns
+    assert read(source, ahead_ns).t_ns - arrived_ns == ahead_ns
 
 
 def test_a_caller_that_is_slow_to_call_does_not_move_frames(live):
@@ -238,7 +238,7 @@ def test_a_caller_that_is_slow_to_call_does_not_move_frames(live):
     until(lambda: source.tally.good == 1)
     arrived_ns = source._newest.t_ns
     camera.later(NS_PER_S // 5)
-    assert take(source, -NS_PER_S // 5).t_ns == arrived_ns
+    assert read(source, -NS_PER_S // 5).t_ns == arrived_ns
 
 
 EVENTS = st.sampled_from(

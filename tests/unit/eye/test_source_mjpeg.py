@@ -33,7 +33,7 @@ def part(data, *lines, sized=True):
 
 
 class Camera:
-    """Serves parts to everybody who asks; None among them: wait until it is killed."""
+    """Service parts to everybody who asks; None among them: wait until it is killed."""
 
     def __init__(self, parts, port=0, kind="multipart/x-mixed-replace; boundary=edge", status=200):
         camera = self
@@ -180,7 +180,7 @@ def take_until(source, condition):
     ends, clock, times = time.monotonic() + DEADLINE_S, WallClock(), []
     while not condition():
         assert time.monotonic() < ends, source.trouble
-        frame = source.take(clock.now_ns(), None)
+        frame = source.read(clock.now_ns(), None)
         times += [frame.t_ns] if frame else []
         time.sleep(0.005)
     return times

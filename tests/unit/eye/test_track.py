@@ -9,7 +9,7 @@ import pytest
 from scm.eye.track.motion import predict
 from scm.eye.track.perception import collective_perception
 from scm.eye.track.sighting import Sighting
-from scm.eye.track.tracks import DROPPED_NS, MOST_CAMERAS, MOST_CARS, Tracks
+from scm.eye.track.tracks import DROPPED_NS, MAX_CAMERAS, MAX_CARS, Tracks
 from scm.geometry import Pose2
 from scm.v2x.message import decode, encode
 from scm.v2x.messages.cpm_tx import CpmTx
@@ -231,9 +231,9 @@ def test_a_car_passes_from_one_camera_to_another_without_a_jump():
 
 
 def test_lean_that_all_cameras_share_is_never_less_than_itself():
-    tracks, lean = Tracks(), np.diag([4e-4, 4e-4, 0.0]) ** 2
-    last = drive(tracks, 60, lean=lean)
-    assert only(tracks, last).covariance[0, 0] > lean[0, 0] + 0.8 * SHARED[0, 0]
+    tracks, common_mode = Tracks(), np.diag([4e-4, 4e-4, 0.0]) ** 2
+    last = drive(tracks, 60, common_mode=common_mode)
+    assert only(tracks, last).covariance[0, 0] > common_mode[0, 0] + 0.8 * SHARED[0, 0]
 
 
 def test_fifty_cars_keep_their_own_names():
@@ -296,12 +296,12 @@ def test_a_sighting_that_cannot_be_is_refused_and_harms_no_track(changed, first)
 
 def test_names_that_never_end_fill_neither_cameras_nor_cars():
     tracks = Tracks()
-    tracks.see([saw(0.0, 0.5, 0, camera=f"c{i}") for i in range(MOST_CAMERAS + 9)], START_NS)
-    cars = [saw(0.0, 0.5, 1, camera="c0", vehicle=f"v{i}") for i in range(MOST_CARS + 9)]
-    tracks.see(cars[: MOST_CARS + 5], START_NS + FRAME_NS)
-    tracks.see(cars[MOST_CARS + 5 :], START_NS + FRAME_NS)
+    tracks.see([saw(0.0, 0.5, 0, camera=f"c{i}") for i in range(MAX_CAMERAS + 9)], START_NS)
+    cars = [saw(0.0, 0.5, 1, camera="c0", vehicle=f"v{i}") for i in range(MAX_CARS + 9)]
+    tracks.see(cars[: MAX_CARS + 5], START_NS + FRAME_NS)
+    tracks.see(cars[MAX_CARS + 5 :], START_NS + FRAME_NS)
     assert tracks.refused == 9 + 10
-    assert len(tracks.at(START_NS + FRAME_NS)) == MOST_CARS
+    assert len(tracks.at(START_NS + FRAME_NS)) == MAX_CARS
 
 
 def test_only_cameras_of_the_city_are_heard_where_they_are_known():
@@ -325,7 +325,7 @@ def told_late(tracks, late_ns, apart):
 def test_a_frame_that_is_told_car_by_car_is_taken_in_as_one(monkeypatch):
     frames = []
     monkeypatch.setattr(
-        "scm.eye.track.tracks.taken_in", lambda fleet, frame: frames.append(len(frame)) or fleet
+        "scm.eye.track.tracks.updated", lambda fleet, frame: frames.append(len(frame)) or fleet
     )
     tracks = Tracks()
     now = told_late(tracks, 0, apart=True)

@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from scm.eye.anchor import Anchor, Tolerance
 from scm.eye.camera import camera_model
+from scm.eye.extrinsics import ExtrinsicsEstimator, Tolerance
 from scm.eye.pose import car_poses
 from scm.eye.render.car import tag_on_roof
 from scm.eye.track.sighting import Sighting
@@ -42,14 +42,14 @@ class Drive:
         self.anchors = [self.anchored(one) for one in cameras]
         self.poses = self.rng.uniform((0.2, 0.1, -3.0), (2.5, 1.2, 3.0), (CARS, 3))
         self.phase = self.rng.uniform(0.0, 6.0, CARS)
-        self.lean = 0.003 * self.rng.standard_normal((CARS, 2))
+        self.common_mode = 0.003 * self.rng.standard_normal((CARS, 2))
 
     def anchored(self, true):
         off = self.rng.standard_normal(6) * Tolerance().deviations()
-        anchor = Anchor(true.moved_to(true.extrinsics + off), CITY.tag)
+        estimator = ExtrinsicsEstimator(true.moved_to(true.extrinsics + off), CITY.tag)
         noise = NOISE_PX * self.rng.standard_normal((4, 2))
-        anchor.see(anchor.expected(CITY.tag, true) + noise, 0)
-        return anchor
+        estimator.see(estimator.expected(CITY.tag, true) + noise, 0)
+        return estimator
 
     def move(self, t):
         v = 0.26 * (0.9 + 0.1 * np.sin(2.0 * t + self.phase))
@@ -68,12 +68,12 @@ class Drive:
                     )
                 )
             )
-            for (x, y, yaw), (roll, pitch) in zip(self.poses, self.lean, strict=True)
+            for (x, y, yaw), (roll, pitch) in zip(self.poses, self.common_mode, strict=True)
         ])  # fmt: skip
         corners += NOISE_PX * self.rng.standard_normal(corners.shape)
         found = car_poses(self.anchors[index], [NIGEL] * CARS, corners)
         return [
-            Sighting(str(index), i, f"n{i}", t_ns, p.pose, p.covariance, p.shared, p.lean)
+            Sighting(str(index), i, f"n{i}", t_ns, p.pose, p.covariance, p.shared, p.common_mode)
             for i, p in enumerate(found)
         ]
 

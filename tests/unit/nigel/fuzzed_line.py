@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from scm.clock import NS_PER_MS
 from tests.unit.nigel.fake_device import BATTERY, OURS, Device, announced, asking_time
-from vehicle_agent.nigel.host import Host, Wish
+from vehicle_agent.nigel.host import Host, NigelCommand
 from vehicle_agent.nigel.rosserial import (
     REQUEST_TOPICS,
     STOP_SENDING,
@@ -19,7 +19,7 @@ from vehicle_agent.nigel.rosserial import (
 TURN_NS = 10 * NS_PER_MS
 RECOVERY_NS = 100 * NS_PER_MS
 CALM_TURNS = 40
-WISH = Wish(0.25, -0.5, 5)
+WISH = NigelCommand(0.25, -0.5, 5)
 RIGHT = {100: pack_float(-0.5), 101: pack_float(0.25), 102: pack_float(5.0)}
 
 
@@ -51,17 +51,19 @@ def fuzz(total, seed):
             rubbish = _rubbish(rng)
             found.sent += len(rubbish)
             now_ns += TURN_NS
-            _check(host.hear(rubbish, now_ns) + host.say(WISH, now_ns), reader, found, now_ns)
+            _check(
+                host.receive(rubbish, now_ns) + host.frames_due(WISH, now_ns), reader, found, now_ns
+            )
         found.rounds += 1
         clean_ns, answered_ns = now_ns, None
         for turn in range(CALM_TURNS):
             now_ns += TURN_NS
             if answered_ns is None and turn % 2 == 0:
                 back += asking_time()
-            answers = host.hear(back, now_ns)
+            answers = host.receive(back, now_ns)
             if answers and answered_ns is None:
                 answered_ns = now_ns
-            frames = answers + host.say(WISH, now_ns)
+            frames = answers + host.frames_due(WISH, now_ns)
             _check(frames, reader, found, now_ns)
             back = device.hear(b"".join(frames), now_ns)
         late_ns = (answered_ns or clean_ns + CALM_TURNS * TURN_NS) - clean_ns

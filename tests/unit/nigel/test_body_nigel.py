@@ -23,24 +23,24 @@ from tests.unit.vehicle_agent.test_agent import EPOCH, Desk, command, lease, one
 from vehicle_agent.bodies import nigel
 from vehicle_agent.bodies.nigel import BODY, LIFTED_M, STALE_NS, NigelBody
 from vehicle_agent.body import Obeyed, Wiring
-from vehicle_agent.nigel.host import REST, Wish
-from vehicle_agent.nigel.serial_watchdog import Told, Written
+from vehicle_agent.nigel.host import REST, NigelCommand
+from vehicle_agent.nigel.serial_watchdog import WatchdogReport, Written
 from vehicle_agent.nigel.telemetry import Telemetry
 
 BEGIN_NS = 10**9
 SURE = tuple(tuple(1e-6 * (row == column) for column in range(6)) for row in range(6))
 
 
-class FakeHelm:
+class FakeWatchdogClient:
     """Takes wishes."""
 
     def __init__(self):
-        self.wishes, self.fault, self.told, self.is_closed = [], "", None, False
+        self.wishes, self.fault, self.report, self.is_closed = [], "", None, False
 
     def trouble(self, now_ns):
         return self.fault
 
-    def steer(self, wish, now_ns):
+    def command(self, wish, now_ns):
         self.wishes.append(wish)
 
     def written(self):
@@ -65,7 +65,7 @@ def calibrated(**numbers):
 
 @pytest.fixture
 def body():
-    made = NigelBody(calibrated(drive_deadband=0.2), FakeHelm())
+    made = NigelBody(calibrated(drive_deadband=0.2), FakeWatchdogClient())
     made.place(Pose2(0.3, 0.3, 0.0), BEGIN_NS)
     made.see(track(), BEGIN_NS)
     made.was_lifted()
@@ -78,7 +78,7 @@ def rests(wish):
 
 
 def newest(body):
-    return body._helm.wishes[-1]
+    return body._watchdog.wishes[-1]
 
 
 def test_a_seen_pose_is_carried_forward_on_its_arc(body):
@@ -93,20 +93,22 @@ def test_a_seen_pose_is_carried_forward_on_its_arc(body):
 
 
 def test_the_charge_of_a_real_battery_is_estimated_from_its_voltage(body):
-    told = Told(phase="ready", trouble="", opened=1, readings=1, battery_v=None, telemetry=None)
-    body._helm.told = told
+    told = WatchdogReport(
+        phase="ready", trouble="", opened=1, readings=1, battery_v=None, telemetry=None
+    )
+    body._watchdog.report = told
     assert (body.motion().battery_v, body.motion().battery_charge) == (None, None)
-    body._helm.told = msgspec.structs.replace(told, battery_v=3 * 3.84 - 0.03 * 0.8)
+    body._watchdog.report = msgspec.structs.replace(told, battery_v=3 * 3.84 - 0.03 * 0.8)
     assert body.motion().battery_charge == pytest.approx(0.5, abs=1e-6), "0.8 A through 0.03 ohm"
     body.command(1.0, 0.0)
     assert body.motion().battery_charge > 0.54, "motors that still stand draw 3 A and more"
 
 
 def test_before_the_eye_has_seen_it_it_stands_where_the_city_put_it():
-    body = NigelBody(calibrated(drive_deadband=0.2), FakeHelm())
+    body = NigelBody(calibrated(drive_deadband=0.2), FakeWatchdogClient())
     body.place(Pose2(0.3, 0.4, 0.5), BEGIN_NS)
     assert body.motion().pose == (0.3, 0.4, 0.5)
-    assert body.unfit(BEGIN_NS) == "the Eye has not seen it yet"
+    assert body.inhibit_reason(BEGIN_NS) == "the Eye has not seen it yet"
     body.command(1.0, 1.0)
     assert rests(newest(body))
 
@@ -126,8 +128,8 @@ def test_an_old_or_stale_pose_keeps_it_from_moving(body, seen, late_ms, words):
     now_ns = BEGIN_NS + late_ms * NS_PER_MS
     body.advance(now_ns)
     body.command(0.5, 0.5)
-    assert body.unfit(now_ns).startswith(words)
-    assert bool(body.unfit(now_ns)) == bool(words)
+    assert body.inhibit_reason(now_ns).startswith(words)
+    assert bool(body.inhibit_reason(now_ns)) == bool(words)
     assert rests(newest(body)) == bool(words)
 
 
@@ -148,21 +150,21 @@ def test_a_car_that_was_carried_away_is_noticed_once(body):
 
 
 def test_trouble_with_the_cable_comes_first(body):
-    body._helm.fault = "/dev/x: unplugged"
+    body._watchdog.fault = "/dev/x: unplugged"
     body.command(0.5, 0.5)
-    assert body.unfit(BEGIN_NS) == "/dev/x: unplugged"
+    assert body.inhibit_reason(BEGIN_NS) == "/dev/x: unplugged"
     assert rests(newest(body))
 
 
 @pytest.mark.parametrize(("wished", "given"), [(0.0, 0.0), (0.1, 0.3), (-0.1, -0.3), (1.0, 1.2)])
 def test_the_cars_own_deadband_is_undone(body, wished, given):
     body.command(wished, 0.25)
-    assert newest(body) == Wish(pytest.approx(given), 0.25, 0)
+    assert newest(body) == NigelCommand(pytest.approx(given), 0.25, 0)
 
 
 def test_gains_and_trim_are_undone():
     car = calibrated(drive_gain=0.5, steering_gain=0.8, steering_trim_rad=0.1)
-    body = NigelBody(car, FakeHelm())
+    body = NigelBody(car, FakeWatchdogClient())
     body.see(track(), BEGIN_NS)
     body.advance(BEGIN_NS)
     body.command(0.2, 0.4)
@@ -172,7 +174,7 @@ def test_gains_and_trim_are_undone():
 
 
 def test_without_a_calibration_nothing_is_added():
-    body = NigelBody(load_car("nigel"), FakeHelm())
+    body = NigelBody(load_car("nigel"), FakeWatchdogClient())
     body.see(track(), BEGIN_NS)
     body.advance(BEGIN_NS)
     body.command(0.1, 0.0)
@@ -207,18 +209,18 @@ def test_lamps_are_bits(body, switches, bits):
 
 def told(readings, gyro=0.5):
     reading = Telemetry(10, -20, gyro, (1.0, 2.0), 11.1, 1.0, 5.0)
-    return Told("ready", "", 1, readings, 11.1, reading)
+    return WatchdogReport("ready", "", 1, readings, 11.1, reading)
 
 
 def test_telemetry_becomes_sensors_once_each(body):
     assert body.sensors("n7", 5) == []
-    body._helm.told = told(1)
+    body._watchdog.report = told(1)
     (message,) = body.sensors("n7", 5)
     assert (message.encoder_left, message.encoder_right, message.t_ns) == (10, -20, 5)
     assert message.gyro_radps == (0.0, 0.0, 0.5)
     assert message.accel_mps2[:2] == (1.0, 2.0)
     assert body.sensors("n7", 6) == []
-    body._helm.told = told(2, gyro=math.nan)
+    body._watchdog.report = told(2, gyro=math.nan)
     assert body.sensors("n7", 7) == []
 
 
@@ -231,8 +233,8 @@ class RealDesk(Desk):
     """A real car's agent, an Eye and a city played by hand."""
 
     def __init__(self, city_map, spawn, monkeypatch):
-        self.helm = FakeHelm()
-        monkeypatch.setattr(nigel, "Helm", lambda path, baud: self.helm)
+        self.watchdog = FakeWatchdogClient()
+        monkeypatch.setattr(nigel, "WatchdogClient", lambda path, baud: self.watchdog)
         super().__init__(city_map, spawn, body="nigel", wiring=Wiring(port="x"))
         self.at, self.sees, self.state = spawn, True, None
 
@@ -243,7 +245,7 @@ class RealDesk(Desk):
             sent = self.step(*seen, *messages)
             self.state = one(sent, VehicleState) or self.state
             self.status = one(sent, PartStatus) or getattr(self, "status", None)
-        return self.helm.wishes[-1]
+        return self.watchdog.wishes[-1]
 
 
 @pytest.fixture
@@ -265,12 +267,12 @@ def test_it_joins_as_a_real_car_and_drives_where_the_eye_sees_it(desk):
 def test_it_rests_before_it_is_in_the_city_and_at_the_end(desk, monkeypatch):
     outside = RealDesk(desk.map, desk.spawn, monkeypatch)
     outside.step()
-    assert outside.helm.wishes == [REST]
+    assert outside.watchdog.wishes == [REST]
     desk.see_for(2.0)
     desk.part.finish(desk.now_ns)
-    assert desk.helm.wishes[-1].throttle == 0.0
+    assert desk.watchdog.wishes[-1].throttle == 0.0
     desk.part.close()
-    assert desk.helm.is_closed
+    assert desk.watchdog.is_closed
 
 
 def test_zeros_within_280_ms_once_the_eye_is_blind(desk):
@@ -302,9 +304,9 @@ def test_zero_throttle_at_once_when_a_renewal_is_refused(desk):
         assert desk.see_for(0.02).throttle > 0.05
     refused = Refused(code="owned", detail="ann has it")
     desk.step(track(desk.now_ns + 1, *desk.at), replies=[(desk.asked[0], refused)])
-    assert desk.helm.wishes[-1].throttle == 0.0
+    assert desk.watchdog.wishes[-1].throttle == 0.0
     desk.step(track(desk.now_ns + 1, *desk.at), command(EPOCH + 1, throttle=0.3))
-    assert desk.helm.wishes[-1].throttle > 0.05
+    assert desk.watchdog.wishes[-1].throttle > 0.05
 
 
 def test_zeros_within_280_ms_once_the_bus_is_broken_and_it_drives_when_it_is_back(desk):
@@ -328,10 +330,10 @@ def test_a_step_that_raises_lets_go_of_the_cable_before_anybody_is_told(desk, mo
     def fails(now_ns, epoch, **_):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(desk.part._stay, "step", fails)
+    monkeypatch.setattr(desk.part._session, "step", fails)
     with pytest.raises(ZeroDivisionError):
         desk.step()
-    assert desk.helm.is_closed
+    assert desk.watchdog.is_closed
 
 
 def test_zeros_when_the_city_forgets_the_car(desk):
@@ -344,7 +346,7 @@ def test_a_car_put_beside_the_lanes_stands_until_it_is_put_on_one(desk):
     desk.see_for(2.0)
     desk.at = Pose2(1.384 + 0.728, 0.655, 0.0)
     assert desk.see_for(1.0).throttle == 0.0
-    assert desk.part._stay.astray
+    assert desk.part._session.off_lane
     desk.at = desk.spawn
     assert desk.see_for(2.0).throttle > 0.05
 
@@ -362,6 +364,6 @@ def test_its_fence_stops_it(desk, monkeypatch):
 
 
 def test_what_it_obeyed_is_what_the_keeper_of_its_cable_wrote():
-    body = NigelBody(load_car("nigel"), FakeHelm())
+    body = NigelBody(load_car("nigel"), FakeWatchdogClient())
     body.command(0.9, 0.9)
     assert body.obeyed() == [Obeyed(BEGIN_NS, 0.3, -0.2)]

@@ -18,12 +18,17 @@ import serial
 from scm.clock import NS_PER_MS, NS_PER_S, StepClock, WallClock
 from tests.unit.nigel.fake_device import Device
 from tests.unit.nigel.pty_device import PtyDevice
-from vehicle_agent.nigel import helm as helm_module
+from vehicle_agent.nigel import watchdog_client as client_module
 from vehicle_agent.nigel.cable import FULL_BYTES, REOPEN_NS, Cable
-from vehicle_agent.nigel.helm import DOUBT_NS, Helm
-from vehicle_agent.nigel.host import Host, Wish
+from vehicle_agent.nigel.host import Host, NigelCommand
 from vehicle_agent.nigel.rosserial import pack_float
-from vehicle_agent.nigel.serial_watchdog import PATIENCE_NS, Asked, Keeper, Told
+from vehicle_agent.nigel.serial_watchdog import (
+    COMMAND_TIMEOUT_NS,
+    SerialWatchdog,
+    WatchdogCommand,
+    WatchdogReport,
+)
+from vehicle_agent.nigel.watchdog_client import SUSPECT_NS, WatchdogClient
 
 ZERO, HALF = pack_float(0.0), pack_float(0.5)
 PATIENCE_S = 40.0
@@ -173,42 +178,45 @@ class Kept:
     def __init__(self):
         self.device = Device()
         self.cable = LoopCable(self.device)
-        self.keeper = Keeper(self.cable, Host())
+        self.keeper = SerialWatchdog(self.cable, Host())
         self.now_ns = 10**18
 
     def run(self, span_ns, wish=None, age_ns=0):
         for _ in range(span_ns // (5 * NS_PER_MS)):
             self.now_ns += 5 * NS_PER_MS
             self.cable.now_ns = self.now_ns
-            asked = None if wish is None else Asked(self.now_ns - age_ns, wish)
+            asked = None if wish is None else WatchdogCommand(self.now_ns - age_ns, wish)
             self.keeper.step(self.now_ns, asked)
         return self.device.values
 
 
 def test_the_keeper_says_zero_once_the_agent_has_been_silent_for_150_ms():
     kept = Kept()
-    kept.run(3 * NS_PER_S, Wish(0.5, -0.5))
+    kept.run(3 * NS_PER_S, NigelCommand(0.5, -0.5))
     assert kept.device.values == {"steer_cmd": -0.5, "drive_cmd": 0.5}
-    assert kept.run(PATIENCE_NS - 25 * NS_PER_MS) == {"steer_cmd": -0.5, "drive_cmd": 0.5}
+    assert kept.run(COMMAND_TIMEOUT_NS - 25 * NS_PER_MS) == {"steer_cmd": -0.5, "drive_cmd": 0.5}
     assert kept.run(50 * NS_PER_MS) == {"steer_cmd": 0.0, "drive_cmd": 0.0}
 
 
-@pytest.mark.parametrize("age_ns", [PATIENCE_NS + 1, -PATIENCE_NS - 1, 10**18])
+@pytest.mark.parametrize("age_ns", [COMMAND_TIMEOUT_NS + 1, -COMMAND_TIMEOUT_NS - 1, 10**18])
 def test_a_wish_that_waited_in_the_queue_or_has_no_honest_stamp_is_not_obeyed(age_ns):
     kept = Kept()
-    assert kept.run(3 * NS_PER_S, Wish(0.5, 0.5), age_ns) == {"steer_cmd": 0.0, "drive_cmd": 0.0}
+    assert kept.run(3 * NS_PER_S, NigelCommand(0.5, 0.5), age_ns) == {
+        "steer_cmd": 0.0,
+        "drive_cmd": 0.0,
+    }
 
 
 def test_the_keeper_answers_every_wish_and_tells_how_to_say_zero_once_it_knows():
     kept = Kept()
-    kept.run(5 * NS_PER_MS, Wish())
+    kept.run(5 * NS_PER_MS, NigelCommand())
     assert kept.keeper.report().rest == b""
     assert kept.keeper.report() is None
-    kept.run(3 * NS_PER_S, Wish(0.5, 0.5))
+    kept.run(3 * NS_PER_S, NigelCommand(0.5, 0.5))
     assert kept.keeper.report() is not None
     kept.run(5 * NS_PER_MS)
     assert kept.keeper.report() is None
-    kept.run(5 * NS_PER_MS, Wish(0.5, 0.5))
+    kept.run(5 * NS_PER_MS, NigelCommand(0.5, 0.5))
     rest = kept.keeper.report().rest
     kept.device.hear(rest, kept.now_ns)
     assert kept.device.values == {"steer_cmd": 0.0, "drive_cmd": 0.0}
@@ -216,10 +224,10 @@ def test_the_keeper_answers_every_wish_and_tells_how_to_say_zero_once_it_knows()
 
 def test_the_keeper_tells_once_what_it_wrote_and_when_it_did_and_what_found_no_room_not():
     kept = Kept()
-    kept.run(3 * NS_PER_S, Wish(0.5, -0.5))
+    kept.run(3 * NS_PER_S, NigelCommand(0.5, -0.5))
     kept.keeper.report()
     begun, heard = kept.now_ns, len(kept.device.said)
-    kept.run(NS_PER_S, Wish(2.0, -0.25))
+    kept.run(NS_PER_S, NigelCommand(2.0, -0.25))
     written = kept.keeper.report().written
     payloads = [frame.payload for frame in kept.device.said[heard:] if frame.topic == 101]
     assert [pack_float(one.throttle) for one in written] == payloads
@@ -228,13 +236,13 @@ def test_the_keeper_tells_once_what_it_wrote_and_when_it_did_and_what_found_no_r
         (5 + 20 * i) * NS_PER_MS for i in range(50)]  # fmt: skip
     assert kept.keeper.report() is None
     kept.cable.is_full = True
-    kept.run(NS_PER_S, Wish(0.5, 0.5))
+    kept.run(NS_PER_S, NigelCommand(0.5, 0.5))
     assert kept.keeper.report().written == ()
 
 
 def test_the_keeper_ends_with_zeros_said_five_times():
     kept = Kept()
-    kept.run(3 * NS_PER_S, Wish(0.5, 0.5))
+    kept.run(3 * NS_PER_S, NigelCommand(0.5, 0.5))
     before = len(kept.device.said)
     clock = StepClock(kept.now_ns)
     kept.keeper.finish(clock)
@@ -260,32 +268,32 @@ def wait(condition, every=lambda: None):
 
 @pytest.fixture
 def driving(plugged, monkeypatch):
-    monkeypatch.setattr(helm_module, "LEAVE_S", PATIENCE_S)
-    helm, clock = Helm(str(plugged.path), 57600), WallClock()
-    steer = lambda: helm.steer(Wish(0.5, 0.5), clock.now_ns())  # noqa: E731
-    wait(lambda: plugged.newest(101) == HALF and helm.told.rest, every=steer)
-    yield helm, steer, plugged
-    helm.close()
-    helm._process.wait(PATIENCE_S)
+    monkeypatch.setattr(client_module, "EXIT_TIMEOUT_S", PATIENCE_S)
+    watchdog, clock = WatchdogClient(str(plugged.path), 57600), WallClock()
+    steer = lambda: watchdog.command(NigelCommand(0.5, 0.5), clock.now_ns())  # noqa: E731
+    wait(lambda: plugged.newest(101) == HALF and watchdog.report.rest, every=steer)
+    yield watchdog, steer, plugged
+    watchdog.close()
+    watchdog._process.wait(PATIENCE_S)
 
 
 def test_a_silent_agent_is_zeroed_from_outside_and_close_leaves_zeros(driving):
-    helm, steer, device = driving
+    watchdog, steer, device = driving
     wait(lambda: device.newest(101) == ZERO)
     wait(lambda: device.newest(101) == HALF, steer)
-    helm.close()
-    assert helm._process.returncode == 0
+    watchdog.close()
+    assert watchdog._process.returncode == 0
     last = lambda: [(topic, payload) for _, topic, payload in device.log[-10:]]  # noqa: E731
     wait(lambda: last() == [(101, ZERO), (100, ZERO)] * 5)
 
 
 def test_the_helm_knows_once_what_was_written_and_when(driving):
-    helm, steer, device = driving
-    helm.written()
+    watchdog, steer, device = driving
+    watchdog.written()
     told, heard = [], []
 
     def are_told():
-        told.extend(helm.written())
+        told.extend(watchdog.written())
         return len(told) > 20 and (0.5, 0.5) in {(one.throttle, one.steering) for one in told}
 
     def are_heard():
@@ -301,11 +309,11 @@ def test_the_helm_knows_once_what_was_written_and_when(driving):
 
 
 def test_a_pulled_cable_is_told_and_drives_again_when_it_is_back(driving):
-    helm, steer, device = driving
+    watchdog, steer, device = driving
     device.pull()
     clock = WallClock()
     gone = ("unplugged", "no such device")
-    wait(lambda: any(w in helm.trouble(clock.now_ns()) for w in gone), steer)
+    wait(lambda: any(w in watchdog.trouble(clock.now_ns()) for w in gone), steer)
     device.log.clear()
     device.plug()
     wait(lambda: device.newest(101) == HALF, every=steer)
@@ -313,12 +321,12 @@ def test_a_pulled_cable_is_told_and_drives_again_when_it_is_back(driving):
 
 @pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP, signal.SIGINT])
 def test_a_keeper_that_dies_or_hangs_is_replaced_and_its_port_is_opened_at_once(driving, way):
-    helm, steer, device = driving
-    old = helm._process
+    watchdog, steer, device = driving
+    old = watchdog._process
     old.send_signal(way)
-    wait(lambda: helm._hand._port is not None, steer)
-    wait(lambda: helm._process is not old, steer)
-    wait(lambda: helm._hand._port is None, steer)
+    wait(lambda: watchdog._fallback._port is not None, steer)
+    wait(lambda: watchdog._process is not old, steer)
+    wait(lambda: watchdog._fallback._port is None, steer)
     device.log.clear()
     wait(lambda: device.newest(101) == HALF, every=steer)
 
@@ -326,43 +334,43 @@ def test_a_keeper_that_dies_or_hangs_is_replaced_and_its_port_is_opened_at_once(
 def test_a_stopped_keeper_has_zeros_said_beside_it_and_drives_on_without_a_reset(
     driving, monkeypatch
 ):
-    monkeypatch.setattr(helm_module, "HANGS_NS", round(PATIENCE_S * NS_PER_S))
-    helm, steer, device = driving
-    old = helm._process
+    monkeypatch.setattr(client_module, "HANG_NS", round(PATIENCE_S * NS_PER_S))
+    watchdog, steer, device = driving
+    old = watchdog._process
     os.kill(old.pid, signal.SIGSTOP)
     device.log.clear()
     wait(lambda: device.newest(101) == ZERO, steer)
     os.kill(old.pid, signal.SIGCONT)
     wait(lambda: device.newest(101) == HALF, steer)
-    assert helm._process is old
-    assert helm._hand._port is None
+    assert watchdog._process is old
+    assert watchdog._fallback._port is None
 
 
 def test_an_agent_that_leaves_while_its_keeper_hangs_says_the_zeros_itself(driving, monkeypatch):
-    helm, _, device = driving
-    monkeypatch.setattr(helm_module, "LEAVE_S", 0.5)
-    kill, killed = helm._process.kill, []
+    watchdog, _, device = driving
+    monkeypatch.setattr(client_module, "EXIT_TIMEOUT_S", 0.5)
+    kill, killed = watchdog._process.kill, []
 
     def kill_later():
         wait(lambda: device.newest(101) == ZERO)  # the keeper cannot have said it
         killed.append(1)
         kill()
 
-    monkeypatch.setattr(helm._process, "kill", kill_later)
-    os.kill(helm._process.pid, signal.SIGSTOP)
+    monkeypatch.setattr(watchdog._process, "kill", kill_later)
+    os.kill(watchdog._process.pid, signal.SIGSTOP)
     device.log.clear()
-    helm.close()
+    watchdog.close()
     assert killed
 
 
 AGENT = """
 import sys, threading
 from scm.clock import WallClock
-from vehicle_agent.nigel.helm import DOUBT_NS, Helm
-from vehicle_agent.nigel.host import Wish
-helm, clock, never = Helm(sys.argv[1], 57600), WallClock(), threading.Event()
+from vehicle_agent.nigel.watchdog_client import SUSPECT_NS, WatchdogClient
+from vehicle_agent.nigel.host import NigelCommand
+client, clock, never = WatchdogClient(sys.argv[1], 57600), WallClock(), threading.Event()
 while True:
-    helm.steer(Wish(0.5, 0.5), clock.now_ns())
+    client.command(NigelCommand(0.5, 0.5), clock.now_ns())
     never.wait(0.02)
 """
 
@@ -387,20 +395,20 @@ class Alone:
         self.said, self.killed = [], []
         ours, self.its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
-        self.helm = Helm("x", 57600)
-        self.helm._line, self.helm._process = (
+        self.watchdog = WatchdogClient("x", 57600)
+        self.watchdog._socket, self.watchdog._process = (
             ours,
             types.SimpleNamespace(kill=lambda: self.killed.append(1), poll=lambda: None),
         )
-        self.helm._hand.say = self.said.append
+        self.watchdog._fallback.write_beside = self.said.append
         self.its.send(msgspec.msgpack.encode(told))
-        self.helm.steer(Wish(), 0)
+        self.watchdog.command(NigelCommand(), 0)
 
     def steer(self, turns, at_ns):
         """Steer some turns with hardly any time between them; return the trouble after them."""
         for turn in range(turns):
-            self.helm.steer(Wish(), at_ns + turn)
-        return self.helm.trouble(at_ns + turns)
+            self.watchdog.command(NigelCommand(), at_ns + turn)
+        return self.watchdog.trouble(at_ns + turns)
 
 
 @pytest.fixture
@@ -408,13 +416,13 @@ def alone():
     made = []
 
     def make(rest=b"zeros"):
-        made.append(Alone(Told("ready", "", 1, 0, None, None, rest=rest)))
+        made.append(Alone(WatchdogReport("ready", "", 1, 0, None, None, rest=rest)))
         return made[-1]
 
     yield make
     for one in made:
         one.its.close()
-        one.helm._hang_up()
+        one.watchdog._disconnect()
 
 
 def test_an_agent_that_stalled_does_not_take_the_keeper_for_silent_or_dead(alone):
@@ -428,8 +436,8 @@ def test_an_agent_that_stalled_does_not_take_the_keeper_for_silent_or_dead(alone
 
 def test_zeros_are_said_beside_a_keeper_that_left_three_wishes_unanswered(alone):
     one = alone()
-    assert one.steer(9, DOUBT_NS - 9) == ""
-    assert "silent" in one.steer(1, DOUBT_NS + 1)
+    assert one.steer(9, SUSPECT_NS - 9) == ""
+    assert "silent" in one.steer(1, SUSPECT_NS + 1)
     assert (one.said, one.killed) == ([b"zeros"], [])
 
 

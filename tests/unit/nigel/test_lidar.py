@@ -33,7 +33,7 @@ def test_a_node_has_the_makers_bits():
 
 def test_turns_are_whole_and_left_is_left():
     wall = turn(lambda d: 1.0 if d == 270 else 3.0)
-    (first, second) = RplidarA1().hear(DESCRIPTOR + wall * 2 + node(0, 1, first=True))
+    (first, second) = RplidarA1().feed(DESCRIPTOR + wall * 2 + node(0, 1, first=True))
     assert len(first.ranges) == len(second.ranges) == 360
     near = int(np.argmin(first.ranges))
     assert np.degrees(first.bearings[near]) % 360.0 == 90.0
@@ -45,13 +45,13 @@ def test_no_answer_and_what_it_cannot_see_are_misses():
     one = Turn(np.zeros(4), np.array([np.inf, 0.01, 99.0, np.nan]))
     scan = scan_of(one, LIDAR, "n7", 5)
     assert np.isinf(np.frombuffer(scan.payload, dtype="<f4")).all()
-    (seen, *_) = RplidarA1().hear(turn(lambda d: 0.0) + node(0, 1, first=True) * 9)
+    (seen, *_) = RplidarA1().feed(turn(lambda d: 0.0) + node(0, 1, first=True) * 9)
     assert np.isinf(seen.ranges).all()
 
 
 def test_bytes_that_come_one_by_one_are_the_same_turn():
     driver, stream = RplidarA1(), DESCRIPTOR + turn() + node(0, 2, first=True)
-    found = [one for at in range(len(stream)) for one in driver.hear(stream[at : at + 1])]
+    found = [one for at in range(len(stream)) for one in driver.feed(stream[at : at + 1])]
     assert [len(one.ranges) for one in found] == [360]
     assert driver.skipped == 0
 
@@ -60,23 +60,23 @@ def test_after_rubbish_the_second_clean_turn_is_right():
     rng = random.Random(3)
     for _ in range(30):
         driver = RplidarA1()
-        driver.hear(DESCRIPTOR + turn()[: rng.randrange(1800)] + rng.randbytes(rng.randrange(99)))
-        found = driver.hear(turn() * 3)
+        driver.feed(DESCRIPTOR + turn()[: rng.randrange(1800)] + rng.randbytes(rng.randrange(99)))
+        found = driver.feed(turn() * 3)
         assert np.array_equal(found[-1].ranges, np.full(360, 2.0))
 
 
 def test_a_turn_that_was_joined_in_its_middle_is_not_told():
-    found = RplidarA1().hear(turn()[500:] + turn() * 2)
+    found = RplidarA1().feed(turn()[500:] + turn() * 2)
     assert [len(one.ranges) for one in found] == [360]
 
 
 def test_rubbish_is_never_raised_and_never_kept():
     rng, driver = random.Random(5), RplidarA1()
     for _ in range(500):
-        for one in driver.hear(rng.randbytes(200)):
+        for one in driver.feed(rng.randbytes(200)):
             assert np.all(np.isinf(one.ranges) | (one.ranges < 17.0))
     assert driver.skipped > 50_000
-    assert len(driver._held) < 50
+    assert len(driver._buffer) < 50
 
 
 @pytest.mark.parametrize("name", registry.names(LIDARS))
@@ -85,7 +85,7 @@ def test_every_driver_keeps_the_contract(name):
     driver = kind.open()
     assert driver.begin()
     assert driver.end()
-    assert list(driver.hear(b"")) == []
+    assert list(driver.feed(b"")) == []
     assert 0.0 < kind.range_min_m < kind.range_max_m
 
 

@@ -9,8 +9,8 @@ from scm.errors import MessageError
 from vehicle_agent.nigel.rosserial import (
     FLOAT32,
     FLOAT32_MD5,
-    LONGEST,
-    PATIENCE_NS,
+    FRAME_TIMEOUT_NS,
+    MAX_PAYLOAD_BYTES,
     REQUEST_TOPICS,
     STOP_SENDING,
     TIME,
@@ -44,13 +44,13 @@ def test_frames_have_the_bytes_of_rosserial(frame, known):
 
 
 def test_the_longest_frame_comes_back():
-    longest = Frame(7, bytes(LONGEST))
+    longest = Frame(7, bytes(MAX_PAYLOAD_BYTES))
     assert Decoder().feed(pack(longest), 0) == [longest]
 
 
 def test_what_is_too_long_is_not_packed():
-    with pytest.raises(MessageError, match=f"got topic 7 with {LONGEST + 1} bytes"):
-        pack(Frame(7, bytes(LONGEST + 1)))
+    with pytest.raises(MessageError, match=f"got topic 7 with {MAX_PAYLOAD_BYTES + 1} bytes"):
+        pack(Frame(7, bytes(MAX_PAYLOAD_BYTES + 1)))
 
 
 def test_a_topic_info_comes_back_and_cut_or_long_ones_are_refused():
@@ -80,7 +80,7 @@ def test_frames_are_found_whatever_lies_between_them_and_however_they_are_cut():
         found += decoder.feed(bytes(stream[:cut]), now_ns)
         del stream[:cut]
         now_ns += NS_PER_MS
-    found += decoder.feed(b"", now_ns + PATIENCE_NS)
+    found += decoder.feed(b"", now_ns + FRAME_TIMEOUT_NS)
     ours = [unpack_float(frame.payload) for frame in found if frame.topic == 125]
     assert ours == list(range(sent))
 
@@ -93,7 +93,7 @@ def test_a_frame_within_one_that_fails_its_check_is_found():
 def test_a_length_that_is_never_filled_holds_nothing_up_for_longer_than_its_patience():
     decoder, endless = Decoder(), bytes.fromhex("fffe 0003 fc")
     assert decoder.feed(endless + endless + pack(STEER), 0) == []
-    assert decoder.feed(pack(STEER), PATIENCE_NS) == [STEER, STEER]
+    assert decoder.feed(pack(STEER), FRAME_TIMEOUT_NS) == [STEER, STEER]
     assert decoder.skipped == 2 * len(endless)
 
 

@@ -1,6 +1,6 @@
 """What the firmware's telemetry means."""
 
-from vehicle_agent.nigel.telemetry import carried_on, telemetry_of
+from vehicle_agent.nigel.telemetry import telemetry_of, unwrapped
 
 
 def reading(left, right):
@@ -8,13 +8,13 @@ def reading(left, right):
 
 
 def test_counts_go_on_where_the_firmware_wraps_them():
-    before = carried_on(reading(2**23 - 2, -(2**23) + 1), None)
-    after = carried_on(reading(-(2**23) + 3, 2**23 - 4), before)
+    before = unwrapped(reading(2**23 - 2, -(2**23) + 1), None)
+    after = unwrapped(reading(-(2**23) + 3, 2**23 - 4), before)
     assert (after.left - before.left, after.right - before.right) == (5, -5)
-    later = carried_on(reading(-(2**23) + 10, 2**23 - 9), after)
+    later = unwrapped(reading(-(2**23) + 10, 2**23 - 9), after)
     assert (later.left - after.left, later.right - after.right) == (7, -5)
     assert later.battery_v == 11.1
 
 
 def test_the_first_reading_is_taken_as_it_is():
-    assert carried_on(reading(7, -7), None) == reading(7, -7)
+    assert unwrapped(reading(7, -7), None) == reading(7, -7)

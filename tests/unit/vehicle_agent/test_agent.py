@@ -299,7 +299,7 @@ def test_a_contact_that_no_car_could_have_is_not_felt(inside):
 def test_a_monitor_fault_heard_outside_is_known_inside(desk):
     desk.step(MonitorStatus(junction="crossing", t_ns=0, fault="conflict", since_ns=0))
     desk.join()
-    assert desk.part._stay.signals.received.fault.all()
+    assert desk.part._session.signals.received.fault.all()
 
 
 def test_what_keeps_it_outside_is_told(desk, city_map):

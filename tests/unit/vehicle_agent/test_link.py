@@ -27,7 +27,7 @@ def ask(link, now_ms):
 
 
 def answer(link, reply, request, now_ms=0):
-    return link.take(Incoming(reply, now_ms * NS_PER_MS, Call(request)))
+    return link.accept_reply(Incoming(reply, now_ms * NS_PER_MS, Call(request)))
 
 
 @pytest.fixture

@@ -1,22 +1,22 @@
-"""A calibration in words, with a map of the frame."""
+"""Describes a calibration in words, with a map of the frame."""
 
 import math
 
 import numpy as np
 
-from scm.eye.calibrate.judge import Verdict
+from scm.eye.calibrate.assessment import ViewAssessment
 from scm.eye.calibrate.solve import Solution
 from scm.eye.calibration import LENS_NAMES, Calibration
 
 _PIXELS = 4
-"""The first so many numbers of a lens are pixels."""
+"""Number of lens parameters in pixels; they come first."""
 
 
-def report(solution: Solution, verdict: Verdict) -> str:
-    """Return all that is worth knowing of a calibration, in lines."""
+def report(solution: Solution, assessment: ViewAssessment) -> str:
+    """Return a summary of a calibration, in lines."""
     calibration = solution.calibration()
     points = sum(len(view.points) for view in solution.views)
-    tilts, fills = np.degrees(verdict.tilts_rad), verdict.fills
+    tilts, fills = np.degrees(assessment.tilts_rad), assessment.fills
     width, height = solution.size
     worst = max(
         range(len(solution.views)),
@@ -27,22 +27,26 @@ def report(solution: Solution, verdict: Verdict) -> str:
         f"{calibration.lens} lens, {width} x {height} px, from {len(solution.views)} views with "
         f"{points} points",
         *lens_lines(calibration),
-        f"  left at the points {calibration.rms_px:.3f} px RMS (a corner's coordinate "
+        f"  residual at the points {calibration.rms_px:.3f} px RMS (a corner coordinate "
         f"{solution.corner_std_px:.3f} px); worst view {solution.views[worst].name}: {off:.3f} px",
-        f"  boards lean {tilts.min():.0f} to {tilts.max():.0f} deg (median {np.median(tilts):.0f}),"
-        f" span {fills.min():.0%} to {fills.max():.0%} of the frame's width",
-        *(f"  {one}" for one in solution.said),
+        f"  boards tilted by {tilts.min():.0f} to {tilts.max():.0f} deg "
+        f"(median {np.median(tilts):.0f}), span {fills.min():.0%} to "
+        f"{fills.max():.0%} of the frame's width",
+        *(f"  {one}" for one in solution.remarks),
         "",
-        *frame_map(verdict),
+        *frame_map(assessment),
     ]
-    if verdict.shots:
-        lines += ["", "to add, the most telling first:" if verdict.refused else "would still help:"]
-        lines += [f"  - {shot}" for shot in verdict.shots]
+    if assessment.shots:
+        lines += [
+            "",
+            "to add, the most informative first:" if assessment.refused else "would still help:",
+        ]
+        lines += [f"  - {shot}" for shot in assessment.shots]
     return "\n".join(lines)
 
 
 def lens_lines(calibration: Calibration) -> list[str]:
-    """Return the numbers of a lens, each with its standard deviation."""
+    """Return the parameters of a lens with their standard deviations."""
     lines = []
     rows = zip(
         LENS_NAMES[calibration.lens], calibration.values, calibration.deviations, strict=True
@@ -59,11 +63,11 @@ def lens_lines(calibration: Calibration) -> list[str]:
     return lines
 
 
-def frame_map(verdict: Verdict) -> list[str]:
-    """Return the frame in cells: how many points lie in each, how sure its rays are."""
-    lines = ["points seen".ljust(5 * verdict.cover.shape[1] + 5) + "doubt of a ray [px]"]
-    for counts, doubts in zip(verdict.cover, verdict.ray_std_px, strict=True):
+def frame_map(assessment: ViewAssessment) -> list[str]:
+    """Return the frame in cells: number of points and ray std of each."""
+    lines = ["points seen".ljust(5 * assessment.cover.shape[1] + 5) + "std of a ray [px]"]
+    for counts, stds in zip(assessment.cover, assessment.ray_std_px, strict=True):
         seen = "".join(f"{count:5d}" if count else "    ." for count in counts)
-        doubt = "".join(f"{value:7.2f}" if value < 1000 else "      ?" for value in doubts)
-        lines.append(f"{seen}     {doubt}")
+        cells = "".join(f"{value:7.2f}" if value < 1000 else "      ?" for value in stds)
+        lines.append(f"{seen}     {cells}")
     return lines

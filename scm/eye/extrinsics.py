@@ -1,18 +1,18 @@
-"""Where the camera really is: the calibration of the map file, corrected by the map's own tags.
+"""Estimates where the camera really is: the map file's calibration, corrected by the map's tags.
 
-One small tag in a corner of the frame tells the camera's shift well, its turn poorly (a tenth of a
-pixel at the tag is millimetres at the far end) and its height and tilt hardly. A plain
-perspective-n-point solution trusts it for all six at once and jumps between two solutions. Here the
-calibration is a prior with a stated tolerance and the corners of the tags are the measurement:
+One small tag in a corner of the frame determines the camera's shift well, its yaw poorly (a tenth
+of a pixel at the tag is millimetres at the far end) and its height and tilt hardly at all. A plain
+perspective-n-point solution trusts it for all six and jumps between two solutions. Here the
+calibration is a prior with a stated tolerance and the tags' corners are the measurement:
 Gauss-Newton on
 
     (p - calibrated)' tolerance^-1 (p - calibrated)  +  (seen - projected)' noise^-1 (same)
 
-lets the tags correct exactly what they can see better than the calibrator did. `p` is the camera's
-place, and its lens too where the calibration doubts it. A tag lies still, so its corners are
-averaged over the last frames, which calms the poses; the doubt stays that of one frame, because a
-still tag's corners are off by nearly the same in every frame. A camera that was knocked shows a tag
-far outside the tolerance: then the tolerance is widened and the tags are believed.
+lets the tags correct exactly what they measure better than the calibration did. `p` is the camera's
+place, and its lens if the calibration has a covariance for it. A tag does not move, so its corners
+are averaged over the last frames, which reduces noise; the covariance stays that of one frame,
+because a static tag's corner errors are nearly the same in every frame. A camera that was knocked
+sees a tag far outside the tolerance: then the tolerance is widened and the tags are trusted.
 """
 
 import logging
@@ -34,19 +34,19 @@ LOGGER = logging.getLogger(__name__)
 AVERAGED_FRAMES = 20
 MOVED_PX = 1.0
 STILL_PX = 0.006
-"""Averages that changed by less are not worth another solution."""
+"""Smaller changes of the averages do not trigger another solution."""
 KNOCKED_SIGMAS = 5.0
 KNOCKED_TOLERANCE = 30.0
 ITERATIONS = 4
-PLACE = 6
+EXTRINSICS_COUNT = 6
 STEPS = np.array(
     [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-2, 1e-2, 1e-2, 1e-2, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6]
 )
-"""Of the differences: camera's place (6), then fx, fy, cx, cy and distortion (9)."""
-SURVEY_M = 0.001
-"""Doubt of where every tag but the first lies, east and north: the first defines the map."""
-BUMP = np.array([0.05, 0.05, 0.02, 0.05, 0.02, 0.02])
-"""How far a bump may have moved a camera that is still on its mount, [m] and [rad]."""
+"""Steps of the finite differences: camera's place (6), then fx, fy, cx, cy and distortion (9)."""
+SURVEY_STD_M = 0.001
+"""Standard deviation of every tag's place but the first, which defines the map [m]."""
+BUMP_STD = np.array([0.05, 0.05, 0.02, 0.05, 0.02, 0.02])
+"""Standard deviation of a bump that leaves the camera on its mount, [m] and [rad]."""
 ROOF_M = 0.13
 GRID = np.linspace(0.1, 0.9, 4)
 
@@ -68,21 +68,21 @@ class Tolerance:
 
 @dataclass(slots=True, eq=False)
 class Average:
-    """Corners of a still tag, (4, 2) [px], the mean of so many frames."""
+    """Corners of a static tag, (4, 2) [px], averaged over some frames."""
 
     corners: Floats
     frames: int = 1
 
 
 @dataclass(slots=True, eq=False)
-class Anchor:
-    """The corrected camera, frame after frame.
+class ExtrinsicsEstimator:
+    """Estimates the camera, frame after frame.
 
     Attributes:
-        tolerance: Of the calibration; None: what the camera says of it, else the usual.
-        tags: Of the map; the first defines its frame. One tag alone may be given bare.
-        model: The camera where it now seems to be.
-        covariance: Of its extrinsics, (6, 6), followed by its lens if that is in doubt, (15, 15).
+        tolerance: Of the calibration; None: the camera's `place_std`, else the default.
+        tags: Of the map; the first defines its frame. A single tag may be given without a tuple.
+        model: The estimated camera.
+        covariance: Of its extrinsics, (6, 6); with the lens, if that has a covariance, (15, 15).
         probes: The camera changed by plus and minus `STEPS` in each of these.
         seen_ns: When a tag of the map was last seen; None before.
     """
@@ -106,11 +106,11 @@ class Anchor:
         if isinstance(self.tags, MapTag):
             self.tags = (self.tags,)
         self.model = self.calibrated
-        count = PLACE if self.calibrated.lens_covariance is None else len(STEPS)
+        count = EXTRINSICS_COUNT if self.calibrated.lens_covariance is None else len(STEPS)
         self.covariance = np.zeros((count, count))
-        self.covariance[:PLACE, :PLACE] = np.diag(self._deviations() ** 2)
+        self.covariance[:EXTRINSICS_COUNT, :EXTRINSICS_COUNT] = np.diag(self._deviations() ** 2)
         if self.calibrated.lens_covariance is not None:
-            self.covariance[PLACE:, PLACE:] = self.calibrated.lens_covariance
+            self.covariance[EXTRINSICS_COUNT:, EXTRINSICS_COUNT:] = self.calibrated.lens_covariance
         self._base = parameters(self.model)[:count], self.covariance
         self.probes = self._probes()
 
@@ -137,9 +137,9 @@ class Anchor:
         return self._knocked
 
     def see(self, seen: Mapping[int, Floats] | Floats | None, t_ns: int) -> None:
-        """Take the corners of the map's tags in a frame, (4, 2) [px] by tag id.
+        """Update with the corners of the map's tags in a frame, (4, 2) [px] by tag id.
 
-        Corners without an id are the first tag's; without any the last correction is kept.
+        An array without an id is the first tag's; without any corners the last estimate stays.
         """
         if self._first_ns is None:
             self._first_ns = t_ns
@@ -155,40 +155,40 @@ class Anchor:
             self._solve()
 
     def bumped(self) -> None:
-        """Believe the tags from here on: the camera was moved, nobody knows how far."""
+        """Trust the tags from now on: the camera was moved by an unknown amount."""
         mean, covariance = parameters(self.model)[: len(self.covariance)], self.covariance.copy()
-        covariance[:PLACE, :PLACE] += np.diag(BUMP**2)
+        covariance[:EXTRINSICS_COUNT, :EXTRINSICS_COUNT] += np.diag(BUMP_STD**2)
         self._base = mean, covariance
         self.covariance = covariance
         self._averages.clear()
         self._solved.clear()
 
     def age_ms(self, t_ns: int) -> float:
-        """Return how long no tag of the map has been seen; never seen: since the first frame."""
+        """Return the time since a map tag was seen; if never, since the first frame."""
         since = self.seen_ns if self.seen_ns is not None else self._first_ns
         return (t_ns - since) / NS_PER_MS if since is not None else 0.0
 
     def expected(self, tag: MapTag, model: CameraModel | None = None) -> Floats:
-        """Return where the corners of a map tag should be, (4, 2) [px]; by default from now."""
+        """Return where the corners of a map tag should be, (4, 2) [px]; by default as estimated."""
         return (model or self.model).project(floor_corners(tag))
 
-    def surprise(self, seen: Mapping[int, Floats]) -> float:
-        """Return how far map tags are from where the calibration has them, over what explains it.
+    def deviation_sigmas(self, seen: Mapping[int, Floats]) -> float:
+        """Return the largest deviation of map tags from the calibration, in standard deviations.
 
         Args:
-            seen: Corners by tag id, (4, 2) [px], of one tag at least.
+            seen: Corners by tag id, (4, 2) [px], of at least one tag.
         """
         tags = [one for one in self.map_tags if one.tag_id in seen]
         corners = np.array([seen[one.tag_id] for one in tags])
         points = np.array([floor_corners(one) for one in tags])
-        return self._surprise(corners, points, self._base[1], self._noise(tags, points))
+        return self._deviation_sigmas(corners, points, self._base[1], self._noise(tags, points))
 
     def averaged(self) -> dict[int, Floats]:
-        """Return the corners of the tags seen, mean of the last frames, (4, 2) [px] by tag id."""
+        """Return the averaged corners of the tags seen, (4, 2) [px] by tag id."""
         return {tag_id: one.corners.copy() for tag_id, one in self._averages.items()}
 
-    def doubt_m(self) -> float:
-        """Return the largest deviation of a roof's place over the frame, from the camera alone."""
+    def max_position_std_m(self) -> float:
+        """Return the largest position std of a roof over the frame, due to the camera alone [m]."""
         camera = self.model.camera
         across, down = np.meshgrid(GRID * camera.width_px, GRID * camera.height_px)
         pixels = np.stack((across.ravel(), down.ravel()), axis=-1)
@@ -198,7 +198,7 @@ class Anchor:
         return float(np.sqrt(np.linalg.eigvalsh(spread)[:, -1].max()))
 
     def by_parameter(self, points: Floats) -> Floats:
-        """Return the change of pixels by each doubted parameter: (..., 3) to (..., 2, p)."""
+        """Return the derivative of pixels by each estimated parameter: (..., 3) to (..., 2, p)."""
         changes = [up.project(points) - down.project(points) for up, down in self.probes]
         return np.stack(changes, axis=-1) / (2.0 * STEPS[: len(changes)])
 
@@ -206,7 +206,7 @@ class Anchor:
         for tag_id, corners in seen.items():
             old = self._averages.get(tag_id)
             if old is not None and np.abs(corners - old.corners).max() > MOVED_PX:
-                self._averages.clear()  # what is hidden now was seen from another place
+                self._averages.clear()  # tags hidden now were seen from another place
                 old = None
             if old is None:
                 self._averages[tag_id] = Average(corners.copy())
@@ -246,12 +246,12 @@ class Anchor:
             if one is not self.tag:
                 shift = by_place(self.model, points[index]).reshape(8, 2)
                 block = slice(8 * index, 8 * index + 8)
-                noise[block, block] += SURVEY_M**2 * shift @ shift.T
+                noise[block, block] += SURVEY_STD_M**2 * shift @ shift.T
         return noise
 
     def _if_knocked(self, corners: Floats, points: Floats, prior: Floats, noise: Floats) -> Floats:
-        """Return the prior, wide if a tag is where its tolerance cannot have put it."""
-        sigmas = self._surprise(corners, points, prior, noise)
+        """Return the prior, widened if a tag is outside its tolerance."""
+        sigmas = self._deviation_sigmas(corners, points, prior, noise)
         knocked = sigmas > KNOCKED_SIGMAS
         if knocked and not self._knocked:
             facts = {"camera": self.model.camera.name, "surprise_sigmas": round(sigmas, 1)}
@@ -259,18 +259,20 @@ class Anchor:
         self._knocked = knocked
         return prior * KNOCKED_TOLERANCE**2 if knocked else prior
 
-    def _surprise(self, corners: Floats, points: Floats, prior: Floats, noise: Floats) -> float:
-        """Return the largest distance of a tag from the prior's place, over its deviation.
+    def _deviation_sigmas(
+        self, corners: Floats, points: Floats, prior: Floats, noise: Floats
+    ) -> float:
+        """Return the largest distance of a tag from the prior's place, in standard deviations.
 
-        Judged by tags' middles, which hardly depend on how well this camera's corners are found.
+        Computed from tags' centres, which hardly depend on this camera's corner accuracy.
         """
         self.model = _changed(self.calibrated, self._base[0])
         self.probes = self._probes()
         off = (corners - self.model.project(points)).mean(axis=1)
         by_camera = self.by_parameter(points).mean(axis=1)
         floor = noise[:8, :8].max() * np.eye(2)
-        doubt = by_camera @ prior @ np.swapaxes(by_camera, -1, -2) + floor
-        squared = (off[:, None] @ np.linalg.solve(doubt, off[..., None])).max()
+        covariance = by_camera @ prior @ np.swapaxes(by_camera, -1, -2) + floor
+        squared = (off[:, None] @ np.linalg.solve(covariance, off[..., None])).max()
         return float(np.sqrt(squared))
 
     def _probes(self) -> tuple[tuple[CameraModel, CameraModel], ...]:
@@ -280,7 +282,7 @@ class Anchor:
 
 
 def by_place(model: CameraModel, points: Floats) -> Floats:
-    """Return the change of pixels by a level step of map points: (..., 3) to (..., 2, 2)."""
+    """Return the derivative of pixels by a level step of map points: (..., 3) to (..., 2, 2)."""
     steps = np.eye(3)[:2] * 1e-5
     changes = [model.project(points + step) - model.project(points - step) for step in steps]
     return np.stack(changes, axis=-1) / 2e-5
@@ -295,11 +297,11 @@ def parameters(model: CameraModel) -> Floats:
 
 def _changed(model: CameraModel, values: Floats) -> CameraModel:
     """Return the model with other extrinsics (6,), or with another lens too, (15,)."""
-    moved = model.moved_to(values[:PLACE])
-    if len(values) == PLACE:
+    moved = model.moved_to(values[:EXTRINSICS_COUNT])
+    if len(values) == EXTRINSICS_COUNT:
         return moved
-    fx, fy, cx, cy = (float(value) for value in values[PLACE : PLACE + 4])
-    k1, k2, p1, p2, k3 = (float(value) for value in values[PLACE + 4 :])
+    fx, fy, cx, cy = (float(value) for value in values[EXTRINSICS_COUNT : EXTRINSICS_COUNT + 4])
+    k1, k2, p1, p2, k3 = (float(value) for value in values[EXTRINSICS_COUNT + 4 :])
     camera = msgspec.structs.replace(
         moved.camera, fx_px=fx, fy_px=fy, cx_px=cx, cy_px=cy, distortion=(k1, k2, p1, p2, k3)
     )

@@ -1,4 +1,4 @@
-"""What a calibration found, as plain data for programs: `--report FILE` of its commands writes it.
+"""The result of a calibration as plain data for programs: `--report FILE` writes it.
 
 Lengths are metres, angles radians, places in a picture pixels; None stands for "not known".
 """
@@ -14,9 +14,9 @@ import numpy as np
 
 from scm.arrays import Floats, Image
 from scm.errors import EyeError
+from scm.eye.calibrate.assessment import CELLS, ViewAssessment
 from scm.eye.calibrate.board import View
 from scm.eye.calibrate.gather import Gathered
-from scm.eye.calibrate.judge import CELLS, Verdict
 from scm.eye.calibrate.locate import NAMES, Located, off_px
 from scm.eye.calibrate.solve import Solution
 from scm.eye.calibration import LENS_NAMES, Calibration
@@ -27,27 +27,27 @@ from scm.records.city_map import Camera, MapTag
 from scm.records.eye import TagSeen
 from scm.scenery.board import Board
 
-Told = dict[str, Any]
+Report = dict[str, Any]
 
 
-def write_report(told: Told, path: Path) -> None:
+def write_report(report: Report, path: Path) -> None:
     """Write a report as JSON.
 
     Raises:
-        EyeError: It cannot be written there.
+        EyeError: It cannot be written.
     """
     try:
-        path.write_text(json.dumps(told, allow_nan=False), encoding="utf-8")
+        path.write_text(json.dumps(report, allow_nan=False), encoding="utf-8")
     except OSError as error:
         raise EyeError(f"{path}: cannot write the report: {error}") from error
 
 
-def views_told(board: Board, gathered: Gathered) -> Told:
-    """Return in which pictures the board is, where, and how sharp."""
+def views_report(board: Board, gathered: Gathered) -> Report:
+    """Return the pictures with the board, its place and sharpness."""
     return {
         "size_px": list(gathered.size),
         "views": [_view(board, view) for view in gathered.views],
-        "said": list(gathered.said),
+        "said": list(gathered.remarks),
         "cover": _cover(gathered.views, gathered.size),
         "ray_std_px": None,
         "refused": [],
@@ -56,42 +56,44 @@ def views_told(board: Board, gathered: Gathered) -> Told:
     }
 
 
-def lens_told(board: Board, gathered: Gathered, solution: Solution, verdict: Verdict) -> Told:
-    """Return the same and what the views tell of the lens."""
-    told = views_told(board, gathered)
-    kept = zip(solution.views, solution.errors, verdict.tilts_rad, strict=True)
+def lens_report(
+    board: Board, gathered: Gathered, solution: Solution, assessment: ViewAssessment
+) -> Report:
+    """Return the same, with the lens."""
+    report = views_report(board, gathered)
+    used = zip(solution.views, solution.errors, assessment.tilts_rad, strict=True)
     more = {
-        view.name: {"rms_px": _rms(errors), "tilt_rad": float(tilt)} for view, errors, tilt in kept
+        view.name: {"rms_px": _rms(errors), "tilt_rad": float(tilt)} for view, errors, tilt in used
     }
-    for view in told["views"]:
+    for view in report["views"]:
         view.update(more.get(view["name"], {}))
         view["used"] = view["name"] in more
-    rays = [[_finite(float(ray)) for ray in row] for row in verdict.ray_std_px]
+    rays = [[_finite(float(ray)) for ray in row] for row in assessment.ray_std_px]
     return {
-        **told,
-        "said": [*gathered.said, *solution.said],
+        **report,
+        "said": [*gathered.remarks, *solution.remarks],
         "ray_std_px": rays,
-        "refused": list(verdict.refused),
-        "shots": list(verdict.shots),
+        "refused": list(assessment.refused),
+        "shots": list(assessment.shots),
         "lens": _lens(solution.calibration()),
     }
 
 
-def place_told(
+def place_report(
     camera: Camera,
     tags: Mapping[int, MapTag],
     seen: Sequence[TagSeen],
     located: Located,
     block: str,
-) -> Told:
-    """Return where a camera was found to hang, against where its map has it.
+) -> Report:
+    """Return where a camera was located, compared with its map.
 
     Args:
-        camera: As it is in force: of the map, with the map's own lens.
-        tags: By id, those whose place is known.
+        camera: As in force: of the map, with the map's own lens.
+        tags: Tags with known places, by id.
         seen: In the picture.
-        located: What was found.
-        block: Of the map file, with what was found.
+        located: The result.
+        block: Of the map file, with the result.
     """
     known = [tag for tag in seen if tag.tag_id in tags]
     before, after = camera_model(camera), located.places[0].model
@@ -113,7 +115,7 @@ def place_told(
     }
 
 
-def _view(board: Board, view: View) -> Told:
+def _view(board: Board, view: View) -> Report:
     grey = grey_of(read_picture(Path(view.name))) if Path(view.name).is_file() else None
     outline = cv2.convexHull(view.pixels.astype(np.float32)).reshape(-1, 2)
     return {
@@ -128,7 +130,7 @@ def _view(board: Board, view: View) -> Told:
 
 
 def _sharpness(board: Board, view: View, grey: Image) -> float:
-    """Return how steep the board's edges are, for views of one set: independent of size and light.
+    """Return the sharpness of the board's edges within a set: independent of size and light.
 
     The variance of the Laplacian over that of the picture, times the pixels of a square.
     """
@@ -154,7 +156,7 @@ def _cover(views: Sequence[View], size: tuple[int, int]) -> list[list[int]]:
     return [[int(count) for count in row] for row in counts]
 
 
-def _lens(calibration: Calibration) -> Told:
+def _lens(calibration: Calibration) -> Report:
     rows = zip(
         LENS_NAMES[calibration.lens], calibration.values, calibration.deviations, strict=True
     )
@@ -166,13 +168,13 @@ def _lens(calibration: Calibration) -> Told:
     return {"lens": calibration.lens, "rms_px": calibration.rms_px, "numbers": numbers}
 
 
-def _stance(camera: Camera) -> Told:
+def _stance(camera: Camera) -> Report:
     return {name: float(getattr(camera, name)) for name in NAMES}
 
 
 def _tag(
     tag: MapTag, seen: TagSeen, before: CameraModel, after: CameraModel, located: Located
-) -> Told:
+) -> Report:
     corners = np.array(seen.corners_px)
     was, now = (_rms(off_px(model, tag, corners)) for model in (before, after))
     sides = np.hypot(*(corners - np.roll(corners, 1, axis=0)).T)
@@ -188,7 +190,7 @@ def _tag(
 
 
 def _rms(errors: Floats) -> float:
-    """Return the root mean square of pixels off, (n, 2) [px]."""
+    """Return the RMS of deviations, (n, 2) [px]."""
     return math.sqrt(float((errors**2).sum(axis=1).mean()))
 
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from scm.clock import NS_PER_MS
+from scm.eye.calibration_state import MAX_STATES, CalibrationHistory
 from scm.eye.camera import camera_model
 from scm.eye.part import EyePart
-from scm.eye.sight import MOST_KEPT, SightRecord
 from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
 from scm.maps.load import load_map
@@ -57,7 +57,7 @@ class Still:
     def cover(self):
         self.shown[:] = 90
 
-    def take(self, now_ns, light):
+    def read(self, now_ns, light):
         del light
         if now_ns < self.due_ns:
             return None
@@ -87,7 +87,7 @@ class City:
 
     def __init__(self, still, city_map=CITY, state=None):
         still.due_ns = 0
-        self.eye = EyePart(city_map, source=still, kept=kept_in(state))
+        self.eye = EyePart(city_map, source=still, restored=restored_from(state))
         self.lockstep = Lockstep(())
         self.poses = self.lockstep.subscribe(Subscription(EyePose))
         self.statuses = self.lockstep.subscribe(Subscription(EyeStatus))
@@ -121,8 +121,8 @@ def off_mm(seen):
     return 1e3 * np.hypot(seen.x_m - CAR.x_m, seen.y_m - CAR.y_m)
 
 
-def kept_in(state):
-    return state and record(state, "calibrations", "eye", "overhead", SightRecord)
+def restored_from(state):
+    return state and record(state, "calibrations", "eye", "overhead", CalibrationHistory)
 
 
 def moved(**change):
@@ -273,12 +273,12 @@ def test_what_was_kept_lapses_when_the_map_file_is_changed(still):
     again = City(still, msgspec.structs.replace(CITY, cameras=(camera,)), state)
     assert again.in_force().now == Calibrated()
     assert again.told() == ["calibration_lapsed"]
-    assert kept_in(state) is None
+    assert restored_from(state) is None
 
 
 def test_of_many_the_last_and_the_first_can_be_put_back(still):
     city = City(still)
-    for number in range(MOST_KEPT + 3):
+    for number in range(MAX_STATES + 3):
         city.ask(calibration=f"lab-{number}", place=TRUE)
-    back = [city.ask(verb="back").in_force.now.place for _ in range(MOST_KEPT - 1)]
-    assert back == [f"lab-{number}" for number in range(MOST_KEPT + 1, 3, -1)] + [""]
+    back = [city.ask(verb="back").in_force.now.place for _ in range(MAX_STATES - 1)]
+    assert back == [f"lab-{number}" for number in range(MAX_STATES + 1, 3, -1)] + [""]

@@ -1,11 +1,11 @@
-"""Whether views of a board can tell a lens at all, and which further ones would.
+"""Assesses whether views of a board determine a lens, and which further views would.
 
-Decided by the covariance. What it means for the Eye is how far a pixel may be off its true ray,
-over the frame, once the camera's turn has taken up what it can: a lens whose middle is off by a
-pixel and whose camera is turned by as much sees the same. A set is refused when the focal length,
-the middle or those rays stay in the dark; the shots to add are those that would lighten them most,
-found by trying the information of a board held in each part of the frame, near and far, leaning
-each way.
+Based on the covariance. What matters to the Eye is the error of a pixel's ray, over the frame,
+after the camera's rotation has absorbed what it can: a lens whose centre is off by a pixel with a
+camera rotated accordingly gives the same result. A set is refused when the focal length, the centre
+or those rays are too uncertain; the suggested shots are those that reduce the uncertainty most,
+found by evaluating the information of a board held in each part of the frame, near and far, tilted
+in each direction.
 """
 
 import math
@@ -20,47 +20,47 @@ from scm.errors import EyeError
 from scm.eye.calibrate.solve import Solution, eliminate, inverse
 from scm.eye.camera import camera_model
 
-LEAST_VIEWS = 5
+MIN_VIEWS = 5
 FOCAL_SHARE = 0.01
-"""Standard deviation of fx or fy, over fx or fy, from which a set is refused."""
+"""Maximum standard deviation of fx or fy, over fx or fy."""
 MIDDLE_SHARE = 0.01
-"""Likewise of cx, cy over the frame's width."""
+"""Likewise of cx, cy, over the frame's width."""
 RAY_SHARE = 1e-3
-"""Likewise of a ray anywhere in the frame."""
+"""Likewise of any ray in the frame."""
 GOOD_RAY_SHARE = 3e-4
-"""Up to that no further shots are asked for."""
+"""Up to this ray std no further shots are suggested."""
 RMS_SHARE = 5e-4
-"""What may be left at the points over the frame's width."""
-LEAST_COVER = 0.35
-"""Share of the frame's cells that must hold points of the board."""
+"""Maximum RMS residual at the points, over the frame's width."""
+MIN_COVER = 0.35
+"""Minimum share of the frame's cells with points of the board."""
 NOT_SEPARABLE = 0.9
 CELLS = (8, 5)
-MOST_SHOTS = 5
-LEAN_RAD = math.radians(35.0)
+MAX_SHOTS = 5
+TILT_RAD = math.radians(35.0)
 _PRIOR = np.array([0.5, 0.5, 0.25, 0.25, 2.0, 2.0, 0.2, 0.2, 2.0])
 _PLACES = (0.2, 0.5, 0.8)
 _ACROSS, _DOWN = ("left", "centre", "right"), ("upper", "middle", "lower")
-_FOLDED = "show the board in the corners too, and tell a wide lens by --fisheye"
-_LEANS = {
-    "its right edge towards the camera": (0.0, LEAN_RAD, 0.0),
-    "its left edge towards the camera": (0.0, -LEAN_RAD, 0.0),
-    "its upper edge towards the camera": (LEAN_RAD, 0.0, 0.0),
-    "its lower edge towards the camera": (-LEAN_RAD, 0.0, 0.0),
+_FOLDED = "show the board in the corners too, and use --fisheye for a wide lens"
+_TILTS = {
+    "its right edge towards the camera": (0.0, TILT_RAD, 0.0),
+    "its left edge towards the camera": (0.0, -TILT_RAD, 0.0),
+    "its upper edge towards the camera": (TILT_RAD, 0.0, 0.0),
+    "its lower edge towards the camera": (-TILT_RAD, 0.0, 0.0),
 }
 _FILLS = {"a quarter": 0.25, "nearly half": 0.45}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Verdict:
-    """What a set of views is worth.
+class ViewAssessment:
+    """Assessment of a set of views.
 
     Attributes:
-        refused: Why no lens can be told from them, in words; empty: it can.
-        shots: What to add, in words.
+        refused: Why they determine no lens, in words; empty if they do.
+        shots: Views to add, in words.
         cover: Points of the board in each cell of the frame, (rows, columns).
-        ray_std_px: Doubt of the rays through the cells, (rows, columns) [px].
+        ray_std_px: Standard deviation of the rays through the cells, (rows, columns) [px].
         tilts_rad: Between the board and the picture, of each view, (n,).
-        fills: How much of the frame's width each board spans, (n,).
+        fills: Share of the frame's width that each board spans, (n,).
     """
 
     refused: tuple[str, ...]
@@ -71,48 +71,48 @@ class Verdict:
     fills: Floats
 
 
-def judge(solution: Solution) -> Verdict:
-    """Return what the views of a solution are worth."""
+def assess(solution: Solution) -> ViewAssessment:
+    """Return the assessment of a solution's views."""
     cover, (tilts, fills) = _cover(solution), _stances(solution)
     blind = np.full(cover.shape, np.inf)
     try:
         by_lens = _by_lens(solution)
     except EyeError as error:
         refused = [*_unknown_focus(solution, tilts), f"{error}: {_FOLDED}"]
-        return Verdict(tuple(refused), _general(), cover, blind, tilts, fills)
+        return ViewAssessment(tuple(refused), _general(), cover, blind, tilts, fills)
     covariance = solution.covariance
     rays = _ray_std(by_lens, covariance) if np.isfinite(covariance).all() else blind
     refused = _refusals(solution, cover, rays, tilts)
     shots = _shots(solution, by_lens, bool(refused))
-    return Verdict(tuple(refused), tuple(shots), cover, rays, tilts, fills)
+    return ViewAssessment(tuple(refused), tuple(shots), cover, rays, tilts, fills)
 
 
 def _refusals(solution: Solution, cover: Ints, rays: Floats, tilts: Floats) -> list[str]:
-    width, views, said = solution.size[0], len(solution.views), []
-    if views < LEAST_VIEWS:
-        said.append(f"too few views: expected at least {LEAST_VIEWS}, got {views}")
+    width, views, faults = solution.size[0], len(solution.views), []
+    if views < MIN_VIEWS:
+        faults.append(f"too few views: expected at least {MIN_VIEWS}, got {views}")
     if solution.rms_px > RMS_SHARE * width:
-        said.append(
-            f"the points are {solution.rms_px:.2f} px off any lens of this kind (at most "
+        faults.append(
+            f"the points deviate by {solution.rms_px:.2f} px from any lens of this kind (at most "
             f"{RMS_SHARE * width:.2f}): a bent board, motion, or a wide lens without --fisheye"
         )
-    said += _unknown_focus(solution, tilts)
+    faults += _unknown_focus(solution, tilts)
     middle = float(np.sqrt(np.diag(solution.covariance)[2:4]).max())
     if middle > MIDDLE_SHARE * width:
-        said.append(
+        faults.append(
             f"the picture's middle is known to +-{middle:.1f} px only (at most "
-            f"{MIDDLE_SHARE * width:.1f}): the board leans too little, or always the same way"
+            f"{MIDDLE_SHARE * width:.1f}): the board is tilted too little, or always the same way"
         )
     covered = float((cover > 0).mean())
-    if covered < LEAST_COVER:
+    if covered < MIN_COVER:
         seen = f"the board was seen in {covered:.0%} of the frame"
-        said.append(f"{seen} (at least {LEAST_COVER:.0%}): the rest of the lens is guessed")
+        faults.append(f"{seen} (at least {MIN_COVER:.0%}): the rest of the lens is extrapolated")
     if not rays.max() <= RAY_SHARE * width:
-        said.append(
+        faults.append(
             f"the ray through a pixel at the frame's {_darkest(rays)} is known to "
             f"+-{rays.max():.2f} px only (at most {RAY_SHARE * width:.2f})"
         )
-    return said
+    return faults
 
 
 def _unknown_focus(solution: Solution, tilts: Floats) -> list[str]:
@@ -128,11 +128,11 @@ def _unknown_focus(solution: Solution, tilts: Floats) -> list[str]:
     )
     if abs(correlation) < NOT_SEPARABLE:
         return [f"the focal length is not known: {known} (at most {FOCAL_SHARE:.0%})"]
-    lean = f"{math.degrees(tilts.min()):.0f} to {math.degrees(tilts.max()):.0f} deg"
+    tilt = f"{math.degrees(tilts.min()):.0f} to {math.degrees(tilts.max()):.0f} deg"
     return [
-        f"focal length and distance cannot be told apart: {known} (at most {FOCAL_SHARE:.0%}), and "
+        f"focal length and distance cannot be separated: {known} (at most {FOCAL_SHARE:.0%}), and "
         f"goes with the boards' distance (correlation {correlation:.4f}), because every board "
-        f"stands nearly parallel to the picture (it seems to lean {lean})"
+        f"stands nearly parallel to the picture (its tilt seems to be {tilt})"
     ]
 
 
@@ -146,17 +146,17 @@ def _cover(solution: Solution) -> Ints:
 
 
 def _stances(solution: Solution) -> tuple[Floats, Floats]:
-    """Return how far each board leans [rad] and how much of the frame's width it spans."""
+    """Return each board's tilt [rad] and the share of the frame's width it spans."""
     normals = np.array([cv2.Rodrigues(pose[:3])[0][2, 2] for pose in solution.poses])
     spans = np.array([np.ptp(view.pixels, axis=0).max() for view in solution.views])
     return np.arccos(np.clip(np.abs(normals), 0.0, 1.0)), spans / solution.size[0]
 
 
 def _by_lens(solution: Solution) -> Floats:
-    """Return how the rays through the cells change by the lens, the turn taken out, (2n, 9).
+    """Return the derivative of the cells' rays by the lens, rotation removed, (2n, 9).
 
     Raises:
-        EyeError: The lens cannot be one of a camera.
+        EyeError: The lens is invalid.
     """
     (columns, rows), (width, height) = CELLS, solution.size
     across = (np.arange(columns) + 0.5) * width / columns - 0.5
@@ -188,26 +188,31 @@ def _place(across: float, down: float) -> str:
 
 
 def _shots(solution: Solution, by_lens: Floats, refused: bool) -> list[str]:
-    """Return the shots that would tell most, one after the other, until enough is known."""
+    """Return the most informative shots, one after the other, until enough is known."""
     width, free = solution.size[0], solution.lens.free
     scale = np.where(np.arange(9) < 4, width, 1.0) * _PRIOR
     known = solution.information / solution.corner_std_px**2 + np.diag(scale**-2.0)
-    tried = [(words, told / solution.corner_std_px**2) for words, told in _candidates(solution)]
+    tried = [
+        (words, information / solution.corner_std_px**2)
+        for words, information in _candidates(solution)
+    ]
     shots: list[str] = []
-    while tried and len(shots) < MOST_SHOTS:
-        doubt = _ray_std(by_lens, inverse(known, free))
-        if doubt.max() <= GOOD_RAY_SHARE * width and not (refused and len(shots) < 2):
+    while tried and len(shots) < MAX_SHOTS:
+        std_px = _ray_std(by_lens, inverse(known, free))
+        if std_px.max() <= GOOD_RAY_SHARE * width and not (refused and len(shots) < 2):
             break
-        left = [_ray_std(by_lens, inverse(known + told, free)).max() for _, told in tried]
-        words, told = tried.pop(int(np.argmin(left)))
-        known = known + told
+        left = [
+            _ray_std(by_lens, inverse(known + information, free)).max() for _, information in tried
+        ]
+        words, information = tried.pop(int(np.argmin(left)))
+        known = known + information
         shots.append(words)
-    short = LEAST_VIEWS - len(solution.views)
+    short = MIN_VIEWS - len(solution.views)
     return shots or (list(_general()) if refused or short > 0 else [])
 
 
 def _candidates(solution: Solution) -> Iterator[tuple[str, Floats]]:
-    """Yield shots in words, and what each would tell of the lens for corners of 1 px, (9, 9)."""
+    """Yield shots in words, and each one's information on the lens for 1 px corners, (9, 9)."""
     lens, (width, height) = solution.lens, solution.size
     model = camera_model(solution.calibration().camera())
     points = max(solution.views, key=lambda view: len(view.points)).points
@@ -219,26 +224,26 @@ def _candidates(solution: Solution) -> Iterator[tuple[str, Floats]]:
             ideal = model.undistort(pixel)
             if not np.isfinite(ideal).all():
                 continue
-            for fill_said, fill in _FILLS.items():
+            for fill_text, fill in _FILLS.items():
                 ray = np.array([*ideal, 1.0])
                 far = ray / np.linalg.norm(ray) * lens.values[0] * span / (fill * width)
-                for lean_said, lean in _LEANS.items():
-                    turn = cv2.Rodrigues(np.array(lean))[0]
-                    pose = np.concatenate((lean, far - turn @ middle))
+                for tilt_text, tilt in _TILTS.items():
+                    turn = cv2.Rodrigues(np.array(tilt))[0]
+                    pose = np.concatenate((tilt, far - turn @ middle))
                     pixels, by_lens, by_pose = lens.see(points, pose)
                     if not (np.all(pixels >= 0.0) and np.all(pixels < (width, height))):
                         continue
                     words = (
-                        f"the board in the frame's {_place(across, down)}, {lean_said} by "
-                        f"{math.degrees(LEAN_RAD):.0f} deg, spanning {fill_said} of its width"
+                        f"the board in the frame's {_place(across, down)}, {tilt_text} by "
+                        f"{math.degrees(TILT_RAD):.0f} deg, spanning {fill_text} of its width"
                     )
                     yield words, eliminate(by_lens, by_pose)
 
 
 def _general() -> tuple[str, ...]:
     return tuple(
-        f"the board in the frame's {where}, {lean} by {math.degrees(LEAN_RAD):.0f} deg"
-        for where, lean in zip(
-            ("lower left", "upper right", "lower right", "upper left"), _LEANS, strict=True
+        f"the board in the frame's {where}, {tilt} by {math.degrees(TILT_RAD):.0f} deg"
+        for where, tilt in zip(
+            ("lower left", "upper right", "lower right", "upper left"), _TILTS, strict=True
         )
     )

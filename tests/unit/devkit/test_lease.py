@@ -6,10 +6,10 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.v2x.message import Refused
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
-from vehicle_agent.devkit.commands import CarWish
-from vehicle_agent.devkit.wheel import RENEW_NS, Wheel
+from vehicle_agent.devkit.commands import CarCommand
+from vehicle_agent.devkit.lease import RENEW_NS, CarLease
 
-WISH = CarWish(0.5, -0.25, headlights="low", indicators="hazard")
+WISH = CarCommand(0.5, -0.25, headlights="low", indicators="hazard")
 
 
 def lease(epoch=4, owner="me"):
@@ -18,7 +18,7 @@ def lease(epoch=4, owner="me"):
 
 @pytest.fixture
 def wheel():
-    made = Wheel("n1", "me")
+    made = CarLease("n1", "me")
     (call,) = made.step(0, WISH, 0)
     assert (call.request.verb, call.request.owner) == ("acquire", "me")
     made.replied(call.request, lease())
@@ -54,7 +54,7 @@ def test_the_lease_is_renewed_five_times_in_its_life(wheel):
 
 
 def test_a_refusal_is_said_once_and_another_one_anew(caplog):
-    wheel = Wheel("n1", "me")
+    wheel = CarLease("n1", "me")
     (call,) = wheel.step(0, WISH, 0)
     for why in ("ada drives", "ada drives", "no such car"):
         wheel.replied(call.request, Refused(code="owned", detail=why))
@@ -64,7 +64,7 @@ def test_a_refusal_is_said_once_and_another_one_anew(caplog):
 
 
 def test_anothers_lease_is_none():
-    wheel = Wheel("n1", "me")
+    wheel = CarLease("n1", "me")
     (call,) = wheel.step(0, WISH, 0)
     wheel.replied(call.request, lease(owner="ada"))
     assert told(wheel, 1, 1) == []

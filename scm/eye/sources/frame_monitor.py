@@ -1,17 +1,24 @@
-"""What becomes of each frame of a live camera, and what to say of it; without a thread or clock."""
+"""Checks, time stamps and counts the frames of a live camera; without a thread or clock."""
 
 import dataclasses
 from dataclasses import dataclass
 
+import numpy as np
+
+from scm.arrays import Image
 from scm.clock import NS_PER_S, seconds
 from scm.eye.source import Frame, Stamped
 from scm.eye.sources.camera_clock import CameraClock
 from scm.eye.sources.capture import Grabbed
-from scm.eye.sources.frame_check import FrameCheck
 
 STALL_NS = NS_PER_S
 HOLD_NS = NS_PER_S
 AGE_LARGEST_NS = 5 * NS_PER_S
+SAMPLE_STEP_PX = 16
+FROZEN_NS = NS_PER_S
+BLACK, BLACK_SHARE = 20, 0.995
+WHITE, WHITE_SHARE = 252, 0.5
+FLAT_LEVELS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,12 +26,12 @@ class Tally:
     """Counts since the start.
 
     Attributes:
-        good: Frames that could be used.
-        passed_over: Good ones that a newer one replaced before anybody took them.
+        good: Usable frames.
+        passed_over: Good ones replaced by a newer one before they were read.
         damaged: Frames that could not be decoded.
-        repeated: Frames with the time of the one before, or an earlier one.
+        repeated: Frames with the time of the previous one, or an earlier one.
         resized: Frames of another size than the first one.
-        opened: How often the camera was opened.
+        opened: Number of times the camera was opened.
     """
 
     good: int = 0
@@ -35,14 +42,47 @@ class Tally:
     opened: int = 0
 
 
-class Watch:
+class FrameCheck:
+    """Checks whether the frames of one live camera show anything."""
+
+    def __init__(self) -> None:
+        self._last = np.empty((0, 0), dtype=np.uint8)
+        self._since_ns = 0
+
+    def look(self, image: Image, t_ns: int) -> str | None:
+        """Return what is wrong with a frame that arrived at `t_ns`, None if nothing is."""
+        some = image[::SAMPLE_STEP_PX, ::SAMPLE_STEP_PX]
+        some = np.ascontiguousarray(some if some.ndim == 2 else some[..., 1])
+        if not np.array_equal(some, self._last):
+            self._last, self._since_ns = some, t_ns
+        return _empty(some) or self._frozen(t_ns)
+
+    def _frozen(self, t_ns: int) -> str | None:
+        still_ns = t_ns - self._since_ns
+        if still_ns <= FROZEN_NS:
+            return None
+        return f"frames are frozen: the same picture for {still_ns / NS_PER_S:.1f} s"
+
+
+def _empty(some: Image) -> str | None:
+    if np.count_nonzero(some <= BLACK) >= BLACK_SHARE * some.size:
+        return "frames are black"
+    white = np.count_nonzero(some >= WHITE) / some.size
+    if white > WHITE_SHARE:
+        return f"frames are overexposed: {100.0 * white:.0f} % of the picture is white"
+    if int(some.max()) - int(some.min()) < FLAT_LEVELS:
+        return f"frames are one flat grey of {int(some.mean())}"
+    return None
+
+
+class FrameMonitor:
     """One live camera's frames: checked, stamped, counted.
 
     Args:
-        delay_ns: From exposure to arrival at the least, where the camera's stamps cannot tell.
+        delay_ns: Minimum delay from exposure to arrival, for cameras without usable stamps.
 
     Attributes:
-        tally: What came so far.
+        tally: Counts so far.
     """
 
     def __init__(self, delay_ns: int = 0) -> None:
@@ -52,38 +92,38 @@ class Watch:
         self._clock = CameraClock()
         self._size: tuple[int, int] | None = None
         self._frame_ns: int | None = None
-        self._heard_ns: int | None = None
+        self._arrival_ns: int | None = None
         self._gone: str | None = None
         self._resized: str | None = None
         self._empty: str | None = None
         self._damaged: tuple[int, str] | None = None
 
     def begin(self, now_ns: int) -> None:
-        """Count the time without a frame from here on."""
-        if self._heard_ns is None:
-            self._heard_ns = now_ns
+        """Start to count the time without a frame."""
+        if self._arrival_ns is None:
+            self._arrival_ns = now_ns
 
     def opened(self) -> None:
         """Note that the camera was opened, perhaps again: its clock is a new one."""
         self._clock = CameraClock()
         self._count(opened=1)
 
-    def gone(self, said: str) -> None:
+    def gone(self, text: str) -> None:
         """Note that there is no camera now."""
-        self._gone = said
+        self._gone = text
 
-    def damaged(self, said: str, now_ns: int) -> None:
+    def damaged(self, text: str, now_ns: int) -> None:
         """Note a frame that could not be decoded."""
         self._count(damaged=1)
-        self._damaged = (now_ns, said)
+        self._damaged = (now_ns, text)
 
     def passed_over(self) -> None:
-        """Note that nobody took a frame."""
+        """Note that a frame was not read."""
         self._count(passed_over=1)
 
     def accept(self, grabbed: Grabbed, arrival_ns: int) -> Frame | None:
-        """Return the frame with its time, None where it must not be used."""
-        self._heard_ns = arrival_ns
+        """Return the frame with its time, None if it must not be used."""
+        self._arrival_ns = arrival_ns
         self._gone = None
         self._empty = self._check.look(grabbed.image, arrival_ns)
         if not self._is_first_size(grabbed):
@@ -99,20 +139,20 @@ class Watch:
 
     def trouble(self, now_ns: int) -> str | None:
         """Return what is wrong now, the worst first."""
-        said = [self._gone, self._silence(now_ns), self._resized]
+        text = [self._gone, self._silence(now_ns), self._resized]
         if self._damaged is not None and now_ns - self._damaged[0] < HOLD_NS:
-            said.append(f"{self._damaged[1]} ({self.tally.damaged} damaged so far)")
+            text.append(f"{self._damaged[1]} ({self.tally.damaged} damaged so far)")
         if self._gone is None:
-            said += [self._empty, *self._clock.trouble(now_ns)]
-        return "; ".join(text for text in said if text) or None
+            text += [self._empty, *self._clock.trouble(now_ns)]
+        return "; ".join(text for text in text if text) or None
 
     def _silence(self, now_ns: int) -> str | None:
-        if self._heard_ns is None or now_ns - self._heard_ns <= STALL_NS:
+        if self._arrival_ns is None or now_ns - self._arrival_ns <= STALL_NS:
             return None
-        return f"no frame for {seconds(now_ns - self._heard_ns):.1f} s"
+        return f"no frame for {seconds(now_ns - self._arrival_ns):.1f} s"
 
     def _is_first_size(self, grabbed: Grabbed) -> bool:
-        """Return whether the frame has the size of the first one: a lens is known for one size."""
+        """Return whether the frame has the first one's size: a lens is calibrated for one size."""
         size = (grabbed.image.shape[1], grabbed.image.shape[0])
         self._size = self._size or size
         (width, height), (first_width, first_height) = size, self._size

@@ -1,4 +1,4 @@
-"""What the Eye found, as the messages that tell it, and poses by other cameras as sightings."""
+"""Conversions between the Eye's results and messages."""
 
 import numpy as np
 
@@ -23,13 +23,13 @@ def pose_message(sighting: Sighting, map_tag_age_ms: float) -> EyePose:
         covariance=_rows(sighting.covariance),
         map_tag_age_ms=map_tag_age_ms,
         shared_covariance=None if sighting.shared is None else _rows(sighting.shared),
-        lean_covariance=None if sighting.lean is None else _rows(sighting.lean),
+        lean_covariance=None if sighting.common_mode is None else _rows(sighting.common_mode),
         flags=sighting.flags,
     )
 
 
 def sighting_of(message: EyePose) -> Sighting:
-    """Return what another camera's part tells of a car."""
+    """Return another camera's message as a sighting."""
     return Sighting(
         camera=message.camera,
         tag_id=message.tag_id,
@@ -38,7 +38,7 @@ def sighting_of(message: EyePose) -> Sighting:
         pose=Pose2(message.x_m, message.y_m, message.yaw_rad),
         covariance=_square(message.covariance),
         shared=None if message.shared_covariance is None else _square(message.shared_covariance),
-        lean=None if message.lean_covariance is None else _square(message.lean_covariance),
+        common_mode=None if message.lean_covariance is None else _square(message.lean_covariance),
         flags=message.flags,
     )
 
@@ -46,13 +46,13 @@ def sighting_of(message: EyePose) -> Sighting:
 def sighting(
     camera: str, t_ns: int, tag_id: int, vehicle: str, found: PoseEstimate, flags: tuple[str, ...]
 ) -> Sighting:
-    """Return what one camera says of a car."""
+    """Return one camera's pose of a car as a sighting."""
     return Sighting(camera, tag_id, vehicle, t_ns, found.pose, found.covariance, found.shared,
-                    found.lean, flags)  # fmt: skip
+                    found.common_mode, flags)  # fmt: skip
 
 
 def track_message(track: Track) -> EyeTrack:
-    """Return where a car is, by all cameras."""
+    """Return a track as a message."""
     a, b, c, d, e, f = (_six(row) for row in track.covariance)
     return EyeTrack(
         vehicle=track.vehicle,

@@ -1,4 +1,4 @@
-"""A keeper of the cable that says when it knows of a zero throttle, and when it has sent it."""
+"""A serial watchdog that reports when it knows of a zero throttle, and when it has sent it."""
 
 import sys
 import time
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from scm.clock import Clock
 from vehicle_agent.nigel import serial_watchdog
 from vehicle_agent.nigel.cable import Cable
-from vehicle_agent.nigel.host import Host, Wish
+from vehicle_agent.nigel.host import Host, NigelCommand
 
 
 def say(what: str) -> None:
@@ -16,14 +16,14 @@ def say(what: str) -> None:
 
 
 class WatchedHost(Host):
-    """A host that tells when what it is wished falls to zero."""
+    """A host that reports when its commanded throttle falls to zero."""
 
     _watched_moves = False
     owes = False
 
-    def say(self, wish: Wish, now_ns: int) -> list[bytes]:
+    def frames_due(self, wish: NigelCommand, now_ns: int) -> list[bytes]:
         self.note(wish.throttle)
-        return super().say(wish, now_ns)
+        return super().frames_due(wish, now_ns)
 
     def note(self, throttle: float) -> None:
         if self._watched_moves and throttle == 0.0:
@@ -32,8 +32,8 @@ class WatchedHost(Host):
         self._watched_moves = throttle != 0.0
 
 
-class WatchedKeeper(serial_watchdog.Keeper):
-    """A keeper that tells when it is to end."""
+class WatchedWatchdog(serial_watchdog.SerialWatchdog):
+    """A watchdog that reports when it ends."""
 
     def finish(self, clock: Clock) -> None:
         self._host.note(0.0)
@@ -41,7 +41,7 @@ class WatchedKeeper(serial_watchdog.Keeper):
 
 
 class WatchedCable(Cable):
-    """A cable that tells when the first zeros were written."""
+    """A cable that reports when the first zeros were written."""
 
     def write(self, frames: Sequence[bytes]) -> None:
         super().write(frames)
@@ -52,6 +52,6 @@ class WatchedCable(Cable):
 
 if __name__ == "__main__":
     setattr(serial_watchdog, "Cable", WatchedCable)  # noqa: B010
-    setattr(serial_watchdog, "Keeper", WatchedKeeper)  # noqa: B010
-    setattr(serial_watchdog, "Host", WatchedHost)  # noqa: B010 what the keeper makes its host of
+    setattr(serial_watchdog, "SerialWatchdog", WatchedWatchdog)  # noqa: B010
+    setattr(serial_watchdog, "Host", WatchedHost)  # noqa: B010 the class of its host
     serial_watchdog.main(sys.argv[1:])

@@ -9,7 +9,7 @@ import pytest
 from scm.__main__ import main
 from scm.eye.calibrate.board import find_board
 from scm.eye.calibrate.gather import Gathered
-from scm.eye.calibrate.told import views_told
+from scm.eye.calibrate.report import views_report
 from scm.scenery.board import Board
 
 WORDS = ["--squares", "9x6", "--square-m", "0.03"]
@@ -65,7 +65,7 @@ def test_a_blurred_board_is_told_from_a_sharp_one(tmp_path):
         path = tmp_path / f"{blur}.png"
         cv2.imwrite(str(path), board_picture(blur))
         view = find_board(board, cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), str(path))
-        told = views_told(board, Gathered((view,), (1200, 600), ()))
+        told = views_report(board, Gathered((view,), (1200, 600), ()))
         return told["views"][0]["sharpness"]
 
     assert sharpness(1.6) < 0.4 * sharpness(0.6)

@@ -7,13 +7,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from scm.eye.anchor import Anchor
 from scm.eye.camera import camera_model
+from scm.eye.camera_monitor import CameraMonitor
+from scm.eye.extrinsics import ExtrinsicsEstimator
 from scm.eye.pose import car_pose
 from scm.eye.render.car import tag_on_roof
 from scm.eye.source import Frame
 from scm.eye.sources.synthetic import SyntheticSource
-from scm.eye.watch import Watch
 from scm.maps.load import load_map
 from scm.records.city_map import MapTag
 from scm.scenery.bodies import NIGEL
@@ -48,18 +48,18 @@ class Camera:
         self.passed_over = set() if sharpness else {"dim", "focus"}
         self.at = TRUE
         self.picture = picture
-        self.watch = Watch(Anchor(calibrated, tags))
+        self.watch = CameraMonitor(ExtrinsicsEstimator(calibrated, tags))
         self.rng = np.random.default_rng(seed)
         self.now_ns = 0
 
     def see(self, frames=1, tags=None, grey=None, frozen=False):
-        anchor = self.watch.anchor
+        estimator = self.watch.estimator
         for _ in range(frames):
             self.now_ns += PERIOD_NS
             found = {
-                one.tag_id: anchor.expected(one, self.at)
+                one.tag_id: estimator.expected(one, self.at)
                 + NOISE_PX * self.rng.standard_normal((4, 2))
-                for one in (anchor.map_tags if tags is None else tags)
+                for one in (estimator.map_tags if tags is None else tags)
             }
             shown = (self.picture if grey is None else grey).copy()
             shown[0, 0] = 255 if frozen else self.now_ns // PERIOD_NS % 251
@@ -159,7 +159,7 @@ def worst_error_m(camera):
                 speed_mps=0.0, steering_rad=0.0,
             )  # fmt: skip
             corners = camera.at.project(tag_on_roof(car))
-            pose = car_pose(camera.watch.anchor, NIGEL, corners).pose
+            pose = car_pose(camera.watch.estimator, NIGEL, corners).pose
             errors.append(math.dist(pose[:2], (x, y)))
     return max(errors)
 
@@ -233,17 +233,17 @@ def test_a_tag_that_moves_back_and_forth_once_stays_suspect_with_one_tag(picture
 def test_a_camera_whose_place_is_known_poorly_is_said_to_be_unsure_until_more_tags_are_seen():
     std = (0.015, 0.018, 0.015, 0.0027, 0.0065, 0.0065)
     doubted = camera_model(msgspec.structs.replace(CITY.cameras[0], place_std=std))
-    watch = Watch(Anchor(doubted, FOUR))
+    watch = CameraMonitor(ExtrinsicsEstimator(doubted, FOUR))
     grey = np.full((720, 1280), 128, dtype=np.uint8)
-    one = {CITY.tag.tag_id: watch.anchor.expected(CITY.tag)}
+    one = {CITY.tag.tag_id: watch.estimator.expected(CITY.tag)}
     for frame in range(3):
         watch.see(frame * PERIOD_NS, grey, one)
     assert "unsure" in watch.flags(0)
-    watch.see(3 * PERIOD_NS, grey, {tag.tag_id: watch.anchor.expected(tag) for tag in FOUR})
+    watch.see(3 * PERIOD_NS, grey, {tag.tag_id: watch.estimator.expected(tag) for tag in FOUR})
     assert "unsure" not in watch.flags(0)
 
 
 def test_a_camera_without_stated_doubt_is_sure_with_one_tag():
-    watch = Watch(Anchor(TRUE, (CITY.tag,)))
-    watch.see(0, np.full((720, 1280), 128, dtype=np.uint8), {0: watch.anchor.expected(CITY.tag)})
+    watch = CameraMonitor(ExtrinsicsEstimator(TRUE, (CITY.tag,)))
+    watch.see(0, np.full((720, 1280), 128, dtype=np.uint8), {0: watch.estimator.expected(CITY.tag)})
     assert "unsure" not in watch.flags(0)
