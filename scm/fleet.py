@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import msgspec
 
@@ -30,6 +30,7 @@ from scm.errors import RunError, ScmError, VoidError, nearest
 from scm.log import event
 from scm.maps.load import load_map
 from scm.records.disturbances import Disturbance
+from scm.runtime.city_link import Keep, Link
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Part, Subscription
 from scm.traffic.monitor.part import MonitorPart
@@ -48,7 +49,6 @@ from scm.v2x.request_retry import send_request
 from scm.world.part import WorldPart
 
 R = TypeVar("R", bound=Message)
-Keep = Callable[[Incoming], bool]
 THEN = ("circulate", "stop")
 MAILBOX_DEPTH = 1000
 FILTERED_MAILBOX_DEPTH = 1_000_000  # never full: it stores at most one arrival per car
@@ -57,34 +57,6 @@ REPLY_TIMEOUT_S = (
 )
 
 _log = logging.getLogger(__name__)
-
-
-class Link(Protocol):
-    """How a script reaches a city: live or in lockstep."""
-
-    @property
-    def now_ns(self) -> int:
-        """The city's time [ns]."""
-        ...
-
-    def request(self, request: Request) -> Message:
-        """Return the reply to a request, or a `Refused`."""
-        ...
-
-    def subscribe(self, subscription: Subscription, keep: Keep | None = None) -> Mailbox:
-        """Return a mailbox that fills from now on with the messages that `keep` accepts.
-
-        `keep` may be called on another thread.
-        """
-        ...
-
-    def publish(self, message: Message) -> None:
-        """Send a message from the script."""
-        ...
-
-    def run_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Let the city run until `done()`; return whether that was in time."""
-        ...
 
 
 class LockstepLink:

@@ -25,9 +25,9 @@ from scm.scenery.sheet import TABLE, FloorSheet, paint_floor, printed_tag, wall_
 from scm.scenery.solids import rectangle
 from scm.scenery.tags import PRINT_SCALE
 
-MOST_TEXELS = 14e6
+MAX_TEXELS = 14e6
 FINEST_TEXELS_PER_M = 1000.0
-PATCHES_KEPT = 8
+MAX_PATCHES = 8
 LEAST_UPRIGHT = 0.01
 """Of a camera that looks straight up or down the horizon is as far away as this says."""
 ASLANT = 1.3
@@ -60,7 +60,7 @@ class Floor:
         self._patches: OrderedDict[tuple[Ring, int, int], Drawing] = OrderedDict()
         x0, y0, x1, y1 = bounds(city_map)
         size = np.array([x1 - x0, y1 - y0]) + 2 * BESIDE_M
-        fits = min(FINEST_TEXELS_PER_M, math.sqrt(MOST_TEXELS / float(size.prod())))
+        fits = min(FINEST_TEXELS_PER_M, math.sqrt(MAX_TEXELS / float(size.prod())))
         self.whole: Drawing | None = None
         if fits >= FINE.texels_per_m:
             corner = (x0 - BESIDE_M, y1 + BESIDE_M)
@@ -100,7 +100,7 @@ class Floor:
             size = np.array([ring.size_m, ring.size_m])
             beyond = colour_of(self._map.floor.colour)
             self._patches[key] = self._drawn(around, corner, size, ring.texels_per_m, beyond)
-            if len(self._patches) > PATCHES_KEPT:
+            if len(self._patches) > MAX_PATCHES:
                 self._patches.popitem(last=False)
         self._patches.move_to_end(key)
         return self._patches[key], half - float(np.abs(at - (x, y)).max())

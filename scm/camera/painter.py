@@ -15,7 +15,7 @@ NEAREST_M = 0.02
 FARTHEST_PX = 1.0e4
 """Corners farther out are pulled in: OpenCV counts in 32 bits, 4 of them fractions."""
 HALO = 0.55
-MOST_HALO_PX = 120.0
+MAX_HALO_PX = 120.0
 
 
 class Thing(NamedTuple):
@@ -58,7 +58,7 @@ class Painter:
         fall = np.clip(1.0 - np.hypot(x, y), 0.0, 1.0) ** 2
         self._halo = np.rint(255.0 * fall).astype(np.uint8)
 
-    def in_sight(self, view: View, middles: Floats, radii: Floats) -> Bools:
+    def visible(self, view: View, middles: Floats, radii: Floats) -> Bools:
         """Return of which balls any part can be in the picture, (n, 3) and (n,) [m] to (n,)."""
         x, y, z = view.seen(middles).T
         a, b = self._reach
@@ -69,7 +69,7 @@ class Painter:
 
     def sees(self, view: View, middle: Floats, radius: float) -> bool:
         """Return whether any of a ball can be in the picture."""
-        return bool(self.in_sight(view, middle[None], np.array([radius]))[0])
+        return bool(self.visible(view, middle[None], np.array([radius]))[0])
 
     def paint(self, canvas: Image, view: View, things: list[Thing]) -> None:
         """Paint things, the farthest first."""
@@ -84,7 +84,7 @@ class Painter:
             return []
         middles = np.array([thing.middle for thing in things])
         radii = np.array([thing.radius for thing in things])
-        found = np.flatnonzero(self.in_sight(view, middles, radii))
+        found = np.flatnonzero(self.visible(view, middles, radii))
         return [things[i] for i in found]
 
     def shade(self, canvas: Image, view: View, outline: Floats, keep: float) -> None:
@@ -147,7 +147,7 @@ class Painter:
 
     def _glow(self, canvas: Image, ring: Ints, colour: list[float], wide: float) -> None:
         middle = ring.mean(axis=0) / (1 << SHIFT)
-        reach = min(MOST_HALO_PX, wide * float(np.ptp(ring, axis=0).max()) / (2 << SHIFT))
+        reach = min(MAX_HALO_PX, wide * float(np.ptp(ring, axis=0).max()) / (2 << SHIFT))
         low = np.floor(middle - reach).astype(int)
         size = int(2 * reach) + 1
         height, width = canvas.shape[:2]
@@ -164,14 +164,14 @@ class Painter:
 
 def _in_front(ring: Floats) -> Floats:
     """Return the part of a polygon in the camera's frame, (n, 3), that lies before the lens."""
-    kept = []
+    corners_in_front = []
     for here, there in zip(ring, np.roll(ring, -1, axis=0), strict=True):
         if here[2] >= NEAREST_M:
-            kept.append(here)
+            corners_in_front.append(here)
         if (here[2] >= NEAREST_M) != (there[2] >= NEAREST_M):
             share = (NEAREST_M - here[2]) / (there[2] - here[2])
-            kept.append(here + share * (there - here))
-    return np.array(kept).reshape(-1, 3)
+            corners_in_front.append(here + share * (there - here))
+    return np.array(corners_in_front).reshape(-1, 3)
 
 
 def _fixed(ring: Floats) -> Ints:

@@ -27,11 +27,11 @@ from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
-LOOK_NS = 100 * NS_PER_MS
+SUBSCRIBER_CHECK_NS = 100 * NS_PER_MS
 FLASH_NS = 500 * NS_PER_MS
 FARTHEST_M = 12.0
 """Cars farther away are not drawn: a Nigel is 15 pixels wide there."""
-AWAKE = (Subscription(WorldSnapshot), Subscription(Spat))
+ACTIVE_SUBSCRIPTIONS = (Subscription(WorldSnapshot), Subscription(Spat))
 ASLEEP: tuple[Subscription, ...] = ()
 
 Which = tuple[str, str]
@@ -43,7 +43,7 @@ class _Counted:
     """What the part tells of itself."""
 
     frames: int = 0
-    told_ns: int = 0
+    published_ns: int = 0
     wanted: set[Which] = field(default_factory=set)
 
 
@@ -90,25 +90,25 @@ class CameraPart(BasePart):
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Look whether anybody wants pictures; make those that are due."""
         if self._look_ns is None or now_ns >= self._look_ns:
-            self._look_ns = now_ns + LOOK_NS
+            self._look_ns = now_ns + SUBSCRIBER_CHECK_NS
             self._look()
         status = self._status(now_ns)
         if not self.subscriptions:
             return status
-        heard_ns: int | None = None
+        received_ns: int | None = None
         for item in inbox:
             if isinstance(item.message, Spat):
                 self._spats[item.message.junction] = item.message
             elif isinstance(item.message, WorldSnapshot):
                 self._snapshots = [*self._snapshots[-1:], item.message]
-                heard_ns = min(item.t_ns, now_ns)
-        if heard_ns is not None:
-            self._expose(heard_ns)
+                received_ns = min(item.t_ns, now_ns)
+        if received_ns is not None:
+            self._expose(received_ns)
         return [*self._under_way.come_out(now_ns), *status]
 
     def _look(self) -> None:
         if self._is_wanted(CameraFrame, {}):
-            self.subscriptions = AWAKE
+            self.subscriptions = ACTIVE_SUBSCRIPTIONS
         elif self.subscriptions:
             self.subscriptions = ASLEEP
             self._snapshots.clear()
@@ -117,7 +117,7 @@ class CameraPart(BasePart):
             self._under_way.clear()
             self._counted.wanted.clear()
 
-    def _expose(self, heard_ns: int) -> None:
+    def _expose(self, received_ns: int) -> None:
         """Picture every wanted camera whose grid has a time between the last two snapshots."""
         if len(self._snapshots) < 2 or self._snapshots[0].t_ns >= self._snapshots[1].t_ns:
             return  # the first one, or the world's time went back
@@ -138,7 +138,7 @@ class CameraPart(BasePart):
                 if is_lost(self._seed, *which, number, optics.drop_out):
                     continue
                 # In the clock by which snapshots are heard: the world's may be another computer's.
-                out_ns = heard_ns - (after.t_ns - due_ns) + nanoseconds(optics.latency_s)
+                out_ns = received_ns - (after.t_ns - due_ns) + nanoseconds(optics.latency_s)
                 for frame in self._frame(which, optics, due_ns):
                     self._under_way.put(frame, out_ns)
 
@@ -187,9 +187,9 @@ class CameraPart(BasePart):
 
     def _status(self, now_ns: int) -> list[Outgoing]:
         counted = self._counted
-        if now_ns - counted.told_ns < NS_PER_S:
+        if now_ns - counted.published_ns < NS_PER_S:
             return []
-        counted.told_ns = now_ns
+        counted.published_ns = now_ns
         count = len(counted.wanted)
         detail = "nobody looks" if not self.subscriptions else f"{count} camera{'s' * (count != 1)}"
         if counted.frames and self._clock is not None:

@@ -13,7 +13,7 @@ from scm.camera.painter import Thing
 from scm.maps.signs import SPEED_LIMIT, TURNS
 from scm.records.city_map import Box, CityMap, Light, Sign, Wall
 from scm.scenery.canvas import Colour, colour_of, dimmed
-from scm.scenery.sheet import BRICK, CARD, wall_pieces
+from scm.scenery.sheet import BRICK, CARDBOARD, wall_pieces
 from scm.scenery.solids import prism, rectangle
 
 S = TypeVar("S")
@@ -84,7 +84,7 @@ def wall_thing(block: Block) -> Thing:
 def box_thing(box: Box) -> Thing:
     """Return a construction box with its red and white band."""
     foot = rectangle(box.x_m, box.y_m, box.length_m, box.width_m, box.yaw_rad)
-    solid = prism(foot, 0.0, box.height_m, CARD)
+    solid = prism(foot, 0.0, box.height_m, CARDBOARD)
     band = [face for i in range(4) for face in _band(foot[i], foot[(i + 1) % 4], box.height_m)]
     return _thing(mesh_of((part_of(solid, *band),)), foot, box.height_m)
 

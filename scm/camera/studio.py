@@ -88,10 +88,10 @@ class Studio:
         self._floor.paint(canvas, kind.lens, view, self._daylight.intensity * kind.exposure)
         boxes = self._boxes(moved)
         self._shadows(canvas, kind, view, cars, boxes)
-        lights = self._heads.in_sight(kind.painter, view)
+        lights = self._heads.visible(kind.painter, view)
         things = [
-            *self._walls.in_sight(kind.painter, view),
-            *self._signs.in_sight(kind.painter, view),
+            *self._walls.visible(kind.painter, view),
+            *self._signs.visible(kind.painter, view),
             *(box_thing(box) for box in boxes),
             *(light_thing(light, shown.get(light.light_id)) for light in lights),
             *(car_thing(other) for other in cars if other.vehicle != car.vehicle),
@@ -167,9 +167,9 @@ class _Still(Generic[S, T]):
         self._middles = np.array([ball.middle for ball in balls]).reshape(-1, 3)
         self._radii = np.array([ball.radius for ball in balls])
 
-    def in_sight(self, painter: Painter, view: View) -> list[T]:
+    def visible(self, painter: Painter, view: View) -> list[T]:
         """Return what can be in the picture."""
-        mask = painter.in_sight(view, self._middles, self._radii)
+        mask = painter.visible(view, self._middles, self._radii)
         found: list[int] = np.flatnonzero(mask).tolist()
         for i in found:
             if i not in self._made:

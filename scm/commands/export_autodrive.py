@@ -61,7 +61,7 @@ def _of_run(arguments: argparse.Namespace) -> "Sequence[Written]":
 
     (path,) = arguments.recording
     run = read_tracks(path, arguments.vehicle)
-    for line in run.told:
+    for line in run.remarks:
         print(line)
     written = write_logs(
         arguments.out, run.cars, run.lights, start_ms=run.start_ms, rate_hz=arguments.rate_hz

@@ -77,7 +77,7 @@ def _run(arguments: argparse.Namespace) -> int:
     _progress("")
     for line in gathered.remarks:
         print(line)
-    print(f"{board.said}: in {len(gathered.views)} pictures")
+    print(f"{board.description}: in {len(gathered.views)} pictures")
     return 0
 
 

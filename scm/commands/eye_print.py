@@ -127,7 +127,7 @@ def _board(arguments: argparse.Namespace) -> "Page":
         arguments.board, columns, rows, arguments.square_m, marker_m, arguments.dictionary,
         arguments.first_id,
     )  # fmt: skip
-    print(board.said)
+    print(board.description)
     return board_page(board, arguments.paper)
 
 

@@ -50,7 +50,7 @@ def _run(arguments: argparse.Namespace) -> int:
         m_per_count=m_per_count,
         axle_m=radius_m,
     )
-    print("\n".join(made.told))
+    print("\n".join(made.remarks))
     for one in made.left_out[:MAX_PRINTED_LINES]:
         print(one)
     if made.left_out:

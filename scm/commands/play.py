@@ -9,7 +9,7 @@ from scm.command import Command, credentials_argument, credentials_of
 from scm.errors import RunError
 
 if TYPE_CHECKING:
-    from scm.play_watch import Watch
+    from scm.recorder.play_monitor import PlayMonitor
 
 NAME = "played"
 
@@ -43,7 +43,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.fleet import LiveLink, LockstepLink
     from scm.maps.load import load_map
-    from scm.play import left_out, play, read_drive, write_recording
+    from scm.recorder.play import left_out, play, read_drive, write_recording
     from scm.runtime.lockstep import Lockstep
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.world.part import WorldPart
@@ -59,8 +59,8 @@ def _run(arguments: argparse.Namespace) -> int:
         with ZenohBus(
             arguments.city, "script", arguments.connect, credentials=credentials_of(arguments)
         ) as bus:
-            watch = _watch(arguments, car) if arguments.floor else None
-            played = play(LiveLink(bus), arguments.vehicle or "n1", rows, watch)
+            monitor = _monitor(arguments, car) if arguments.floor else None
+            played = play(LiveLink(bus), arguments.vehicle or "n1", rows, monitor)
     else:
         floor = arguments.drive.parent / drive.map
         city_map = load_map(floor if floor.is_file() else drive.map)
@@ -79,10 +79,10 @@ def _run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _watch(arguments: argparse.Namespace, car: str) -> "Watch":
+def _monitor(arguments: argparse.Namespace, car: str) -> "PlayMonitor":
     """Return what to look for on a city's floor, for a car of that size."""
-    from scm.play import read_way
-    from scm.play_watch import Watch
+    from scm.recorder.play import read_way
+    from scm.recorder.play_monitor import PlayMonitor
     from scm.runtime.live import stop_on_signal
     from scm.vehicles.car import load_car
 
@@ -90,11 +90,11 @@ def _watch(arguments: argparse.Namespace, car: str) -> "Watch":
     own = load_car(car)
     known = own.has("body.footprint_x_m")
     ends = own.vector("body.footprint_x_m") if known else (own.value("body.wheelbase_m") * 1.5,)
-    return Watch(
+    return PlayMonitor(
         floor=((x0, x1), (y0, y1)),
         margin_m=max(abs(end) for end in ends),
         way=read_way(arguments.drive),
-        asked=stop_on_signal(),
+        stop_requested=stop_on_signal(),
     )
 
 

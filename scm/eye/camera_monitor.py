@@ -203,9 +203,9 @@ class CameraMonitor:
         if self._bump is None:
             return
         std_m = self.estimator.max_position_std_m()
-        is_settled = any(len(one.reference) >= REFERENCE_FRAMES for one in self._tags.values())
+        has_reference = any(len(one.reference) >= REFERENCE_FRAMES for one in self._tags.values())
         corrected = f"realigned to the map tags, poses are accurate to {2e3 * std_m:.1f} mm"
-        if not is_settled or std_m > MAX_STD_M:
+        if not has_reference or std_m > MAX_STD_M:
             self._complaints["bumped"] = f"{self._bump}; {corrected}; locate the camera again"
             return
         if self._corrected_ns is None:

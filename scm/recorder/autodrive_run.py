@@ -56,7 +56,7 @@ _KINDS: tuple[tuple[re.Pattern[str], type[Message]], ...] = tuple(
 
 
 @dataclass(slots=True)
-class _Heard:
+class _CarMessages:
     """What a run tells of one car; `placed` is what the world's snapshots tell."""
 
     states: list[VehicleState] = field(default_factory=list)
@@ -71,13 +71,13 @@ class Run(NamedTuple):
     """A run, by the recorder's columns; times since `start_ms` [milliseconds since 1970].
 
     Attributes:
-        told: What of the run could not be taken over as it is, in lines.
+        remarks: What of the run could not be taken over as it is, in lines.
     """
 
     start_ms: int
     cars: list[CarTrack]
     lights: list[LightTrack]
-    told: list[str]
+    remarks: list[str]
 
 
 def read_tracks(path: Path, vehicle: str | None = None) -> Run:
@@ -90,24 +90,24 @@ def read_tracks(path: Path, vehicle: str | None = None) -> Run:
     Raises:
         RecordingError: when the file is no complete run, or no car reports where it is.
     """
-    cars: dict[str, _Heard] = {}
+    cars: dict[str, _CarMessages] = {}
     spats: dict[str, list[Spat]] = {}
     lights: tuple[Light, ...] = ()
     is_level = False
-    for told in _messages(path):
-        match told:
+    for message in _messages(path):
+        match message:
             case WorldDefinition():
-                lights, is_level = told.map.lights, told.map.floor.is_level
+                lights, is_level = message.map.lights, message.map.floor.is_level
             case WorldSnapshot():
-                for state in _states_of(told):
-                    cars.setdefault(state.vehicle, _Heard()).placed.append(state)
+                for state in _states_of(message):
+                    cars.setdefault(state.vehicle, _CarMessages()).placed.append(state)
             case Spat():
-                spats.setdefault(told.junction, []).append(told)
+                spats.setdefault(message.junction, []).append(message)
             case _:
-                _take(cars, told)
-    for heard in cars.values():
-        heard.states = heard.states or heard.placed
-    reporting = sorted((name for name, heard in cars.items() if heard.states), key=_natural)
+                _add(cars, message)
+    for car in cars.values():
+        car.states = car.states or car.placed
+    reporting = sorted((name for name, car in cars.items() if car.states), key=_natural)
     chosen = [name for name in reporting if vehicle in (None, name)]
     if not chosen:
         which = "" if vehicle is None else f" {vehicle!r}"
@@ -123,31 +123,31 @@ def read_tracks(path: Path, vehicle: str | None = None) -> Run:
 
 def pictures_of(path: Path, vehicle: str, camera: int) -> Iterator[bytes]:
     """Yield the JPEG files of a car's camera, 0 front and 1 rear, in the order of their times."""
-    taken = [
-        (told.t_ns, told.payload)
-        for told in _messages(path)
-        if isinstance(told, CameraFrame)
-        and told.vehicle == vehicle
-        and told.camera == CAMERAS[camera]
+    frames = [
+        (message.t_ns, message.payload)
+        for message in _messages(path)
+        if isinstance(message, CameraFrame)
+        and message.vehicle == vehicle
+        and message.camera == CAMERAS[camera]
     ]
-    yield from (payload for _, payload in sorted(taken))
+    yield from (payload for _, payload in sorted(frames))
 
 
 def _messages(path: Path) -> Iterator[Message]:
-    """Yield what matters of a run; what cannot be read is a stranger's and left out."""
+    """Yield the relevant messages of a run; unreadable ones are foreign and skipped."""
     kinds = {key: kind for key in read_keys(path) for form, kind in _KINDS if form.fullmatch(key)}
-    for message in read_run(path, set(kinds)):
-        told = _told(message, kinds[message.key])
-        if told is not None:
-            yield told
+    for recorded in read_run(path, set(kinds)):
+        message = _decoded(recorded, kinds[recorded.key])
+        if message is not None:
+            yield message
 
 
-def _told(message: Recorded, kind: type[Message]) -> Message | None:
+def _decoded(recorded: Recorded, kind: type[Message]) -> Message | None:
     try:
-        told: Message = msgspec.json.decode(message.body, type=kind)
+        message: Message = msgspec.json.decode(recorded.body, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return None
-    return told
+    return message
 
 
 def _states_of(snapshot: WorldSnapshot) -> Iterator[VehicleState]:
@@ -169,20 +169,20 @@ def _states_of(snapshot: WorldSnapshot) -> Iterator[VehicleState]:
         )
 
 
-def _take(cars: dict[str, _Heard], told: Any) -> None:
+def _add(cars: dict[str, _CarMessages], message: Any) -> None:
     """Note a message about one car."""
-    heard = cars.setdefault(told.vehicle, _Heard())
-    match told:
+    car = cars.setdefault(message.vehicle, _CarMessages())
+    match message:
         case VehicleState():
-            heard.states.append(told)
+            car.states.append(message)
         case EyeTrack():
-            heard.tracks.append(told)
+            car.tracks.append(message)
         case VehicleSensors():
-            heard.sensors.append(told)
+            car.sensors.append(message)
         case LidarScan():
-            heard.scans.append(told)
+            car.scans.append(message)
         case CameraFrame():
-            heard.pictures.setdefault(told.camera, []).append(told.t_ns)
+            car.pictures.setdefault(message.camera, []).append(message.t_ns)
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
@@ -194,26 +194,26 @@ class _Car:
     """One car's part of a run on its way to the recorder's columns."""
 
     def __init__(
-        self, name: str, heard: _Heard, start_ns: int, is_level: bool, notes: list[str]
+        self, name: str, car: _CarMessages, start_ns: int, is_level: bool, notes: list[str]
     ) -> None:
-        self._name, self._heard, self._start_ns = name, heard, start_ns
+        self._name, self._messages, self._start_ns = name, car, start_ns
         self._is_level, self._notes = is_level, notes
-        for known in (heard.states, heard.tracks, heard.sensors, heard.scans):
+        for known in (car.states, car.tracks, car.sensors, car.scans):
             known.sort(key=lambda one: one.t_ns)
-        self._car = _car_of(heard.states[-1].car, name, notes)
+        self._car = _car_of(car.states[-1].car, name, notes)
 
     def track(self) -> CarTrack:
         """Return the car by the recorder's columns."""
         columns = self._poses() | self._commands() | self._sensed()
-        scans = [(one.t_ns, ranges_of(one)) for one in self._heard.scans]
+        scans = [(one.t_ns, ranges_of(one)) for one in self._messages.scans]
         return CarTrack(
             self._name,
             columns,
             self._times([t_ns for t_ns, _ in scans]),
             np.array([ranges for _, ranges in scans]).reshape(-1, BEAMS),
             {
-                CAMERAS.index(camera): self._times(sorted(taken))
-                for camera, taken in self._heard.pictures.items()
+                CAMERAS.index(camera): self._times(sorted(frames))
+                for camera, frames in self._messages.pictures.items()
                 if camera in CAMERAS
             },
         )
@@ -228,9 +228,9 @@ class _Car:
         return Series(t[keep], values[keep])
 
     def _poses(self) -> dict[str, Series]:
-        heard = self._heard
-        is_real = heard.states[-1].source != SIMULATED and heard.tracks
-        at: Sequence[VehicleState | EyeTrack] = heard.tracks if is_real else heard.states
+        car = self._messages
+        is_real = car.states[-1].source != SIMULATED and car.tracks
+        at: Sequence[VehicleState | EyeTrack] = car.tracks if is_real else car.states
         if is_real:
             self._notes.append(f"{self._name}: where the overhead cameras saw it")
         yaw = self._series([(one.t_ns, one.yaw_rad) for one in at])
@@ -250,7 +250,7 @@ class _Car:
 
     def _commands(self) -> dict[str, Series]:
         """Return what the car was told, each from the report before on."""
-        states = self._heard.states
+        states = self._messages.states
         since = [states[0].t_ns, *(one.t_ns for one in states[:-1])]
         limit = self._car.value(LIMIT) if self._car and self._car.has(LIMIT) else None
         angles = [
@@ -271,7 +271,7 @@ class _Car:
 
     def _sensed(self) -> dict[str, Series]:
         """Return encoders, roll, pitch, rates and acceleration without gravity."""
-        read = self._heard.sensors
+        read = self._messages.sensors
         columns = {
             "leftTicks": self._series([(one.t_ns, one.encoder_left) for one in read]),
             "rightTicks": self._series([(one.t_ns, one.encoder_right) for one in read]),

@@ -71,7 +71,7 @@ class Report(NamedTuple):
 
 
 @dataclass(slots=True)
-class Heard:
+class CarMessages:
     """All that a run tells of one car; `hit_ns` is when it hit something hard enough to tell."""
 
     commands: list[DriveCommand] = field(default_factory=list)
@@ -80,21 +80,21 @@ class Heard:
     seen: dict[str, list[EyePose]] = field(default_factory=dict)
     hit_ns: list[int] = field(default_factory=list)
 
-    def take(self, told: Message) -> None:
+    def add(self, message: Message) -> None:
         """Note a message that is about this car."""
-        match told:
+        match message:
             case DriveCommand():
-                self.commands.append(told)
+                self.commands.append(message)
             case VehicleSensors():
-                self.sensors.append(told)
+                self.sensors.append(message)
             case EyePose():
-                self.seen.setdefault(told.camera, []).append(told)
+                self.seen.setdefault(message.camera, []).append(message)
             case CityEvent(name=event, t_ns=t_ns) if event == HIT:
                 self.hit_ns.append(t_ns)
             case VehicleState():
-                at = (told.t_ns, told.x_m, told.y_m, told.yaw_rad, told.source)
-                whom = (told.mode, told.epoch, told.car, told.seq)
-                self.reports.append(Report(*at, *whom, told.throttle, told.steering))
+                at = (message.t_ns, message.x_m, message.y_m, message.yaw_rad, message.source)
+                whom = (message.mode, message.epoch, message.car, message.seq)
+                self.reports.append(Report(*at, *whom, message.throttle, message.steering))
 
     @property
     def lost(self) -> int:
@@ -111,13 +111,13 @@ class Stretch(NamedTuple):
     epoch: int
 
 
-def tells_commands(heard: Heard) -> bool:
+def reports_commands(messages: CarMessages) -> bool:
     """Return whether a car's reports say how it was steered."""
-    return any(report.steering is not None for report in heard.reports)
+    return any(report.steering is not None for report in messages.reports)
 
 
 def recording_of(
-    heard: Heard, path: Path, name: str, start_ns: int = 0, *, sent_only: bool = False
+    messages: CarMessages, path: Path, name: str, start_ns: int = 0, *, sent_only: bool = False
 ) -> Recording:
     """Return what was heard of a car as a recording, times since `start_ns`.
 
@@ -125,33 +125,33 @@ def recording_of(
     camera that saw it most.
 
     Args:
-        heard: All of it.
+        messages: All of it.
         path: Of the run, to name it by.
         name: Of the car.
         start_ns: What times are counted from.
-        sent_only: Leave out where the car obeyed other commands than those in `heard`.
+        sent_only: Leave out where the car obeyed other commands than those in `messages`.
 
     Raises:
         RecordingError: naming `path` and the car, when it lacks poses, or obeyed no command.
     """
-    return _Drive(path, name, heard, start_ns, sent_only=sent_only).recording()
+    return _Drive(path, name, messages, start_ns, sent_only=sent_only).recording()
 
 
 class _Drive:
     """One car's part of a run on its way to being a recording."""
 
     def __init__(
-        self, path: Path, name: str, heard: Heard, start_ns: int, *, sent_only: bool
+        self, path: Path, name: str, messages: CarMessages, start_ns: int, *, sent_only: bool
     ) -> None:
         self._at, self._path, self._name = f"{path}: {name}", path, name
-        self._heard, self._start_ns = heard, start_ns
-        heard.reports.sort(key=lambda report: report.t_ns)
-        sent, self._sent = _obeyed(heard.commands)
-        self._lives = [] if sent_only and self._sent else _lives(heard.reports)
-        self._rows = self._clipped(_commands(heard.reports, sent))
-        self._reported = _Reported(heard.reports)
-        hits = heard.hit_ns if heard.reports else []
-        self._hits = [_about_hit(hit_ns, heard.reports) for hit_ns in hits]
+        self._messages, self._start_ns = messages, start_ns
+        messages.reports.sort(key=lambda report: report.t_ns)
+        sent, self._sent = _obeyed(messages.commands)
+        self._lives = [] if sent_only and self._sent else _lives(messages.reports)
+        self._rows = self._clipped(_commands(messages.reports, sent))
+        self._reported = _Reported(messages.reports)
+        hits = messages.hit_ns if messages.reports else []
+        self._hits = [_about_hit(hit_ns, messages.reports) for hit_ns in hits]
         self._left_out: tuple[LeftOut, ...] = ()
 
     def recording(self) -> Recording:
@@ -160,7 +160,7 @@ class _Drive:
         Raises:
             RecordingError: when it lacks poses, or the car obeyed no command.
         """
-        if not self._heard.reports:
+        if not self._messages.reports:
             msg = f"{self._at}: neither it nor the world reports which car it is"
             raise RecordingError(msg)
         if not self._rows:
@@ -172,17 +172,17 @@ class _Drive:
             values = np.array([row[i] for row in self._rows], np.float64)
             channels[name] = self._channel(t, values, None, "ratio")
         channels |= self._sensors()
-        car = self._heard.reports[-1].car
+        car = self._messages.reports[-1].car
         return Recording(self._path, car, channels, self._name, left_out=self._left_out)
 
     def _poses(self) -> dict[str, Channel]:
         """Return the poses that count, and note how many do not, and why."""
         rows: list[tuple[float, ...]] = [
-            report[:4] for report in self._heard.reports if report.source == SIMULATED
+            report[:4] for report in self._messages.reports if report.source == SIMULATED
         ]
         std = REPORTED_M, REPORTED_M, REPORTED_RAD
         if not rows:
-            seen = max(self._heard.seen.values(), key=len, default=[])
+            seen = max(self._messages.seen.values(), key=len, default=[])
             rows = sorted((pose.t_ns, pose.x_m, pose.y_m, pose.yaw_rad) for pose in seen)
             variances = [pose.covariance[::4] for pose in seen] or [(np.nan,) * 3]
             std = tuple(np.sqrt(np.maximum(np.median(variances, axis=0), 1e-12)))
@@ -205,7 +205,7 @@ class _Drive:
 
     def _sensors(self) -> dict[str, Channel]:
         """Return encoders and yaw gyro, where the car has them."""
-        t = np.array([one.t_ns for one in self._heard.sensors], np.int64)
+        t = np.array([one.t_ns for one in self._messages.sensors], np.int64)
         counts = self._reasons(t) == ""
         if not counts.any():
             return {}
@@ -215,7 +215,7 @@ class _Drive:
             "imu.gyro_z": (lambda one: one.gyro_radps[2], GYRO_RAD_S, "angular speed"),
         }
         every = {
-            name: (np.array([value(one) for one in self._heard.sensors], np.float64), std, kind)
+            name: (np.array([value(one) for one in self._messages.sensors], np.float64), std, kind)
             for name, (value, std, kind) in of.items()
         }
         return {
@@ -243,8 +243,8 @@ class _Drive:
         for start_ns, end_ns in self._lives:
             reasons[(t_ns >= start_ns - RUN_IN_NS) & (t_ns < start_ns)] = PLACED
             lives |= (t_ns >= start_ns) & (t_ns <= end_ns)
-        known = lives & reported.tells[k] & reported.moves[k]
-        reasons[lives & reported.tells[k] & ~reported.moves[k]] = STOPPED
+        known = lives & reported.has_command[k] & reported.moves[k]
+        reasons[lives & reported.has_command[k] & ~reported.moves[k]] = STOPPED
         for stretch in self._sent:
             inside = (t_ns >= stretch.start_ns) & (t_ns <= stretch.end_ns)
             own = reported.epoch[k] == stretch.epoch
@@ -265,7 +265,9 @@ class _Reported:
 
     def __init__(self, reports: Sequence[Report]) -> None:
         self.t_ns: Ints = np.array([report.t_ns for report in reports], np.int64)
-        self.tells: Bools = np.array([report.steering is not None for report in reports], np.bool_)
+        self.has_command: Bools = np.array(
+            [report.steering is not None for report in reports], np.bool_
+        )
         self.moves: Bools = np.array([report.mode in MOVED for report in reports], np.bool_)
         self.obeys: Bools = np.array([report.mode in OBEYED for report in reports], np.bool_)
         self.epoch: Ints = np.array([report.epoch for report in reports], np.int64)

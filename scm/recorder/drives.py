@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from scm.errors import MessageError, RecordingError, nearest
-from scm.recorder.driven import SIMULATED, Heard, Report, recording_of, tells_commands
+from scm.recorder.driven import SIMULATED, CarMessages, Report, recording_of, reports_commands
 from scm.recorder.mcap_file import has_end, read_begin_ns, read_keys, read_run
 from scm.recording.columns import LeftOut
 from scm.recording.read import Recording, read_recordings
@@ -60,7 +60,7 @@ def recordings_of(
     chosen = [recording for recording in found if vehicle in (None, recording.name)]
     if not chosen:
         names = [recording.name for recording in found]
-        msg = f"{path}: no car {vehicle!r}{nearest(str(vehicle), names) or _listed(names)}"
+        msg = f"{path}: no car {vehicle!r}{nearest(str(vehicle), names) or _names_hint(names)}"
         raise RecordingError(msg)
     return chosen
 
@@ -104,10 +104,10 @@ def read_drives(
         raise RecordingError(msg)
     cars = sorted({name for name, kind in map(_of, keys) if name and kind in _OF_A_CAR})
     if vehicle is not None and vehicle not in cars:
-        msg = f"{path}: no car {vehicle!r}{nearest(vehicle, cars) or _listed(cars)}"
+        msg = f"{path}: no car {vehicle!r}{nearest(vehicle, cars) or _names_hint(cars)}"
         raise RecordingError(msg)
-    heard, start_ns = _heard(path, keys, [vehicle] if vehicle is not None else cars)
-    able = {name: one for name, one in heard.items() if one.commands or tells_commands(one)}
+    messages, start_ns = _read_messages(path, keys, [vehicle] if vehicle is not None else cars)
+    able = {name: one for name, one in messages.items() if one.commands or reports_commands(one)}
     if not able:
         none = f"none of its cars ({', '.join(cars) or 'none'}) was"
         who = f"{vehicle} was not" if vehicle else none
@@ -126,7 +126,7 @@ def read_drives(
             failures.append(str(error))
     if not found:
         raise RecordingError("\n".join(failures))
-    if unable := [name for name in heard if name not in able]:
+    if unable := [name for name in messages if name not in able]:
         failures.append(
             f"{path}: {', '.join(unable)}: not commanded over the bus, and no report tells the "
             "steering command: left out"
@@ -152,11 +152,13 @@ def _of(key: str) -> tuple[str, type[Message] | None]:
     return "", next((kind for kind, keys in _OF_ALL.items() if keys.fullmatch(key)), None)
 
 
-def _listed(names: Sequence[str]) -> str:
+def _names_hint(names: Sequence[str]) -> str:
     return f"; it has {', '.join(names)}" if names else "; it has none"
 
 
-def _heard(path: Path, keys: Iterable[str], chosen: Sequence[str]) -> tuple[dict[str, Heard], int]:
+def _read_messages(
+    path: Path, keys: Iterable[str], chosen: Sequence[str]
+) -> tuple[dict[str, CarMessages], int]:
     """Return what a run tells of some cars, and when it began [ns].
 
     Snapshots of the world stand in for the reports of a car that a sparse run has not.
@@ -166,25 +168,25 @@ def _heard(path: Path, keys: Iterable[str], chosen: Sequence[str]) -> tuple[dict
     silent = {name for name in chosen if name not in reporting}
     of_all = {CityEvent, WorldSnapshot} if silent else {CityEvent}
     wanted = {key for key, (name, kind) in of.items() if name in chosen or kind in of_all}
-    heard = {name: Heard() for name in chosen}
+    messages = {name: CarMessages() for name in chosen}
     for message in read_run(path, wanted, whole=False):
         name, kind = of[message.key]
         if kind is None:
             continue
         try:
-            told = decode(kind, message.body)
+            decoded = decode(kind, message.body)
         except MessageError:
             continue  # a stranger's, as everybody on the bus ignores it
-        match told:
+        match decoded:
             case WorldSnapshot():
-                for one, report in _reports(told):
+                for one, report in _reports(decoded):
                     if one in silent:
-                        heard[one].reports.append(report)
-            case CityEvent(vehicle=str() as one) if one in heard:
-                heard[one].take(told)
-            case _ if name in heard:
-                heard[name].take(told)
-    return heard, read_begin_ns(path, whole=False) or 0
+                        messages[one].reports.append(report)
+            case CityEvent(vehicle=str() as one) if one in messages:
+                messages[one].add(decoded)
+            case _ if name in messages:
+                messages[name].add(decoded)
+    return messages, read_begin_ns(path, whole=False) or 0
 
 
 def _reports(snapshot: WorldSnapshot) -> Iterator[tuple[str, Report]]:

@@ -74,16 +74,16 @@ def write_foxglove(index: RunIndex) -> Iterator[bytes]:
             kinds[key] = kind
     writing = _Writing(out)
     for one in index.read(0, index.end_ns, kinds.__contains__):
-        told = _told(one, kinds[one.key])
-        if told is not None:
-            writing.take(one.t_ns, told)
+        message = _decoded(one, kinds[one.key])
+        if message is not None:
+            writing.write(one.t_ns, message)
         if out.held > BLOCK:
-            yield out.taken()
+            yield out.pop()
     writing.close()
-    yield out.taken()
+    yield out.pop()
 
 
-def _told(one: Recorded, kind: type[M]) -> M | None:
+def _decoded(one: Recorded, kind: type[M]) -> M | None:
     try:
         return msgspec.json.decode(one.body, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
@@ -95,7 +95,7 @@ class _Blocks:
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
-        self._taken = 0
+        self._popped = 0
         self.held = 0
 
     def write(self, data: bytes) -> int:
@@ -106,15 +106,15 @@ class _Blocks:
 
     def tell(self) -> int:
         """Return how much was written since the begin."""
-        return self._taken + self.held
+        return self._popped + self.held
 
     def flush(self) -> None:
         """Do nothing: who takes the bytes sends them."""
 
-    def taken(self) -> bytes:
+    def pop(self) -> bytes:
         """Return what is held, and hold it no longer."""
         block = b"".join(self._parts)
-        self._taken += self.held
+        self._popped += self.held
         self._parts, self.held = [], 0
         return block
 
@@ -132,7 +132,7 @@ class _Writing:
         self._colours: dict[tuple[str, str], str] = {}
         self._lights: tuple[Light, ...] = ()
         self._has_map = False
-        self._takers: dict[type[Message], Callable[[int, Any], None]] = {
+        self._writers: dict[type[Message], Callable[[int, Any], None]] = {
             WorldDefinition: self._definition,
             WorldSnapshot: self._snapshot,
             VehicleState: self._state,
@@ -143,9 +143,9 @@ class _Writing:
             LidarScan: self._scan,
         }
 
-    def take(self, t_ns: int, told: Message) -> None:
+    def write(self, t_ns: int, message: Message) -> None:
         """Write what a message means."""
-        self._takers[type(told)](t_ns, told)
+        self._writers[type(message)](t_ns, message)
 
     def close(self) -> None:
         """End the file with its index."""
@@ -168,24 +168,24 @@ class _Writing:
             data=msgspec.json.encode(body),
         )
 
-    def _definition(self, t_ns: int, told: WorldDefinition) -> None:
+    def _definition(self, t_ns: int, message: WorldDefinition) -> None:
         if self._has_map:  # the same is sent every 10 s
             return
-        self._has_map, self._lights = True, told.map.lights
+        self._has_map, self._lights = True, message.map.lights
         entity = fox.Entity(
             timestamp=_time(t_ns),
             frame_id=MAP,
             id="roads",
-            cubes=(_floor(told.map),),
-            lines=_road_lines(told.map),
+            cubes=(_floor(message.map),),
+            lines=_road_lines(message.map),
         )
         self._add("/map", t_ns, fox.SceneUpdate(entities=(entity,)))
 
-    def _snapshot(self, t_ns: int, told: WorldSnapshot) -> None:
+    def _snapshot(self, t_ns: int, message: WorldSnapshot) -> None:
         at = _time(t_ns)
-        frames = tuple(_frame(at, car) for car in told.vehicles)
+        frames = tuple(_frame(at, car) for car in message.vehicles)
         self._add("/tf", t_ns, fox.FrameTransforms(transforms=frames))
-        cars = {car.vehicle: (car.car, car.kind, car.alive) for car in told.vehicles}
+        cars = {car.vehicle: (car.car, car.kind, car.alive) for car in message.vehicles}
         if cars == self._cars and t_ns < self._cars_due_ns:
             return
         # All of them again each second: after a seek Foxglove knows one message a topic.
@@ -194,29 +194,29 @@ class _Writing:
             fox.Deletion(timestamp=at, type=0, id=name) for name in self._cars if name not in cars
         )
         self._cars = cars
-        entities = tuple(_car(at, car) for car in told.vehicles)
+        entities = tuple(_car(at, car) for car in message.vehicles)
         self._add("/cars", t_ns, fox.SceneUpdate(deletions=gone, entities=entities))
 
-    def _state(self, t_ns: int, told: VehicleState) -> None:
+    def _state(self, t_ns: int, message: VehicleState) -> None:
         state = fox.CarState(
-            timestamp=_time(told.t_ns),
-            x_m=told.x_m,
-            y_m=told.y_m,
-            yaw_rad=told.yaw_rad,
-            speed_mps=told.speed_mps,
-            lateral_speed_mps=told.lateral_speed_mps,
-            yaw_rate_radps=told.yaw_rate_radps,
-            accel_mps2=told.accel_mps2,
-            throttle=told.throttle,
-            steering=told.steering or 0.0,
-            steering_rad=told.steering_rad,
-            mode=told.mode,
-            owner_epoch=told.epoch,
+            timestamp=_time(message.t_ns),
+            x_m=message.x_m,
+            y_m=message.y_m,
+            yaw_rad=message.yaw_rad,
+            speed_mps=message.speed_mps,
+            lateral_speed_mps=message.lateral_speed_mps,
+            yaw_rate_radps=message.yaw_rate_radps,
+            accel_mps2=message.accel_mps2,
+            throttle=message.throttle,
+            steering=message.steering or 0.0,
+            steering_rad=message.steering_rad,
+            mode=message.mode,
+            owner_epoch=message.epoch,
         )
-        self._add(f"/{told.vehicle}/state", t_ns, state)
+        self._add(f"/{message.vehicle}/state", t_ns, state)
 
-    def _spat(self, t_ns: int, told: Spat) -> None:
-        colours = {(told.junction, group.group): group.colour for group in told.groups}
+    def _spat(self, t_ns: int, message: Spat) -> None:
+        colours = {(message.junction, group.group): group.colour for group in message.groups}
         if all(self._colours.get(group) == colour for group, colour in colours.items()):
             return
         self._colours |= colours
@@ -226,36 +226,36 @@ class _Writing:
         )
         self._add("/signals", t_ns, fox.SceneUpdate(entities=entities))
 
-    def _event(self, t_ns: int, told: CityEvent) -> None:
+    def _event(self, t_ns: int, message: CityEvent) -> None:
         log = fox.Log(
             timestamp=_time(t_ns),
-            level=LEVELS[told.severity],
-            message=told.text,
-            name=f"{told.source}: {told.name}",
+            level=LEVELS[message.severity],
+            message=message.text,
+            name=f"{message.source}: {message.name}",
         )
         self._add("/events", t_ns, log)
 
-    def _eye(self, t_ns: int, told: EyeFrame) -> None:
-        self._picture(f"/eye/{told.camera}", t_ns, told.camera, told.payload)
+    def _eye(self, t_ns: int, message: EyeFrame) -> None:
+        self._picture(f"/eye/{message.camera}", t_ns, message.camera, message.payload)
 
-    def _camera(self, t_ns: int, told: CameraFrame) -> None:
-        topic = f"/{told.vehicle}/camera/{told.camera}"
-        self._picture(topic, t_ns, told.vehicle, told.payload)
+    def _camera(self, t_ns: int, message: CameraFrame) -> None:
+        topic = f"/{message.vehicle}/camera/{message.camera}"
+        self._picture(topic, t_ns, message.vehicle, message.payload)
 
     def _picture(self, topic: str, t_ns: int, frame: str, payload: bytes) -> None:
         picture = fox.CompressedImage(timestamp=_time(t_ns), frame_id=frame, data=payload)
         self._add(topic, t_ns, picture)
 
-    def _scan(self, t_ns: int, told: LidarScan) -> None:
+    def _scan(self, t_ns: int, message: LidarScan) -> None:
         cloud = fox.PointCloud(
-            timestamp=_time(told.t_ns),
-            frame_id=told.vehicle,
-            pose=fox.Pose(position=_scanner(self._cars.get(told.vehicle, ("nigel",))[0])),
+            timestamp=_time(message.t_ns),
+            frame_id=message.vehicle,
+            pose=fox.Pose(position=_scanner(self._cars.get(message.vehicle, ("nigel",))[0])),
             point_stride=12,
             fields=tuple(fox.PackedField(name=axis, offset=4 * i) for i, axis in enumerate("xyz")),
-            data=_points(told),
+            data=_points(message),
         )
-        self._add(f"/{told.vehicle}/scan", t_ns, cloud)
+        self._add(f"/{message.vehicle}/scan", t_ns, cloud)
 
 
 def _time(t_ns: int) -> fox.Time:

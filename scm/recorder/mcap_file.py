@@ -31,7 +31,7 @@ from scm.v2x.message import Message, Request
 
 MESSAGES = "scm.v2x.messages"
 MAGIC = b"\x89MCAP0\r\n"
-MOST_UNPACKED = 256 * 2**20  # of one chunk: a file that claims more is damaged or hostile
+MAX_UNPACKED_BYTES = 256 * 2**20  # of one chunk: a file that claims more is damaged or hostile
 UNREADABLE = (  # what a torn or damaged file makes its readers raise
     McapError, EOFError, ValueError, LookupError, MemoryError, OverflowError, struct.error,
     zstandard.ZstdError,
@@ -237,7 +237,7 @@ def _begun(path: Path, keys: Collection[str] | None) -> Iterator[Recorded]:
     topics: dict[int, str] = {}
     with _reading(path), path.open("rb") as stream:
         begin = Begin(stream, os.fstat(stream.fileno()).st_size)
-        reader = StreamReader(cast("IO[bytes]", begin), record_size_limit=MOST_UNPACKED)
+        reader = StreamReader(cast("IO[bytes]", begin), record_size_limit=MAX_UNPACKED_BYTES)
         with suppress(*UNREADABLE):
             for record in reader.records:
                 if isinstance(record, Channel):

@@ -17,20 +17,20 @@ from scm.v2x.uper.codec import CODINGS, encode
 _KEY = re.compile(r"scm/@v\d+/[^/]+/v2x/tx/([^/]+)/([^/]+)")
 
 
-class Said(NamedTuple):
+class RadioMessage(NamedTuple):
     """One message on the air.
 
     Attributes:
         kind: Its message_type.
         station: Who sent it.
         t_ns: When, on the sender's clock.
-        heard_ns: When the recorder heard it.
+        received_ns: When the recorder heard it.
     """
 
     kind: str
     station: str
     t_ns: int
-    heard_ns: int
+    received_ns: int
     body: Body
 
 
@@ -58,7 +58,7 @@ class OnAir:
         self.counts: Counter[str] = Counter()
         self.unreadable = 0
 
-    def __iter__(self) -> Iterator[Said]:
+    def __iter__(self) -> Iterator[RadioMessage]:
         """Yield them in the order in which they were heard; counts begin anew."""
         self.counts, self.unreadable = Counter(), 0
         classes: dict[str, type[Message]] = {
@@ -74,10 +74,10 @@ class OnAir:
                 self.unreadable += 1
                 continue
             self.counts[kind] += 1
-            yield Said(kind, station, message.t_ns, one.t_ns, message.body)  # type: ignore[attr-defined]
+            yield RadioMessage(kind, station, message.t_ns, one.t_ns, message.body)  # type: ignore[attr-defined]
 
 
-def write_pcap(said: OnAir, stream: BinaryIO) -> int:
+def write_pcap(messages: OnAir, stream: BinaryIO) -> int:
     """Write a run's messages as a capture of ITS-G5 frames; return how many there are in it.
 
     A CPM is left out: it has no UPER here.
@@ -89,17 +89,20 @@ def write_pcap(said: OnAir, stream: BinaryIO) -> int:
     return write_capture(
         stream,
         (
-            (one.heard_ns, frame_of(one.kind, encode(one.body), positions.of(one.body), one.t_ns))
-            for one in said
+            (
+                one.received_ns,
+                frame_of(one.kind, encode(one.body), positions.of(one.body), one.t_ns),
+            )
+            for one in messages
             if one.kind in CODINGS
         ),
     )
 
 
-def write_json(said: OnAir, stream: BinaryIO) -> int:
+def write_json(messages: OnAir, stream: BinaryIO) -> int:
     """Write a run's messages in its-client's envelopes, one a line; return how many there are."""
     lines = 0
-    for one in said:
+    for one in messages:
         stream.write(wrap(one.body, one.station, one.t_ns) + b"\n")
         lines += 1
     return lines

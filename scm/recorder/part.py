@@ -84,7 +84,7 @@ class RecorderPart(BasePart):
     def step(self, now_ns: int, inbox: Sequence[Incoming | RawSample]) -> list[Outgoing]:
         """Write what came in; flush four times a second."""
         for item in inbox:
-            if isinstance(item, RawSample) and self._is_kept(item):
+            if isinstance(item, RawSample) and self._is_stored(item):
                 self.file.write(item)
         if now_ns >= self._flush_due_ns:
             self._flush_due_ns = now_ns + FLUSH_NS
@@ -95,7 +95,7 @@ class RecorderPart(BasePart):
         detail = f"{self.file.messages} messages in {self.file.path.name}"
         return [PartStatus(station=self.name, t_ns=now_ns, detail=detail)]
 
-    def _is_kept(self, sample: RawSample) -> bool:
+    def _is_stored(self, sample: RawSample) -> bool:
         """Say whether a message goes into the file: everything but pictures before their time."""
         kind = self.file.kind_of(sample.key)
         if kind not in self._period_ns:

@@ -31,17 +31,17 @@ class Recovered:
     grew: bool = False
 
 
-def recover(broken: Path, mended: Path | None = None) -> Recovered:
+def recover(broken: Path, repaired: Path | None = None) -> Recovered:
     """Copy what can be read of a cut-off recording.
 
     Args:
         broken: The recording; it is not changed.
-        mended: Where to write; None: beside it, as `<name>.recovered.mcap`.
+        repaired: Where to write; None: beside it, as `<name>.recovered.mcap`.
 
     Raises:
         RecordingError: when nothing at all can be read, or the target is the source.
     """
-    target = mended or broken.with_suffix(".recovered.mcap")
+    target = repaired or broken.with_suffix(".recovered.mcap")
     if target.resolve() == broken.resolve():
         msg = f"{broken}: cannot be recovered onto itself"
         raise RecordingError(msg)

@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 from mcap.records import ChunkIndex
 
 from scm.errors import RecordingError
-from scm.recorder.mcap_file import MAGIC, MOST_UNPACKED, UNREADABLE, Recorded
+from scm.recorder.mcap_file import MAGIC, MAX_UNPACKED_BYTES, UNREADABLE, Recorded
 
 CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, DATA_END = 0x04, 0x05, 0x06, 0x07, 0x0F
 _RECORD = struct.Struct("<BQ")
@@ -109,7 +109,7 @@ class RunIndex:
         for chunk, keys, stream in backwards:
             try:
                 places = _places(stream, self.path, chunk, keys, 0, before_ns)
-                last = sorted(places, key=_heard_ns)[-1:]
+                last = sorted(places, key=_log_ns)[-1:]
                 found = _messages(stream, self.path, chunk, keys, last)
             except RecordingError:
                 continue
@@ -250,7 +250,7 @@ def _places(
         try:
             stream.seek(chunk.channels[number])
             _, size = _LIST.unpack(stream.read(_LIST.size))
-            rows = _ENTRY.iter_unpack(stream.read(min(size, MOST_UNPACKED)))
+            rows = _ENTRY.iter_unpack(stream.read(min(size, MAX_UNPACKED_BYTES)))
         except (struct.error, OverflowError, OSError) as cause:
             raise _damaged(path, chunk, cause) from cause
         found += [(at, t_ns) for t_ns, at in rows if begin_ns <= t_ns <= end_ns]
@@ -275,9 +275,9 @@ def _messages(
     found = []
     try:
         for start, t_ns in places:
-            kind, length, number, _, heard_ns, _ = _MESSAGE.unpack_from(content, start)
+            kind, length, number, _, log_ns, _ = _MESSAGE.unpack_from(content, start)
             end = start + _RECORD.size + length
-            if kind != MESSAGE or heard_ns != t_ns or end > len(content):
+            if kind != MESSAGE or log_ns != t_ns or end > len(content):
                 raise _damaged(path, chunk, "its list of messages is not of its messages")
             found.append(Recorded(t_ns, keys[number], content[start + _MESSAGE.size : end]))
     except (struct.error, OverflowError, KeyError) as cause:
@@ -285,7 +285,7 @@ def _messages(
     return found
 
 
-def _heard_ns(place: tuple[int, int]) -> int:
+def _log_ns(place: tuple[int, int]) -> int:
     return place[1]
 
 
@@ -314,7 +314,10 @@ def _unpacked(stream: BinaryIO, path: Path, chunk: Chunk) -> bytes:
         packing, packed = record[_CHUNK.size : at], record[at + 8 :]
         if packing == b"":
             return packed
-        if packing != b"zstd" or max(size, zstandard.frame_content_size(packed)) > MOST_UNPACKED:
+        if (
+            packing != b"zstd"
+            or max(size, zstandard.frame_content_size(packed)) > MAX_UNPACKED_BYTES
+        ):
             msg = f"{path}: a chunk of {size} bytes packed as {packing[:20]!r} is none of ours"
             raise RecordingError(msg)
         return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)

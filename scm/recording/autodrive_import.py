@@ -27,7 +27,7 @@ from scm.recording.autodrive import (
     cell_of,
 )
 from scm.recording.autodrive_read import TICKS, Log, read_logs
-from scm.recording.autodrive_told import (
+from scm.recording.autodrive_remarks import (
     counted_on,
     of_axes,
     of_clock,
@@ -82,11 +82,11 @@ class Imported:
     """What came of a folder of logs.
 
     Attributes:
-        told: What is to be known of the logs, in lines.
+        remarks: What is to be known of the logs, in lines.
         left_out: Lines of the logs that are no rows, or placeholders; they stand in `left_out.csv`.
     """
 
-    told: list[str]
+    remarks: list[str]
     left_out: list[LeftOut]
 
 
@@ -126,19 +126,19 @@ def import_logs(
         raise RecordingError(msg)
     out.mkdir(parents=True, exist_ok=True)
     start_ms = min(int(log.stamps_ms[0]) for log in logs)
-    told: list[str] = []
+    remarks: list[str] = []
     names = [log.name for log in logs if log.kind == "V"]
     vehicles = {name: car if len(names) == 1 else f"{name}.toml" for name in names}
     for log in logs:
-        told += of_clock(log)
+        remarks += of_clock(log)
         if log.kind == "V":
             if unity_axes:
                 _turn(log)
             copy = f"put its car file in place of {vehicles[log.name]} in {out}"
             instead = "give its car file with --car" if len(names) == 1 else copy
             axes = [] if unity_axes else of_axes(log)
-            told += axes or _of_motion(log, steering_sign, m_per_count, car, instead)
-            told += of_scans(log) + _find_pictures(log, folder)
+            remarks += axes or _of_motion(log, steering_sign, m_per_count, car, instead)
+            remarks += of_scans(log) + _find_pictures(log, folder)
         _write_table(log, out, start_ms)
     left_out = [one for log in logs for one in log.left_out]
     if left_out:
@@ -147,15 +147,15 @@ def import_logs(
         for vehicle in vehicles.values():
             shutil.copyfile(car_file, out / vehicle)
     _describe(logs, out, vehicles, steering_sign, axle_m)
-    return Imported(told, left_out)
+    return Imported(remarks, left_out)
 
 
 def _of_motion(
     log: Log, steering_sign: int, m_per_count: float | None, car: str, instead: str
 ) -> list[str]:
     steering = steering_sign * log.numbers("steering")
-    told = of_steering(steering, log.numbers("speed"), log.numbers("angZ"))
-    return told + of_wheels(log, m_per_count, car, instead)
+    remarks = of_steering(steering, log.numbers("speed"), log.numbers("angZ"))
+    return remarks + of_wheels(log, m_per_count, car, instead)
 
 
 def _turn(log: Log) -> None:
@@ -174,17 +174,19 @@ def _find_pictures(log: Log, folder: Path) -> list[str]:
     """Name the pictures by where they are now, if they came with the logs."""
     frames = folder / f"{log.name} Camera Frames"
     there = {path.name for path in frames.iterdir()} if frames.is_dir() else set()
-    told = []
+    remarks = []
     for column in PICTURES:
         cells = log.cells.get(column, [])
         names = [ntpath.basename(cell) for cell in cells]
         found = sum(name in there for name in names)
         if any(names):
-            told.append(f"  {OURS[column]}: {found} of {sum(map(bool, names))} pictures are there")
+            remarks.append(
+                f"  {OURS[column]}: {found} of {sum(map(bool, names))} pictures are there"
+            )
         for k, name in enumerate(names):
             if name in there:
                 cells[k] = str((frames / name).resolve())
-    return told
+    return remarks
 
 
 def _write_table(log: Log, out: Path, start_ms: int) -> None:

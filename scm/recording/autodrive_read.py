@@ -116,7 +116,7 @@ def read_log(path: Path, kind: str, number: int) -> Log:
     layout, rows = _layout(path, rows, CAR_LAYOUTS if kind == "V" else LIGHT_LAYOUTS)
     reader = _Rows(path, layout, kind)
     for i, line, cells in rows:
-        reader.take(i, line, cells)
+        reader.pop_row(i, line, cells)
     if not reader.lines:
         why = "".join(f": line {one.line}: {one.why}" for one in reader.left_out[:1])
         msg = f"{path}: no row of AutoDRIVE's recorder{why}"
@@ -268,7 +268,7 @@ class _Rows:
         self.stamps_ms: list[int] = []
         self.left_out: list[LeftOut] = []
 
-    def take(self, line: int, text: str, cells: list[str]) -> None:
+    def pop_row(self, line: int, text: str, cells: list[str]) -> None:
         """Note a line as a row, or set it aside."""
         try:
             named = self._named(cells)
@@ -277,8 +277,8 @@ class _Rows:
         except RecordingError as problem:
             self.left_out.append(LeftOut(self._path.name, line, str(problem), text))
             return
-        for name, kept in self.cells.items():
-            kept.append(named[name])
+        for name, usable in self.cells.items():
+            usable.append(named[name])
         self.lines.append(line)
         self.stamps_ms.append(at_ms)
         self._scans.append(scan)

@@ -324,7 +324,7 @@ def _scan_ros1(path: Path) -> BagFile:
             for header, data in _ros1_records(stream):
                 size += len(data)
                 refuse_large(size, path)
-                _take_ros1(header, data, topics, found)
+                _read_ros1(header, data, topics, found)
         except RecordingError:
             raise
         except Exception as cause:  # noqa: BLE001  whatever a torn record makes of its readers
@@ -375,7 +375,7 @@ def _ros1_fields(data: bytes) -> dict[bytes, bytes]:
     return fields
 
 
-def _take_ros1(
+def _read_ros1(
     header: dict[bytes, bytes], data: bytes, topics: dict[int, Topic], found: list[Raw]
 ) -> None:
     """Note a connection or a message; other records belong to the index."""

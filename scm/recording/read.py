@@ -164,7 +164,7 @@ def read_recordings(path: Path | str, data: Path | str | None = None) -> list[Re
             if vehicle in scans:
                 msg = f"{found}: table {table.file}: {vehicle} has the scans of another table too"
                 raise RecordingError(msg)
-            t, keep = _rows_kept(table, columns, f"{found}: table {table.file}", origin_s)
+            t, keep = _selected_rows(table, columns, f"{found}: table {table.file}", origin_s)
             scans[vehicle] = read_scans(folder / table.file, table.topic, t, keep)
     return [
         Recording(
@@ -278,7 +278,7 @@ def _channels(
 ) -> dict[str, Channel]:
     """Return the channels of one table in SI, times counted from `origin_s`."""
     where = f"{path}: table {table.file}"
-    t, keep = _rows_kept(table, columns, where, origin_s)
+    t, keep = _selected_rows(table, columns, where, origin_s)
     source = Source(
         table=f"{table.file} {table.topic}" if table.topic else table.file,
         index=index,
@@ -298,7 +298,9 @@ def _channels(
     return found
 
 
-def _rows_kept(table: Table, columns: Columns, where: str, origin_s: int) -> tuple[Floats, Bools]:
+def _selected_rows(
+    table: Table, columns: Columns, where: str, origin_s: int
+) -> tuple[Floats, Bools]:
     """Return the time of every row of a table, and which rows its `where` keeps."""
     keep: Bools = np.ones(columns.rows, dtype=np.bool_)
     if table.where is not None:

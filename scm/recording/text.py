@@ -241,9 +241,9 @@ class _Table:
         counts = Counter(self._widths[is_named:] or self._widths)  # without the line of names
         width, most = counts.most_common(1)[0]
         if 2 * most < len(self._widths) - min(MAX_ABOVE, len(self._widths) // 2):
-            listed = ", ".join(f"{n} of {cells}" for cells, n in counts.most_common(4))
+            cells = ", ".join(f"{n} of {cells}" for cells, n in counts.most_common(4))
             msg = (
-                f"{self._path}: no common width: of {len(self._widths)} lines {listed} cells; "
+                f"{self._path}: no common width: of {len(self._widths)} lines {cells} cells; "
                 "expected one row a line, its cells parted by commas, semicolons, tabs or blanks"
             )
             raise RecordingError(msg)

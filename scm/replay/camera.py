@@ -54,7 +54,7 @@ class Camera:
         """Return the stamps of poses taken at true times."""
         return t + self._late + self._rate * (t - self._begin)
 
-    def taken(self, stamp: Floats) -> Floats:
+    def true_times(self, stamp: Floats) -> Floats:
         """Return the true times of stamps."""
         return self._begin + (stamp - self._late - self._begin) / (1.0 + self._rate)
 
@@ -90,7 +90,7 @@ class Camera:
         first, last = max(one[0] for one in known), min(one[-1] for one in known)
         around = [np.clip(self.stamp(t + h), first, last) for h in (-_HALF_S, _HALF_S)]
         before, after = (self.truly(*self.recorded(stamp)) for stamp in around)
-        span = np.maximum(self.taken(around[1]) - self.taken(around[0]), _TINY_S)
+        span = np.maximum(self.true_times(around[1]) - self.true_times(around[0]), _TINY_S)
         vx, vy, rate = ((b - a) / span for a, b in zip(before, after, strict=True))
         c, s = np.cos(yaw), np.sin(yaw)
         return Moved(x, y, yaw, self._along(t, c * vx + s * vy), c * vy - s * vx, rate)

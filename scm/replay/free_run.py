@@ -101,24 +101,24 @@ class Replay:
         self.drive = Drive(right, car)
         self.camera = Camera(self.drive, {})
         self._stamps = recording.channel("pose.x").t
-        self._taken = right.channel("pose.x").t
+        self._true_span = right.channel("pose.x").t
         self._windows = Windows(self.drive, car)
 
-    def taken(self, stamps: Floats) -> Floats:
+    def true_times(self, stamps: Floats) -> Floats:
         """Return when poses of these stamps were taken, on the commands' clock [s]."""
-        if np.array_equal(self._stamps, self._taken):
+        if np.array_equal(self._stamps, self._true_span):
             return stamps
-        late = np.interp(stamps, self._stamps, self._stamps - self._taken)
+        late = np.interp(stamps, self._stamps, self._stamps - self._true_span)
         return np.asarray(stamps - late)
 
-    def stamp(self, taken_s: float) -> float:
+    def stamp(self, true_s: float) -> float:
         """Return the stamp of a pose taken at a time on the commands' clock [s]."""
-        return float(np.interp(taken_s, self._taken, self._stamps))
+        return float(np.interp(true_s, self._true_span, self._stamps))
 
     def holds(self, first: Floats, last: Floats) -> bool:
         """Return whether poses and commands cover the time between two stamps."""
         edges = self.drive.edges
-        begin, end = float(self.taken(first).min()), float(self.taken(last).max())
+        begin, end = float(self.true_times(first).min()), float(self.true_times(last).max())
         return bool(begin >= edges[0] - TINY_S and end <= edges[-1] + STEP_S)
 
     def run(
@@ -135,13 +135,13 @@ class Replay:
             What the sides did, the edges at which their windows began, (sides, windows), and each
             window's start since its edge, (windows,).
         """
-        taken = self.taken(starts_s)
-        begun = np.floor((taken - self.drive.edges[0]) / STEP_S + TINY_S).astype(np.int64)
+        true_times = self.true_times(starts_s)
+        begun = np.floor((true_times - self.drive.edges[0]) / STEP_S + TINY_S).astype(np.int64)
         begun = np.clip(begun, 0, len(self.drive.edges) - 1)
         sides = [Side({}, self.camera), *(Side({}, camera, like=0) for camera in cameras)]
         starts: Ints = np.tile(begun, (len(sides), 1))
         steps = int(np.ceil(horizon_s / STEP_S - TINY_S)) + 1
-        return self._windows.run(sides, starts, steps), starts, taken - self.drive.edges[begun]
+        return self._windows.run(sides, starts, steps), starts, true_times - self.drive.edges[begun]
 
 
 def _refuse_apart(recording: Recording, car: Car) -> None:
@@ -188,7 +188,7 @@ def free_run(
     if not ok.all():
         left_out = {**left_out, DIVERGED: int((~ok).sum())}
     t_s: Floats = np.append(np.arange(0.0, horizon_s - 0.5 * STEP_S, save_every_s), horizon_s)
-    at = replay.taken((starts[:, None] + t_s).ravel()).reshape(len(starts), -1)
+    at = replay.true_times((starts[:, None] + t_s).ravel()).reshape(len(starts), -1)
     after = at - replay.drive.edges[begun[0]][:, None]
     yaw = np.unwrap(runs["yaw"], axis=0)
     x, y, psi, speed = (
@@ -226,7 +226,7 @@ def _whole_windows(replay: Replay, horizon_s: float) -> tuple[Floats, dict[str, 
     recording = replay.recording
     poses = Poses(recording)
     commands = Commands(recording, replay.car).span_s
-    seen = replay.taken(poses.t[[0, -1]])
+    seen = replay.true_times(poses.t[[0, -1]])
     first = max(float(seen[0]), commands[0])
     span = min(float(seen[1]), commands[1]) - first
     if span < horizon_s - TINY_S:

@@ -27,7 +27,7 @@ from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 
 BEYOND_STEPS = 3  # behind the last edge, for which commands hold
-KEPT = ("x", "y", *SIGNALS, "yaw")
+RECORDED_STATES = ("x", "y", *SIGNALS, "yaw")
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,13 +200,13 @@ class Windows:
         for i, command in enumerate(commands):
             rows = slice(leaders + i * windows, leaders + (i + 1) * windows)
             wide[:, :, rows] = command[:, run_in + at[i]]
-        first = {name: _signal(fleet, name)[leaders:] for name in KEPT}
+        first = {name: _signal(fleet, name)[leaders:] for name in RECORDED_STATES}
         got = self._rolled(fleet, wide, starts.ravel(), leaders)
         signals = {
             name: np.concatenate((first[name][None], got[name][:, leaders:])).reshape(
                 steps + 1, sides, windows
             )
-            for name in KEPT
+            for name in RECORDED_STATES
         }
         ok = fleet.status[leaders:].reshape(sides, windows) == VehicleStatus.OK
         return Runs(signals, ok)
@@ -215,13 +215,13 @@ class Windows:
         """Drive all windows through their commands, at the voltage measured meanwhile."""
         battery = self.drive.battery
         if battery is None:
-            return dict(fleet.rollout(wide[0], wide[1], STEP_S, KEPT))
+            return dict(fleet.rollout(wide[0], wide[1], STEP_S, RECORDED_STATES))
         parts = []
         for a in range(0, wide.shape[1], TETHER_STEPS):
             part = wide[:, a : a + TETHER_STEPS]
             fleet.battery[leaders:] = battery[np.minimum(starts + a, len(battery) - 1)]
-            parts.append(fleet.rollout(part[0], part[1], STEP_S, KEPT))
-        return {name: np.concatenate([part[name] for part in parts]) for name in KEPT}
+            parts.append(fleet.rollout(part[0], part[1], STEP_S, RECORDED_STATES))
+        return {name: np.concatenate([part[name] for part in parts]) for name in RECORDED_STATES}
 
 
 def at_times(signal: Floats, since: Floats) -> Floats:

@@ -127,8 +127,8 @@ class RosCar:
     def command(self, topic: str, message: Any, now_ns: int) -> None:
         """Take a command of a ROS node, from one of `COMMANDS`."""
         wheelbase = self._pilot.limits.wheelbase
-        speed, angle = convert.wished(COMMANDS[topic], message, wheelbase)
-        self._pilot.hear(speed, angle, now_ns)
+        speed, angle = convert.speed_and_angle(COMMANDS[topic], message, wheelbase)
+        self._pilot.set_command(speed, angle, now_ns)
 
     @property
     def pilot(self) -> Pilot:

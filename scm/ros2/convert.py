@@ -106,7 +106,7 @@ def picture(name: str, frame: CameraFrame) -> Any:
     )
 
 
-def wished(kind: str, message: Any, wheelbase_m: float) -> tuple[float, float]:
+def speed_and_angle(kind: str, message: Any, wheelbase_m: float) -> tuple[float, float]:
     """Return speed [m/s] and road-wheel angle [rad, + = left] that a command asks for.
 
     A car cannot turn on the spot: at standstill a turn is not followed. What is not a number

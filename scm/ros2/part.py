@@ -30,7 +30,7 @@ from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.vehicles.car import Car, load_car
 
-LOOK_NS = 200 * NS_PER_MS
+CHECK_NS = 200 * NS_PER_MS
 MARKERS_EVERY = 2  # snapshots
 _ALWAYS = (Subscription(WorldSnapshot),)
 _TF = "tf2_msgs/TFMessage"
@@ -58,29 +58,29 @@ class RosPart(BasePart):
         self._cars: dict[str, RosCar] = {}
         self._unknown: set[str] = set()
         self._spats: dict[str, Spat] = {}
-        self._look_ns: int | None = None
+        self._check_ns: int | None = None
         self._snapshots = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Publish what the city said; send what ROS nodes want of their cars."""
         moved: list[Any] = []
         for item in inbox:
-            moved += self._hear(item, now_ns)
+            moved += self._process(item, now_ns)
         if moved:
             self._tf.publish(ros(_TF, transforms=moved), now_ns)
-        for topic, message in self._graph.heard():
+        for topic, message in self._graph.received():
             name, _, command = topic.strip("/").partition("/")
             for car in self._cars.values():
                 if car.name == name:
                     car.command(command, message, now_ns)
-        if self._look_ns is None:
+        if self._check_ns is None:
             self._roads.publish(markers.roads(self._map, now_ns), now_ns)
-        if self._look_ns is None or now_ns >= self._look_ns:
-            self._look_ns = now_ns + LOOK_NS
-            self._look()
+        if self._check_ns is None or now_ns >= self._check_ns:
+            self._check_ns = now_ns + CHECK_NS
+            self._update_subscriptions()
         return [item for car in self._cars.values() for item in car.drive(now_ns)]
 
-    def _hear(self, item: Incoming, now_ns: int) -> list[Any]:
+    def _process(self, item: Incoming, now_ns: int) -> list[Any]:
         """Publish one thing; return transforms."""
         message = item.message
         if item.call is not None:
@@ -88,7 +88,7 @@ class RosPart(BasePart):
             if isinstance(request, LeaseRequest) and request.vehicle in self._cars:
                 self._cars[request.vehicle].pilot.replied(request, message)
         elif isinstance(message, WorldSnapshot):
-            self._hear_snapshot(message, now_ns)
+            self._process_snapshot(message, now_ns)
         elif isinstance(message, Spat):
             self._spats[message.junction] = message
         else:
@@ -96,15 +96,15 @@ class RosPart(BasePart):
             return [] if car is None else car.show(message, now_ns)
         return []
 
-    def _hear_snapshot(self, snapshot: WorldSnapshot, now_ns: int) -> None:
+    def _process_snapshot(self, snapshot: WorldSnapshot, now_ns: int) -> None:
         self._clock.publish(convert.clock(snapshot.t_ns), now_ns)
-        self._meet({row.vehicle: row.car for row in snapshot.vehicles}, now_ns)
+        self._update_cars({row.vehicle: row.car for row in snapshot.vehicles}, now_ns)
         self._snapshots += 1
         if self._snapshots % MARKERS_EVERY == 0 and self._markers.is_wanted:
             cars = {car.car.name: car.car for car in self._cars.values()}
             self._markers.publish(markers.moving(self._map, snapshot, self._spats, cars), now_ns)
 
-    def _meet(self, here: dict[str, str], now_ns: int) -> None:
+    def _update_cars(self, here: dict[str, str], now_ns: int) -> None:
         """Follow who came and who left."""
         gone = [vehicle for vehicle in self._cars if vehicle not in here]
         come = [vehicle for vehicle in here if vehicle not in self._cars.keys() | self._unknown]
@@ -112,14 +112,14 @@ class RosPart(BasePart):
         for vehicle in gone:
             self._cars.pop(vehicle).close()
         for vehicle in come:
-            self._welcome(vehicle, here[vehicle])
+            self._add_car(vehicle, here[vehicle])
         if gone or come:
             mounts = [
                 m for car in self._cars.values() for m in frames.mounts(car.name, car.car, now_ns)
             ]
             self._mounts.publish(ros(_TF, transforms=mounts), now_ns)
 
-    def _welcome(self, vehicle: str, kind: str) -> None:
+    def _add_car(self, vehicle: str, kind: str) -> None:
         name = ros_name(vehicle)
         if any(car.name == name for car in self._cars.values()):
             self._refuse(vehicle, f"another car is called {name} in ROS")
@@ -135,17 +135,17 @@ class RosPart(BasePart):
         self._unknown.add(vehicle)
         event(_log, "ros_car_not_shown", level=logging.WARNING, vehicle=vehicle, why=why)
 
-    def _look(self) -> None:
+    def _update_subscriptions(self) -> None:
         """Hear what is wanted now; a list that is the same stays the same object."""
         moves = self._tf.is_wanted
-        wished = [
+        wanted = [
             *_ALWAYS,
             *(h for car in self._cars.values() for h in car.subscriptions(moves=moves)),
         ]
         if self._markers.is_wanted:
-            wished.append(Subscription(Spat))
-        if wished != list(self.subscriptions):
-            self.subscriptions = wished
+            wanted.append(Subscription(Spat))
+        if wanted != list(self.subscriptions):
+            self.subscriptions = wanted
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Give back the leases; the cars leave the ROS graph."""

@@ -21,15 +21,15 @@ from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.vehicles.driver import CarLimits
 
-FRESH_NS = 300 * NS_PER_MS
+COMMAND_TIMEOUT_NS = 300 * NS_PER_MS
 SILENT_NS = NS_PER_S
 DRIVE_NS = 50 * NS_PER_MS
 LEASE_MS = 1000
 RENEW_NS = LEASE_MS * NS_PER_MS // 3
-ASK_AGAIN_NS = NS_PER_S
-ASK_S = 0.5
-LONGEST_STEP_S = 0.1
-MOST_SUM = 0.3
+RETRY_NS = NS_PER_S
+REQUEST_TIMEOUT_S = 0.5
+MAX_STEP_S = 0.1
+MAX_INTEGRAL = 0.3
 
 _log = logging.getLogger(__name__)
 
@@ -49,22 +49,22 @@ class Pilot:
         self._owner = owner
         self._speed_mps = 0.0
         self._angle_rad = 0.0
-        self._heard_ns: int | None = None
+        self._command_ns: int | None = None
         self._epoch: int | None = None
         self._seq = 0
-        self._asked_ns: int | None = None
+        self._requested_ns: int | None = None
         self._drive_ns = 0
         self._lost = False
-        self._cruise = _Cruise(limits)
+        self._speed_control = _SpeedControl(limits)
 
     @property
     def is_driving(self) -> bool:
         """Whether a node has spoken within the last second, or the lease is still held."""
-        return self._heard_ns is not None or self._epoch is not None
+        return self._command_ns is not None or self._epoch is not None
 
-    def hear(self, speed_mps: float, angle_rad: float, now_ns: int) -> None:
+    def set_command(self, speed_mps: float, angle_rad: float, now_ns: int) -> None:
         """Take a command: speed, + = forward, and road-wheel angle, + = left."""
-        self._speed_mps, self._angle_rad, self._heard_ns = speed_mps, angle_rad, now_ns
+        self._speed_mps, self._angle_rad, self._command_ns = speed_mps, angle_rad, now_ns
 
     def step(self, now_ns: int, speed_mps: float) -> list[Outgoing]:
         """Return what is due: asking for the lease, renewing it, driving, giving it back.
@@ -73,25 +73,25 @@ class Pilot:
             now_ns: Now.
             speed_mps: Of the car, as it last told.
         """
-        if self._heard_ns is not None and now_ns - self._heard_ns >= SILENT_NS:
-            self._heard_ns = None
+        if self._command_ns is not None and now_ns - self._command_ns >= SILENT_NS:
+            self._command_ns = None
             self._lost = False
-        if self._heard_ns is None:
+        if self._command_ns is None:
             return self.release()
-        due = self._asked_ns is None or now_ns - self._asked_ns >= self._pause_ns
+        due = self._requested_ns is None or now_ns - self._requested_ns >= self._pause_ns
         if due and not self._lost:
-            self._asked_ns = now_ns
-            return [self._ask("acquire" if self._epoch is None else "renew")]
+            self._requested_ns = now_ns
+            return [self._request("acquire" if self._epoch is None else "renew")]
         if self._epoch is None or now_ns < self._drive_ns:
             return []
-        return [self._drive(now_ns, speed_mps, self._heard_ns)]
+        return [self._drive(now_ns, speed_mps, self._command_ns)]
 
     @property
     def _pause_ns(self) -> int:
-        return ASK_AGAIN_NS if self._epoch is None else RENEW_NS
+        return RETRY_NS if self._epoch is None else RENEW_NS
 
-    def _drive(self, now_ns: int, speed_mps: float, heard_ns: int) -> DriveCommand:
-        is_fresh = now_ns - heard_ns < FRESH_NS
+    def _drive(self, now_ns: int, speed_mps: float, command_ns: int) -> DriveCommand:
+        is_fresh = now_ns - command_ns < COMMAND_TIMEOUT_NS
         self._drive_ns = now_ns + DRIVE_NS
         self._seq += 1
         return DriveCommand(
@@ -99,19 +99,21 @@ class Pilot:
             t_ns=now_ns,
             epoch=self._epoch or 0,
             seq=self._seq,
-            throttle=self._cruise.throttle(self._speed_mps if is_fresh else 0.0, speed_mps, now_ns),
+            throttle=self._speed_control.throttle(
+                self._speed_mps if is_fresh else 0.0, speed_mps, now_ns
+            ),
             steering=max(-1.0, min(1.0, self._angle_rad / self.limits.steer_limit)),
         )
 
     def release(self) -> list[Outgoing]:
         """Return what gives the lease back, if it is held."""
-        out: list[Outgoing] = [] if self._epoch is None else [self._ask("release")]
+        out: list[Outgoing] = [] if self._epoch is None else [self._request("release")]
         self._forget_lease()
         return out
 
     def _forget_lease(self) -> None:
-        self._epoch = self._asked_ns = None
-        self._cruise = _Cruise(self.limits)
+        self._epoch = self._requested_ns = None
+        self._speed_control = _SpeedControl(self.limits)
 
     def replied(self, request: LeaseRequest, reply: Message) -> None:
         """Hear what became of a request for the lease."""
@@ -124,7 +126,7 @@ class Pilot:
                 self._lost = True
                 self._forget_lease()
 
-    def _ask(self, verb: str) -> Call:
+    def _request(self, verb: str) -> Call:
         request = LeaseRequest(
             vehicle=self.vehicle,
             owner=self._owner,
@@ -132,39 +134,39 @@ class Pilot:
             epoch=self._epoch or 0,
             ttl_ms=LEASE_MS,
         )
-        return Call(request, ASK_S)
+        return Call(request, REQUEST_TIMEOUT_S)
 
 
-class _Cruise:
+class _SpeedControl:
     """Throttle for a speed: what the car's table says, and feedback for the rest."""
 
     def __init__(self, limits: CarLimits) -> None:
         self._limits = limits
         self._gain, self._rate = (4.0, 2.0) if limits.speeds else (1.0, 1.0)
-        self._aim_mps: float | None = None
-        self._sum = 0.0
+        self._ramp_mps: float | None = None
+        self._integral = 0.0
         self._then_ns: int | None = None
 
-    def throttle(self, wished_mps: float, speed_mps: float, now_ns: int) -> float:
+    def throttle(self, target_mps: float, speed_mps: float, now_ns: int) -> float:
         """Return the throttle, -1 to 1, with which the car comes to a speed at its own pace."""
         passed_s = 0.0 if self._then_ns is None else seconds(now_ns - self._then_ns)
-        passed_s = min(LONGEST_STEP_S, passed_s)
+        passed_s = min(MAX_STEP_S, passed_s)
         self._then_ns = now_ns
-        if wished_mps == 0.0:
-            self._aim_mps, self._sum = None, 0.0
+        if target_mps == 0.0:
+            self._ramp_mps, self._integral = None, 0.0
             return 0.0
         most = self._limits.accel * passed_s
-        aim = speed_mps if self._aim_mps is None else self._aim_mps
-        aim += max(-most, min(most, wished_mps - aim))
-        self._aim_mps = aim
+        aim = speed_mps if self._ramp_mps is None else self._ramp_mps
+        aim += max(-most, min(most, target_mps - aim))
+        self._ramp_mps = aim
         error = aim - speed_mps
-        value = self._steady(aim) + self._gain * error + self._sum
+        value = self._steady(aim) + self._gain * error + self._integral
         slowest = self._limits.brake_throttle
-        low, high = (slowest, 1.0) if wished_mps > 0.0 else (-1.0, -slowest)
+        low, high = (slowest, 1.0) if target_mps > 0.0 else (-1.0, -slowest)
         bounded = max(low, min(high, value))
         if bounded == value:
-            more = self._sum + self._rate * error * passed_s
-            self._sum = max(-MOST_SUM, min(MOST_SUM, more))
+            more = self._integral + self._rate * error * passed_s
+            self._integral = max(-MAX_INTEGRAL, min(MAX_INTEGRAL, more))
         return bounded
 
     def _steady(self, speed_mps: float) -> float:

@@ -23,14 +23,14 @@ from scm.v2x.access import is_local
 from scm.v2x.yielding import yielding
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7448"
-HEARD_DEPTH = 1000
+MAX_RECEIVED = 1000
 HEARTBEAT_S = 0.5
 CONNECT_S = 5.0
 
 _log = logging.getLogger(__name__)
 
 
-class Heard(NamedTuple):
+class Received(NamedTuple):
     """A message that a ROS node published."""
 
     topic: str
@@ -66,10 +66,10 @@ class Graph(Protocol):
         ...
 
     def subscribe(self, topic: str, kind: str) -> Endpoint:
-        """Let messages of a topic come out of `heard`."""
+        """Let messages of a topic come out of `received`."""
         ...
 
-    def heard(self) -> list[Heard]:
+    def received(self) -> list[Received]:
         """Return what arrived since the last time, in order."""
         ...
 
@@ -100,7 +100,7 @@ class Wire:
             )
             raise AccessError(msg)
         self._lock = threading.Lock()
-        self._heard: deque[tuple[str, str, bytes]] = deque(maxlen=HEARD_DEPTH)
+        self._received: deque[tuple[str, str, bytes]] = deque(maxlen=MAX_RECEIVED)
         self._endpoints: list[_End] = []
         self._made = 0
         self._closed = False
@@ -119,28 +119,28 @@ class Wire:
         return publisher
 
     def subscribe(self, topic: str, kind: str) -> "_End":
-        """Let messages of a topic come out of `heard`, the newest thousand of all topics."""
+        """Let messages of a topic come out of `received`, the newest thousand of all topics."""
         key, token = self._names(topic, kind, "MS", names.qos())
 
         def note(sample: zenoh.Sample) -> None:
             if sample.kind == zenoh.SampleKind.PUT:
                 with self._lock:
-                    self._heard.append((topic, kind, sample.payload.to_bytes()))
+                    self._received.append((topic, kind, sample.payload.to_bytes()))
 
         direct: Any = zenoh.handlers.Callback(note, indirect=False)
         subscription = _End(self._session, token, self._session.declare_subscriber(key, direct))
         self._endpoints.append(subscription)
         return subscription
 
-    def heard(self) -> list[Heard]:
+    def received(self) -> list[Received]:
         """Return what arrived since the last time, in order; what cannot be read is dropped."""
         with self._lock:
-            raw = list(self._heard)
-            self._heard.clear()
+            raw = list(self._received)
+            self._received.clear()
         out = []
         for topic, kind, body in raw:
             try:
-                out.append(Heard(topic, types.from_cdr(kind, body)))
+                out.append(Received(topic, types.from_cdr(kind, body)))
             except MessageError as cause:
                 self.rejected += 1
                 event(_log, "ros_message_rejected", level=logging.WARNING, topic=topic, why=cause)

@@ -60,7 +60,7 @@ class Board:
             charuco_board(self)
 
     @property
-    def said(self) -> str:
+    def description(self) -> str:
         """What it is, in words."""
         if self.kind == "tags":
             return f"{self.columns} x {self.rows} tags from id {self.first_id}"

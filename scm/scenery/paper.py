@@ -14,7 +14,7 @@ PAPERS_MM = {
 }  # fmt: skip
 POINTS_PER_MM = 72.0 / 25.4
 RULER_MM = 100.0
-RULER_SAID = "This ruler is 100 mm long. If yours differs, print again at 100 % (actual size)."
+RULER_NOTE = "This ruler is 100 mm long. If yours differs, print again at 100 % (actual size)."
 Rectangle = tuple[float, float, float, float]
 """Left, bottom, width, height [mm]."""
 
@@ -53,7 +53,7 @@ class Page:
         for tenth in range(11):
             at = x + tenth * RULER_MM / 10.0
             self.lines.append((at, y, at, y + (4.0 if tenth % 5 == 0 else 2.5), 0.2))
-        self.texts.append((x, y - 4.0, 3.0, RULER_SAID))
+        self.texts.append((x, y - 4.0, 3.0, RULER_NOTE))
 
 
 def svg(page: Page) -> str:

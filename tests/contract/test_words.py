@@ -12,16 +12,13 @@ GLOSSARY = ROOT / "docs" / "glossary.md"
 TWIN_MEANS_CITY_TWIN = {"twin", "twins"}  # a car's versioned file; only effects may not be twins
 RECORDS = ("Struct", "BaseModel", "Message", "Record")
 STANDARD = {
+    "tell",  # of files
     "wait_for_calm",  # of `scm.fleet.City`: scripts of users call it by its name of 0.1
     "__slots__",  # Python's own name
     "_slots_",  # of ctypes structures
 }
 PENDING = (
-    "scm/camera",
-    "scm/eye", "scm/maps", "scm/mismatch", "scm/play.py",
-    "scm/play_watch.py", "scm/recorder", "scm/recording", "scm/replay",
-    "scm/ros2", "scm/scenery", "scm/traffic",
-    "scm/vehicles", "scm/world", "vehicle_agent",
+    "scm/maps", "scm/mismatch", "scm/traffic", "scm/vehicles", "scm/world",
 )  # fmt: skip
 """Where old names still stand; this list only gets shorter."""
 PUBLISHED = ("scm/client/nouns",)  # written from the interface: methods carry its operation ids

@@ -82,7 +82,7 @@ def _from_pictures(board: Board, paths: Sequence[Path], progress: Progress) -> G
         size, first = got, first or path
         view = find_board(board, grey, str(path))
         if view is None:
-            remarks.append(f"{path}: no {board.said}")
+            remarks.append(f"{path}: no {board.description}")
         else:
             views.append(view)
     if not views:
@@ -157,4 +157,4 @@ def _nothing(board: Board, where: str) -> str:
         more = f"{board.columns + 1}x{board.rows + 1}"
         hint = f" (--squares counts squares: a board of {board.columns} x {board.rows} inner "
         hint += f"corners is {more})"
-    return f"{where}: expected a {board.said}, found none{hint}"
+    return f"{where}: expected a {board.description}, found none{hint}"

@@ -10,7 +10,7 @@ from scm.eye.camera import CameraModel
 from scm.geometry import Pose2
 from scm.records.city_map import Box, CityMap, MapTag
 from scm.scenery.canvas import Canvas
-from scm.scenery.sheet import BRICK, CARD, FloorSheet, paint_floor, printed_tag, wall_pieces
+from scm.scenery.sheet import BRICK, CARDBOARD, FloorSheet, paint_floor, printed_tag, wall_pieces
 from scm.scenery.solids import Solid, draw_shape, prism, rectangle, shape_of
 from scm.scenery.tags import PRINT_SCALE, tag_corners
 
@@ -90,7 +90,7 @@ def draw_scenery(city_map: CityMap, model: CameraModel, rng: np.random.Generator
 def draw_box(frame: Image, model: CameraModel, box: Box, at: Pose2) -> None:
     """Paint a movable box at its present pose."""
     foot = rectangle(at.x, at.y, box.length_m, box.width_m, at.yaw)
-    _draw_obstacle(frame, model, prism(foot, 0.0, box.height_m, CARD))
+    _draw_obstacle(frame, model, prism(foot, 0.0, box.height_m, CARDBOARD))
 
 
 def draw_map_tag(frame: Image, model: CameraModel, tag: MapTag) -> None:
@@ -176,7 +176,7 @@ def _light(width: int, height: int) -> Floats:
 
 def _standing(city_map: CityMap) -> list[Solid]:
     solids = [
-        prism(rectangle(b.x_m, b.y_m, b.length_m, b.width_m, b.yaw_rad), 0.0, b.height_m, CARD)
+        prism(rectangle(b.x_m, b.y_m, b.length_m, b.width_m, b.yaw_rad), 0.0, b.height_m, CARDBOARD)
         for b in city_map.boxes
         if b.mass_kg is None
     ]

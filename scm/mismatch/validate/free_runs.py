@@ -196,7 +196,7 @@ class _Driven:
 def _driven(replay: Replay, starts: Floats, t_s: Floats, cameras: Sequence[Camera]) -> _Driven:
     """Drive one car through all windows, from the measured motion and from noisy ones."""
     runs, begun, _ = replay.run(starts, float(t_s[-1]), cameras)
-    at = replay.taken((starts[:, None] + t_s).ravel()).reshape(len(starts), -1)
+    at = replay.true_times((starts[:, None] + t_s).ravel()).reshape(len(starts), -1)
     edges = replay.drive.edges[begun[0]]
     seen = [camera.motion(at.ravel()) for camera in (replay.camera, *cameras)]
     signals = {"x": runs["x"], "y": runs["y"], "yaw": np.unwrap(runs["yaw"], axis=0)}

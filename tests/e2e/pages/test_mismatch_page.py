@@ -11,7 +11,7 @@ from scm.fleet import LockstepLink
 from scm.maps.load import load_map
 from scm.mismatch.report.cars_page import write_several
 from scm.mismatch.report.write import write_report
-from scm.play import play, write_recording
+from scm.recorder.play import play, write_recording
 from scm.runtime.lockstep import Lockstep
 from scm.world.part import WorldPart
 from tests.e2e.city_process import wait_for

@@ -191,7 +191,7 @@ def test_a_real_car_is_where_the_cameras_see_it(tmp_path: Path) -> None:
     real = [state(ms, source="odometry") for ms in range(0, 1000, 20)]
     run = read_tracks(said(tmp_path / "a.mcap", *real, *tracks))
     assert set(run.cars[0].columns["posX"].values) == {4.0}
-    assert "n2: where the overhead cameras saw it" in run.told
+    assert "n2: where the overhead cameras saw it" in run.remarks
 
 
 def test_a_sparse_run_is_exported_from_its_snapshots(tmp_path: Path) -> None:
@@ -205,7 +205,7 @@ def test_a_sparse_run_is_exported_from_its_snapshots(tmp_path: Path) -> None:
     ]  # fmt: skip
     run = read_tracks(said(tmp_path / "a.mcap", *world))
     assert set(run.cars[0].columns["steering"].values) == {0.2}
-    assert "n2: steering is the wheels' angle: no command was told" in run.told
+    assert "n2: steering is the wheels' angle: no command was told" in run.remarks
 
 
 def test_a_run_without_the_car_asked_for_is_refused(tmp_path: Path) -> None:

@@ -14,10 +14,10 @@ from scm.errors import RecordingError
 from scm.fleet import LockstepLink
 from scm.maps.load import load_map
 from scm.mismatch.diagnose import diagnose
-from scm.play import play, write_recording
 from scm.recorder.drives import read_drives, recordings_of
 from scm.recorder.mcap_file import RunFile, read_run
 from scm.recorder.part import RecorderPart
+from scm.recorder.play import play, write_recording
 from scm.replay.free_run import free_run
 from scm.runtime.lockstep import Lockstep
 from scm.traffic.signals.part import TrafficPart

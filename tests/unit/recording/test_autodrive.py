@@ -99,7 +99,7 @@ def test_pictures_and_scans_come_along_though_a_path_has_commas(
     logs(folder, *(",".join([row(k), *paths, SCAN]) for k in range(3)))
     (folder / "V1 Camera Frames").mkdir()
     (folder / "V1 Camera Frames/Camera0_Frame_1.jpg").write_bytes(b"jpg")
-    told = imported(folder).told
+    told = imported(folder).remarks
     with (folder / "out/V1.csv").open() as stream:
         first = next(csv.DictReader(stream))
     assert first["front_camera"] == str(folder / "V1 Camera Frames/Camera0_Frame_1.jpg")
@@ -177,7 +177,7 @@ def test_clocks_that_repeat_gap_and_go_back_are_told(tmp_path: Path) -> None:
     at = [0, 0, 40, 20, 60, 900, 900 - 3_600_000, 950 - 3_600_000]
     rows = [row(k, timestamp=stamp_of(START_MS + ms)) for k, ms in enumerate(at)]
     folder = logs(tmp_path / "log", *rows)
-    told = "\n".join(imported(folder).told)
+    told = "\n".join(imported(folder).remarks)
     assert "1 stamps repeat" in told
     assert "1 stamps go back by less than a second" in told
     assert "line 7: the clock was set back by 3600.000 s" in told
@@ -188,9 +188,9 @@ def test_clocks_that_repeat_gap_and_go_back_are_told(tmp_path: Path) -> None:
 
 def test_steering_that_turns_against_the_car_is_told_and_can_be_turned(tmp_path: Path) -> None:
     folder = logs(tmp_path / "log", *(row(k, steering="-0.25") for k in range(30)))
-    assert "against its steering" in "\n".join(imported(folder).told)
+    assert "against its steering" in "\n".join(imported(folder).remarks)
     (folder / "out").rename(tmp_path / "wrong")
-    assert "against" not in "\n".join(imported(folder, steering_sign=-1).told)
+    assert "against" not in "\n".join(imported(folder, steering_sign=-1).remarks)
     assert_allclose(read_one(folder).channel("command.steering").values, 0.25)
 
 
@@ -200,7 +200,7 @@ def test_unity_axes_are_told_and_converted(tmp_path: Path) -> None:
         for k in range(3)
     ]
     folder = logs(tmp_path / "log", *rows)
-    assert "--axes unity" in "\n".join(imported(folder).told)
+    assert "--axes unity" in "\n".join(imported(folder).remarks)
     (folder / "out").rename(tmp_path / "wrong")
     imported(folder, unity_axes=True)
     recording = read_one(folder)
@@ -218,7 +218,7 @@ def counted(m_per_count: float, n: int = 20, **changed: str) -> list[str]:
 
 def test_wheels_that_slip_are_told_and_kept(tmp_path: Path) -> None:
     folder = logs(tmp_path / "log", *counted(1e-4 / 1.11))
-    told = "\n".join(imported(folder).told)
+    told = "\n".join(imported(folder).remarks)
     assert "encoders read +11.0%" in told
     assert "slip" in told
     assert read_one(folder).channel("encoder.left").values[-1] == round(0.19 * 1.11e4)
@@ -226,7 +226,7 @@ def test_wheels_that_slip_are_told_and_kept(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("factor", [0.7, 0.9, 1.3, 1.5])
 def test_what_slip_cannot_do_is_not_put_down_to_slip(tmp_path: Path, factor: float) -> None:
-    told = "\n".join(imported(logs(tmp_path / "log", *counted(1e-4 / factor))).told)
+    told = "\n".join(imported(logs(tmp_path / "log", *counted(1e-4 / factor))).remarks)
     assert f"encoders read {factor - 1:+.1%}" in told
     assert "slip" not in told
     assert "encoder.counts_per_revolution" in told
@@ -235,7 +235,7 @@ def test_what_slip_cannot_do_is_not_put_down_to_slip(tmp_path: Path, factor: flo
 
 @pytest.mark.parametrize("factor", [0.17, 0.2, 0.5, 6.0])
 def test_wheels_of_another_car_ask_for_its_file(tmp_path: Path, factor: float) -> None:
-    told = "\n".join(imported(logs(tmp_path / "log", *counted(1e-4 / factor))).told)
+    told = "\n".join(imported(logs(tmp_path / "log", *counted(1e-4 / factor))).remarks)
     assert "V1 Log.csv is not of the car nigel" in told
     assert "give its car file with --car" in told
     assert "slip" not in told
@@ -244,7 +244,7 @@ def test_wheels_of_another_car_ask_for_its_file(tmp_path: Path, factor: float) -
 def test_of_several_cars_the_one_that_is_another_is_named(tmp_path: Path) -> None:
     rows = {f"V{k}": "\n".join(counted(m)) for k, m in ((1, 1e-4), (2, 5e-4), (3, 1e-4))}
     folder = logs(tmp_path / "log", rows.pop("V1"), **rows)
-    (told,) = [line for line in imported(folder).told if "is not of the car" in line]
+    (told,) = [line for line in imported(folder).remarks if "is not of the car" in line]
     assert "V2 Log.csv is not of the car nigel" in told
     assert "put its car file in place of V2.toml" in told
 
@@ -254,7 +254,7 @@ def test_backward_counts_are_counts(tmp_path: Path) -> None:
             for k in range(20)]  # fmt: skip
     made = imported(logs(tmp_path / "log", *rows))
     assert made.left_out == []
-    assert "encoders" not in "\n".join(made.told)
+    assert "encoders" not in "\n".join(made.remarks)
     assert read_one(tmp_path / "log").channel("encoder.left").values[-1] == -1900
 
 
@@ -265,7 +265,7 @@ def test_rows_with_a_fraction_of_a_count_are_left_out(tmp_path: Path, column: st
     made = imported(logs(tmp_path / "log", *rows))
     assert [one.line for one in made.left_out] == [1, 2]
     assert made.left_out[0].why == f"{column}: got 0.2, expected whole counts of an encoder"
-    assert "encoders read" not in "\n".join(made.told)
+    assert "encoders read" not in "\n".join(made.remarks)
     recording = read_one(tmp_path / "log")
     assert recording.channel("encoder.left").values[0] == 200
     with (tmp_path / "log/out/left_out.csv").open(newline="") as stream:
@@ -276,7 +276,9 @@ def test_a_column_of_fractions_is_no_encoder(tmp_path: Path) -> None:
     rows = [row(k, leftTicks=f"{0.31 * k:g}", rightTicks=f"{0.3 * k:g}") for k in range(40)]
     made = imported(logs(tmp_path / "log", *rows))
     assert made.left_out == []
-    assert "leftTicks: 39 of 40 cells are not whole (0.31, 0.62, 0.93, ...)" in "\n".join(made.told)
+    assert "leftTicks: 39 of 40 cells are not whole (0.31, 0.62, 0.93, ...)" in "\n".join(
+        made.remarks
+    )
     channels = read_one(tmp_path / "log").channels
     assert "pose.x" in channels
     assert not {"encoder.left", "encoder.right"} & channels.keys()
@@ -293,7 +295,7 @@ def test_first_rows_that_hold_defaults_are_left_out(tmp_path: Path, first: dict[
     made = imported(logs(tmp_path / "log", *rows))
     assert [one.line for one in made.left_out] == [1, 2, 3]
     assert "placeholder" in made.left_out[0].why
-    assert "encoders read" not in "\n".join(made.told)
+    assert "encoders read" not in "\n".join(made.remarks)
     recording = read_one(tmp_path / "log")
     assert recording.channel("pose.x").values[0] == pytest.approx(0.03)
     assert recording.channel("pose.x").t[0] == 0.0
@@ -313,7 +315,7 @@ def test_a_full_size_car_that_is_driven_fast_from_the_first_row_on_loses_none(
 
 def test_an_encoder_that_stays_while_the_car_drives_is_told(tmp_path: Path) -> None:
     rows = [row(k, leftTicks="5", rightTicks=f"{100 * k}") for k in range(40)]
-    told = "\n".join(imported(logs(tmp_path / "log", *rows)).told)
+    told = "\n".join(imported(logs(tmp_path / "log", *rows)).remarks)
     assert "leftTicks stays at 5 while poses go 0.39 m" in told
     assert "encoders read" not in told
 
@@ -323,7 +325,7 @@ def test_a_car_put_elsewhere_and_a_counter_that_begins_anew_are_no_other_car(
 ) -> None:
     rows = [row(k, posX=f"{0.01 * k + 9 * (k > 20):g}", leftTicks=f"{100 * (k % 30)}",
                 rightTicks=f"{100 * (k % 30)}") for k in range(60)]  # fmt: skip
-    assert "encoders read" not in "\n".join(imported(logs(tmp_path / "log", *rows)).told)
+    assert "encoders read" not in "\n".join(imported(logs(tmp_path / "log", *rows)).remarks)
 
 
 def test_a_light_that_was_saved_as_decimals_is_read(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import pytest
 
 from scm.maps.load import load_map
 from scm.ros2.part import RosPart
-from scm.ros2.wire import Heard
+from scm.ros2.wire import Received
 from scm.runtime.lockstep import Lockstep
 from scm.world.part import WorldPart
 
@@ -33,7 +33,7 @@ class NotedGraph:
         self.wanted = set()
         self.topics = {}
         self.ears = {}
-        self._heard = []
+        self._received = []
 
     def publisher(self, topic, kind, *, latched=False):
         self.topics[topic] = NotedTopic(self, topic, kind, latched)
@@ -43,12 +43,12 @@ class NotedGraph:
         self.ears[topic] = NotedTopic(self, topic, kind, latched=False)
         return self.ears[topic]
 
-    def heard(self):
-        out, self._heard = self._heard, []
+    def received(self):
+        out, self._received = self._received, []
         return out
 
     def say(self, topic, message):
-        self._heard.append(Heard(topic, message))
+        self._received.append(Received(topic, message))
 
     def sent(self, topic):
         return [message for message, _ in self.topics[topic].sent]

@@ -154,7 +154,9 @@ def twist(speed, rate):
     ],
 )
 def test_a_twist_becomes_speed_and_wheel_angle(speed, rate, expected):
-    assert_allclose(convert.wished("geometry_msgs/Twist", twist(speed, rate), 0.14), expected)
+    assert_allclose(
+        convert.speed_and_angle("geometry_msgs/Twist", twist(speed, rate), 0.14), expected
+    )
 
 
 def test_an_ackermann_command_is_taken_as_it_is():
@@ -162,4 +164,4 @@ def test_an_ackermann_command_is_taken_as_it_is():
     command = types.ros(
         kind, steering_angle=0.25, steering_angle_velocity=0.0, speed=-0.5, acceleration=0, jerk=0
     )
-    assert convert.wished(kind, again(kind, command), 0.14) == (-0.5, 0.25)
+    assert convert.speed_and_angle(kind, again(kind, command), 0.14) == (-0.5, 0.25)

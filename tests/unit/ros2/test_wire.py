@@ -9,7 +9,7 @@ import zenoh
 from scm.errors import AccessError, LinkError, RunError
 from scm.ros2 import types
 from scm.ros2.names import read_attachment
-from scm.ros2.wire import Heard, Wire
+from scm.ros2.wire import Received, Wire
 from scm.v2x.router import free_endpoint
 
 STRING = "std_msgs/String"
@@ -69,8 +69,8 @@ def test_what_is_published_carries_its_number_time_and_sender(wire, peer):
     topic = wire.publisher("/talk", STRING)
     assert not topic.is_wanted
     got = []
-    heard = zenoh.handlers.Callback(got.append, indirect=False)
-    subscriber = peer.declare_subscriber(KEY, heard)
+    received = zenoh.handlers.Callback(got.append, indirect=False)
+    subscriber = peer.declare_subscriber(KEY, received)
     soon(lambda: topic.is_wanted)
     topic.publish(text("one"), 11)
     topic.publish(text("two"), 22)
@@ -88,9 +88,9 @@ def test_what_arrives_is_read_and_what_cannot_be_is_dropped(wire, peer):
     soon(lambda: publisher.matching_status.matching)
     publisher.put(b"nonsense")
     publisher.put(types.to_cdr(STRING, text("hello")))
-    heard = []
-    soon(lambda: heard.extend(wire.heard()) or heard)
-    assert heard == [Heard("/talk", text("hello"))]
+    received = []
+    soon(lambda: received.extend(wire.received()) or received)
+    assert received == [Received("/talk", text("hello"))]
     assert wire.rejected == 1
     publisher.undeclare()
 

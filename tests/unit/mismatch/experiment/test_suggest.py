@@ -15,7 +15,7 @@ from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.separation import quick
 from scm.mismatch.experiment.suggest import ANYBODY, NOBODY, names_of, suggest
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.play import read_drive
+from scm.recorder.play import read_drive
 from scm.recording.read import Channel, Recording
 from scm.replay.drive import Drive
 from scm.vehicles.car import load_car

@@ -33,12 +33,14 @@ def of_clock(log: Log) -> list[str]:
     step = np.diff(log.stamps_ms)
     forward = step[step > 0]
     rate = f", {1000.0 / float(np.median(forward)):.1f} rows a second" if len(forward) else ""
-    told = [f"{log.path.name}: {len(log.lines)} rows{rate}"]
+    remarks = [f"{log.path.name}: {len(log.lines)} rows{rate}"]
     if (repeated := int(np.sum(step == 0))) > 0:
-        told.append(f"  {repeated} stamps repeat the one before: a replay takes the first of each")
+        remarks.append(
+            f"  {repeated} stamps repeat the one before: a replay takes the first of each"
+        )
     if (back := int(np.sum((step < 0) & (step > -SET_BACK_MS)))) > 0:
-        told.append(f"  {back} stamps go back by less than a second: a replay leaves them out")
-    told += [
+        remarks.append(f"  {back} stamps go back by less than a second: a replay leaves them out")
+    remarks += [
         f"  line {log.lines[k + 1]}: the clock was set back by {-step[k] / 1000:.3f} s: rows "
         f"from there on are counted on from {AFTER_SET_BACK_MS / 1000:g} s later"
         for k in np.flatnonzero(step <= -SET_BACK_MS)
@@ -46,11 +48,11 @@ def of_clock(log: Log) -> list[str]:
     gaps = np.flatnonzero(step > LONGEST_STEP_MS)
     if len(gaps):
         worst = gaps[np.argmax(step[gaps])]
-        told.append(
+        remarks.append(
             f"  {len(gaps)} gaps of more than {LONGEST_STEP_MS / 1000:g} s, the longest of "
             f"{step[worst] / 1000:.3f} s before line {log.lines[worst + 1]}"
         )
-    return told
+    return remarks
 
 
 def of_axes(log: Log) -> list[str]:
@@ -75,19 +77,19 @@ def of_steering(steering: Floats, speed: Floats, yaw_rate: Floats) -> list[str]:
         speed: + = forward [m/s], shape (rows,).
         yaw_rate: + = left [rad/s], shape (rows,).
     """
-    told = []
+    remarks = []
     largest = float(np.nanmax(np.abs(steering), initial=0.0))
     if largest > LONGEST_STEERING_RAD:
-        told.append(f"  steering reaches {largest:g}, expected radian: is it in degree?")
+        remarks.append(f"  steering reaches {largest:g}, expected radian: is it in degree?")
     turning: Bools = (np.abs(steering) > TURNING_RAD) & (np.abs(speed) > MOVING_MPS)
     turning &= np.isfinite(yaw_rate)
     agrees = np.sign(steering[turning] * speed[turning]) == np.sign(yaw_rate[turning])
     if len(agrees) >= FEWEST_ROWS and (wrong := float(np.mean(~agrees))) > DISAGREE:
-        told.append(
+        remarks.append(
             f"  in {wrong:.0%} of {len(agrees)} turning rows the car turns against its steering: "
             "the other --steering-positive is meant"
         )
-    return told
+    return remarks
 
 
 def of_wheels(log: Log, m_per_count: float | None, car: str, instead: str) -> list[str]:
@@ -100,7 +102,7 @@ def of_wheels(log: Log, m_per_count: float | None, car: str, instead: str) -> li
         instead: What to do where it is another car's.
     """
     place = np.stack((log.numbers("posX"), log.numbers("posY")))
-    told, counters = [], []
+    remarks, counters = [], []
     for name in TICKS:
         counts = log.numbers(name)
         known = counts[np.isfinite(counts)]
@@ -108,30 +110,32 @@ def of_wheels(log: Log, m_per_count: float | None, car: str, instead: str) -> li
         way_m, _ = _ways(place, np.stack((counts, counts)))
         if len(odd):
             some = ", ".join(f"{value:g}" for value in odd[:3])
-            told.append(
+            remarks.append(
                 f"  {name}: {len(odd)} of {len(known)} cells are not whole ({some}, ...): not the "
                 "counts of an encoder, and not read as such"
             )
         elif len(known) and np.ptp(known) == 0.0 and way_m > SHORTEST_WAY_M:
-            told.append(f"  {name} stays at {known[0]:g} while poses go {way_m:.2f} m")
+            remarks.append(f"  {name} stays at {known[0]:g} while poses go {way_m:.2f} m")
         elif len(known):
             counters.append(counts)
     if m_per_count is None or not counters:
-        return told
+        return remarks
     gone_m, rolled_m = _ways(place, m_per_count * np.mean(counters, axis=0)[None])
     ratio = rolled_m / gone_m if gone_m > SHORTEST_WAY_M else 1.0
     ways = f"  wheels rolled {rolled_m:.2f} m, poses went {gone_m:.2f} m"
     more = f"{ways}: encoders read {ratio - 1:+.1%}"
     if not OTHER_CAR[0] < ratio < OTHER_CAR[1]:
-        told.append(f"{more}: {log.path.name} is not of the car {car}, by its encoders: {instead}")
+        remarks.append(
+            f"{more}: {log.path.name} is not of the car {car}, by its encoders: {instead}"
+        )
     elif SLIPS < ratio - 1.0 < MOST_SLIP:
-        told.append(f"{more}, as driven wheels that slip do: kept as they are")
+        remarks.append(f"{more}, as driven wheels that slip do: kept as they are")
     elif abs(ratio - 1.0) > SLIPS:
-        told.append(
+        remarks.append(
             f"{more}, expected 0 to {MOST_SLIP:+.0%}: check wheel.radius_m and "
             f"encoder.counts_per_revolution of the car {car}; kept as they are"
         )
-    return told
+    return remarks
 
 
 def of_scans(log: Log) -> list[str]:
@@ -141,13 +145,13 @@ def of_scans(log: Log) -> list[str]:
     there = ~np.isnan(log.scans).all(axis=1)
     same = (log.scans[1:] == log.scans[:-1]) | (np.isnan(log.scans[1:]) & np.isnan(log.scans[:-1]))
     new = 1 + int(np.sum(~same.all(axis=1)))
-    told = (
+    remarks = (
         f"  LIDAR: {int(there.sum())} rows of {log.scans.shape[1]} beams, {new} scans differ from "
         "the row before; scans were taken when the log was written, so any may be stale"
     )
     scans = log.scans[there]
     first = next((k for k, scan in enumerate(scans) if not _is_alike(scan, scans[-1])), 0)
-    return [told + (f": the first {first} rows hold the last one's" if first else "")]
+    return [remarks + (f": the first {first} rows hold the last one's" if first else "")]
 
 
 def _is_alike(scan: Floats, other: Floats) -> bool:

@@ -20,12 +20,12 @@ import yaml
 
 from scm.clock import NS_PER_S
 from scm.errors import RecordingError, RunError, ScmError, reading
-from scm.fleet import Link
 from scm.geometry import Pose2
-from scm.play_watch import Watch
-from scm.recorder.driven import RUN_IN_NS, Heard, recording_of
+from scm.recorder.driven import RUN_IN_NS, CarMessages, recording_of
+from scm.recorder.play_monitor import PlayMonitor
 from scm.recording.read import Recording
 from scm.recording.table import read_table
+from scm.runtime.city_link import Link
 from scm.runtime.part import Subscription
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.city_event import CityEvent
@@ -39,7 +39,7 @@ OWNER = "script"
 LEASE_MS = 5000
 RENEW_S = 1.0
 REPEATED_S = 0.05
-LONGEST_REST_NS = 5 * NS_PER_S
+MAX_STOPPING_NS = 5 * NS_PER_S
 Row = tuple[float, float, float]
 _FILES = {
     "commands.csv": {"throttle": "command.throttle", "steering": "command.steering"},
@@ -79,22 +79,22 @@ class Played:
 
     Attributes:
         vehicle: Who drove it.
-        heard: What was sent to it and what the city told of it.
+        messages: What was sent to it and what the city told of it.
         lost: How many of the car's messages did not arrive, or had to make room for newer ones.
         ended: Why it ended before its time; empty: it did not.
     """
 
     vehicle: str
-    heard: Heard
+    messages: CarMessages
     lost: int
     ended: str = ""
 
 
-class _Ear:
+class _Listener:
     """Takes in what a city tells of one car, as it comes: on a long drive no queue may fill up."""
 
     def __init__(self, link: Link, vehicle: str) -> None:
-        self._link, self._vehicle, self._heard = link, vehicle, Heard()
+        self._link, self._vehicle, self._messages = link, vehicle, CarMessages()
         of_car = {"vehicle": vehicle}
         self._reports = link.subscribe(Subscription(VehicleState, of_car))
         self._others = [
@@ -103,25 +103,25 @@ class _Ear:
         self._others.append(link.subscribe(Subscription(CityEvent)))
 
     def sent(self, command: DriveCommand) -> None:
-        self._heard.take(command)
+        self._messages.add(command)
 
     def listen_until(self, due_ns: int) -> None:
         def is_due() -> bool:
             for box in (self._reports, *self._others):
                 for item in box.drain():
                     if getattr(item.message, "vehicle", None) == self._vehicle:
-                        self._heard.take(item.message)
+                        self._messages.add(item.message)
             return self._link.now_ns >= due_ns
 
         self._link.run_until(is_due, 60.0)
 
     @property
-    def heard(self) -> Heard:
-        return self._heard
+    def messages(self) -> CarMessages:
+        return self._messages
 
     def played(self, ended: str) -> Played:
-        lost = self._heard.lost + sum(box.dropped for box in self._others)
-        return Played(self._vehicle, self._heard, lost, ended)
+        lost = self._messages.lost + sum(box.dropped for box in self._others)
+        return Played(self._vehicle, self._messages, lost, ended)
 
 
 def read_drive(path: Path) -> tuple[Drive, list[Row]]:
@@ -142,7 +142,7 @@ def read_drive(path: Path) -> tuple[Drive, list[Row]]:
     return drive, rows
 
 
-def play(link: Link, vehicle: str, rows: list[Row], watch: Watch | None = None) -> Played:
+def play(link: Link, vehicle: str, rows: list[Row], monitor: PlayMonitor | None = None) -> Played:
     """Command a car row by row and return what it reported; the lease is given back at the end.
 
     It is listened to for a second before: the first commands meet a servo that stands somewhere.
@@ -151,30 +151,30 @@ def play(link: Link, vehicle: str, rows: list[Row], watch: Watch | None = None) 
         link: To the city.
         vehicle: Who is to drive.
         rows: Time, throttle and steering.
-        watch: Brings the car to rest first, and may end the drive before its time; None: nobody
+        monitor: Brings the car to rest first, and may end the drive before its time; None: nobody
             looks.
 
     Raises:
         RunError: when the car is not to be had, or the watch does not let it begin.
     """
-    ear = _Ear(link, vehicle)
-    ear.listen_until(link.now_ns + RUN_IN_NS)
-    at_wheel = _Wheel(link, vehicle, ear)
+    listener = _Listener(link, vehicle)
+    listener.listen_until(link.now_ns + RUN_IN_NS)
+    leased = _LeasedCar(link, vehicle, listener)
     try:
-        if watch is not None:
-            at_wheel.rest(watch)
-        ended = at_wheel.drive(rows, watch)
+        if monitor is not None:
+            leased.rest(monitor)
+        ended = leased.drive(rows, monitor)
     finally:
-        at_wheel.release()
-    ear.listen_until(link.now_ns)
-    return ear.played(ended)
+        leased.release()
+    listener.listen_until(link.now_ns)
+    return listener.played(ended)
 
 
-class _Wheel:
+class _LeasedCar:
     """Holds a car's lease and commands it."""
 
-    def __init__(self, link: Link, vehicle: str, ear: _Ear) -> None:
-        self._link, self._vehicle, self._ear = link, vehicle, ear
+    def __init__(self, link: Link, vehicle: str, listener: _Listener) -> None:
+        self._link, self._vehicle, self._listener = link, vehicle, listener
         self._epoch = _lease(link, vehicle, "acquire", 0)
         self._renewed_ns, self._seq = link.now_ns, 0
 
@@ -186,25 +186,27 @@ class _Wheel:
         command = DriveCommand(vehicle=self._vehicle, t_ns=self._link.now_ns, epoch=self._epoch,
                                seq=self._seq, throttle=throttle, steering=steering)  # fmt: skip
         self._link.publish(command)
-        self._ear.sent(command)
+        self._listener.sent(command)
 
-    def rest(self, watch: Watch) -> None:
+    def rest(self, monitor: PlayMonitor) -> None:
         """Stop the car and wait until it stands."""
-        until_ns = self._link.now_ns + LONGEST_REST_NS
-        while not watch.is_at_rest(self._ear.heard.reports) and self._link.now_ns < until_ns:
+        until_ns = self._link.now_ns + MAX_STOPPING_NS
+        while (
+            not monitor.is_at_rest(self._listener.messages.reports) and self._link.now_ns < until_ns
+        ):
             self.command(0.0, 0.0)
-            self._ear.listen_until(self._link.now_ns + round(REPEATED_S * 1e9))
-        why = watch.refuses(self._ear.heard.reports)
+            self._listener.listen_until(self._link.now_ns + round(REPEATED_S * 1e9))
+        why = monitor.refuses(self._listener.messages.reports)
         if why:
             msg = f"{self._vehicle}: {why}"
             raise RunError(msg)
 
-    def drive(self, rows: list[Row], watch: Watch | None) -> str:
+    def drive(self, rows: list[Row], monitor: PlayMonitor | None) -> str:
         """Command row by row; return why it ended before its time."""
         began_ns = self._link.now_ns
         for t, throttle, steering in _repeated(rows):
-            self._ear.listen_until(began_ns + round(t * 1e9))
-            ended = watch.ends(self._ear.heard, began_ns) if watch is not None else ""
+            self._listener.listen_until(began_ns + round(t * 1e9))
+            ended = monitor.ends(self._listener.messages, began_ns) if monitor is not None else ""
             if ended:
                 self.command(0.0, 0.0)
                 return ended
@@ -247,7 +249,7 @@ def write_recording(played: Played, car: str, folder: Path) -> Recording:
     Raises:
         RecordingError: when nothing of it can be driven again.
     """
-    recording = recording_of(played.heard, folder, played.vehicle, sent_only=True)
+    recording = recording_of(played.messages, folder, played.vehicle, sent_only=True)
     folder.mkdir(parents=True, exist_ok=True)
     there = recording.channels.keys()
     written = {file: of for file, of in _FILES.items() if there >= set(of.values())}
@@ -277,23 +279,25 @@ def _described(file: str, of: dict[str, str], recording: Recording) -> dict[str,
 
 def left_out(played: Played, recording: Recording) -> list[str]:
     """Return in sentences what of a played drive is not in its recording, or not as it was sent."""
-    heard, said = played.heard, [played.ended] if played.ended else []
-    first_ns, last_ns = heard.commands[0].t_ns, heard.commands[-1].t_ns
-    reports = [report for report in heard.reports if first_ns <= report.t_ns <= last_ns]
-    hits = sum(first_ns <= t_ns <= last_ns for t_ns in heard.hit_ns)
+    messages, sentences = played.messages, [played.ended] if played.ended else []
+    first_ns, last_ns = messages.commands[0].t_ns, messages.commands[-1].t_ns
+    reports = [report for report in messages.reports if first_ns <= report.t_ns <= last_ns]
+    hits = sum(first_ns <= t_ns <= last_ns for t_ns in messages.hit_ns)
     missing = len(reports) - len(recording.channel("pose.x").t)
     if hits and missing > 0:
-        said.append(f"{missing} poses are left out: the car hit something {hits} times")
+        sentences.append(f"{missing} poses are left out: the car hit something {hits} times")
     begun = dropwhile(lambda report: report.mode != "drive", reports)
     late = [report for report in begun if report.mode != "drive"]
     if late:
-        said.append(
+        sentences.append(
             f"{len(late)} of {len(reports)} reports say that it did not obey, for commands came "
             "late or the city was stopped; recorded is what it did obey"
         )
     if played.lost:
-        said.append(f"{played.lost} messages of the car were lost on the way: it is not all here")
-    return said
+        sentences.append(
+            f"{played.lost} messages of the car were lost on the way: it is not all here"
+        )
+    return sentences
 
 
 def _lease(link: Link, vehicle: str, verb: str, epoch: int) -> int:

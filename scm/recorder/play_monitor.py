@@ -12,28 +12,28 @@ from dataclasses import dataclass, field
 from scm.clock import NS_PER_S
 from scm.geometry import Pose2
 from scm.maps.ways import Span, Way, is_inside, laid_from, leaves
-from scm.recorder.driven import Heard, Report
+from scm.recorder.driven import CarMessages, Report
 
 AT_REST_M = 0.002
 REST_NS = NS_PER_S // 5
-DISOBEYS_NS = NS_PER_S // 2
+MAX_DISOBEYING_NS = NS_PER_S // 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Watch:
+class PlayMonitor:
     """What a drive must not do.
 
     Attributes:
         floor: Its x and y from and to [m]; None: any.
         margin_m: The rear axle keeps so far from the floor's edges.
         way: Where the drive is thought to lead; its own start counts for nothing. Empty: unknown.
-        asked: Set by anybody who wants it to end.
+        stop_requested: Set by anybody who wants it to end.
     """
 
     floor: tuple[Span, Span] | None = None
     margin_m: float = 0.2
     way: Way = ()
-    asked: threading.Event = field(default_factory=threading.Event)
+    stop_requested: threading.Event = field(default_factory=threading.Event)
 
     def is_at_rest(self, reports: Sequence[Report]) -> bool:
         """Say whether a car has stood still for a moment."""
@@ -59,17 +59,17 @@ class Watch:
             f"x {far.x:.2f} m, y {far.y:.2f} m, off the floor; expected room for all of it"
         )
 
-    def ends(self, heard: Heard, began_ns: int) -> str:
+    def ends(self, messages: CarMessages, began_ns: int) -> str:
         """Return why a drive that began then must end now; empty: it goes on."""
-        if self.asked.is_set():
+        if self.stop_requested.is_set():
             return "stopped on request"
-        if any(t_ns >= began_ns for t_ns in heard.hit_ns):
+        if any(t_ns >= began_ns for t_ns in messages.hit_ns):
             return "stopped: the car hit something"
-        report = heard.reports[-1]
+        report = messages.reports[-1]
         if self.floor is not None and not is_inside(_pose(report), *self.floor, self.margin_m / 2):
             return f"stopped at the edge of the floor, x {report.x_m:.2f} m, y {report.y_m:.2f} m"
-        since = [r for r in heard.reports if r.t_ns >= report.t_ns - DISOBEYS_NS]
-        whole = since[0].t_ns >= began_ns and report.t_ns - since[0].t_ns >= 0.9 * DISOBEYS_NS
+        since = [r for r in messages.reports if r.t_ns >= report.t_ns - MAX_DISOBEYING_NS]
+        whole = since[0].t_ns >= began_ns and report.t_ns - since[0].t_ns >= 0.9 * MAX_DISOBEYING_NS
         if whole and all(r.mode != "drive" for r in since):
             return "stopped: the car does not obey; is the city stopped, or its link lost?"
         return ""

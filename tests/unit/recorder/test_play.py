@@ -9,7 +9,7 @@ from scm.__main__ import main
 from scm.errors import RunError, ScmError
 from scm.fleet import LockstepLink
 from scm.maps.load import load_map
-from scm.play import left_out, play, read_drive, write_recording
+from scm.recorder.play import left_out, play, read_drive, write_recording
 from scm.recording.read import read_recordings
 from scm.replay.free_run import free_run
 from scm.runtime.lockstep import Lockstep
@@ -69,8 +69,8 @@ def test_a_drive_played_with_a_car_file_names_it_from_where_the_recording_lies(t
 
 def test_a_command_is_held_for_as_long_as_the_table_says(link):
     played = play(link, "n1", [(0.0, 0.6, 0.0), (2.0, 0.0, 0.0)])
-    assert len(played.heard.commands) == 41
-    assert played.heard.reports[-1].x_m - played.heard.reports[0].x_m > 0.2
+    assert len(played.messages.commands) == 41
+    assert played.messages.reports[-1].x_m - played.messages.reports[0].x_m > 0.2
 
 
 def test_where_the_servo_stood_before_the_drive_is_recorded_too(link, tmp_path):

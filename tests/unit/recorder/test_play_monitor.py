@@ -10,8 +10,8 @@ from scm.fleet import LockstepLink
 from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.ways import laid_from, leaves
-from scm.play import play, read_way
-from scm.play_watch import Watch
+from scm.recorder.play import play, read_way
+from scm.recorder.play_monitor import PlayMonitor
 from scm.runtime.lockstep import Lockstep
 from scm.v2x.messages.stop_request import StopRequest
 from scm.world.part import WorldPart
@@ -49,42 +49,42 @@ def test_the_first_pose_that_leaves_the_floor_is_told():
 
 
 def test_a_drive_with_room_is_played_to_its_end(link):
-    played = play(link, "n1", ROWS, Watch(floor=FLOOR))
+    played = play(link, "n1", ROWS, PlayMonitor(floor=FLOOR))
     assert played.ended == ""
-    assert played.heard.reports[-1].t_ns - played.heard.reports[0].t_ns > 4.9e9
+    assert played.messages.reports[-1].t_ns - played.messages.reports[0].t_ns > 4.9e9
 
 
 def test_a_drive_without_room_does_not_begin_and_gives_the_car_back(link, lockstep):
-    watch = Watch(floor=FLOOR, way=(Pose2(0.0, 0.0, 0.0), Pose2(500.0, 0.0, 0.0)))
+    monitor = PlayMonitor(floor=FLOOR, way=(Pose2(0.0, 0.0, 0.0), Pose2(500.0, 0.0, 0.0)))
     with pytest.raises(RunError, match=r"n1: from where it stands.*off the floor"):
-        play(link, "n1", ROWS, watch)
+        play(link, "n1", ROWS, monitor)
     assert play(link, "n1", ROWS[:1]).ended == "", "the lease was released"
 
 
 def test_a_drive_ends_at_the_edge_of_the_floor(link):
-    here = play(link, "n1", [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)]).heard.reports[-1]
+    here = play(link, "n1", [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)]).messages.reports[-1]
     tight = ((here.x_m - 0.25, here.x_m + 0.25), (here.y_m - 0.25, here.y_m + 0.25))
-    played = play(link, "n1", ROWS, Watch(floor=tight, margin_m=0.2))
+    played = play(link, "n1", ROWS, PlayMonitor(floor=tight, margin_m=0.2))
     assert played.ended.startswith("stopped at the edge of the floor")
-    assert played.heard.commands[-1].throttle == 0.0
+    assert played.messages.commands[-1].throttle == 0.0
 
 
 def test_a_drive_ends_when_somebody_asks(link):
-    asked = threading.Event()
-    asked.set()
-    played = play(link, "n1", ROWS, Watch(asked=asked))
+    stop_requested = threading.Event()
+    stop_requested.set()
+    played = play(link, "n1", ROWS, PlayMonitor(stop_requested=stop_requested))
     assert played.ended == "stopped on request"
-    assert played.heard.commands[-1].throttle == 0.0
+    assert played.messages.commands[-1].throttle == 0.0
 
 
 def test_a_drive_ends_when_the_car_hits_something(link):
-    played = play(link, "n1", [(0.0, 1.0, 0.0), (60.0, 0.0, 0.0)], Watch())
+    played = play(link, "n1", [(0.0, 1.0, 0.0), (60.0, 0.0, 0.0)], PlayMonitor())
     assert played.ended == "stopped: the car hit something"
 
 
 def test_a_drive_ends_when_the_city_is_stopped(link, lockstep):
     lockstep.call(StopRequest(engaged=True, by="test"))
-    played = play(link, "n1", ROWS, Watch())
+    played = play(link, "n1", ROWS, PlayMonitor())
     assert "does not obey" in played.ended
 
 
