@@ -167,8 +167,8 @@ def test_boards_parallel_to_the_picture_are_refused_with_2_and_nothing_is_writte
     out = tmp_path / "lens.toml"
     assert main(words("chessboard", shots("chessboard", LENS, 14, 0.02), out)) == 2
     said = capsys.readouterr()
-    assert "focal length and distance cannot be told apart" in said.err
-    assert "to add, the most telling first:" in said.out
+    assert "focal length and distance cannot be separated" in said.err
+    assert "to add, the most informative first:" in said.out
     assert not out.exists()
 
 

@@ -155,7 +155,7 @@ def test_what_was_before_is_put_back_and_is_the_last_that_can_be(still):
     back = city.ask(verb="back", reason="worse")
     assert (back.in_force.now, back.in_force.before) == (Calibrated(), None)
     assert city.off_mm() == pytest.approx(first, abs=0.5)
-    assert "nothing to put back" in city.ask(verb="back").detail
+    assert "nothing to restore" in city.ask(verb="back").detail
 
 
 def test_the_doubt_of_place_and_lens_is_the_doubt_of_poses(still):
@@ -164,7 +164,7 @@ def test_the_doubt_of_place_and_lens_is_the_doubt_of_poses(still):
     sure = city.pose().shared_covariance
     rough = moved(place_std=tuple(5.0 * std for std in WELL_KNOWN))
     refusal = city.ask(calibration="rough", place=rough)
-    assert (refusal.code, "mm only (at most 5 mm pass)" in refusal.detail) == ("unsure", True)
+    assert (refusal.code, "mm only (at most 5 mm)" in refusal.detail) == ("unsure", True)
     assert city.in_force().now.place == "lab"
     city.ask(calibration="rough", place=rough, accept_unsure=True)
     unsure = city.pose().shared_covariance
@@ -192,7 +192,7 @@ WRONG = {
     "what is no camera": ({"place": moved(z_m=-1.0)}, "z_m: expected above the floor, got -1"),
     "a lens that missed its board": (
         {"lens": msgspec.structs.replace(LENS, rms_px=3.0)},
-        "rms_px: expected at most 0.64 px left at the board's points, got 3.00 px",
+        "rms_px: expected a residual of at most 0.64 px at the board's points, got 3.00 px",
     ),
     "a lens without doubt": (
         {"lens": msgspec.structs.replace(LENS, covariance=())},
@@ -206,7 +206,7 @@ WRONG = {
         {"place": moved(x_m=TRUE.x_m + 0.5)},
         "is it another camera's?",
     ),
-    "a place a little off": ({"place": moved(x_m=TRUE.x_m + 0.02)}, "times what its doubt"),
+    "a place a little off": ({"place": moved(x_m=TRUE.x_m + 0.02)}, "standard deviations (at most"),
     "a lens that makes tags too large": (
         {"place": moved(fx_px=1200.0, fy_px=1200.0)},
         "larger than it should",

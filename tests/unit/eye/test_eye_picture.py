@@ -35,7 +35,7 @@ def jpeg(shape=(48, 64, 3)):
     [
         (b"", "expected a picture that OpenCV reads, got 0 bytes"),
         (b"no picture at all", "expected a picture that OpenCV reads, got 17 bytes"),
-        (jpeg()[:-20], "expected a whole JPEG, got one cut short after"),
+        (jpeg()[:-20], "expected a whole JPEG, got one truncated after"),
         (jpeg((1, 1, 3)), "expected at least 16 x 16 px, got 1 x 1"),
     ],
 )

@@ -93,7 +93,7 @@ def test_lenses_of_ros_and_opencv_are_read_with_a_stated_covariance(tmp_path, te
     assert (lens.lens, lens.width_px, lens.height_px) == ("pinhole", 1280, 720)
     assert lens.values.tolist() == [K[0], K[4], K[2], K[5], *D]
     assert (lens.rms_px, lens.views) == ((0.25, 17) if text is OPENCV else (0.0, 0))
-    assert "each ray is known to 0.64 px" in remarks[-1]
+    assert "each ray is assumed known to 0.64 px" in remarks[-1]
 
 
 def test_opencv_s_own_xml_and_json_are_read(tmp_path):
@@ -142,7 +142,7 @@ def rational(*more):
 
 def test_a_rational_lens_is_fitted_by_five_and_what_is_left_is_said(tmp_path):
     lens, remarks = read_calibration(written(tmp_path, rational(0.3, -0.1, 0.02)))
-    assert "8 distortion coefficients are fitted by five" in remarks[0]
+    assert "8 distortion coefficients are approximated by five" in remarks[0]
     rays = np.array([[0.0, 0.0, 1.0], [0.5, 0.3, 1.0], [-0.6, -0.35, 1.0]])
     zero, matrix = np.zeros(3), np.reshape(K, (3, 3))
     want = cv2.projectPoints(
@@ -163,7 +163,7 @@ def test_a_frame_size_that_the_file_lacks_is_the_camera_s(tmp_path):
         read_calibration(path)
     lens, remarks = read_calibration(path, (1280, 720))
     assert (lens.width_px, lens.height_px) == (1280, 720)
-    assert "taken as the camera's, 1280 x 720" in remarks[0]
+    assert "assumed to be the camera's, 1280 x 720" in remarks[0]
 
 
 @pytest.mark.parametrize(
@@ -216,6 +216,6 @@ def test_the_command_converts_and_says_what_it_took(tmp_path, capsys):
     source, made = written(tmp_path, OPENCV, "lens.yml"), tmp_path / "lens.toml"
     assert main(["eye", "convert", str(source), "--out", str(made)]) == 0
     assert load_calibration(made).values.tolist() == [K[0], K[4], K[2], K[5], *D]
-    assert "each ray is known to 0.64 px" in capsys.readouterr().out
+    assert "each ray is assumed known to 0.64 px" in capsys.readouterr().out
     assert main(["eye", "convert", str(made), "--out", str(tmp_path / "camera.yaml")]) == 0
     assert yaml.safe_load((tmp_path / "camera.yaml").read_text())["image_width"] == 1280

@@ -58,7 +58,7 @@ class FakeCamera:
             self.stopped.wait(STALL_S)
             raise EyeError("interrupted")
         if self.event == "gone":
-            raise EyeError("it gives no frames any more")
+            raise EyeError("it delivers no more frames")
         assert self.may_send.wait(DEADLINE_S)
         time.sleep(0.0005)  # who takes frames has a chance to
         self.later(FRAME_NS)

@@ -23,7 +23,7 @@ SHARED = np.diag([1e-3, 1e-3, 1e-3]) ** 2
 def saw(x, y, frame, yaw=0.0, camera="a", vehicle="n1", tag_id=1, **more):
     return Sighting(
         camera, tag_id, vehicle, START_NS + frame * FRAME_NS, Pose2(x, y, yaw),
-        WHITE + SHARED + more.get("lean", 0.0), SHARED, **more,
+        WHITE + SHARED + more.get("common_mode", 0.0), SHARED, **more,
     )  # fmt: skip
 
 
@@ -269,9 +269,9 @@ HOSTILE = {
     "not a number": {"covariance": np.full((3, 3), np.nan)},
     "huge": {"covariance": HUGE},
     "negative": {"covariance": -WHITE},
-    "without doubt": {"covariance": NOUGHT, "shared": NOUGHT, "lean": NOUGHT},
+    "without doubt": {"covariance": NOUGHT, "shared": NOUGHT, "common_mode": NOUGHT},
     "endless shared": {"shared": np.full((3, 3), np.inf)},
-    "lean not a number": {"lean": np.full((3, 3), np.nan)},
+    "common mode not a number": {"common_mode": np.full((3, 3), np.nan)},
     "more shared than all": {"shared": 2.0 * (WHITE + SHARED)},
     "far away": {"pose": Pose2(1e300, 0.0, 0.0)},
     "no such tag": {"tag_id": 2**60},
