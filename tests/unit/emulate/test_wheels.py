@@ -223,7 +223,5 @@ def test_a_guarded_city_lets_it_say_the_truth_and_no_vehicle_hear_it():
     assert any(fnmatchcase(key, pattern) for pattern in rights.publishes)
     received_bytes = [selector("city", wish.kind, wish.where) for wish in part().subscriptions]
     assert [prefix("city") + pattern for pattern in rights.subscribes] == received_bytes
-    assert not any(
-        fnmatchcase(key, pattern) for pattern in rights_of("vehicle", "n7").subscribes
-    )
+    assert not any(fnmatchcase(key, pattern) for pattern in rights_of("vehicle", "n7").subscribes)
     assert any(fnmatchcase(key, pattern) for pattern in rights_of("part", "eye").subscribes)
