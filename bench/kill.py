@@ -2,11 +2,11 @@
 
     python -m bench kill [published] [ours] [--only WORD] [--times N]
 
-A city, an Eye, an agent with its watchdog, and a device: the published firmware emulated, or ours on
-a simulated chip. Times count to the line in which the device tells PWM 0: from the deed, and from
-when the host first knew (its watchdog, or its agent that finds the watchdog gone or silent); "to the
-port" from there until the watchdog's zeros were written. Bars: ours 300 ms from the deed, whatever
-happens; the published one 20 ms, a frame, from when the host knew.
+A city, an Eye, an agent with its watchdog, and a device: the published firmware emulated, or ours
+on a simulated chip. Times count to the line in which the device reports PWM 0: from the deed, and
+from when the host first knew (its watchdog, or its agent that finds the watchdog gone or silent);
+"to the port" from there until the watchdog's zeros were written. Limits: ours 300 ms from the deed,
+whatever happens; the published one 20 ms, a frame, from when the host knew.
 Some ten minutes for each firmware; `--only` takes the rows with a word in their name.
 """
 

@@ -22,8 +22,8 @@ from scm.eye.camera import CameraModel, camera_model
 from scm.eye.camera_monitor import MAX_STD_M, CameraMonitor
 from scm.eye.extrinsics import KNOCKED_SIGMAS, ExtrinsicsEstimator
 from scm.records.city_map import Camera, MapTag
-from scm.v2x.messages.calibration_request import CalibrationRequest, MeasuredLens
 from scm.records.eye import Calibrated, InForce
+from scm.v2x.messages.calibration_request import CalibrationRequest, MeasuredLens
 
 MAX_STATES = 10
 _OF_THE_SENSOR = ("name", "rate_hz", "noise_sigma", "rolling_s")
