@@ -6,6 +6,7 @@ and places that answers point to have it always: that is where a browser finds t
 
 import re
 from collections.abc import Collection
+from pathlib import Path
 from typing import NamedTuple
 
 from starlette.datastructures import MutableHeaders
@@ -18,8 +19,29 @@ _PLACES = re.compile(r"(?<=<)/|^/")
 _COOKIE_PATH = re.compile(r"(?i)(;\s*path=)/")
 
 
-PAGES = ("map", "signals", "vehicles", "cars", "eye", "recordings", "mismatch", "events")
-"""First part of the address of each page of the dashboard; what follows is the page's own."""
+PAGE_LIST = Path(__file__).parent / "static" / "js" / "pages" / "index.js"
+_PAGE = re.compile(
+    r'name: "([a-z]+)", title: "([^"]+)",(?: under: "([a-z]+)",)? load: \(\) => import\("([^"]+)"\)'
+)
+
+
+class Page(NamedTuple):
+    """One page of the dashboard, as `static/js/pages/index.js` lists it.
+
+    Attributes:
+        name: First part of its address; what follows is the page's own.
+        title: In the title bar.
+        under: The page that it is reached from; empty: it is in the title bar itself.
+        module: What the browser loads to draw it.
+    """
+
+    name: str
+    title: str
+    under: str
+    module: str
+
+
+PAGES = {page[0]: Page(*page) for page in _PAGE.findall(PAGE_LIST.read_text("utf-8"))}
 RESERVED = (*PAGES, "api", "static", "docs", "ngsi-ld", "metrics")
 
 

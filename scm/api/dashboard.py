@@ -30,8 +30,10 @@ from scm.api.etag import etag_of, has_tag
 
 STATIC_DIR = Path(__file__).parent / "static"
 INDEX = STATIC_DIR / "index.html"
-PAGE_LIST = STATIC_DIR / "js/pages/index.js"
-NEEDS, FRAME = "<!-- needs -->", "<main></main>"
+PLAIN = STATIC_DIR / "css" / "plain.css"
+"""Style sheet of a page that has no rules of its own."""
+
+LINKS, NEEDS, FRAME = "<!-- pages -->", "<!-- needs -->", "<main></main>"
 """What a page fills in, in `index.html`."""
 
 NO_PAGES = ("/api/", "/ngsi-ld/", "/static/")
@@ -39,8 +41,6 @@ NO_PAGES = ("/api/", "/ngsi-ld/", "/static/")
 
 _READS = frozenset({"GET", "HEAD"})
 _IMPORT = re.compile(r'(?:\bfrom|^import)\s*"([\w@./-]+)"', re.MULTILINE)
-_UNDER = re.compile(r'name: "([a-z]+)".* under: "([a-z]+)"')
-_LOADS = re.compile(r'name: "([a-z]+)".*import\("([^"]+)"\)')
 _MAPPING = re.compile(r'<script type="importmap">(.*?)</script>', re.DOTALL)
 _ADDRESS_IN = re.compile(r'((?:href|src)="|: ")/')
 _Version = tuple[int, int]
@@ -87,6 +87,8 @@ class Dashboard:
             for path in STATIC_DIR.rglob("*")
             if path.is_file() and path.suffix != ".html"
         }
+        for page in PAGES:
+            self._files.setdefault(f"/static/css/pages/{page}.css", PLAIN)
         for path in self._files.values():
             _file(path, _version(path))
         for page in PAGES:
@@ -121,7 +123,7 @@ class Dashboard:
             file = STATIC_DIR / "docs.html"
             return _document(file, self._base, _version(file)), _Place(path), {}
         first = path.split("/")[1]
-        name = first or PAGES[0]
+        name = first or next(iter(PAGES))
         if name not in PAGES or (not first and path != "/"):
             return None
         return _page(name, self._base, _version(INDEX)), _Place(f"/{first}"), {}
@@ -181,7 +183,9 @@ def _body(data: bytes, media: str, *more: tuple[bytes, bytes]) -> _Body:
 
 def index_text(base: str = "") -> str:
     """Return the document of all pages, with addresses below a base path."""
-    return _placed(INDEX.read_text("utf-8"), base)
+    bar = (page for page in PAGES.values() if not page.under)
+    links = "\n".join(f'<a href="/{page.name}">{page.title}</a>' for page in bar)
+    return _placed(INDEX.read_text("utf-8").replace(LINKS, links), base)
 
 
 def _placed(document: str, base: str) -> str:
@@ -198,7 +202,7 @@ def page_text(name: str, base: str = "") -> str:
     inside = frame.read_text("utf-8") if frame.is_file() else ""
     needs = [f'<link rel="stylesheet" href="/static/css/pages/{name}.css">']
     needs += [f'<link rel="modulepreload" href="{address}">' for address in modules_of(name)]
-    shown = dict(_UNDER.findall(PAGE_LIST.read_text("utf-8"))).get(name, name)
+    shown = PAGES[name].under or name
     text = (
         index_text()
         .replace(NEEDS, "\n".join(needs))
@@ -211,8 +215,7 @@ def page_text(name: str, base: str = "") -> str:
 @functools.cache
 def modules_of(name: str) -> tuple[str, ...]:
     """Return the addresses of all modules that a page imports, the nearest first."""
-    loads = dict(_LOADS.findall(PAGE_LIST.read_text("utf-8")))
-    found = dict.fromkeys(["/static/js/app.js", _address(loads[name])])
+    found = dict.fromkeys(["/static/js/app.js", _address(PAGES[name].module)])
     left = list(found)
     for address in left:  # which grows
         for module in _imports(address):
