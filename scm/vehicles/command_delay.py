@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.jit import array_kernel
+from scm.vehicles.jit import allocating_kernel, array_kernel
 
 KNOTS = 64  # instants a car remembers
 SPACING_S = 8e-3  # at least between two of them: 0.5 s of the past, the longest delay
@@ -55,7 +55,7 @@ class CommandPast:
         )  # fmt: skip
 
 
-@array_kernel
+@allocating_kernel
 def _recall(
     block: Floats, numbers: Floats, all_knots: Floats, newest: Ints, before: Floats, slots: Ints,
     columns: Ints, first: int, last: int, span: float,

@@ -9,7 +9,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import RunError
-from scm.vehicles.compiler.vector_code import LANES
+from scm.vehicles.lanes import LANES
 
 # what others write, and what they read: names here, slots of the block where those differ
 WRITTEN = {

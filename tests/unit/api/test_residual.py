@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from scm.api.eye_residuals import HISTORY_NS, ResidualLog, stats_of
+from scm.api.eye_residuals import KEPT_NS, ResidualLog, stats_of
 from scm.api.residual import residual_of, truth_at
 from scm.geometry import Pose2
 from scm.records.eye import Residual, ResidualSample
@@ -47,9 +47,9 @@ def test_a_car_out_of_sight_for_long_is_forgotten():
         covariance=(0.0,) * 9,
     )  # fmt: skip
     log.add(pose, off)
-    log.forget(5 + HISTORY_NS)
+    log.forget(5 + KEPT_NS)
     assert list(log.samples("c", 5, 1.0)) == ["n1"]
-    log.forget(6 + HISTORY_NS)
+    log.forget(6 + KEPT_NS)
     assert log.samples("c", 5, 1.0) == {}
 
 

@@ -1,1 +1,0 @@
-"""Makes one compiled kernel of a car's list of terms; README.md shows one term on its way."""
