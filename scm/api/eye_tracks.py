@@ -11,6 +11,8 @@ from scm.v2x.messages.eye_track import EyeTrack
 WATCHED_NS = 5 * NS_PER_S
 """So long after somebody asked tracks are heard: 20 a second of each car are many."""
 SHOWN_S = 2.0
+AS_SENT = ("vehicle", "tag_id", "t_ns", "stale", "flags", "cameras")
+ROUNDED = ("x_m", "y_m", "yaw_rad", "speed_mps", "lateral_speed_mps", "yaw_rate_radps")
 
 
 class TrackWatch:
@@ -60,21 +62,11 @@ class TrackWatch:
 def _row(track: EyeTrack, age_s: float) -> TrackRow:
     x, y, yaw, speed = (math.sqrt(max(0.0, track.covariance[i][i])) for i in range(4))
     return TrackRow(
-        vehicle=track.vehicle,
-        tag_id=track.tag_id,
-        t_ns=track.t_ns,
-        x_m=round(track.x_m, 4),
-        y_m=round(track.y_m, 4),
-        yaw_rad=round(track.yaw_rad, 4),
-        speed_mps=round(track.speed_mps, 4),
-        lateral_speed_mps=round(track.lateral_speed_mps, 4),
-        yaw_rate_radps=round(track.yaw_rate_radps, 4),
+        **{name: getattr(track, name) for name in AS_SENT},
+        **{name: round(getattr(track, name), 4) for name in ROUNDED},
         std_x_m=round(x, 5),
         std_y_m=round(y, 5),
         std_yaw_rad=round(yaw, 5),
         std_speed_mps=round(speed, 5),
         age_s=round(track.age_s + age_s, 2),
-        stale=track.stale,
-        flags=track.flags,
-        cameras=track.cameras,
     )

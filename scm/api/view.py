@@ -13,15 +13,14 @@ from typing import Any
 
 from scm.api.close_up import CloseUps
 from scm.api.event_log import EventLog
-from scm.api.eye_residuals import ResidualLog
 from scm.api.eye_tracks import TrackWatch
 from scm.api.picture import Held, Picture, SeenPose, TagSighting
-from scm.api.residual import residual_of, truth_at
 from scm.api.scan_watch import ScanWatch
 from scm.api.signal_history import SignalHistory
 from scm.api.stations import StationTable
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.disturbances import Disturbances
+from scm.eye.accuracy import EyeAccuracyPart
 from scm.geometry import Pose2
 from scm.records.events import LoggedEvent
 from scm.records.eye import ResidualSample, TrackRow
@@ -53,7 +52,6 @@ from scm.v2x.messages.violation import Violation
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
-TRUTH_DEPTH = 80  # snapshots: 4 s, longer than any camera's latency
 FRAME_DEPTH = 4
 TAGS_DEPTH = 8
 FORGET_NS = 60 * NS_PER_S
@@ -78,7 +76,6 @@ class CityView(BasePart):
         self._definition: WorldDefinition | None = None
         self._stop: CityStop | None = None
         self._stop_untold_ns = 0
-        self._truth: deque[WorldSnapshot] = deque(maxlen=TRUTH_DEPTH)
         self._spats: dict[str, Held[Spat]] = {}
         self._monitors: dict[str, Held[MonitorStatus]] = {}
         self._sites: dict[str, SignalSite] = {}
@@ -97,7 +94,7 @@ class CityView(BasePart):
         self._tracks = TrackWatch()
         self._close_ups = CloseUps()
         self._poses: dict[tuple[str, str], SeenPose] = {}
-        self._residuals = ResidualLog()
+        self._eye_accuracy = EyeAccuracyPart()
         self._scores: Held[MisbehaviourScores] | None = None
         self._reports: dict[str, MisbehaviourReport] = {}
         self._stations = StationTable()
@@ -140,6 +137,7 @@ class CityView(BasePart):
         with self._lock:
             self._now_ns = now_ns
             self._picture = None
+            self._eye_accuracy.step(now_ns, inbox)
             for incoming in inbox:
                 taker = self._receivers.get(type(incoming.message))
                 if taker is not None:
@@ -202,8 +200,10 @@ class CityView(BasePart):
     ) -> dict[str, tuple[ResidualSample, ...]]:
         """Return what a camera's poses were off by of late, by car; safe from any thread."""
         with self._lock:
-            newest_ns = self._truth[-1].t_ns if self._truth else self._now_ns
-            return self._residuals.samples(camera, newest_ns, window_s, vehicle)
+            newest_ns = self._eye_accuracy.truth_ns
+            return self._eye_accuracy.samples(
+                camera, self._now_ns if newest_ns is None else newest_ns, window_s, vehicle
+            )
 
     def misbehaviour(
         self,
@@ -262,7 +262,7 @@ class CityView(BasePart):
             held = self._scans.newest(vehicle)
             if held is None:
                 return None
-            return held, truth_at(self._truth, vehicle, held.message.t_ns)
+            return held, self._eye_accuracy.truth_at(vehicle, held.message.t_ns)
 
     def tracks(self) -> tuple[TrackRow, ...]:
         """Return the Eye's tracks, and hear them for some seconds more; safe from any thread."""
@@ -341,9 +341,6 @@ class CityView(BasePart):
         if self._stop_untold_ns > STOP_EXPIRES_NS:
             self._stop = None  # its release was missed: an engaged stop is repeated
         self._snapshot = Held(snapshot, t_ns)
-        if self._truth and snapshot.t_ns < self._truth[-1].t_ns:
-            self._truth.clear()  # the world was restarted: its time went back
-        self._truth.append(snapshot)
 
     def _receive_definition(self, definition: WorldDefinition, _t_ns: int) -> None:
         self._definition = definition
@@ -371,12 +368,8 @@ class CityView(BasePart):
             self._tags_seen[tags.camera, tag.tag_id] = TagSighting(tag, tags.t_ns, t_ns)
 
     def _receive_pose(self, pose: EyePose, t_ns: int) -> None:
-        truth = truth_at(self._truth, pose.vehicle, pose.t_ns)
-        measured = Pose2(pose.x_m, pose.y_m, pose.yaw_rad)
-        residual = residual_of(measured, truth) if truth is not None else None
+        residual = self._eye_accuracy.newest(pose.camera, pose.vehicle)
         self._poses[pose.camera, pose.vehicle] = SeenPose(Held(pose, t_ns), residual)
-        if residual is not None:
-            self._residuals.add(pose, residual)
 
     def _receive_scores(self, scores: MisbehaviourScores, t_ns: int) -> None:
         self._scores = Held(scores, t_ns)
@@ -398,5 +391,4 @@ class CityView(BasePart):
             del self._poses[key]
         for tag in [k for k, one in self._tags_seen.items() if one.arrived_ns < oldest_ns]:
             del self._tags_seen[tag]
-        if self._truth:
-            self._residuals.forget(self._truth[-1].t_ns)
+        self._eye_accuracy.forget()

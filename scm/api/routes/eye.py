@@ -6,11 +6,11 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from scm.api.city import City, Name, json_response, not_found
-from scm.api.eye_residuals import stats_of, thinned
 from scm.api.eye_rows import camera_rows, frame_of, pose_rows, tags_of
 from scm.api.paging import Cursor, Limit, page_of, page_response
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer, answer_file, answer_page
+from scm.eye.accuracy import stats_of, thinned
 from scm.records.eye import (
     CameraRow,
     CameraState,

@@ -2,11 +2,37 @@ import math
 
 import pytest
 
-from scm.api.eye_residuals import KEPT_NS, ResidualLog, stats_of
-from scm.api.residual import residual_of, truth_at
+from scm.eye.accuracy import SAMPLES_NS, EyeAccuracyPart, residual_of, stats_of
 from scm.geometry import Pose2
-from scm.records.eye import Residual, ResidualSample
+from scm.records.eye import ResidualSample
+from scm.v2x.exchange import Incoming
 from scm.v2x.messages.eye_pose import EyePose
+from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
+
+
+@pytest.fixture
+def snapshot():
+    def build(at_s, **cars):
+        vehicles = tuple(
+            SnapshotVehicle(
+                vehicle=name, kind="hosted", car="nigel", tag_id=1, x_m=x, y_m=y, yaw_rad=yaw,
+                speed_mps=0.2, steering_rad=0.1,
+            )
+            for name, (x, y, yaw) in cars.items()
+        )  # fmt: skip
+        return WorldSnapshot(t_ns=round(at_s * 1e9), tick=1, vehicles=vehicles)
+
+    return build
+
+
+def fed(*messages):
+    part = EyeAccuracyPart()
+    assert part.step(0, [Incoming(message, 0) for message in messages]) == []
+    return part
+
+
+def truth_at(history, vehicle, t_ns):
+    return fed(*history).truth_at(vehicle, t_ns)
 
 
 def test_between_two_snapshots_the_truth_is_linear(snapshot):
@@ -40,17 +66,20 @@ def test_measured_further_left_is_positive_yaw():
     assert residual.yaw_deg == pytest.approx(math.degrees(0.02), abs=1e-3)
 
 
-def test_a_car_out_of_sight_for_long_is_forgotten():
-    log, off = ResidualLog(), Residual(position_mm=1.0, x_mm=1.0, y_mm=0.0, yaw_deg=0.0)
+def test_a_car_not_seen_for_long_is_forgotten(snapshot):
     pose = EyePose(
-        camera="c", vehicle="n1", tag_id=1, t_ns=5, x_m=0.0, y_m=0.0, yaw_rad=0.0,
+        camera="c", vehicle="n1", tag_id=1, t_ns=0, x_m=0.003, y_m=0.0, yaw_rad=0.0,
         covariance=(0.0,) * 9,
     )  # fmt: skip
-    log.add(pose, off)
-    log.forget(5 + KEPT_NS)
-    assert list(log.samples("c", 5, 1.0)) == ["n1"]
-    log.forget(6 + KEPT_NS)
-    assert log.samples("c", 5, 1.0) == {}
+    part = fed(snapshot(0.0, n1=(0.0, 0.0, 0.0)), pose)
+    assert part.newest("c", "n1").position_mm == 3.0
+    part.step(0, [Incoming(snapshot(SAMPLES_NS / 1e9), 0)])
+    part.forget()
+    assert list(part.samples("c", 0, 1.0)) == ["n1"]
+    part.step(0, [Incoming(snapshot(SAMPLES_NS / 1e9 + 0.001), 0)])
+    part.forget()
+    assert part.samples("c", 0, 1.0) == {}
+    assert part.newest("c", "n1") is None
 
 
 def test_95_of_100_samples_lie_nearer():
