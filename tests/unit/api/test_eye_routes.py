@@ -286,7 +286,7 @@ class TestShelf:
         assert sorted(path.name for path in folder.iterdir()) == ["a.toml", "c.toml"]
 
     def test_a_full_shelf_takes_no_more(self, client, monkeypatch):
-        monkeypatch.setattr("scm.api.calibration_repository.MOST_KEPT", 1)
+        monkeypatch.setattr("scm.api.calibration_repository.MAX_CALIBRATIONS", 1)
         new = {"If-None-Match": "*"}
         for name, status in (("a", 201), ("b", 409)):
             path = f"{EYE}/calibrations/{name}"
