@@ -11,7 +11,7 @@ import numpy as np
 from scm import registry
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import load_car
-from scm.vehicles.external_vehicles import Placed
+from scm.vehicles.external_vehicles import ExternalVehicles
 from scm.vehicles.sensor import Sensor
 
 CARS, TICKS, TICK_NS = 10_000, 50, 20_000_000
@@ -28,7 +28,7 @@ def second_of(bank: Bank, begin_ns: int) -> tuple[float, int]:
 
 def main() -> None:
     """Print the table."""
-    car, truth = load_car("nigel"), Placed(CARS)
+    car, truth = load_car("nigel"), ExternalVehicles(CARS)
     rng = np.random.default_rng(0)
     generators = rng.spawn(200)
     print(f"{CARS} cars           unwanted     wanted   readings/s   own generators")

@@ -297,7 +297,7 @@ class AgentPart:
         message = item.message
         if isinstance(message, DriveCommand) and self._session is not None:
             newer = message.epoch > self._link.epoch
-            if newer and self._session.guard.take(message, item.t_ns):
+            if newer and self._session.guard.accept(message, item.t_ns):
                 self._session.switch_lights(message.headlights, message.indicators)
                 self._link.give_way()
         return []

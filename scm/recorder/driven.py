@@ -362,7 +362,7 @@ def _obeyed(commands: Iterable[DriveCommand]) -> tuple[list[Row], list[Stretch]]
 
     for command in commands:
         t_ns = command.t_ns
-        if not guard.take(command, t_ns):
+        if not guard.accept(command, t_ns):
             continue
         let_go(t_ns)
         allowed = guard.output(t_ns)

@@ -1,4 +1,4 @@
-"""What a car of ours senses, as AutoDRIVE tells it: for its scripts and for its recordings."""
+"""A car's sensor readings in AutoDRIVE's conventions, for its scripts and recordings."""
 
 import math
 
@@ -14,10 +14,10 @@ Three = tuple[float, float, float]
 
 
 def without_gravity(accel_mps2: Three, rpy_rad: Three) -> Three:
-    """Return what an accelerometer would read if it did not feel the floor's push.
+    """Return an accelerometer's reading without gravity.
 
     Args:
-        accel_mps2: What it reads, on the body's axes: x ahead, y left, z up.
+        accel_mps2: Its reading in the body frame: x forward, y left, z up.
         rpy_rad: Roll, pitch and yaw of the body.
     """
     (roll, pitch, _), (x, y, z) = rpy_rad, accel_mps2
@@ -30,9 +30,9 @@ def without_gravity(accel_mps2: Three, rpy_rad: Three) -> Three:
 
 
 def ranges_of(scan: LidarScan) -> Floats:
-    """Return 360 ranges [m] a degree apart from straight ahead, counter-clockwise.
+    """Return 360 ranges [m] at steps of 1 degree from straight ahead, counter-clockwise.
 
-    Each is that of the nearest beam; infinite where there is none, or where it hit nothing.
+    Each is that of the nearest beam; infinite without a beam or a hit.
     """
     payload = scan.payload[: len(scan.payload) // 4 * 4]
     ranges = np.frombuffer(payload, "<f4")[: scan.beams].astype(np.float64)

@@ -1,10 +1,10 @@
-"""All cars' devices of one kind: who is due, what they read, and what comes out of them when.
+"""All cars' devices of one kind: which are due, what they read, and when readings come out.
 
-    due -> lost? -> measure -> bias, noise, limits (`spoil`) -> under way for the latency -> out
+    due -> lost? -> measure -> bias, noise, limits -> pending for the latency -> out
 
-Arrays by slot, the number that a car has in its world. Noise is counted, not drawn (`noise.py`), by
-the number of the reading since the car came: a car's readings depend on no other car, and those of
-a device that nobody wanted for a while go on as if it had been wanted all along.
+Arrays by vehicle index. Noise is counter-based (`noise.py`), by the number of the reading since the
+car was fitted: a car's readings depend on no other car, and a device that was not wanted for a
+while continues as if it had been.
 """
 
 from collections import deque
@@ -21,8 +21,8 @@ from scm.vehicles.car import Car
 from scm.vehicles.jit import array_kernel
 from scm.vehicles.noise import Keys, bases_of, key_of, normals, uniforms
 from scm.vehicles.rays.scene import Scene
-from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
-from scm.vehicles.sensor_noise import spoil, wander
+from scm.vehicles.sensor import Device, Sensor, Surroundings, Truth
+from scm.vehicles.sensor_noise import add_device_errors, wander
 
 NEVER = np.iinfo(np.int64).max
 LOSS = np.uint64(0x10553B6E0D1C4F27)
@@ -31,27 +31,27 @@ NOBODY = -1
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What came out of the devices of one instant, of cars of one file.
+    """The readings of one instant, of cars of one file.
 
     Attributes:
-        t_ns: The instant that the values were true at.
-        slots: (k,) whose they are, each once, rising.
-        values: (k, n) as `Sensor.values` names them.
+        t_ns: Time of measurement.
+        indices: (k,) vehicle indices, ascending.
+        values: (k, n) in the order of `Sensor.values`.
     """
 
     car: Car
     t_ns: int
-    slots: Ints
+    indices: Ints
     values: Floats
 
 
 @dataclass(slots=True)
 class _Model:
-    """The devices in the cars of one truth, all alike."""
+    """The identical devices in the cars of one file."""
 
     car: Car
     truth: Truth
-    facts: Facts
+    device: Device
     cars: int = 0
     under_way: deque[tuple[Readings, Ints]] = field(default_factory=deque)
 
@@ -61,12 +61,12 @@ class Bank:
 
     Args:
         sensor: The kind.
-        seed: The run's; with the names of car and sensor it makes their noise.
-        capacity: Slots to begin with; more are made when a higher slot is fitted.
+        seed: Of the run; with the names of car and sensor it determines the noise.
+        capacity: Initial number of vehicle indices; it grows when a higher one is fitted.
 
     Attributes:
-        wanted: By slot, whether anybody wants its readings; write here. A car that nobody wants is
-            not measured. Read the attribute anew after `fit`: it may have grown.
+        wanted: By vehicle index, whether its readings are wanted; write here. Other cars are not
+            measured. Read the attribute again after `fit`: it may have grown.
     """
 
     def __init__(self, sensor: Sensor, seed: int, capacity: int = 64) -> None:
@@ -83,67 +83,66 @@ class Bank:
         _warm()
 
     def fit(
-        self, slot: int, name: str, car: Car, truth: Truth, row: int, now_ns: int,
+        self, index: int, name: str, car: Car, truth: Truth, row: int, now_ns: int,
         offset: float = 0.0,
     ) -> bool:  # fmt: skip
-        """Give a car its device, if its file describes one; return whether it did.
+        """Fit a car's device if its file describes one; return whether it does.
 
         Args:
-            slot: The car's number from now on.
-            name: The car's; its noise hangs on it.
+            index: The vehicle index.
+            name: Of the car; it determines the noise.
             car: Describes the device.
             truth: What is measured, read at every step.
-            row: The car's in the truth.
-            now_ns: Its schedule starts here.
-            offset: Share of a period that the first reading waits, so that not all cars read
-                at once.
+            row: The car's row in the truth.
+            now_ns: Start of its schedule.
+            offset: Delay of the first reading as a share of a period, to spread the cars.
         """
         if not self.sensor.is_fitted(car):
             return False
-        if slot >= len(self.wanted):
-            self._grow(max(slot + 1, 2 * len(self.wanted)))
-        self.unfit(slot)
+        if index >= len(self.wanted):
+            self._grow(max(index + 1, 2 * len(self.wanted)))
+        self.unfit(index)
         model = self._model_of(car, truth)
-        period = round(NS_PER_S / self._models[model].facts.rate_hz)
+        period = round(NS_PER_S / self._models[model].device.rate_hz)
         self._models[model].cars += 1
-        self._model[slot], self._row[slot], self._period[slot] = model, row, period
-        self._start[slot] = self._next[slot] = now_ns + round(offset * period)
-        self._key[slot] = key_of(self._seed, name, self.sensor.name)
-        self._life[slot] += 1
-        self._second[slot] = NOBODY
-        self.wanted[slot] = True
+        self._model[index], self._row[index], self._period[index] = model, row, period
+        self._start[index] = self._next[index] = now_ns + round(offset * period)
+        self._key[index] = key_of(self._seed, name, self.sensor.name)
+        self._life[index] += 1
+        self._second[index] = NOBODY
+        self.wanted[index] = True
         return True
 
-    def unfit(self, slot: int) -> None:
-        """Take a car's device out, and all its readings under way; the slot is free again."""
-        if slot >= len(self.wanted) or self._model[slot] == NOBODY:
+    def unfit(self, index: int) -> None:
+        """Remove a car's device with its pending readings; the index is free again."""
+        if index >= len(self.wanted) or self._model[index] == NOBODY:
             return
-        self._models[self._model[slot]].cars -= 1
-        self._model[slot] = NOBODY
-        self._next[slot] = NEVER
-        self._life[slot] += 1
-        self.wanted[slot] = False
+        self._models[self._model[index]].cars -= 1
+        self._model[index] = NOBODY
+        self._next[index] = NEVER
+        self._life[index] += 1
+        self.wanted[index] = False
 
-    def is_fitted(self, slot: int) -> bool:
-        """Return whether the car of a slot has such a device."""
-        return slot < len(self.wanted) and bool(self._model[slot] != NOBODY)
+    def is_fitted(self, index: int) -> bool:
+        """Return whether the car at an index has such a device."""
+        return index < len(self.wanted) and bool(self._model[index] != NOBODY)
 
     def step(self, now_ns: int, scene: Callable[[], Scene] | None = None) -> list[Readings]:
-        """Read the devices that are due; return what has come out by now, oldest first.
+        """Read the devices that are due; return the readings that have come out, oldest first.
 
-        A device reads once a period; instants that no step came near are not made up for. `scene`
-        is asked, at most once, when devices are due that look around.
+        A device reads once a period; missed instants are not made up for. `scene` is called at most
+        once, when devices are due that need it.
         """
         due = self._due(now_ns)
         if len(due):
             seen = scene() if scene is not None else None
             models = self._model[due]
             for number, model in enumerate(self._models):
-                slots = due if len(self._models) == 1 else due[models == number]
-                if len(slots):
-                    self._read(model, slots, now_ns, seen)
+                indices = due if len(self._models) == 1 else due[models == number]
+                if len(indices):
+                    self._read(model, indices, now_ns, seen)
         out = [r for model in self._models for r in self._come_out(model, now_ns)]
-        return [readings for readings in out if len(readings.slots)]
+        return [readings for readings in out if len(readings.indices)]
 
     def _due(self, now_ns: int) -> Ints:
         due = np.empty(len(self.wanted), np.int64)
@@ -156,56 +155,56 @@ class Bank:
         self._before_ns = now_ns
         return due[:count]
 
-    def _read(self, model: _Model, slots: Ints, now_ns: int, scene: Scene | None) -> None:
-        facts, numbers = model.facts, self._number[slots]
-        if facts.drop_out:
-            lost = uniforms(bases_of(self._key[slots] ^ LOSS, numbers), 1)[:, 0] < facts.drop_out
-            slots, numbers = slots[~lost], numbers[~lost]
-        if len(slots) == 0:
+    def _read(self, model: _Model, indices: Ints, now_ns: int, scene: Scene | None) -> None:
+        device, numbers = model.device, self._number[indices]
+        if device.drop_out:
+            lost = uniforms(bases_of(self._key[indices] ^ LOSS, numbers), 1)[:, 0] < device.drop_out
+            indices, numbers = indices[~lost], numbers[~lost]
+        if len(indices) == 0:
             return
-        around = None if scene is None else Sight(scene, slots)
-        exact = self.sensor.measure(model.car, model.truth, self._row[slots], around)
-        bias = self._bias(facts, slots, now_ns, exact.shape[1])
-        values = spoil(facts, exact, bias, bases_of(self._key[slots], numbers))
-        model.under_way.append((Readings(model.car, now_ns, slots, values), self._life[slots]))
+        around = None if scene is None else Surroundings(scene, indices)
+        exact = self.sensor.measure(model.car, model.truth, self._row[indices], around)
+        bias = self._bias(device, indices, now_ns, exact.shape[1])
+        values = add_device_errors(device, exact, bias, bases_of(self._key[indices], numbers))
+        model.under_way.append((Readings(model.car, now_ns, indices, values), self._life[indices]))
 
-    def _bias(self, facts: Facts, slots: Ints, now_ns: int, count: int) -> Floats:
+    def _bias(self, device: Device, indices: Ints, now_ns: int, count: int) -> Floats:
         """Return the bias of each value now, (k, n) or (n,) or (1,)."""
-        bias = np.array(facts.bias)
-        if not any(facts.walk):
+        bias = np.array(device.bias)
+        if not any(device.walk):
             return bias
         if self._wandered.shape != (len(self.wanted), count):
             self._wandered = np.zeros((len(self.wanted), count))
             self._second[:] = NOBODY
-        keys = self._key[slots]
-        # not all cars' biases step in the same tick
+        keys = self._key[indices]
+        # spread the steps of the biases over all ticks
         phase = (keys % np.uint64(NS_PER_S)).astype(np.int64)
-        second = (now_ns - self._start[slots] + phase) // NS_PER_S
-        stale = second != self._second[slots]
+        second = (now_ns - self._start[indices] + phase) // NS_PER_S
+        stale = second != self._second[indices]
         if stale.any():
-            self._wandered[slots[stale]] = wander(keys[stale], second[stale], count)
-            self._second[slots[stale]] = second[stale]
-        return bias + np.array(facts.walk) * self._wandered[slots]
+            self._wandered[indices[stale]] = wander(keys[stale], second[stale], count)
+            self._second[indices[stale]] = second[stale]
+        return bias + np.array(device.walk) * self._wandered[indices]
 
     def _come_out(self, model: _Model, now_ns: int) -> Iterable[Readings]:
-        latency_ns = round(model.facts.latency_s * NS_PER_S)
+        latency_ns = round(model.device.latency_s * NS_PER_S)
         while model.under_way and model.under_way[0][0].t_ns + latency_ns <= now_ns:
             readings, lives = model.under_way.popleft()
-            same = self._life[readings.slots] == lives
+            same = self._life[readings.indices] == lives
             if same.all():
                 yield readings
             else:
                 yield Readings(
-                    readings.car, readings.t_ns, readings.slots[same], readings.values[same]
+                    readings.car, readings.t_ns, readings.indices[same], readings.values[same]
                 )
 
     def _model_of(self, car: Car, truth: Truth) -> int:
         for i, model in enumerate(self._models):
             if model.truth is truth and model.car is car:
                 return i
-        new = _Model(car, truth, self.sensor.facts(car))
+        new = _Model(car, truth, self.sensor.device(car))
         for i, model in enumerate(self._models):
-            if model.cars == 0:  # what it still had under way was nobody's
+            if model.cars == 0:  # its pending readings belong to removed cars
                 self._models[i] = new
                 return i
         self._models.append(new)
@@ -225,7 +224,7 @@ class Bank:
 
 @cache
 def _warm() -> None:
-    """Compile or load the kernels now, and not at the first reading."""
+    """Compile or load the kernels before the first reading."""
     nobody: Ints = np.zeros(0, np.int64)
     normals(bases_of(nobody.astype(np.uint64), nobody), 1)
     _find_due(0, 0, np.zeros(0, np.bool_), nobody, nobody, nobody, nobody, nobody)
@@ -242,19 +241,19 @@ def _find_due(
     number: Ints,
     due: Ints,
 ) -> int:
-    """Write the slots that read now into `due` and the number of each one's reading; count them."""
+    """Write the indices that read now into `due` and their reading numbers; return the count."""
     count = 0
-    for slot in range(len(wanted)):
-        if not wanted[slot] or following[slot] > now_ns:
+    for index in range(len(wanted)):
+        if not wanted[index] or following[index] > now_ns:
             continue
-        at = following[slot]
-        if at <= before_ns:  # nobody wanted it when it was due
-            at += ((before_ns - at) // period[slot] + 1) * period[slot]
-            following[slot] = at
+        at = following[index]
+        if at <= before_ns:  # it was not wanted when it was due
+            at += ((before_ns - at) // period[index] + 1) * period[index]
+            following[index] = at
         if at > now_ns:
             continue
-        number[slot] = (now_ns - start[slot]) // period[slot]
-        following[slot] = start[slot] + (number[slot] + 1) * period[slot]
-        due[count] = slot
+        number[index] = (now_ns - start[index]) // period[index]
+        following[index] = start[index] + (number[index] + 1) * period[index]
+        due[count] = index
         count += 1
     return count

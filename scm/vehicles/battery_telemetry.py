@@ -1,10 +1,10 @@
-"""What the batteries of a fleet's cars would tell: voltage under load, and the charge that is left.
+"""Battery telemetry of a fleet's cars: voltage under load, and remaining charge.
 
     charge_drawn += I dt,  I = idle_current + motors * stall_current * max(0, u (u V / V_n - n))
     V = max(cells * CUT_OFF_V, V0(charge) - R I)
 
-It is told, and never felt: a car whose motors are to feel their battery lists `battery_charge`,
-`battery_curve` and `battery_resistance`, which go by the same laws and numbers.
+It does not affect the motors: a car whose motors depend on their battery lists `battery_charge`,
+`battery_curve` and `battery_resistance`, which use the same equations and numbers.
 Holds: u as commanded, before lag and dead-band.   Source: as of those effects.
 """
 
@@ -21,11 +21,11 @@ from scm.vehicles.pack import CUT_OFF_V, pack_of
 
 
 class Packs:
-    """The packs of a fleet, a row each.
+    """The packs of a fleet, one row per car.
 
     Attributes:
-        volts: At the clamps, under load [V]; NaN: the car has no pack, or never stood here.
-        charge: What is left, 0 to 1; likewise NaN.
+        volts: At the terminals, under load [V]; NaN: no pack, or the row was never used.
+        charge: Remaining charge, 0 to 1; likewise NaN.
     """
 
     def __init__(self, fleet: Fleet) -> None:
@@ -35,15 +35,15 @@ class Packs:
         self._drawn: Floats = np.zeros(fleet.capacity)
         self.volts: Floats = np.full(fleet.capacity, math.nan)
         self.charge: Floats = np.full(fleet.capacity, math.nan)
-        self.drain(np.empty(0, np.int64), 0.0)  # compiled now, and not when the first car comes
+        self.drain(np.empty(0, np.int64), 0.0)  # compile before the first car
 
     def renew(self, row: int) -> None:
-        """Give a row the pack that a car comes with."""
+        """Give a row a new pack."""
         self._drawn[row] = 0.0
         self.drain(np.array([row]), 0.0)
 
     def drain(self, rows: Ints, duration: float) -> None:
-        """Take out what some cars draw over a time [s], with commands and speeds as they are."""
+        """Discharge some cars' packs over a time [s] at the present commands and speeds."""
         if self._numbers is not None:
             fleet = self._fleet
             _drain(
@@ -65,8 +65,8 @@ def _drain(
         turn = wheels / (max(1.0, 2.0 * (front + rear)) * no_load)
         rest = pack_voltage(drawn[row], cells, capacity, start)
         loaded = loaded_voltage(rest, resistance, u, turn, full, idle, nominal)
-        taken = duration * pack_current(loaded, u, turn, full, idle, nominal)
-        drawn[row] = min(most, drawn[row] + taken)
+        used = duration * pack_current(loaded, u, turn, full, idle, nominal)
+        drawn[row] = min(most, drawn[row] + used)
         rest = pack_voltage(drawn[row], cells, capacity, start)
         loaded = loaded_voltage(rest, resistance, u, turn, full, idle, nominal)
         volts[row] = max(cells * CUT_OFF_V, loaded)

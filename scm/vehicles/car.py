@@ -1,6 +1,6 @@
-"""A car as its file says: the effects it uses, and each number with its spread, unit and source.
+"""A car from its file: its effects, and each number with standard deviation, unit and source.
 
-`types/<name>.toml` holds the cars shipped; those of the folder in the environment's `SCM_CARS` have
+`types/<name>.toml` holds the shipped cars; those in the folder of the variable `SCM_CARS` have
 names too; any other TOML file is loaded by its path.
 """
 
@@ -16,7 +16,7 @@ from scm import registry
 from scm.errors import CarError, TermError, nearest, reading
 from scm.vehicles import body14
 from scm.vehicles.assemble import setters_of
-from scm.vehicles.car_file_schema import FACTS, Fact
+from scm.vehicles.car_file_schema import FileKey, file_keys
 from scm.vehicles.car_files import OWN_CARS, TYPES_DIR, car_files
 from scm.vehicles.correlated import Correlated, read_correlated
 from scm.vehicles.own_term import SUFFIX, load_own_term
@@ -37,7 +37,7 @@ Value = float | tuple[float, ...] | str
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One value of a car file; `std` is None where the file does not say how sure it is."""
+    """One value of a car file; `std` is None if the file has none."""
 
     value: Value
     std: float | None
@@ -50,7 +50,7 @@ class Car:
     """A car: its name, its effects in the file's order, and every value by `section.key`.
 
     Attributes:
-        measures: What its recordings are known to get wrong, without numbers; see `faults`.
+        measures: Known sensor faults of its recordings, without numbers; see `faults`.
         correlated: Groups of numbers whose errors are correlated; all others are independent.
     """
 
@@ -64,18 +64,18 @@ class Car:
 
     @property
     def faults(self) -> tuple[AppliedFault, ...]:
-        """The faults of its measurements with the car's numbers, in the file's order."""
+        """Its sensor faults with the car's numbers, in the file's order."""
         return tuple(
             replace(fault, values={p.name: self.value(p.key) for p in fault.kind.params})
             for fault in self.measures
         )
 
     def has(self, key: str) -> bool:
-        """Say whether the file, or an effect's default, gives this key a value."""
+        """Return whether the file, or an effect's default, has a value for this key."""
         return key in self.values
 
     def quantity(self, key: str) -> Quantity:
-        """Return a value with its spread, unit and source.
+        """Return a value with its standard deviation, unit and source.
 
         Raises:
             CarError: when the car has no such key.
@@ -90,39 +90,39 @@ class Car:
     ) -> "Car":
         """Return this car with further effects, and with other numbers by `section.key`.
 
-        An effect, by its name or one of your own, takes the place of one that sets the same.
+        An effect, by name or as a term, replaces one that sets the same variable.
 
         Raises:
             CarError: naming every unknown effect and key, and every value outside its bounds.
         """
         known, problems = {**all_terms(), **{t.name: t for t in self.terms}}, list[str]()
         known |= {term.name: term for term in names if isinstance(term, Term)}
-        asked = [name.name if isinstance(name, Term) else name for name in names]
-        problems += [f"no effect {n!r}{nearest(n, list(known))}" for n in asked if n not in known]
-        new = flat(known[name] for name in asked if name in known)
-        taken = {term.sets for term in new if term.sets}
-        kept = [term for term in self.terms if term.sets not in taken and term not in new]
-        car = replace(self, terms=(*kept, *new))
+        wanted = [name.name if isinstance(name, Term) else name for name in names]
+        problems += [f"no effect {n!r}{nearest(n, list(known))}" for n in wanted if n not in known]
+        new = flat(known[name] for name in wanted if name in known)
+        replaced = {term.sets for term in new if term.sets}
+        others = [term for term in self.terms if term.sets not in replaced and term not in new]
+        car = replace(self, terms=(*others, *new))
         numbers = _filled(car, {**_defaults(new), **self.values}, values or {}, problems)
         return replace(car, values=numbers)
 
     def with_measures(
         self, entries: Sequence[str], values: Mapping[str, float] | None = None
     ) -> "Car":
-        """Return this car with further faults of measurement, and with other numbers.
+        """Return this car with further sensor faults, and with other numbers.
 
         Raises:
             CarError: naming every unknown fault and key, and every value outside its bounds.
         """
         problems: list[str] = []
         new = read_faults(list(entries), problems)
-        kept = [old for old in self.measures if old.kind not in [f.kind for f in new]]
+        others = [old for old in self.measures if old.kind not in [f.kind for f in new]]
         numbers = {**_fault_defaults(new), **self.values}
         numbers = _filled(self, numbers, values or {}, problems)
-        return replace(self, measures=(*kept, *new), values=numbers)
+        return replace(self, measures=(*others, *new), values=numbers)
 
     def value(self, key: str) -> float:
-        """Return a number such as `value("body.mass_kg")`, in the unit its key ends in."""
+        """Return a number such as `value("body.mass_kg")`, in the unit of its key."""
         value = self.quantity(key).value
         if not isinstance(value, float):
             msg = f"{self.path}: {key}: expected one number, got {value!r}"
@@ -149,7 +149,7 @@ class Car:
 def _filled(
     car: Car, numbers: dict[str, Quantity], values: Mapping[str, float], problems: list[str]
 ) -> dict[str, Quantity]:
-    """Return the numbers with some given anew; refuse what does not fit this car's effects."""
+    """Return the numbers with some replaced; raise CarError for unknown ones."""
     known = _known_keys(car.terms)
     for key, number in values.items():
         kind = known.get(key)
@@ -164,13 +164,13 @@ def _filled(
 
 
 def car_names() -> list[str]:
-    """Return the names of the cars that have one, sorted: those shipped, and one's own."""
+    """Return the names of all cars, shipped ones and the user's, sorted."""
     return sorted(car_files())
 
 
 @cache
 def all_terms() -> Mapping[str, Term]:
-    """Return every effect known, by name."""
+    """Return every known effect, by name."""
     return {name: registry.load(TERMS, name, "TERM", Term) for name in registry.names(TERMS)}
 
 
@@ -179,8 +179,8 @@ def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
 
     Args:
         name_or_path: Of the car.
-        trusted: False where the path comes with somebody's data: a file that lists an effect of
-            its own, which is code, is then refused.
+        trusted: False for a path from somebody else's data: a file with an effect of its own, which
+            is code, is then refused.
 
     Raises:
         CarError: naming every problem of the file at once.
@@ -200,7 +200,7 @@ def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
 
 
 def car_of_text(text: str, path: Path) -> Car:
-    """Make a car of the text of a car file that is not written yet; `path` names it in errors.
+    """Parse the text of an unwritten car file; `path` names it in errors.
 
     Raises:
         CarError: naming every problem at once.
@@ -210,7 +210,7 @@ def car_of_text(text: str, path: Path) -> Car:
 
 
 def car_of(data: Mapping[str, Any], path: Path, *, trusted: bool = True) -> Car:
-    """Make a car of a parsed file; `path` names it in errors, effects of its own stand beside it.
+    """Make a car from parsed TOML; `path` names it in errors, its own effects are files beside it.
 
     Raises:
         CarError: naming every problem at once.
@@ -218,7 +218,7 @@ def car_of(data: Mapping[str, Any], path: Path, *, trusted: bool = True) -> Car:
     problems: list[str] = []
     terms = _terms(data, path.parent if trusted else None, problems)
     faults = read_faults(data.get("measures", []), problems)
-    values = _defaults(terms) | _fault_defaults(faults) | _fact_defaults(data)
+    values = _defaults(terms) | _fault_defaults(faults) | _key_defaults(data)
     values |= _values(data, terms, problems)
     problems += _contradictions(data, values)
     stds = {key: quantity.std for key, quantity in values.items()}
@@ -247,7 +247,7 @@ def _terms(data: Mapping[str, Any], folder: Path | None, problems: list[str]) ->
         if name not in known and name not in own:
             problems.append(f"terms: no effect {name!r}{nearest(name, list(known))}")
         elif name in names[:i]:
-            problems.append(f"terms: {name!r} stands twice")
+            problems.append(f"terms: {name!r} is listed twice")
     return flat(known[name] for name in dict.fromkeys(names) if name in known)
 
 
@@ -263,7 +263,7 @@ def _own_terms(folder: Path | None, names: list[str], problems: list[str]) -> di
             problems.append(f"terms: {error}")
             continue
         if term.name in all_terms():
-            problems.append(f"terms: {name}: {term.name!r} is an effect already; take another name")
+            problems.append(f"terms: {name}: {term.name!r} is an effect already; use another name")
         found[name] = term
     return found
 
@@ -282,11 +282,11 @@ def _fault_defaults(faults: Sequence[AppliedFault]) -> dict[str, Quantity]:
     }
 
 
-def _fact_defaults(data: Mapping[str, Any]) -> dict[str, Quantity]:
+def _key_defaults(data: Mapping[str, Any]) -> dict[str, Quantity]:
     return {
-        key: Quantity(fact.default, None, fact.unit, "default")
-        for key, fact in FACTS.items()
-        if fact.default is not None and isinstance(data.get(key.partition(".")[0]), dict)
+        key: Quantity(schema.default, None, schema.unit, "default")
+        for key, schema in file_keys().items()
+        if schema.default is not None and isinstance(data.get(key.partition(".")[0]), dict)
     }
 
 
@@ -295,11 +295,11 @@ def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
     return {f"{s}.{key}": entry for s, body in sections.items() for key, entry in body.items()}
 
 
-def _known_keys(terms: Sequence[Term]) -> dict[str, Param | Fact]:
+def _known_keys(terms: Sequence[Term]) -> dict[str, Param | FileKey]:
     known = flat([*all_terms().values(), *terms])
     params = [*body14.PARAMS, *(param for term in known for param in term.params)]
     params += [param for fault in all_sensor_faults().values() for param in fault.params]
-    return {**FACTS, **{param.key: param for param in params}}
+    return {**file_keys(), **{param.key: param for param in params}}
 
 
 def _values(
@@ -327,9 +327,9 @@ def _values(
 
 
 def _unread(data: Mapping[str, Any], terms: Sequence[Term]) -> set[str]:
-    """Return the sections of own effects that could not be read: told of already."""
-    listed = data.get("terms", [])
-    own = {Path(n).stem for n in listed if isinstance(n, str) and n.endswith(SUFFIX)}
+    """Return the sections of own effects that could not be read: reported already."""
+    entries = data.get("terms", [])
+    own = {Path(n).stem for n in entries if isinstance(n, str) and n.endswith(SUFFIX)}
     return own - {term.name for term in terms}
 
 
@@ -352,7 +352,7 @@ def _top_problems(data: Mapping[str, Any], sections: set[str]) -> Iterator[str]:
             yield f"[{name}]: no such section{nearest(name, valid)}"
 
 
-def _entry_problems(key: str, entry: Any, kind: Param | Fact) -> Iterator[str]:
+def _entry_problems(key: str, entry: Any, kind: Param | FileKey) -> Iterator[str]:
     fields = ["value", "std", "unit", "source"]
     for name in entry if isinstance(entry, dict) else ():
         if name not in fields:
@@ -369,9 +369,9 @@ def _entry_problems(key: str, entry: Any, kind: Param | Fact) -> Iterator[str]:
     yield from _value_problems(key, entry["value"], kind)
 
 
-def _value_problems(key: str, value: Any, kind: Param | Fact) -> Iterator[str]:
-    count = kind.count if isinstance(kind, Fact) else 1
-    if isinstance(kind, Fact) and count == 0:
+def _value_problems(key: str, value: Any, kind: Param | FileKey) -> Iterator[str]:
+    count = kind.count if isinstance(kind, FileKey) else 1
+    if isinstance(kind, FileKey) and count == 0:
         if not isinstance(value, str) or (kind.words and value not in kind.words):
             expected = " or ".join(map(repr, kind.words)) or "text"
             yield f"{key}: expected {expected}, got {value!r}"
@@ -390,7 +390,7 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _quantity(entry: Mapping[str, Any], kind: Param | Fact) -> Quantity:
+def _quantity(entry: Mapping[str, Any], kind: Param | FileKey) -> Quantity:
     raw = entry["value"]
     value: Value
     if isinstance(raw, list):

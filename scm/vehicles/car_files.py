@@ -1,7 +1,7 @@
-"""Where the cars lie that have a name: those shipped, and those of one's own folder.
+"""Car files by name: shipped ones, and those in the user's folder.
 
-The environment's `SCM_CARS` names that folder, for each process of a city and each agent. Where it
-does not, that is `cars` beside the recordings of `scm up`, which are in `runs` unless it says so.
+The environment variable `SCM_CARS` names that folder, for each process of a city and each agent.
+Its default is `cars` beside the recordings of `scm up`, which are in `runs` by default.
 """
 
 import os
@@ -12,11 +12,11 @@ from scm.errors import CarError, reading
 TYPES_DIR = Path(__file__).parent / "types"
 OWN_CARS = "SCM_CARS"
 USUAL_FOLDER = Path("runs/cars")
-"""Of one's own cars, from the working directory, where the environment has no `SCM_CARS`."""
+"""The user's folder, from the working directory, without `SCM_CARS`."""
 
 
 def name_own_folder(folder: Path) -> None:
-    """Make a folder that of one's own cars for this process and its children, if none is named.
+    """Set the user's folder for this process and its children, unless `SCM_CARS` is set.
 
     Raises:
         CarError: when it cannot be made.
@@ -28,7 +28,7 @@ def name_own_folder(folder: Path) -> None:
 
 
 def own_folder() -> Path | None:
-    """Return the folder of one's own cars; None: there is none, or `SCM_CARS` is empty.
+    """Return the user's folder, or None if there is none or `SCM_CARS` is empty.
 
     Raises:
         CarError: when there is no such folder.
@@ -46,7 +46,7 @@ def car_files() -> dict[str, Path]:
     """Return the car files by name.
 
     Raises:
-        CarError: when there is no such folder, or a name in it is a shipped car's.
+        CarError: when there is no such folder, or a file in it has the name of a shipped car.
     """
     found = {path.stem: path for path in TYPES_DIR.glob("*.toml")}
     folder = own_folder()

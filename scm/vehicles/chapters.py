@@ -1,4 +1,4 @@
-"""The order in which effects are told to people: by what they act on."""
+"""Chapters of effects for people, by what they act on."""
 
 from scm.vehicles.term import Term
 
@@ -26,5 +26,5 @@ CHAPTERS: tuple[tuple[str, frozenset[str]], ...] = (
 
 
 def chapter_of(term: Term) -> str:
-    """Return under which heading an effect stands."""
+    """Return the heading of an effect."""
     return next((title for title, targets in CHAPTERS if term.target in targets), OTHERS)

@@ -1,4 +1,4 @@
-"""What a car was commanded a while ago: its commands' integral over time, at a few instants.
+"""Delayed commands of a car: the integral of its commands over time, at a few instants.
 
 The mean of a command over the last call, one delay earlier, is a difference of that integral:
 smooth in the delay, exact where calls are regular and where there is no delay.
@@ -11,68 +11,68 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.vehicles.jit import allocating_kernel, array_kernel
 
-KNOTS = 64  # instants a car remembers
-SPACING_S = 8e-3  # at least between two of them: 0.5 s of the past, the longest delay
+KNOTS = 64  # stored instants per car
+SPACING_S = 8e-3  # minimum between two of them: 0.5 s in all, the longest delay
 COMMANDS = ("throttle_command", "steering_command")
 DELAYS = {"throttle_past": "drive.delay_s", "steering_past": "steering.delay_s"}
 
 
-class CommandPast:
-    """The past of all cars of a fleet whose effects read `throttle_past` or `steering_past`.
+class CommandHistory:
+    """The command history of a fleet whose effects read `throttle_past` or `steering_past`.
 
     Attributes:
-        slots: Rows of the fleet's block: both commands, then both as they were.
-        columns: Rows of the fleet's numbers that hold both delays, -1 where there is none.
+        block_rows: Rows of the fleet's block: both commands, then both delayed ones.
+        columns: Rows of the fleet's numbers with both delays; -1: none.
     """
 
-    def __init__(self, capacity: int, slots: Ints, columns: Ints) -> None:
-        self.slots, self.columns = slots, columns
+    def __init__(self, capacity: int, block_rows: Ints, columns: Ints) -> None:
+        self.block_rows, self.columns = block_rows, columns
         self._knots: Floats = np.zeros((capacity, KNOTS, 3))
         self._newest: Ints = np.zeros(capacity, dtype=np.int64)
         self._before: Floats = np.zeros((capacity, 2))
 
     @property
     def bytes_per_car(self) -> int:
-        """Memory that one more car takes."""
+        """Memory per car."""
         return (KNOTS * 3 + 1 + 2) * 8
 
-    def forget(self, row: int, throttle: float, steering: float | None) -> None:
-        """Begin anew: before now the commands were these; None is whatever comes first."""
+    def reset(self, row: int, throttle: float, steering: float | None) -> None:
+        """Restart with these past commands; None: the first command to come."""
         self._knots[row] = 0.0
         self._newest[row] = 0
         self._before[row] = throttle, math.nan if steering is None else steering
 
     def copy_row(self, source: int, row: int) -> None:
-        """Remember for one car what another one was commanded."""
+        """Copy one car's history to another row."""
         for array in (self._knots, self._newest, self._before):
             array[row] = array[source]
 
-    def recall(self, block: Floats, numbers: Floats, first: int, last: int, span: float) -> None:
-        """Before a call of `span` seconds: note the commands, write what they were."""
-        _recall(
-            block, numbers, self._knots, self._newest, self._before, self.slots, self.columns,
+    def apply(self, block: Floats, numbers: Floats, first: int, last: int, span: float) -> None:
+        """Before a call of `span` seconds: store the commands and write the delayed ones."""
+        _apply(
+            block, numbers, self._knots, self._newest, self._before, self.block_rows, self.columns,
             first, last, span,
         )  # fmt: skip
 
 
 @allocating_kernel
-def _recall(
-    block: Floats, numbers: Floats, all_knots: Floats, newest: Ints, before: Floats, slots: Ints,
-    columns: Ints, first: int, last: int, span: float,
+def _apply(
+    block: Floats, numbers: Floats, all_knots: Floats, newest: Ints, before: Floats,
+    block_rows: Ints, columns: Ints, first: int, last: int, span: float,
 ) -> None:  # fmt: skip
     for row in range(first, last):
         knots, top = all_knots[row], newest[row]
         here = knots[top % KNOTS]
         start = here[0]
         end = start + span
-        # a knot too near the last one is moved, not kept
+        # a knot too close to the last one replaces it
         near = top > 0 and start - knots[(top - 1) % KNOTS, 0] < 0.999 * SPACING_S
         place = top if near else top + 1
         value = np.empty(3)
         value[0] = end
         now = np.empty(2)
         for k in range(2):
-            given = min(max(block[slots[k], row], -1.0), 1.0)
+            given = min(max(block[block_rows[k], row], -1.0), 1.0)
             now[k] = given if given == given else 0.0  # noqa: PLR0124 a command that is no number
             if np.isnan(before[row, k]):
                 before[row, k] = now[k]
@@ -83,10 +83,10 @@ def _recall(
             past = now[k]
             if columns[k] >= 0 and numbers[columns[k], row] > 0.0:
                 delay = numbers[columns[k], row]
-                gone = _integral(knots, place, k, end - delay, before[row, k])
-                gone -= _integral(knots, place, k, start - delay, before[row, k])
-                past = gone / span
-            block[slots[k + 2], row] = past
+                moved = _integral(knots, place, k, end - delay, before[row, k])
+                moved -= _integral(knots, place, k, start - delay, before[row, k])
+                past = moved / span
+            block[block_rows[k + 2], row] = past
 
 
 @array_kernel

@@ -4,8 +4,8 @@
     numbers = ["drive.no_load_speed_rad_s", "drive.stall_torque_nm"]
     matrix = [[1.0, -0.93], [-0.93, 1.0]]
 
-A drive often tells a combination of two numbers far better than each of them. Their stds alone
-would then allow cars that no drive allows. What no table names is independent.
+Drives often determine a combination of two numbers far better than each of them. Their standard
+deviations alone would then allow impossible combinations. Numbers in no table are independent.
 """
 
 from collections.abc import Iterator, Mapping
@@ -19,7 +19,7 @@ from scm.errors import nearest
 
 @dataclass(frozen=True, slots=True)
 class Correlated:
-    """Numbers of a car that are known together better than each alone.
+    """Numbers of a car with correlated errors.
 
     Attributes:
         numbers: Their keys, `section.key`.
@@ -33,12 +33,12 @@ class Correlated:
 def read_correlated(
     blocks: Any, stds: Mapping[str, float | None], problems: list[str]
 ) -> tuple[Correlated, ...]:
-    """Return the groups of a parsed car file; what is wrong with any joins `problems`.
+    """Return the groups of a parsed car file; append errors to `problems`.
 
     Args:
         blocks: As parsed.
-        stds: Of every value of the car, by key; None where the file gives none.
-        problems: Gets sentences.
+        stds: Of every value of the car, by key; None: the file has none.
+        problems: Gets one sentence per error.
     """
     if not isinstance(blocks, list):
         problems.append("correlated: expected [[correlated]] tables")
@@ -56,7 +56,7 @@ def read_correlated(
 
 
 def _problems(block: Any, stds: Mapping[str, float | None], seen: set[str]) -> Iterator[str]:
-    """Yield what is wrong with one table; what follows the first assumes that it is corrected."""
+    """Yield the errors of one table; later ones assume that earlier ones are corrected."""
     if not isinstance(block, dict) or set(block) != {"numbers", "matrix"}:
         yield f"expected numbers and matrix, got {block!r}"
         return

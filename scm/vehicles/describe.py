@@ -1,10 +1,10 @@
-"""A car as text for people, `scm show car nigel`: its effects, its numbers, and what is odd."""
+"""A car as text, `scm show car nigel`: its effects, its numbers, and warnings."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
 from scm.vehicles import body14
 from scm.vehicles.car import Car, Quantity, all_terms
-from scm.vehicles.car_file_schema import FACTS
+from scm.vehicles.car_file_schema import file_keys
 from scm.vehicles.drivers.limits import turning_radius_m
 from scm.vehicles.param import Param
 from scm.vehicles.term import Term, flat
@@ -38,16 +38,16 @@ def describe_car(car: Car) -> str:
 
 
 def warnings_of(car: Car) -> Iterator[str]:
-    """Say what is allowed, but seldom meant: silent defaults, numbers without effect or source."""
+    """Yield warnings: defaults in use, numbers without effect or source, implausible values."""
     params = _params(car)
     defaults = [key for key in params if car.values[key].source.startswith("default of")]
     if defaults:
         yield f"not in the file, so at their defaults: {', '.join(defaults)}"
-    for reader, keys in _idle(car, {*params, *FACTS}).items():
+    for reader, keys in _idle(car, {*params, *file_keys()}).items():
         yield f"{reader} is not listed, so nothing reads {', '.join(keys)}"
     for key, quantity in car.values.items():
         if not quantity.source:
-            yield f"{key}: nobody says where {_value(quantity)} comes from; add source = ..."
+            yield f"{key}: {_value(quantity)} has no source; add source = ..."
     for target in ("tyre_x", "tyre_y"):
         names = [term.name for term in car.terms if term.adds == target]
         if len(names) > 1:
@@ -57,7 +57,7 @@ def warnings_of(car: Car) -> Iterator[str]:
 
 
 def _idle(car: Car, used: set[str]) -> dict[str, list[str]]:
-    """Keys that no listed effect reads, by the first effect that would."""
+    """Return keys that no listed effect reads, by the first effect that would."""
     found: dict[str, list[str]] = {}
     for key in car.values:
         if key not in used:
@@ -79,9 +79,9 @@ def _tips_over(car: Car) -> Iterator[str]:
     grip = next(
         (car.value(k) for k in ("tyre.lateral_force_extremum", "tyre.front_d") if car.has(k)), None
     )
-    leans = 0.5 * car.value("body.track_m") / car.value("body.cog_height_m")
-    if grip is not None and grip > leans:
-        yield f"its tyres hold {grip:.2g} times the load, but it rolls over at {leans:.2g}"
+    tipping_ratio = 0.5 * car.value("body.track_m") / car.value("body.cog_height_m")
+    if grip is not None and grip > tipping_ratio:
+        yield f"its tyres hold {grip:.2g} times the load, but it rolls over at {tipping_ratio:.2g}"
 
 
 def _effects(car: Car) -> list[Term]:
@@ -91,7 +91,7 @@ def _effects(car: Car) -> list[Term]:
 
 
 def _without_name(term: Term) -> str:
-    """The effect's sentence; where it opens with its own name, only what follows."""
+    """Return the effect's sentence without its own name at the start."""
     head, colon, rest = term.about.partition(": ")
     same = head.lower().replace("-", "").split() == term.name.split("_")
     return rest[:1].upper() + rest[1:] if colon and same else term.about

@@ -1,4 +1,4 @@
-"""All effects as text for people, `scm show terms`: a line each, and one of them whole."""
+"""All effects as text, `scm show terms`: one line each, or one in full."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,7 +14,7 @@ Effect = Term | SensorFault
 
 
 def all_effects() -> dict[str, Effect]:
-    """Return every effect on a car, then every fault of measuring it, by name."""
+    """Return every physical effect, then every sensor fault, by name."""
     return {**all_terms(), **all_sensor_faults()}
 
 
@@ -32,20 +32,20 @@ def effect_named(name: str) -> Effect:
 
 
 def list_effects() -> str:
-    """Return a line for each effect, by what it acts on."""
+    """Return a line for each effect, grouped by what it acts on."""
     terms, faults = list(all_terms().values()), list(all_sensor_faults().values())
     width = max(len(name) for name in all_effects())
-    lines = [f"{len(terms)} effects on a car, {len(faults)} faults of measuring it; "
-             "`scm show terms NAME` tells one whole"]  # fmt: skip
+    lines = [f"{len(terms)} effects on a car, {len(faults)} sensor faults; "
+             "`scm show terms NAME` shows one in full"]  # fmt: skip
     for title in [*(title for title, _ in CHAPTERS), OTHERS]:
         chosen = [term for term in terms if chapter_of(term) == title]
         lines += ["", title, *_lines(chosen, width)] if chosen else []
-    lines += ["", "Faults of measuring", *_lines(faults, width)]
+    lines += ["", "Sensor faults", *_lines(faults, width)]
     return "\n".join(lines)
 
 
 def describe_term(name: str) -> str:
-    """Return one effect whole: equation, numbers, where it holds and shows, source.
+    """Return one effect in full: equation, numbers, range, visible manoeuvres, source.
 
     Raises:
         TermError: when there is none of this name.
@@ -83,8 +83,8 @@ def _lines(effects: Sequence[Effect], width: int) -> Iterator[str]:
 
 
 def _reads(term: Term) -> str:
-    laws = [law for part in flat([term]) for law in (part.law, part.damping) if law]
-    names = dict.fromkeys(name for law in laws for name in reads(law) if name in SIGNALS)
+    functions = [f for part in flat([term]) for f in (part.law, part.damping) if f]
+    names = dict.fromkeys(name for f in functions for name in reads(f) if name in SIGNALS)
     return ", ".join(names) or "only its own numbers"
 
 

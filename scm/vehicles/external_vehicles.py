@@ -1,7 +1,7 @@
-"""What is known of cars that somebody else simulates: where they are and how they move over ground.
+"""The known state of cars that are simulated elsewhere: pose and planar motion.
 
-It stands in for a `Fleet` where such cars are measured: a LIDAR needs no more. All the rest is at
-rest and level.
+It replaces a `Fleet` where such cars are measured; a LIDAR needs no more. All other values are
+those of a car at rest on level floor.
 """
 
 import numpy as np
@@ -9,8 +9,8 @@ import numpy as np
 from scm.arrays import Floats
 
 
-class Placed:
-    """Cars by row; write where they are.
+class ExternalVehicles:
+    """Cars by row; write their poses and motion here.
 
     Attributes:
         x, y, yaw: Rear-axle pose in the map frame, (capacity,) [m, rad].
@@ -26,6 +26,6 @@ class Placed:
         self.roll = self.pitch = self.roll_rate = self.pitch_rate = rest
         self.roll_accel = self.pitch_accel = self.yaw_accel = rest
         self.accel_x = self.accel_y = self.accel_z = rest
-        self.impact_x = self.impact_y = self.impact_yaw = rest
+        self.contact_accel_x = self.contact_accel_y = self.contact_yaw_accel = rest
         self.throttle = self.steer_angle = rest
         self.wheel_angle: Floats = np.broadcast_to(rest[:, None], (capacity, 4))

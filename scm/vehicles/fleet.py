@@ -1,7 +1,7 @@
-"""All cars of one car file, advanced together: a struct of arrays, a row is a whole car.
+"""All cars of one car file, advanced together: a struct of arrays with one row per car.
 
 Every array is a view of one block that the compiled kernel works on. Poses are of the rear axle's
-centre on the ground; wheels stand front-left, front-right, rear-left, rear-right.
+centre on the ground; wheel order is front-left, front-right, rear-left, rear-right.
 """
 
 import math
@@ -16,17 +16,17 @@ from scm.errors import RunError, TermError, nearest
 from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY, STATUS_DIVERGED, STATUS_OK, STATUS_ROLLED, sprung_part
 from scm.vehicles.car import Car
-from scm.vehicles.command_delay import COMMANDS, DELAYS, CommandPast
+from scm.vehicles.command_delay import COMMANDS, DELAYS, CommandHistory
 from scm.vehicles.fleet_rows import (
     COG,
     COG_CHANGED,
     READ,
-    SLOT_OF,
+    VARIABLE_OF,
     WRITTEN,
     aligned,
     columns_of_command,
+    offsets_of_variables,
     pool,
-    slots_of_signals,
     steps_of,
     whole_steps,
 )  # fmt: skip
@@ -42,7 +42,7 @@ SUBSTEP_S = 1e-3
 
 
 class VehicleStatus(IntEnum):
-    """What became of a car in the kernel."""
+    """The state of a car in the kernel."""
 
     OK = STATUS_OK
     DIVERGED = STATUS_DIVERGED
@@ -50,7 +50,7 @@ class VehicleStatus(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """Say it in words."""
+        """The state in words."""
         if self is VehicleStatus.OK:
             return "The car drives."
         if self is VehicleStatus.ROLLED:
@@ -68,28 +68,29 @@ class Fleet:
     """All cars of one car file.
 
     Attributes:
-        throttle: Commands in [-1, 1], + forward, shape (capacity,); write here. Beyond counts as
-            full, and a command that is no number freezes the car, marked DIVERGED.
+        throttle: Commands in [-1, 1], + forward, shape (capacity,); write here. Larger values are
+            clipped; a NaN freezes the car, marked DIVERGED.
         steering: Likewise, + left.
         battery: Battery voltage [V], shape (capacity,); write here.
-        air_x, air_y: Wind velocity in the world [m/s], shape (capacity,); write here. 0 is still.
+        air_x, air_y: Wind velocity in the world [m/s], shape (capacity,); write here.
         floor_height, floor_slope_x, floor_slope_y: Floor under each wheel [m] and its rise along
-            world x and y [1], shape (capacity, 4); write here. The kernel carries the height along
-            the slope, so it stays that of the wheel's place until written anew.
-        floor_grip, floor_rolling: Factor on tyre friction, and what the floor adds to the rolling
-            coefficient [1], shape (capacity, 4); write here. Adding or placing a car makes its
-            floor level and of grip 1, its air still.
+            world x and y [1], shape (capacity, 4); write here. The kernel extrapolates the height
+            along the slope until it is written again.
+        floor_grip, floor_rolling: Factor on tyre friction, and addition to the rolling coefficient
+            [1], shape (capacity, 4); write here. Adding or placing a car resets its floor to level
+            with grip 1, and its wind to 0.
         wheel_x, wheel_y: Contact points in the world, (capacity, 4) [m].
         time, wheel_angle: Since the car was placed, (capacity,) [s], and how far each wheel has
             turned since, (capacity, 4) [rad]; may be written.
-        impact_x, impact_y, impact_yaw: What contacts added to the acceleration over the last tick,
-            level body frame [m/s^2, rad/s^2], shape (capacity,); written by who finds the contacts.
-        columns: What each number of a car means, in the order of `parameters`.
-        threads: How many threads `advance` uses for big fleets; 1 from the start.
+        contact_accel_x, contact_accel_y, contact_yaw_accel: Acceleration by contacts over the last
+            tick, level body frame [m/s^2, rad/s^2], shape (capacity,); written by the contact
+            solver.
+        columns: Meaning of each column of `parameters`.
+        threads: Number of threads of `advance` for large fleets; default 1.
         alive, status: Rows in use, and the `VehicleStatus` of each, shape (capacity,).
         x, y, z, roll, pitch, yaw: Rear-axle pose in the world [m, rad]; yaw in (-pi, pi]. The
-            point is fixed to the leaning body at floor height: a stopped car that still rocks on
-            its springs has stopped.
+            point is fixed to the rolling body at floor height, so a stopped car that still
+            oscillates on its springs has zero speed.
         speed, lateral_speed: Velocity of the rear axle along and across the body [m/s].
         roll_rate, pitch_rate, yaw_rate: [rad/s]; roll_accel, pitch_accel, yaw_accel: [rad/s^2].
         accel_x, accel_y, accel_z: Acceleration of the centre of gravity over the last substep, in
@@ -103,11 +104,11 @@ class Fleet:
         self.car, self.capacity = car, capacity
         self.threads = 1
         self.columns = columns_of(car.terms)
-        self._slots = slots_of(car.terms)
-        self._signal_slots = slots_of_signals(self._slots)
+        self._offsets = slots_of(car.terms)
+        self._variable_offsets = offsets_of_variables(self._offsets)
         self._kernel = compile_kernel(car.terms)
         padded = -(-capacity // LANES) * LANES
-        height = max(offset + width for offset, width in self._slots.values())
+        height = max(offset + width for offset, width in self._offsets.values())
         self._block: Floats = aligned((height, padded))
         self._nominal: Floats = np.array([car.value(c.param.key) for c in self.columns])
         self.parameter_names = tuple(column.name for column in self.columns)
@@ -118,12 +119,12 @@ class Fleet:
         self.alive: Bools = self._alive[:capacity]
         self._status: Ints = np.zeros(padded, dtype=np.int64)
         self.status: Ints = self._status[:capacity]
-        self._past = self._past_of(padded)
-        self.impact_x, self.impact_y, self.impact_yaw = np.zeros((3, capacity))
-        for name, slot in WRITTEN.items():
-            setattr(self, name, self._view(slot))
+        self._history = self._history_of(padded)
+        self.contact_accel_x, self.contact_accel_y, self.contact_yaw_accel = np.zeros((3, capacity))
+        for name, variable in WRITTEN.items():
+            setattr(self, name, self._view(variable))
         for name in READ:
-            view = self._view(SLOT_OF.get(name, name))
+            view = self._view(VARIABLE_OF.get(name, name))
             view.flags.writeable = False
             setattr(self, name, view)
 
@@ -164,7 +165,7 @@ class Fleet:
     wheel_y: Floats
 
     def add(self, pose: Pose2, speed: float = 0.0) -> int:
-        """Put a car on the floor with its rear axle at `pose`, settled and rolling; return its row.
+        """Add a car with its rear axle at `pose`, in equilibrium and rolling; return its row.
 
         Raises:
             RunError: when all rows are in use.
@@ -180,7 +181,7 @@ class Fleet:
         return row
 
     def remove(self, row: int) -> None:
-        """Take a car off the floor; its row is free again.
+        """Remove a car; its row is free again.
 
         Raises:
             RunError: when there is no such row.
@@ -202,12 +203,12 @@ class Fleet:
         *,
         keep_actuators: bool = False,
     ) -> None:
-        """Restart a row from a measured state of its rear axle; no angle means wheels straight.
+        """Restart a row from a measured state of its rear axle; by default with straight wheels.
 
-        Lags and servo start settled at `steer_angle` [rad] and `throttle`; a trim adds its angle to
-        the servo's. The commands themselves start at zero and the battery at its nominal voltage,
-        so write commands after placing. With `keep_actuators` lags and servo stay as they are,
-        whatever angle and throttle are given.
+        Lags and servo start in steady state at `steer_angle` [rad] and `throttle`; a trim adds its
+        angle to the servo's. Commands start at zero and the battery at its nominal voltage, so
+        write commands after placing. With `keep_actuators` lags and servo keep their state and
+        `steer_angle` and `throttle` are ignored.
 
         Raises:
             RunError: when there is no such row.
@@ -215,7 +216,7 @@ class Fleet:
         self._check(row)
         car = self._block[:, row]
         lags = [term.target for term in self.car.terms if term.keeps is not None]
-        kept = {name: self._view(name)[row].copy() for name in {*lags, "steer_angle"}}
+        actuators = {name: self._view(name)[row].copy() for name in {*lags, "steer_angle"}}
         car[:] = 0.0
         shape = self.shape(row)
         cog, c, s = shape.cog_to_rear_axle, math.cos(pose.yaw), math.sin(pose.yaw)
@@ -229,43 +230,43 @@ class Fleet:
         self._set(row, "yaw_rate", yaw_rate)
         self._set(row, "battery", self._nominal_battery(row))
         self._set(row, "floor_grip", 1.0)
-        self.impact_x[row] = self.impact_y[row] = self.impact_yaw[row] = 0.0
-        settled = {"steer": steer_angle, "throttle": throttle}
+        self.contact_accel_x[row] = self.contact_accel_y[row] = self.contact_yaw_accel[row] = 0.0
+        at_rest = {"steer": steer_angle, "throttle": throttle}
         for term in self.car.terms:
             if term.keeps is not None:
-                start = settled.get(SIGNALS[term.target].settles)
+                start = at_rest.get(SIGNALS[term.target].starts_at)
                 self._set(row, term.target, start or term.keeps)
         self._set(row, "steer_angle", steer_angle or 0.0)
-        for name in kept if keep_actuators else ():
-            self._set(row, name, kept[name])
+        for name in actuators if keep_actuators else ():
+            self._set(row, name, actuators[name])
         self._roll(row, shape, speed, yaw_rate)
         self.status[row] = VehicleStatus.OK
-        if self._past is not None and not keep_actuators:
-            self._past.forget(row, throttle, 0.0 if steer_angle is None else None)
+        if self._history is not None and not keep_actuators:
+            self._history.reset(row, throttle, 0.0 if steer_angle is None else None)
         self._run(row, row + 1, 0, SUBSTEP_S)
 
     def _roll(self, row: int, shape: Shape, speed: float, yaw_rate: float) -> None:
-        """Start a placed car's wheels: rolling without slip, under the weight at rest."""
+        """Initialise a placed car's wheels: rolling without slip, under the static load."""
         car, param = self._block[:, row], self._parameter
-        offset = self._slots["wheel_speed"][0]
+        offset = self._offsets["wheel_speed"][0]
         half = 0.5 * param(row, "track") * yaw_rate
         rolling = np.array([speed - half, speed + half, speed - half, speed + half])
         car[offset : offset + 4] = rolling / param(row, "wheel_radius")
         front = shape.cog_to_rear_axle / param(row, "wheelbase")
-        offset = self._slots["wheel_load"][0]
+        offset = self._offsets["wheel_load"][0]
         shares = np.array([front, front, 1.0 - front, 1.0 - front])
         car[offset : offset + 4] = 0.5 * shape.mass * GRAVITY * shares
 
     def copy_row(self, source: int, row: int) -> None:
-        """Make a row the very car of another one: its numbers, and all that it remembers."""
+        """Copy a car with its numbers and its whole state to another row."""
         for array in (self._block, self._numbers):
             array[:, row] = array[:, source]
         self.alive[row], self.status[row] = self.alive[source], self.status[source]
-        if self._past is not None:
-            self._past.copy_row(source, row)
+        if self._history is not None:
+            self._history.copy_row(source, row)
 
-    def settle(self, row: int) -> None:
-        """Let a car that was just placed stand on the heights that `floor_height` has for it."""
+    def place_at_rest(self, row: int) -> None:
+        """Put a newly placed car at rest on the heights in `floor_height`."""
         front_left, front_right, rear_left, rear_right = self.floor_height[row].tolist()
         shape, rear = self.shape(row), 0.5 * (rear_left + rear_right)
         rise = (0.5 * (front_left + front_right) - rear) / self._parameter(row, "wheelbase")
@@ -286,14 +287,14 @@ class Fleet:
         self._run(row, row + 1, 0, SUBSTEP_S)
 
     def shape(self, row: int) -> Shape:
-        """Return one car's mass properties, with all that its effects add to them."""
+        """Return one car's mass properties, effects included."""
         places = {column.param.key: i for i, column in enumerate(self.columns)}
         return shape_of(self.car, lambda key: float(self.parameters[row, places[key]]))
 
     def advance(self, duration: float, substep: float = SUBSTEP_S) -> None:
         """Advance all cars by whole substeps in one call, without the interpreter lock [s].
 
-        With `threads` above 1 big fleets are shared by whole tiles; the result is the same.
+        With `threads` above 1 large fleets are divided by whole tiles; the result is the same.
 
         Raises:
             RunError: when duration or substep is negative or no number.
@@ -315,7 +316,7 @@ class Fleet:
     def advance_rows(
         self, first: int, last: int, duration: float, substep: float = SUBSTEP_S
     ) -> None:
-        """Advance the rows first..last-1 only: threads may share a fleet by rows.
+        """Advance only the rows first..last-1, so that threads can share a fleet.
 
         Raises:
             RunError: when there are no such rows, or duration or substep is negative or no number.
@@ -333,39 +334,39 @@ class Fleet:
         signals: Sequence[str] = ("x", "y", "yaw", "speed"),
         substep: float = SUBSTEP_S,
     ) -> dict[str, Floats]:
-        """Drive all cars through a recording in one call, each with its own numbers.
+        """Simulate all cars with recorded commands in one call, each with its own numbers.
 
         Args:
             throttle: Commands at the start of each step, (T,), or (T, capacity) for each car.
             steering: Likewise.
             step_s: Length of one step of the recording [s], in whole substeps.
-            signals: Results to keep, by their names here; one wheel as `wheel_angle.rl`.
+            signals: Names of the results; one wheel as `wheel_angle.rl`.
             substep: Length of a substep [s].
 
         Returns:
             Each signal after every step, (T, capacity).
 
         Raises:
-            RunError: when shapes or steps do not fit, or a signal is not one of each car.
+            RunError: when shapes or steps do not fit, or a name is unknown.
         """
         commands = [columns_of_command(c, self.capacity) for c in (throttle, steering)]
         if len(commands[0]) != len(commands[1]):
             msg = f"{len(commands[0])} throttles and {len(commands[1])} steerings: expected as many"
             raise RunError(msg)
-        slots = np.array([self._slot_of_signal(name) for name in signals], dtype=np.int64)
-        out = np.zeros((len(commands[0]), len(slots), self._alive.size))
+        offsets = np.array([self._offset_of(name) for name in signals], dtype=np.int64)
+        out = np.zeros((len(commands[0]), len(offsets), self._alive.size))
         steps = steps_of(step_s, substep)
-        if self._past is None:
+        if self._history is None:
             self._kernel.rollout(
                 self._block, self._numbers, self._alive, self._status, 0, self.capacity, steps,
-                substep, *commands, slots, out,
+                substep, *commands, offsets, out,
             )  # fmt: skip
         else:
             for t in range(len(out)):
                 now = (np.resize(command[t], self.capacity) for command in commands)
                 self.throttle[:], self.steering[:] = now
                 self._run(0, self.capacity, steps, substep)
-                out[t] = self._block[slots]
+                out[t] = self._block[offsets]
         return {name: out[:, k, : self.capacity] for k, name in enumerate(signals)}
 
     def pose(self, row: int) -> Pose2:
@@ -374,13 +375,13 @@ class Fleet:
 
     def planar_cog(self, row: int) -> tuple[float, float, float, float, float, float]:
         """Return (x, y, yaw, vx, vy, yaw_rate) of the centre of gravity in the world frame."""
-        x, y, yaw, vx, vy, rate = (float(self._block[self._slots[n][0], row]) for n in COG)
+        x, y, yaw, vx, vy, rate = (float(self._block[self._offsets[n][0], row]) for n in COG)
         return x, y, yaw, vx, vy, rate
 
     def planar_cogs(self, rows: Ints) -> Floats:
         """Return `planar_cog` of many rows at once, shape (n, 6)."""
-        slots = [self._slots[name][0] for name in COG]
-        return self._block[slots, rows[:, None]]
+        offsets = [self._offsets[name][0] for name in COG]
+        return self._block[offsets, rows[:, None]]
 
     def push(
         self,
@@ -394,7 +395,7 @@ class Fleet:
     ) -> None:
         """Apply a contact's result: change of velocity and pose of the COG, in the world frame.
 
-        A change that is no number is not applied: it freezes the car, marked DIVERGED.
+        A change that is not finite is not applied: it freezes the car, marked DIVERGED.
         """
         if self.status[row] != VehicleStatus.OK:
             return
@@ -403,24 +404,24 @@ class Fleet:
             self.status[row] = VehicleStatus.DIVERGED
             return
         for name, change in zip(COG_CHANGED, changes, strict=True):
-            self._block[self._slots[name][0], row] += change
+            self._block[self._offsets[name][0], row] += change
         self._run(row, row + 1, 0, SUBSTEP_S)
 
     def push_rows(self, rows: Ints, changes: Floats) -> None:
-        """`push` many cars at once: each row once, changes (n, 6) in the order of `push`."""
+        """Do `push` for many cars: each row once, changes (n, 6) in the order of `push`."""
         rows, changes = np.asarray(rows), np.asarray(changes)
         fine = self.status[rows] == VehicleStatus.OK
         finite = np.isfinite(changes).all(axis=1)
         self.status[rows[fine & ~finite]] = VehicleStatus.DIVERGED
         rows, changes = rows[fine & finite], changes[fine & finite]
         for name, change in zip(COG_CHANGED, changes.T, strict=True):
-            self._block[self._slots[name][0], rows] += change
+            self._block[self._offsets[name][0], rows] += change
         tiles = np.unique(rows // LANES) * LANES
         for start in tiles:
             self._run(start, min(start + LANES, self.capacity), 0, SUBSTEP_S)
 
     def set_parameter(self, row: int, name: str, value: float) -> None:
-        """Give one car another number, by the parameter's name or its key in the car file.
+        """Set one car's number by the parameter's name or its key in the car file.
 
         Raises:
             TermError: when the car has no such parameter, or the value lies outside its bounds.
@@ -437,9 +438,9 @@ class Fleet:
 
     @property
     def bytes_per_car(self) -> int:
-        """Memory that one more car takes."""
+        """Memory per car."""
         arrays = (self._block, self._numbers, self._alive, self._status)
-        past = self._past.bytes_per_car if self._past else 0
+        past = self._history.bytes_per_car if self._history else 0
         return sum(a.nbytes for a in arrays) // self._alive.size + past + 3 * 8
 
     def _check(self, row: int) -> None:
@@ -447,30 +448,30 @@ class Fleet:
             msg = f"fleet of {self.car.name}: no row {row}, expected 0 to {self.capacity - 1}"
             raise RunError(msg)
 
-    def _past_of(self, padded: int) -> CommandPast | None:
-        """Return the memory of commands where an effect reads it.
+    def _history_of(self, padded: int) -> CommandHistory | None:
+        """Return the command history if an effect reads delayed commands.
 
         Raises:
-            TermError: when an effect reads the past, and the car has no such delay.
+            TermError: when an effect reads a delayed command and the car has no such delay.
         """
-        asked = {name for term in self.car.terms for name in reads(term.law)} & DELAYS.keys()
-        if not asked:
+        delayed = {name for term in self.car.terms for name in reads(term.law)} & DELAYS.keys()
+        if not delayed:
             return None
         keys = {column.param.key: i for i, column in enumerate(self.columns)}
-        for name in sorted(asked):
+        for name in sorted(delayed):
             if DELAYS[name] not in keys:
                 msg = f"an effect reads {name}, but no effect has the parameter {DELAYS[name]}"
                 raise TermError(msg)
-        slots = [self._slots[name][0] for name in (*COMMANDS, *DELAYS)]
+        offsets = [self._offsets[name][0] for name in (*COMMANDS, *DELAYS)]
         columns = [keys.get(key, -1) for key in DELAYS.values()]
-        return CommandPast(padded, np.array(slots), np.array(columns))
+        return CommandHistory(padded, np.array(offsets), np.array(columns))
 
-    def _slot_of_signal(self, name: str) -> int:
-        if name not in self._signal_slots:
-            hint = nearest(name, sorted(self._signal_slots))
+    def _offset_of(self, name: str) -> int:
+        if name not in self._variable_offsets:
+            hint = nearest(name, sorted(self._variable_offsets))
             msg = f"rollout: {name!r} is no signal of each car{hint}"
             raise RunError(msg)
-        return self._signal_slots[name]
+        return self._variable_offsets[name]
 
     def _parameter(self, row: int, name: str) -> float:
         return float(self.parameters[row, self.parameter_names.index(name)])
@@ -483,18 +484,18 @@ class Fleet:
         return self.car.value(key) if self.car.has(key) else 0.0
 
     def _view(self, name: str) -> Floats:
-        offset, width = self._slots[name]
+        offset, width = self._offsets[name]
         if width == 1:
             return self._block[offset, : self.capacity]
         return self._block[offset : offset + width, : self.capacity].T
 
     def _set(self, row: int, name: str, value: float | Floats) -> None:
-        offset, width = self._slots[name]
+        offset, width = self._offsets[name]
         self._block[offset : offset + width, row] = value
 
     def _run(self, first: int, last: int, steps: int, substep: float) -> None:
-        if self._past is not None and steps > 0:
-            self._past.recall(self._block, self._numbers, first, last, steps * substep)
+        if self._history is not None and steps > 0:
+            self._history.apply(self._block, self._numbers, first, last, steps * substep)
         self._kernel.advance(
             self._block, self._numbers, self._alive, self._status, first, last, steps, substep
         )

@@ -1,4 +1,4 @@
-"""The names of a fleet's arrays, the memory behind them, and what may be asked of it."""
+"""Names and memory of a fleet's arrays, and checks of its arguments."""
 
 import math
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from scm.arrays import Floats
 from scm.errors import RunError
 from scm.vehicles.lanes import LANES
 
-# what others write, and what they read: names here, slots of the block where those differ
+# arrays that others write, and that they read: by name, with the block's name where it differs
 WRITTEN = {
     "throttle": "throttle_command", "steering": "steering_command",
     **{name: name for name in (
@@ -25,23 +25,23 @@ READ = (
     "yaw_accel", "steer_angle", "wheel_speed", "wheel_steer", "wheel_load", "wheel_x", "wheel_y",
 )  # fmt: skip
 WHEELS = ("fl", "fr", "rl", "rr")
-SLOT_OF = {"wheel_x": "ground_x", "wheel_y": "ground_y"}
+VARIABLE_OF = {"wheel_x": "ground_x", "wheel_y": "ground_y"}
 COG = ("x_cog", "y_cog", "yaw", "vx_world", "vy_world", "yaw_rate")
 COG_CHANGED = ("vx_world", "vy_world", "yaw_rate", "x_cog", "y_cog", "yaw")
 
 
-def slots_of_signals(slots: Mapping[str, tuple[int, int]]) -> dict[str, int]:
-    """Return the slot of each number that may be asked of a car; a wheel's as `wheel_angle.rl`."""
+def offsets_of_variables(offsets: Mapping[str, tuple[int, int]]) -> dict[str, int]:
+    """Return the offset of each variable of a car; a wheel's is named like `wheel_angle.rl`."""
     found = dict[str, int]()
     for name in (*READ, *WRITTEN):
-        first, width = slots[WRITTEN.get(name, SLOT_OF.get(name, name))]
+        first, width = offsets[WRITTEN.get(name, VARIABLE_OF.get(name, name))]
         wheels = {f"{name}.{wheel}": first + w for w, wheel in enumerate(WHEELS)}
         found |= {name: first} if width == 1 else wheels
     return found
 
 
 def whole_steps(duration: float, substep: float) -> int:
-    """Return how many substeps make a duration [s]; refuse what is no time.
+    """Return the number of substeps in a duration [s].
 
     Raises:
         RunError: when one of them is negative or no number.
@@ -53,10 +53,10 @@ def whole_steps(duration: float, substep: float) -> int:
 
 
 def steps_of(step_s: float, substep: float) -> int:
-    """Return how many substeps a recording's step is made of [s].
+    """Return the number of substeps in a recording's step [s].
 
     Raises:
-        RunError: when they are no times, or the step is not a whole number of substeps.
+        RunError: when they are invalid, or the step is not a whole number of substeps.
     """
     steps = whole_steps(step_s, substep)
     if not math.isclose(steps * substep, step_s, rel_tol=1e-6):
@@ -72,7 +72,7 @@ def steps_of(step_s: float, substep: float) -> int:
 
 
 def columns_of_command(command: Floats, capacity: int) -> Floats:
-    """Return a recording's command for whole tiles: as wide as one where all cars have the same.
+    """Return a recording's command for whole tiles; one tile wide if it is the same for all cars.
 
     Raises:
         RunError: when it has another shape.
@@ -89,7 +89,7 @@ def columns_of_command(command: Floats, capacity: int) -> Floats:
 
 
 def aligned(shape: tuple[int, int]) -> Floats:
-    """Return zeros that begin on a cache line."""
+    """Return zeros aligned to a cache line."""
     size = shape[0] * shape[1]
     room = np.zeros(size + 8)
     begin = -room.ctypes.data % 64 // 8
@@ -98,5 +98,5 @@ def aligned(shape: tuple[int, int]) -> Floats:
 
 @cache
 def pool(threads: int) -> ThreadPoolExecutor:
-    """Return the threads that all fleets share."""
+    """Return the thread pool that all fleets share."""
     return ThreadPoolExecutor(threads, thread_name_prefix="fleet")

@@ -1,7 +1,7 @@
-"""What lies under the wheels: a map's grip, rolling resistance, heights and wind, for fleets.
+"""The ground of a map for fleets: grip, rolling resistance, heights, and wind.
 
-The world and every agent make a `Ground` of the same map and feel the same floor and the same wind.
-On a map without floor data and wind it does nothing at all.
+The world and every agent build a `Ground` from the same map and get the same floor and wind. On a
+map without floor data and wind it does nothing.
 """
 
 import math
@@ -20,7 +20,7 @@ from scm.vehicles.wind import Gusts
 
 CELL_M = 0.25
 MOST_CELLS = 1_000_000
-WHEEL_REACH_M = 0.25  # wheels this large see an edge before their middle is in its cell
+WHEEL_REACH_M = 0.25  # wheels this large touch an edge before their centre is in its cell
 CAR_REACH_M = 1.5  # a car this long reaches a cell with its front wheels
 
 Bounds = tuple[float, float, float, float]
@@ -31,11 +31,11 @@ class Ground:
 
     Args:
         city_map: The city.
-        seed: Of the gusts; everybody who is given the same one feels the same wind.
+        seed: Of the gusts; the same seed gives the same wind.
 
     Attributes:
-        is_flat: Whether the floor is level and holds as it should everywhere.
-        is_calm: Whether there is no wind.
+        is_flat: Whether the floor is level and has nominal friction everywhere.
+        has_no_wind: Whether there is no wind.
     """
 
     def __init__(self, city_map: CityMap, seed: int = 0) -> None:
@@ -46,39 +46,39 @@ class Ground:
             and not (floor.patches or floor.friction_map)
             and (floor.grip, floor.rolling) == (1.0, 0.0)
         )
-        self.is_calm = not (wind.x_mps or wind.y_mps or wind.gust_mps)
+        self.has_no_wind = not (wind.x_mps or wind.y_mps or wind.gust_mps)
         self._sheet = None if self.is_flat else sheet_of(floor)
-        self._gusts = None if self.is_calm else Gusts(wind, seed)
+        self._gusts = None if self.has_no_wind else Gusts(wind, seed)
 
     def fit(self, car: Car) -> Car:
-        """Return a car as it drives here: where the floor slopes, one that can stand on it."""
+        """Return the car for this map: on a sloping floor with effects that hold it at rest."""
         return car if self._is_level else standing(car)
 
     def feel(self, fleet: Fleet, t_ns: int) -> None:
-        """Write floor and wind of the instant `t_ns` into a fleet: before each of its advances."""
+        """Write floor and wind at `t_ns` into a fleet; call it before each advance."""
         if self._sheet is not None:
             self._write(self._sheet, fleet, CLIMBS)
         if self._gusts is not None:
             fleet.air_x[:], fleet.air_y[:] = self._gusts.at(t_ns)
 
-    def settle(self, fleet: Fleet, row: int) -> None:
-        """Let a car that was just placed stand on the highest ground under its wheels."""
+    def place_at_rest(self, fleet: Fleet, row: int) -> None:
+        """Put a newly placed car at rest on the highest ground under its wheels."""
         if self._sheet is None:
             return
         only = np.zeros(fleet.capacity, np.bool_)
         only[row] = True
         self._write(self._sheet, fleet, rows=only)
-        fleet.settle(row)
+        fleet.place_at_rest(row)
 
     def warm(self, fleet: Fleet) -> None:
-        """Compile or load now what `feel` needs, not when the first car drives."""
+        """Compile or load what `feel` needs before the first car drives."""
         if self._sheet is not None:
             self._write(self._sheet, fleet, rows=np.zeros(fleet.capacity, np.bool_))
 
     def _write(
         self, sheet: Sheet, fleet: Fleet, climbs: float = ANYTHING, rows: Bools | None = None
     ) -> None:
-        """Write the floor under `rows`; only what is at most `climbs` wheel radii up counts."""
+        """Write the floor under `rows`; steps higher than `climbs` wheel radii are ignored."""
         radius = fleet.car.value("wheel.radius_m")
         feel(
             sheet, fleet.alive if rows is None else rows,
@@ -89,7 +89,7 @@ class Ground:
 
 
 def sheet_of(floor: Floor) -> Sheet:
-    """Return a floor as the kernel reads it."""
+    """Return the arrays of a floor for the kernel."""
     pieces = pieces_of(floor)
     outlines = [() if patch.radius_m is not None else outline_of(patch) for patch in floor.patches]
     reaches = [outline_of(patch) for patch in floor.patches] + [p.corners for p in pieces]
@@ -137,7 +137,7 @@ def _frame(
 
 
 def _level(heights: Floats, frame: Floats) -> Bools:
-    """Return where all within a wheel's reach is as high as the place itself."""
+    """Return where everything within a wheel's reach has the same height."""
     lowest, highest = heights.copy(), heights.copy()
     for axis, size in ((1, frame[2]), (0, frame[3])):
         count = min(math.ceil(WHEEL_REACH_M / size) + 1, heights.shape[axis]) if size else 0
@@ -159,7 +159,7 @@ def _bounds(points: tuple[Point, ...]) -> Bounds:
 def _cells(
     shapes: list[Bounds], pictures: list[Bounds]
 ) -> tuple[tuple[float, float, float], Ints, Ints, Ints, Bools]:
-    """Sort shapes into square cells: each into all that a wheel touching it can be in."""
+    """Sort shapes into square cells: each into all cells of wheels that can touch it."""
     every = np.array([*shapes, *pictures]).reshape(-1, 4)
     if not len(every):
         every = np.zeros((1, 4))

@@ -1,8 +1,8 @@
 """The guard between every command and every body: fencing, dead-man, limits, city stop.
 
-Whatever commands a car, a driver beside it or a person far away, its wishes pass here last. The
-guard knows no bus, no clock and no physics: it is told what arrived and when, on the receiver's
-own clock, and says what the body may do now.
+Every command of a car, from its own driver or a remote person, passes the guard last. The guard has
+no bus, clock or physics: it gets commands with their times on the receiver's clock, and returns
+what the body may do now.
 
     age of the newest accepted command    mode     what the body does
     below 150 ms                          drive    the command
@@ -10,7 +10,7 @@ own clock, and says what the body may do now.
     300 ms                                stop     controlled stop
     1000 ms                               lost     brake, hazard lights, the lease is dropped
 
-A lost car does not drive again on its old epoch, however healthy its commander looks by then.
+A lost car does not drive again on its old epoch, even if commands arrive again.
 """
 
 import math
@@ -33,7 +33,7 @@ class Guarded:
 
     Attributes:
         throttle: -1 to 1, + forward; zero in every mode but `drive`.
-        steering: -1 to 1, + = left; the last commanded one when there is no newer.
+        steering: -1 to 1, + = left; the last commanded value without a newer one.
         hazard: Whether the hazard lights must flash.
     """
 
@@ -44,14 +44,14 @@ class Guarded:
 
     @property
     def brake(self) -> bool:
-        """Whether a body that has a brake of its own must use it."""
+        """Whether a body with a brake must use it."""
         return self.mode in ("stop", "lost")
 
 
 class Guard:
-    """The last word on one car's throttle and steering.
+    """Decides one car's throttle and steering.
 
-    A new guard stops until its first command. `epoch` is the lowest one it will obey.
+    A new guard stops until its first command. `epoch` is the lowest accepted one.
     """
 
     def __init__(self, epoch: int = 0) -> None:
@@ -59,7 +59,7 @@ class Guard:
         self._seq: int | None = None
         self._throttle = 0.0
         self._steering = 0.0
-        self._heard_ns: int | None = None
+        self._received_ns: int | None = None
         self._now_ns: int | None = None
         self._lost = False
         self._stopped = False
@@ -67,7 +67,7 @@ class Guard:
 
     @property
     def epoch(self) -> int:
-        """The highest epoch seen: what is older is refused for ever."""
+        """The highest epoch seen; older ones are refused for ever."""
         return self._epoch
 
     @property
@@ -76,21 +76,21 @@ class Guard:
         return self._lost
 
     def set_epoch(self, epoch: int, now_ns: int) -> bool:
-        """Learn that the city granted a newer lease; return whether it was newer.
+        """Set the epoch of a newly granted lease; return whether it is newer.
 
-        From now on older commands are refused, and the new holder has as long to speak up as
-        between two commands. Until then the car holds its steering without throttle.
+        Older commands are refused from now on. Until the new holder's first command, for which it
+        has the same time as between two commands, the car holds its steering without throttle.
         """
         self._advance(now_ns)
         if epoch <= self._epoch:
             return False
         self._epoch, self._seq = epoch, None
-        self._heard_ns = self._now_ns
+        self._received_ns = self._now_ns
         self._lost = False
         return True
 
-    def take(self, command: DriveCommand, now_ns: int) -> bool:
-        """Accept a command that arrived at `now_ns`, or refuse (and count) it; return which."""
+    def accept(self, command: DriveCommand, now_ns: int) -> bool:
+        """Accept a command that arrived at `now_ns`, or refuse and count it; return which."""
         return self.drive(command.throttle, command.steering, command.epoch, command.seq, now_ns)
 
     def drive(self, throttle: float, steering: float, epoch: int, seq: int, now_ns: int) -> bool:
@@ -110,18 +110,18 @@ class Guard:
             return False
         self._epoch, self._seq = epoch, seq
         self._throttle, self._steering = _limited(throttle), _limited(steering)
-        self._heard_ns = self._now_ns
+        self._received_ns = self._now_ns
         self._lost = False
         return True
 
     def command_age_ns(self, now_ns: int) -> int | None:
-        """Return how old the newest command under this epoch is; None: none came yet."""
-        if self._seq is None or self._heard_ns is None:
+        """Return the age of the newest command of this epoch, or None."""
+        if self._seq is None or self._received_ns is None:
             return None
-        return max(0, now_ns - self._heard_ns)
+        return max(0, now_ns - self._received_ns)
 
     def stop(self, engaged: bool) -> None:
-        """Engage or release the city-wide stop: while engaged the car stops for everybody."""
+        """Engage or release the city-wide stop, which overrides all commands."""
         self._stopped = engaged
 
     def output(self, now_ns: int) -> Guarded:
@@ -136,11 +136,11 @@ class Guard:
         return Guarded(self._throttle, self._steering, "drive", hazard=False)
 
     def _advance(self, now_ns: int) -> int | None:
-        """Move to `now_ns`, never backwards; return the newest command's age and note a loss."""
+        """Advance to `now_ns`, never backwards; return the newest command's age."""
         self._now_ns = now_ns if self._now_ns is None else max(self._now_ns, now_ns)
-        if self._heard_ns is None:
+        if self._received_ns is None:
             return None
-        age_ns = self._now_ns - self._heard_ns
+        age_ns = self._now_ns - self._received_ns
         if age_ns >= LOST_NS:
             self._lost = True
         return age_ns

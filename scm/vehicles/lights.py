@@ -1,4 +1,4 @@
-"""Which lamps of a car are on: two it is told, three that follow from how it moves.
+"""Which lamps of a car are on: two are commanded, three follow from its motion.
 
     headlights   off, low, high (the low beam stays on with the high one)          commanded
     indicators   off, left, right, hazard: 500 ms on, 500 ms off, all cars alike   commanded
@@ -27,13 +27,13 @@ REVERSING_MPS = -0.01
 
 @dataclass(frozen=True, slots=True)
 class Switches:
-    """What the lights of a car are told."""
+    """The commanded lights of a car."""
 
     headlights: Headlights = "off"
     indicators: Indicators = "off"
 
     def updated(self, headlights: Headlights | None, indicators: Indicators | None) -> "Switches":
-        """Return the switches after a command; None leaves one as it is."""
+        """Return the switches after a command; None leaves one unchanged."""
         if headlights is None and indicators is None:
             return self
         return Switches(headlights or self.headlights, indicators or self.indicators)
@@ -42,7 +42,7 @@ class Switches:
 OFF = Switches()
 
 TURNS: dict[int, Indicators] = {1: "left", -1: "right", 0: "off"}
-"""What a driver shows who is about to turn that way."""
+"""Indicator by direction of the next turn."""
 
 _HEAD: dict[Headlights, tuple[str, ...]] = {
     "off": (),
@@ -69,12 +69,12 @@ def lamps(
     """Return the names of the lamps that are on.
 
     Args:
-        switches: What was commanded.
+        switches: Commanded lights.
         throttle: As the motors get it, -1 to 1.
         speed: Along the body [m/s].
         now_ns: The city's time; indicators are lit in the first half of each of its seconds.
-        hazard: Whether both indicators must flash whatever was commanded: the car is lost.
-        turn: What the car's own driver is about to do; a commanded indicator goes first.
+        hazard: Whether both indicators must flash regardless of commands: the car is lost.
+        turn: The next turn of the car's own driver; a commanded indicator has priority.
     """
     shown = _HEAD[switches.headlights]
     if abs(speed) < HOLDING_MPS or throttle * speed <= 0.0:

@@ -1,6 +1,6 @@
-"""A lithium-polymer pack: its voltage over its charge, and what the motors take from it.
+"""A lithium-polymer pack: its voltage over its charge, and the current of the motors.
 
-Straight lines between the points of the usual 1C rest chart (3.27 V empty, 3.69 V at a tenth,
+Piecewise linear between the points of the usual 1C rest chart (3.27 V empty, 3.69 V at a tenth,
 3.84 V at half, 4.20 V full); cells differ by some 20 mV from it.
 """
 
@@ -13,7 +13,7 @@ _BENDS = (0.0, 0.05, 0.1, 0.3, 0.5, 0.8, 1.0)
 
 @law
 def cell_voltage(charge: float) -> float:
-    """Voltage of one cell at rest, of its state of charge 0..1 [V]."""
+    """Voltage of one cell at rest by its state of charge 0..1 [V]."""
     steep = 6.8 * min(max(charge, 0.0), 0.05) + 1.6 * min(max(charge - 0.05, 0.0), 0.05)
     flat = 0.4 * min(max(charge - 0.1, 0.0), 0.2) + 0.35 * min(max(charge - 0.3, 0.0), 0.2)
     full = 0.6 * min(max(charge - 0.5, 0.0), 0.3) + 0.9 * min(max(charge - 0.8, 0.0), 0.2)
@@ -31,11 +31,11 @@ def loaded_voltage(
     open_circuit: float, resistance: float, throttle: float, turn: float,
     motor_current: float, idle_current: float, nominal: float,
 ) -> float:  # fmt: skip
-    """Voltage at the pack's clamps while choppers feed its motors [V].
+    """Voltage at the pack's terminals while choppers drive its motors [V].
 
-    A chopper takes `throttle` times the motor's current; that current falls with `turn`, the speed
-    over the no-load speed, and rises with the voltage itself: solved in closed form. Motors that
-    brake give nothing back. `motor_current` is of all motors at stall and nominal voltage [A].
+    A chopper draws `throttle` times the motor's current; that current falls with `turn`, the speed
+    over the no-load speed, and rises with the voltage itself: solved in closed form. Braking motors
+    do not recharge. `motor_current` is of all motors at stall and nominal voltage [A].
     """
     idle = open_circuit - resistance * idle_current
     pull = resistance * motor_current * throttle
@@ -48,10 +48,10 @@ def pack_current(
     nominal: float,
 ) -> float:  # fmt: skip
     """Current out of the pack, never negative [A]; arguments as of `loaded_voltage`."""
-    taken = throttle * (throttle * voltage * (1.0 / nominal) - turn)
-    return idle_current + motor_current * max(0.0, taken)
+    share = throttle * (throttle * voltage * (1.0 / nominal) - turn)
+    return idle_current + motor_current * max(0.0, share)
 
 
 def charge_of(volts: float) -> float:
-    """Return the state of charge, 0 to 1, of a cell that rests at a voltage [V]."""
+    """Return the state of charge, 0 to 1, of a cell by its voltage at rest [V]."""
     return float(np.interp(volts, [plain(cell_voltage)(bend) for bend in _BENDS], _BENDS))

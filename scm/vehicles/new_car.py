@@ -1,8 +1,8 @@
-"""A car file made from the few figures that anybody can measure, with honest standard deviations.
+"""A car file from the few figures that anybody can measure, with realistic standard deviations.
 
-What is not given is estimated by scaling: the shipped cars of `LIKE` agree on a number relative to
-a known one, such as the track over the wheelbase, to within some spread; the estimate is their
-geometric mean, and the spread is its standard deviation. `scm mismatch` finds the rest from drives.
+Missing figures are estimated by scaling: for the shipped cars of `LIKE` a ratio such as the track
+over the wheelbase agrees within some spread; the estimate is their geometric mean, and the spread
+is its standard deviation. `scm mismatch` identifies the rest from drives.
 """
 
 import math
@@ -18,23 +18,23 @@ from scm.vehicles.car_files import TYPES_DIR
 
 LIKE = ("nigel", "f1tenth", "dart")
 SPREAD = (0.1, 0.5)
-"""Least and largest standard deviation of an estimate, relative: three cars show no less, and with
-more a number means nothing."""
+"""Smallest and largest relative standard deviation of an estimate: three cars cannot show less, and
+a larger one carries no information."""
 RULER_M = 0.001
 BY_HAND = {"mass": 0.01, "length": 0.005, "radius": 0.01, "speed": 0.05, "accel": 0.2, "lock": 0.05}
-"""Standard deviations of what people measure, relative: scales, ruler, stopwatch, protractor."""
+"""Relative standard deviations of manual measurements: scales, ruler, stopwatch, protractor."""
 
 THRUST = 0.6
-"""Of its weight that a car pushes with at full throttle from standing: known are 0.4 to 1.4."""
+"""Full-throttle force at standstill over a car's weight; known cars have 0.4 to 1.4."""
 REFLECTED = {"geared": 0.5, "direct": 0.05}
-"""Inertia of the rotors at the wheels, over the car's own there."""
+"""Rotor inertia at the wheels over the car's own inertia there."""
 HOLD = 0.03
-"""Of its weight that a direct motor holds when it is off."""
+"""Holding force of a direct motor when off, over the car's weight."""
 ROOF = 3.5
 """Height of the roof, over the radius of the wheels."""
 ROLLING = 0.015
 DAMPING = 0.05
-"""Torque that turning wheels lose in their bearings at the no-load speed, over the stall torque."""
+"""Bearing losses at the no-load speed, over the stall torque."""
 G = 9.80665
 
 Motor = Literal["geared", "direct"]
@@ -43,20 +43,20 @@ Driven = Literal["rear", "front", "all"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figures:
-    """What is known of a car; None: estimated.
+    """The known figures of a car; None: estimated.
 
     Attributes:
         name: Of the car and its file.
         scale: "1:10"; a label only.
         mass_kg: Ready to drive, with battery.
         wheelbase_m: Between the axles.
-        motor: "geared": it holds the car when it is off, as Nigel's 120:1 gear; "direct": it can
-            be pushed then, as RC cars; both brake by their own voltage when the throttle is let go.
+        motor: "geared": it holds the car when it is off, like Nigel's 120:1 gear; "direct": the car
+            can be pushed then, like RC cars. Both brake electrically at zero throttle.
         top_speed_mps: At full throttle on the level.
         acceleration_mps2: From standing, at full throttle.
         driven: Which wheels.
         length_m, width_m: Of the whole car.
-        track_m: Between the middles of two wheels of an axle.
+        track_m: Between the centres of two wheels of an axle.
         wheel_radius_m: Under load.
         steering_limit_rad: Of a front wheel, to either side.
         tag_size_m: Edge of the black square of the tag on its roof; 0: none.
@@ -191,7 +191,7 @@ _BOXES: Mapping[str, Callable[[float, float, float], float]] = {
     "roll_inertia_kgm2": lambda mass, _, width: mass * width**2 / 12.0,
     "pitch_inertia_kgm2": lambda mass, length, _: mass * length**2 / 12.0,
 }
-"""Inertia of a box as heavy and as large as the car."""
+"""Inertia of a box with the car's mass and size."""
 
 
 def _over_box(car: Car, key: str, box: Callable[[float, float, float], float]) -> float:
@@ -271,7 +271,7 @@ def _tyre() -> Entries:
 
 
 def _drive(figures: Figures, size: _Size) -> tuple[Entries, str]:
-    """Return a motor that reaches the top speed against what the wheels lose, and their damping."""
+    """Return a motor that reaches the top speed against all losses, and the wheels' damping."""
     wheels, weight = (4 if figures.driven == "all" else 2), figures.mass_kg * G
     acceleration = figures.acceleration_mps2 or THRUST * G
     sure = BY_HAND["accel"] if figures.acceleration_mps2 else SPREAD[1]
@@ -333,7 +333,7 @@ def _or_scaled(
 
 
 def _given(value: float, how: str) -> str:
-    """Return an entry that somebody measured, as `BY_HAND` says how surely."""
+    """Return a measured entry with the standard deviation in `BY_HAND`."""
     least = RULER_M if how == "length" else 0.0
     return _entry(f"{value:.6g}", max(least, BY_HAND[how] * value), "given")
 

@@ -1,12 +1,12 @@
-"""Noise by counting: the number of (key, counter, index) is the same whenever it is asked for.
+"""Counter-based noise: the number of (key, counter, index) is always the same.
 
-A generator with a state gives other numbers when somebody else draws from it first. Here each value
-is a hash of what it belongs to, so one car's noise depends on no other car, on no order, on no
-batch, and on nothing that was or was not asked before:
+The numbers of a stateful generator depend on who else draws from it. Here each value is a hash of
+what it belongs to, so one car's noise does not depend on other cars, on order, on batches, or on
+earlier calls:
 
     base = mix(key + counter G)                   one reading of one device
-    u_i = mix(base + (i + 1) G) / 2^64            evenly spread over (0, 1)
-    normal = sqrt(-2 ln u_i) (cos a, sin a)       a = 2 pi u_j, i and j never the same
+    u_i = mix(base + (i + 1) G) / 2^64            uniform over (0, 1)
+    normal = sqrt(-2 ln u_i) (cos a, sin a)       a = 2 pi u_j, i and j differ
 
 `mix` is the finaliser of SplitMix64 and G its odd constant, so the values of one reading are a
 SplitMix64 sequence that starts at `base`. The angle is drawn within a quarter turn about 45 degrees
@@ -36,27 +36,27 @@ _COS_45 = math.sqrt(0.5)
 
 
 def key_of(seed: int, *names: str) -> np.uint64:
-    """Return the key of one stream of noise: one car's one device in a run of one seed."""
-    said = "/".join((str(seed), *names)).encode()
-    return np.uint64(int.from_bytes(hashlib.blake2s(said, digest_size=8).digest(), "little"))
+    """Return the key of one noise stream: one device of one car in a run."""
+    text = "/".join((str(seed), *names)).encode()
+    return np.uint64(int.from_bytes(hashlib.blake2s(text, digest_size=8).digest(), "little"))
 
 
 def bases_of(keys: Keys, counters: Ints) -> Keys:
-    """Return where the values of each reading start, (k,), from its key and its number."""
+    """Return the base of each reading (k,) from its key and number."""
     bases = np.empty(len(keys), np.uint64)
     _bases(keys, counters, bases)
     return bases
 
 
 def uniforms(bases: Keys, count: int) -> Floats:
-    """Return numbers evenly spread over (0, 1), never either end, (k, count)."""
+    """Return uniform numbers in the open interval (0, 1), (k, count)."""
     out = np.empty((len(bases), count))
     _uniforms(bases, out)
     return out
 
 
 def normals(bases: Keys, count: int) -> Floats:
-    """Return standard normal numbers, (k, count): a row for each base."""
+    """Return standard normal numbers (k, count), a row for each base."""
     pairs = (count + 1) // 2
     radius = np.sqrt(-2.0 * np.log(uniforms(bases, pairs)))
     out = np.empty((len(bases), 2 * pairs))

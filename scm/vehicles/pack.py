@@ -1,4 +1,4 @@
-"""A car's battery, as its file and the effects' defaults tell of it.
+"""A car's battery pack, from its file and the effects' defaults.
 
 Holds: one pack that feeds motors behind choppers and everything else.
 Source: as of the effects `battery_charge`, `battery_curve` and `battery_resistance`, whose numbers
@@ -17,15 +17,15 @@ CUT_OFF_V = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Pack:
-    """One kind of car's pack, and what draws from it.
+    """One kind of car's pack and its consumers.
 
     Attributes:
         capacity: From full to empty [A*h].
-        start_charge: With which a car comes, 0 to 1.
+        start_charge: Of a new car, 0 to 1.
         resistance: Of the pack and its leads [ohm].
         motor_current: Of all motors, at stall and nominal voltage [A].
         idle_current: Of everything but the motors [A].
-        nominal: Voltage at which the motors' numbers are given [V].
+        nominal: Nominal voltage of the motors' numbers [V].
         no_load_speed: Of a driven wheel [rad/s].
         front, rear: Whether these axles' wheels are driven, 0 or 1.
     """
@@ -42,7 +42,7 @@ class Pack:
     rear: float
 
     def charge_at(self, volts: float, throttle: float, wheel_speed: float) -> float:
-        """Return the charge left that a voltage measured under load tells of, 0 to 1.
+        """Return the remaining charge by a voltage measured under load, 0 to 1.
 
         `wheel_speed` is that of the driven wheels [rad/s].
         """
@@ -54,7 +54,7 @@ class Pack:
 
 
 def pack_of(car: Car) -> Pack | None:
-    """Return a car's pack; None: its file tells of no motors that draw from one."""
+    """Return a car's pack, or None if its file describes no battery-driven motors."""
     if not (car.has("drive.battery_nominal_v") and car.has("drive.no_load_speed_rad_s")):
         return None
     defaults = {param.key: param.default for param in all_terms()["battery_charge"].params}

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """A belief of mean and standard deviation, both in the parameter's unit."""
+    """A normal prior: mean and standard deviation in the parameter's unit."""
 
     mean: float
     std: float
@@ -13,7 +13,7 @@ class Normal:
 
 @dataclass(frozen=True, slots=True)
 class LogNormal:
-    """A belief about a positive quantity: median in its unit, `sigma` of its logarithm."""
+    """A log-normal prior of a positive quantity: median in its unit, `sigma` of its logarithm."""
 
     median: float
     sigma: float
@@ -25,15 +25,15 @@ class Param:
 
     Attributes:
         name: The law's argument name, without the unit.
-        default: Taken where a car file is silent, in `unit`.
-        unit: SI, as `N*m*s`; "1" where there is none.
+        default: Value if a car file has none, in `unit`.
+        unit: SI, such as `N*m*s`; "1": none.
         key: `section.key` in a car file; two effects with the same key share the number.
         bounds: Lowest and highest value that makes physical sense.
-        prior: What is believed before any recording; None leaves only the bounds.
-        fit: False for numbers of the method, which no recording may move.
-        required: A car file without this key is refused.
-        about: The meaning in a few words.
-        report: Its public name, with the unit, in reports; empty where that is `name`.
+        prior: Before any recording; None: only the bounds.
+        fit: False for numerical constants that are never fitted.
+        required: Whether a car file must have this key.
+        about: Short meaning.
+        report: Its name in reports, with the unit; empty: `name`.
     """
 
     name: str

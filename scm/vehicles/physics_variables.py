@@ -1,4 +1,4 @@
-"""The vocabulary of the physics: every signal a law may name, its unit, frame and sign, once.
+"""The variables of the physics: every name that an effect may use, with unit, frame and sign.
 
 ISO 8855: x forward, y left, z up; angles counter-clockwise. The body frame is the yaw frame at the
 centre of gravity: it turns with yaw, but stays level. SI throughout. Wheels: front-left,
@@ -10,30 +10,30 @@ from enum import Enum
 
 
 class Per(Enum):
-    """Whether a signal or an effect exists once a car or once a wheel."""
+    """Whether a variable or an effect exists per car or per wheel."""
 
     BODY = "body"
     WHEEL = "wheel"
 
 
 class Role(Enum):
-    """Who gives a signal its value."""
+    """Where a variable gets its value."""
 
     INPUT = "input"  # from outside, constant during a call
     GIVEN = "given"  # the 14-degree-of-freedom skeleton
-    CHAIN = "chain"  # one term sets it; without one it passes on `otherwise`
+    CHAIN = "chain"  # one term sets it; without one it equals `otherwise`
     SUM = "sum"  # starts at 0 each substep, any number of terms add to it
-    SHAPE = "shape"  # a sum over numbers of the car alone, made once a call
+    SHAPE = "shape"  # a sum over numbers of the car alone, computed once per call
 
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """One name of the vocabulary.
+    """One variable.
 
     Attributes:
-        span: The physical range that tests draw from.
-        otherwise: What a chain signal is where no term sets it: another signal, or a number.
-        settles: Where a state starts when a car is placed: at its "steer" angle or "throttle".
+        span: Physical range for tests.
+        otherwise: Value of a chain variable that no term sets: another variable, or a number.
+        starts_at: Initial value of a state when a car is placed: its "steer" angle or "throttle".
     """
 
     name: str
@@ -43,7 +43,7 @@ class Signal:
     about: str
     span: tuple[float, float] = (-10.0, 10.0)
     otherwise: str | None = None
-    settles: str = ""
+    starts_at: str = ""
 
 
 def _body(name: str, unit: str, role: Role, about: str, **more: object) -> Signal:
@@ -130,7 +130,7 @@ _ALL = (
         "what the motor controller gives, + forward",
         span=(-1.0, 1.0),
         otherwise="throttle_scaled",
-        settles="throttle",
+        starts_at="throttle",
     ),
     _body(
         "throttle_memory",
@@ -220,7 +220,7 @@ _ALL = (
         "angle the servo is asked for, + left",
         span=(-0.6, 0.6),
         otherwise="steer_scaled",
-        settles="steer",
+        starts_at="steer",
     ),
     _body(
         "servo_load_pace",
@@ -245,7 +245,7 @@ _ALL = (
         "road-wheel angle that the servo holds, + left",
         span=(-0.6, 0.6),
         otherwise="steer_target",
-        settles="steer",
+        starts_at="steer",
     ),
     _body(
         "linkage_angle",
@@ -254,7 +254,7 @@ _ALL = (
         "road-wheel angle behind the linkage's play, + left",
         span=(-0.6, 0.6),
         otherwise="servo_angle",
-        settles="steer",
+        starts_at="steer",
     ),
     _body(
         "steer_trimmed",
@@ -279,7 +279,7 @@ _ALL = (
         "mean road-wheel angle, + left",
         span=(-0.6, 0.6),
         otherwise="steer_trimmed",
-        settles="steer",
+        starts_at="steer",
     ),
     _body(
         "road_angle",

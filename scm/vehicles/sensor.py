@@ -1,27 +1,40 @@
-"""The contract of a sensor: what it measures exactly, how often, and how its readings are spoilt.
+"""The contract of a sensor: exact values, rate and errors, and its part of `VehicleSensors`.
 
-A sensor module says two things: how to `measure` the exact values of many cars at once, and the
-facts of its device, read from the car file. A `Bank` then makes readings of them: at the device's
-rate, with noise of its own, late, and sometimes lost. Without noise, bias, latency and drop-out the
-readings are the truth. To add one, copy `sensors/encoders.py`.
+A sensor module defines its keys of the car file (`KEYS`), how to `measure` the exact values of many
+cars at once, the properties of its device, and the message fields that it fills. A `Bank` turns the
+exact values into readings at the device's rate, with noise, latency and drop-outs; without these
+the readings are exact. To add one, copy `sensors/encoders.py` and add its fields to
+`VehicleSensors`.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cache
+from typing import Any, Protocol
 
+import numpy as np
+
+from scm import registry
 from scm.arrays import Floats, Ints
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.car import Car
+from scm.vehicles.car_file_schema import SENSORS
 from scm.vehicles.rays.scene import Scene
+
+ENCODERS = "encoders"
+"""Its readings trigger `VehicleSensors`."""
+REQUIRED = ("encoder_left", "accel_mps2")
+"""Fields without which there is no message."""
 
 
 class Truth(Protocol):
-    """What sensors may see of the cars of one file; `Fleet` has it. Arrays over the fleet's rows.
+    """The true state that sensors measure, as `Fleet` has it. Arrays over the fleet's rows.
 
     `x y yaw` is the rear axle's pose; accelerations are those of the centre of gravity without
-    gravity, in the level frame that turns with yaw. `impact_x`, `impact_y` and `impact_yaw` are
-    what contacts added to them, as a mean over the last tick. Angles and rates are right-handed.
+    gravity, in the level frame that turns with yaw. `contact_accel_x`, `contact_accel_y` and
+    `contact_yaw_accel` are added by contacts, averaged over the last tick. Angles and rates are
+    right-handed.
     """
 
     @property
@@ -53,11 +66,11 @@ class Truth(Protocol):
     @property
     def accel_z(self) -> Floats: ...  # noqa: D102
     @property
-    def impact_x(self) -> Floats: ...  # noqa: D102
+    def contact_accel_x(self) -> Floats: ...  # noqa: D102
     @property
-    def impact_y(self) -> Floats: ...  # noqa: D102
+    def contact_accel_y(self) -> Floats: ...  # noqa: D102
     @property
-    def impact_yaw(self) -> Floats: ...  # noqa: D102
+    def contact_yaw_accel(self) -> Floats: ...  # noqa: D102
     @property
     def speed(self) -> Floats: ...  # noqa: D102
     @property
@@ -71,31 +84,31 @@ class Truth(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
-    """What stands around the measured cars; `own` (k,) are their slots: none sees itself."""
+class Surroundings:
+    """What surrounds the measured cars; `own` (k,) are their indices: none sees itself."""
 
     scene: Scene
     own: Ints
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
-    """What a device is like. A tuple holds a number for each value, or one for all.
+class Device:
+    """The properties of a device. A tuple holds one number per value, or one for all.
 
-    A reading is the exact value, plus bias, plus noise; then it is held within its limits, then
-    rounded, then angles are wrapped.
+    A reading is the exact value plus bias plus noise, then clipped to the limits, then rounded,
+    then angles are wrapped.
 
     Attributes:
         noise: Standard deviation of each reading, independent of all others.
-        latency_s: From the instant of the reading to when it can be had.
-        drop_out: Share of the readings that never come.
-        quantum: Readings are whole multiples of it, rounded towards minus infinity; 0: any value.
+        latency_s: From the instant of the reading to its output.
+        drop_out: Share of the readings that are lost.
+        quantum: Resolution; readings are rounded down to its multiples; 0: none.
         bias: Added to every reading.
-        walk: How far the bias wanders: its standard deviation after one second, growing with the
+        walk: Bias instability: standard deviation of the bias after one second, growing with the
             root of the time. It steps once a second.
-        saturates_at: Readings are held within plus and minus this.
-        seen: Lowest and highest value that the device can tell; what lies beyond is a miss, inf.
-        angles: Which values are angles, kept in (-pi, pi].
+        saturates_at: Readings are clipped to plus and minus this.
+        seen: Lowest and highest measurable value; readings beyond are a miss, inf.
+        angles: Indices of values that are angles, wrapped to (-pi, pi].
     """
 
     rate_hz: float
@@ -117,17 +130,51 @@ class Sensor:
     Attributes:
         values: Names of the values in order, with units; one name when all are of a kind.
         needs: Keys of the car file that describe the device.
-        facts: The device as a car file describes it.
-        measure: (car, truth, rows, around) to exact values, (k, number of values). One that
-            looks `around` gets what stands there, or None where nothing does.
+        device: The device's properties from a car file.
+        measure: (car, truth, rows, surroundings) to exact values, (k, number of values).
+        fields: Readings (k, n) to columns of `VehicleSensors` fields; None: it has a message of its
+            own.
     """
 
     name: str
     values: tuple[str, ...]
     needs: tuple[str, ...]
-    facts: Callable[[Car], Facts]
-    measure: Callable[[Car, Truth, Ints, Sight | None], Floats]
+    device: Callable[[Car], Device]
+    measure: Callable[[Car, Truth, Ints, Surroundings | None], Floats]
+    fields: Callable[[Floats], Mapping[str, list[Any]]] | None = None
 
     def is_fitted(self, car: Car) -> bool:
         """Return whether a car has such a device: its file describes it."""
         return all(car.has(key) for key in self.needs)
+
+
+@cache
+def all_sensors() -> Mapping[str, Sensor]:
+    """Return every kind of sensor, by name."""
+    names = registry.names(SENSORS)
+    return {name: registry.load(SENSORS, name, "SENSOR", Sensor) for name in names}
+
+
+def sensor_messages(
+    vehicles: Sequence[str], t_ns: int, readings: Mapping[str, Floats]
+) -> Iterator[VehicleSensors]:
+    """Yield a message for each car that has readings of encoders and IMU.
+
+    Args:
+        vehicles: Names of the cars (k,).
+        t_ns: The instant of the encoders' reading.
+        readings: By kind of sensor, the newest values (k, n); NaN rows have no reading yet.
+    """
+    columns: dict[str, list[Any]] = {}
+    for kind, values in readings.items():
+        fields = all_sensors()[kind].fields
+        if fields is None:
+            continue
+        is_known = ~np.isnan(values[:, 0])
+        for name, known in fields(values[is_known]).items():
+            cells = iter(known)
+            columns[name] = [next(cells) if ok else None for ok in is_known.tolist()]
+    for vehicle, row in zip(vehicles, zip(*columns.values(), strict=True), strict=True):
+        given = dict(zip(columns, row, strict=True))
+        if all(given.get(name) is not None for name in REQUIRED):
+            yield VehicleSensors(vehicle=vehicle, t_ns=t_ns, **given)

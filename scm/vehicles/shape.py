@@ -1,7 +1,7 @@
-"""What a car weighs and where its centre of gravity lies, with all that its effects add.
+"""Mass and centre of gravity of a car, including what its effects add.
 
-Payload, a shifted or a raised centre of gravity are numbers of effects, not of the body: whoever
-needs the mass or a lever arm about the centre of gravity asks here.
+Payload and shifts of the centre of gravity are parameters of effects, not of the body: this module
+gives the totals for masses and lever arms.
 """
 
 from collections.abc import Callable
@@ -32,8 +32,8 @@ def shape_of(car: Car, number: Callable[[str], float] | None = None) -> Shape:
     """Return a car's mass properties.
 
     Args:
-        car: Its effects say what they add.
-        number: Gives a number by its key; without one, the car file does.
+        car: Its effects may add to the body's values.
+        number: Returns a number by its key; default: from the car file.
     """
     value = number or car.value
     totals = {key: value(key) for key in _ADDED.values()}

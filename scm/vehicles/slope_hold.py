@@ -1,20 +1,20 @@
-"""What a car is given where the floor slopes, so that it stands there instead of creeping.
+"""Effects that hold a car at rest on a slope.
 
-The nominal tyres are quasi-static: they push only while they slip, so on a slope they creep. Where
-the floor is level nothing of this is used, and nothing is computed.
+The nominal tyres are quasi-static: they produce force only while they slip, so a car creeps on a
+slope. On level floor none of this is used.
 """
 
 from scm.vehicles.car import Car, all_terms
 
 MEMORY = ("tyre_relaxation", "tyre_windup")
-LENGTH_M = 0.002  # the least that 1 ms substeps carry well: driving hardly feels it
+LENGTH_M = 0.002  # the smallest that is stable with 1 ms substeps: it hardly affects driving
 
 
 def standing(car: Car) -> Car:
-    """Return the car with what holds it at rest; what its file lists itself stays as it is.
+    """Return the car with effects that hold it at rest; its own effects stay.
 
-    Tyres get memory. A drive line that is a force on the body gets dry friction of that size at
-    rest, for the force alone is none there. Motors that do not hold are not made to.
+    Tyres get relaxation. Friction that is modelled as a force on the body is zero at rest, so it
+    also becomes dry friction at the wheels. Motors without holding torque stay as they are.
     """
     own = {term.sets for term in car.terms} | {term.name for term in car.terms}
     new = [name for name in MEMORY if own.isdisjoint({name, all_terms()[name].sets})]

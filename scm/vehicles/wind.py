@@ -1,9 +1,9 @@
-"""Gusts: a wind that is a function of time and seed alone, so everybody feels the same one.
+"""Gusts: wind as a function of time and seed only, so it is the same for everybody.
 
     v(t) = mean + sigma * sqrt(2 / n) * sum of cos(w_k t + phase_k),   w_k = tan(pi/2 * q_k) / tau
 
 The frequencies are quantiles of the Lorentz curve, which is the spectrum of a first-order gust:
-two instants are alike by exp(-|t1 - t0| / tau).   Holds: over a map so small that a gust covers it.
+its correlation is exp(-|t1 - t0| / tau).   Holds: for a map smaller than a gust.
 Source: spectral sum for a process of given spectrum (M. Shinozuka, G. Deodatis, 1991).
 """
 

@@ -50,7 +50,7 @@ def _command(world: World, command: DriveCommand, now_ns: int) -> None:
     if car.lease.is_at_home or command.epoch != car.lease.epoch:
         world.ignored += 1
         return
-    if car.guard is not None and car.guard.take(command, now_ns):
+    if car.guard is not None and car.guard.accept(command, now_ns):
         car.switches = car.switches.updated(command.headlights, command.indicators)
 
 

@@ -10,7 +10,7 @@ from scm.vehicles.fleet import Fleet
 
 
 class Impacts:
-    """Adds up the tick's contacts in `impact_x`, `impact_y` and `impact_yaw` of the fleets."""
+    """Adds up the tick's contacts in the fleets' `contact_accel_x`, `_y` and `contact_yaw_accel`."""
 
     def __init__(self) -> None:
         self._struck: list[tuple[Fleet, Ints]] = []
@@ -19,7 +19,9 @@ class Impacts:
     def begin(self, duration: float) -> None:
         """Forget the last tick's; the tick that begins lasts `duration` [s]."""
         for fleet, rows in self._struck:
-            fleet.impact_x[rows] = fleet.impact_y[rows] = fleet.impact_yaw[rows] = 0.0
+            fleet.contact_accel_x[rows] = fleet.contact_accel_y[rows] = fleet.contact_yaw_accel[
+                rows
+            ] = 0.0
         self._struck.clear()
         self._share = 1.0 / duration if duration > 0.0 else 0.0
 
@@ -28,7 +30,7 @@ class Impacts:
         yaw = fleet.yaw[rows]
         c, s = np.cos(yaw), np.sin(yaw)
         x, y, turn = self._share * dv.T
-        fleet.impact_x[rows] += c * x + s * y
-        fleet.impact_y[rows] += c * y - s * x
-        fleet.impact_yaw[rows] += turn
+        fleet.contact_accel_x[rows] += c * x + s * y
+        fleet.contact_accel_y[rows] += c * y - s * x
+        fleet.contact_yaw_accel[rows] += turn
         self._struck.append((fleet, rows))

@@ -67,7 +67,7 @@ def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
     slots, signal = world.slots, world.garage.signal
     columns = (
         slots.seq, slots.x, slots.y, slots.yaw, slots.speed, signal("lateral_speed"),
-        slots.yaw_rate, signal("accel_x") + signal("impact_x"), signal("steer_angle"),
+        slots.yaw_rate, signal("accel_x") + signal("contact_accel_x"), signal("steer_angle"),
         slots.throttle, slots.steering, slots.mode, *world.garage.batteries(),
     )  # fmt: skip
     rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)

@@ -1,10 +1,5 @@
-"""The sensor stage: every device that is due and wanted reads; what comes out of them is told.
+"""The sensor stage: all devices that are due and wanted read; their readings become messages."""
 
-To add a kind that is told, give it a place in `_sensors`; a kind of its own message, a line in
-`sense`.
-"""
-
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -16,12 +11,10 @@ from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.bank import Readings
 from scm.vehicles.rays.scene import Scene
+from scm.vehicles.sensor import ENCODERS, sensor_messages
 from scm.vehicles.sensors import lidar
 from scm.world.hull import outline
 from scm.world.world import SCANNER, World
-
-ENCODERS, IMU, IPS = "encoders", "imu", "ips"
-THROTTLE, STEERING = "throttle_feedback", "steering_feedback"
 
 
 def sense(world: World, now_ns: int) -> list[Message]:
@@ -36,11 +29,13 @@ def sense(world: World, now_ns: int) -> list[Message]:
                 out += _scans(world, readings)
             continue
         for readings in bank.step(now_ns):
-            world.readings[kind][readings.slots] = readings.values
+            world.readings[kind][readings.indices] = readings.values
             if kind == ENCODERS:
                 fresh.append(readings)
     for readings in fresh:
-        out += _sensors(world, readings)
+        newest = {kind: values[readings.indices] for kind, values in world.readings.items()}
+        names = [world.slots.names[slot] for slot in readings.indices.tolist()]
+        out += sensor_messages(names, readings.t_ns, newest)
     return out
 
 
@@ -73,41 +68,13 @@ def _scene(world: World) -> Scene:
     return Scene(world.wall_grid, np.concatenate(outlines), np.concatenate(owners))
 
 
-def _sensors(world: World, encoders: Readings) -> Iterator[VehicleSensors]:
-    """Yield a message for each new reading of encoders, with the newest of all other devices."""
-    of = encoders.slots[~np.isnan(world.readings[IMU][encoders.slots, 0])]
-    newest = [
-        world.readings[kind][of].tolist() for kind in (ENCODERS, IMU, THROTTLE, STEERING, IPS)
-    ]
-    for slot, (left, right), imu, (throttle,), (steering,), (x, y, yaw) in zip(
-        of.tolist(), *newest, strict=True
-    ):
-        yield VehicleSensors(
-            vehicle=world.slots.names[slot],
-            t_ns=encoders.t_ns,
-            encoder_left=int(left),
-            encoder_right=int(right),
-            accel_mps2=(imu[0], imu[1], imu[2]),
-            gyro_radps=(imu[3], imu[4], imu[5]),
-            orientation_rad=(imu[6], imu[7], imu[8]),
-            throttle=_known(throttle),
-            steering_rad=_known(steering),
-            ips_m=None if math.isnan(x) else (x, y),
-            ips_yaw_rad=_known(yaw),
-        )
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
-
-
 def _scans(world: World, scans: Readings) -> Iterator[LidarScan]:
     nearest, farthest = scans.car.vector("lidar.range_m")
     first, step, _ = lidar.bearings_of(scans.car)
     sweep_ns = round(lidar.sweep_s(scans.car) * NS_PER_S)
     period_ns = round(NS_PER_S / scans.car.value("lidar.rate_hz"))
     ranges = scans.values.astype("<f4")
-    for row, slot in enumerate(scans.slots.tolist()):
+    for row, slot in enumerate(scans.indices.tolist()):
         yield LidarScan(
             vehicle=world.slots.names[slot],
             t_ns=scans.t_ns,

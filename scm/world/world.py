@@ -4,14 +4,13 @@
 to be sent waits in `outbox`.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Literal
 
 import numpy as np
 from msgspec.structs import replace
 
-from scm import registry
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.maps.route import Roads
@@ -29,11 +28,11 @@ from scm.vehicles.drivers.early import compile_together
 from scm.vehicles.drivers.lane_graph import lane_graph_of
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.trips import Trips
-from scm.vehicles.external_vehicles import Placed
+from scm.vehicles.external_vehicles import ExternalVehicles
 from scm.vehicles.ground import Ground
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
-from scm.vehicles.sensor import Sensor
+from scm.vehicles.sensor import Sensor, all_sensors
 from scm.world import lease as rules
 from scm.world.batteries import Batteries
 from scm.world.blows import Blows
@@ -142,10 +141,8 @@ class World:
         self.roadside = roadside_places(city_map)
         self.cams = CamTriggers(capacity)
         self.front = np.zeros(capacity)
-        self.placed = Placed(capacity)
-        sensors: Mapping[str, Sensor] = {
-            name: registry.load(SENSORS, name, "SENSOR", Sensor) for name in registry.names(SENSORS)
-        }
+        self.placed = ExternalVehicles(capacity)
+        sensors = all_sensors()
         self._compile(prepare, sensors[SCANNER])
         self.banks = {name: Bank(sensor, seed, capacity) for name, sensor in sensors.items()}
         self.readings = {
@@ -254,7 +251,7 @@ class World:
         model = self.garage.car(car_name)
         slot = self._take(name, car_name, pose, hosted=True)
         fleet, row = self.garage.park(car_name, pose, slot)
-        self.ground.settle(fleet, row)
+        self.ground.place_at_rest(fleet, row)
         self.drivers.enter(slot, limits_of(model), number(self.seed, name, "driver"))
         for kind, bank in self.banks.items():
             bank.fit(slot, name, model, fleet, row, now_ns, self._offset(kind))
@@ -362,7 +359,7 @@ class World:
     def _warm_scanner(self, scanner: Sensor) -> None:
         """Scan once for nobody, so that the kernels are there before the first car scans."""
         bank, model = Bank(scanner, self.seed, 1), self.garage.car(DEFAULT_CAR)
-        bank.fit(0, "nobody", model, Placed(1), 0, 0)
+        bank.fit(0, "nobody", model, ExternalVehicles(1), 0, 0)
         nowhere = Scene(self.wall_grid, np.zeros((0, 4)), np.zeros(0, np.int64))
         bank.step(0, lambda: nowhere)
 

@@ -7,7 +7,7 @@ import pytest
 from scm.vehicles.describe_effects import all_effects
 from scm.vehicles.manual.folder import INDEX, index_page, pages_of
 from scm.vehicles.manual.manoeuvres import MANOEUVRES
-from scm.vehicles.manual.picture import SIGHTS, cars_of
+from scm.vehicles.manual.picture import PLOTS, cars_of
 from scm.vehicles.manual.shown import shown_of
 from scm.vehicles.term import Term
 
@@ -42,8 +42,8 @@ def test_the_folder_stays_small():
 def test_a_picture_compares_two_cars_that_differ(name):
     term, shown = TERMS[name], shown_of(TERMS[name])
     assert shown.manoeuvre in MANOEUVRES
-    assert shown.see in SIGHTS
+    assert shown.see in PLOTS
     (without, _), (with_it, _) = cars_of(term, shown)
     assert term in with_it.terms
     same = without.terms == with_it.terms and without.values == with_it.values
-    assert not same or SIGHTS[shown.see].dashed is not None
+    assert not same or PLOTS[shown.see].dashed is not None

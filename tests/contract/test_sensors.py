@@ -12,11 +12,11 @@ from scm.clock import NS_PER_S
 from scm.geometry import Pose2
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import car_names, load_car
-from scm.vehicles.car_file_schema import FACTS
+from scm.vehicles.car_file_schema import file_keys
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
-from scm.vehicles.sensor import Sensor, Sight
+from scm.vehicles.sensor import Sensor, Surroundings
 
 PACKAGE = "scm.vehicles.sensors"
 DOCS = Path(__file__).parents[2] / "docs"
@@ -39,7 +39,7 @@ def fleet():
 
 
 def measured(kind, fleet, rows):
-    around = Sight(SCENE, np.array(rows))
+    around = Surroundings(SCENE, np.array(rows))
     return sensor(kind).measure(fleet.car, fleet, np.array(rows), around)
 
 
@@ -54,10 +54,10 @@ def test_a_shipped_car_describes_its_device_or_has_none(kind, car):
     model = load_car(car)
     if not sensor(kind).is_fitted(model):
         pytest.skip(f"{car} has no {kind}")
-    facts = sensor(kind).facts(model)
-    assert facts.rate_hz > 0.0
-    assert min(facts.noise) >= 0.0
-    assert 0.0 <= facts.drop_out < 1.0
+    device = sensor(kind).device(model)
+    assert device.rate_hz > 0.0
+    assert min(device.noise) >= 0.0
+    assert 0.0 <= device.drop_out < 1.0
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -73,13 +73,13 @@ def test_a_car_measures_the_same_alone_and_in_company(kind, fleet):
     assert_array_equal(measured(kind, fleet, [0])[0], together[1])
 
 
-def quiet(facts):
+def quiet(device):
     nothing = (0.0,)
-    return replace(facts, noise=nothing, bias=nothing, walk=nothing, drop_out=0.0, latency_s=0.0)
+    return replace(device, noise=nothing, bias=nothing, walk=nothing, drop_out=0.0, latency_s=0.0)
 
 
-def bank_of(kind, fleet, facts, seed=0):
-    bank = Bank(replace(sensor(kind), facts=lambda car: facts), seed)
+def bank_of(kind, fleet, device, seed=0):
+    bank = Bank(replace(sensor(kind), device=lambda car: device), seed)
     for row in range(3):
         bank.fit(row, f"car{row}", fleet.car, fleet, row, 0)
     return bank
@@ -87,12 +87,12 @@ def bank_of(kind, fleet, facts, seed=0):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_without_noise_a_reading_is_the_truth_to_its_quantum(kind, fleet):
-    facts = quiet(sensor(kind).facts(fleet.car))
+    device = quiet(sensor(kind).device(fleet.car))
     exact = measured(kind, fleet, [0, 1, 2])
-    (readings,) = bank_of(kind, fleet, facts).step(0, lambda: SCENE)
-    expected = np.floor(exact / facts.quantum) * facts.quantum if facts.quantum else exact.copy()
-    if facts.seen is not None:
-        expected[(exact < facts.seen[0]) | (exact > facts.seen[1])] = np.inf
+    (readings,) = bank_of(kind, fleet, device).step(0, lambda: SCENE)
+    expected = np.floor(exact / device.quantum) * device.quantum if device.quantum else exact.copy()
+    if device.seen is not None:
+        expected[(exact < device.seen[0]) | (exact > device.seen[1])] = np.inf
     assert_array_equal(readings.values, expected)
 
 
@@ -104,15 +104,15 @@ def test_the_names_of_the_values_fit_what_is_measured(kind, fleet):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_seed_one_noise(kind, fleet):
-    facts = sensor(kind).facts(fleet.car)
+    device = sensor(kind).device(fleet.car)
 
     def read(seed):
-        return bank_of(kind, fleet, facts, seed).step(0, lambda: SCENE)[0].values
+        return bank_of(kind, fleet, device, seed).step(0, lambda: SCENE)[0].values
 
     assert_array_equal(read(3), read(3))
     noisy = np.isfinite(read(3)) & np.isfinite(read(4))
-    if any(facts.noise):
-        noisy &= np.broadcast_to(np.array(facts.noise) > 0.0, noisy.shape)
+    if any(device.noise):
+        noisy &= np.broadcast_to(np.array(device.noise) > 0.0, noisy.shape)
         assert (read(3)[noisy] != read(4)[noisy]).all()
 
 
@@ -133,7 +133,9 @@ def told(kind, **numbers):
 
 def noise_keys(kind):
     start = f"{section(kind)}."
-    return [key.removeprefix(start) for key in FACTS if key.startswith(start) and "noise" in key]
+    return [
+        key.removeprefix(start) for key in file_keys() if key.startswith(start) and "noise" in key
+    ]
 
 
 def read_for(kind, car, fleet, seconds, seed=0):
@@ -177,9 +179,9 @@ def test_a_file_without_noise_gives_the_truth(kind, fleet):
     others = [key for key in ("drop_out", "latency_s", "quantum", "quantum_m", "quantum_rad",
                               "bias_rad", "heading_bias_rad", "heading_walk_rad_sqrt_s",
                               "accel_walk_m_s2_sqrt_s", "gyro_walk_rad_s_sqrt_s")
-              if f"{section(kind)}.{key}" in FACTS]  # fmt: skip
+              if f"{section(kind)}.{key}" in file_keys()]  # fmt: skip
     car = told(kind, rate_hz=20.0, **dict.fromkeys(noise_keys(kind) + others, 0.0))
-    exact = sensor(kind).measure(car, fleet, np.array([0]), Sight(SCENE, np.array([0])))[0]
+    exact = sensor(kind).measure(car, fleet, np.array([0]), Surroundings(SCENE, np.array([0])))[0]
     exact = np.floor(exact) if kind == "encoders" else exact
     readings = read_for(kind, car, fleet, 1.0)
     assert len(readings) == 20
@@ -192,6 +194,6 @@ def test_a_file_without_noise_gives_the_truth(kind, fleet):
 def test_every_key_of_a_sensor_stands_in_its_page(kind):
     page = DOCS / ("cameras.md" if kind == "camera" else "sensors.md")
     text = page.read_text(encoding="utf-8")
-    keys = [key.partition(".")[2] for key in FACTS if key.startswith(f"{section(kind)}.")]
+    keys = [key.partition(".")[2] for key in file_keys() if key.startswith(f"{section(kind)}.")]
     assert {"rate_hz", "latency_s", "drop_out"} <= set(keys)
     assert [key for key in keys if f"`{key}`" not in text] == []

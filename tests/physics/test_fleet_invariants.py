@@ -83,7 +83,7 @@ def energy(fleet, row):
         return fleet.parameters[row, fleet.parameter_names.index(name)]
 
     def state(name):
-        offset, width = fleet._slots[name]
+        offset, width = fleet._offsets[name]
         return fleet._block[offset, row] if width == 1 else fleet._block[offset : offset + 4, row]
 
     wheel = number("wheel_mass")

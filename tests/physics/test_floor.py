@@ -33,7 +33,7 @@ def drive(city_map, pose, seconds, speed=0.0, throttle=0.0, each=lambda fleet: N
     """Let one Nigel drive; return (x, z, speed, pitch, load of a front wheel) of each step."""
     ground, fleet = Ground(city_map), Fleet(NIGEL, 1)
     fleet.add(Pose2(*pose), speed)
-    ground.settle(fleet, 0)
+    ground.place_at_rest(fleet, 0)
     fleet.throttle[0] = throttle
     history = []
     for _ in range(round(seconds / STEP_S)):
@@ -164,7 +164,7 @@ def test_an_accelerometer_feels_a_hit_as_the_mean_of_its_tick():
     felt = []
     for i in range(20):
         tick(world, i * PERIOD_NS, [])
-        felt.append(float(car.fleet.impact_x[car.row]))
+        felt.append(float(car.fleet.contact_accel_x[car.row]))
     hardest = min(felt)
     bounce = NIGEL.value("body.bounce_restitution")
     # The motor holds the wheels, so the car has lost some of its 0.25 m/s before the wall.

@@ -65,7 +65,7 @@ def test_stronger_holding_motors_hold_on_a_steeper_slope():
 def stood(ground, car):
     fleet = Fleet(ground.fit(car), 1)
     fleet.add(Pose2(0.0, 0.0, 0.3))
-    ground.settle(fleet, 0)
+    ground.place_at_rest(fleet, 0)
     x, y = float(fleet.x[0]), float(fleet.y[0])
     for _ in range(2000):
         ground.feel(fleet, 0)

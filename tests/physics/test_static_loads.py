@@ -57,7 +57,7 @@ def test_a_car_at_rest_neither_pitches_nor_heaves(name, moved):
 def test_a_car_settled_on_uneven_heights_stands_on_them_at_once():
     fleet = standing("f1tenth", ("com_shift",), wheel_mass=0.3)
     fleet.floor_height[0] = [0.03, 0.02, 0.01, 0.0]
-    fleet.settle(0)
+    fleet.place_at_rest(0)
     assert fleet.z[0] == pytest.approx(0.005, abs=1e-12)
     fleet.advance(0.5)
     assert fleet.z[0] == pytest.approx(0.005, abs=1e-9)

@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 
-from scm import registry
 from scm.arrays import Floats
 from scm.clock import NS_PER_MS, seconds
 from scm.geometry import Pose2
@@ -23,8 +22,7 @@ from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
 from scm.vehicles.lights import Switches
-from scm.vehicles.sensed import ENCODERS, KINDS, sensors_message
-from scm.vehicles.sensor import Sensor
+from scm.vehicles.sensor import ENCODERS, all_sensors, sensor_messages
 from vehicle_agent.body import Body, BodyKind, Motion, Wiring
 
 MAX_ADVANCE_NS = 100 * NS_PER_MS
@@ -67,7 +65,7 @@ class SimulatedBody:
         """Stand at a pose."""
         self._fleet.place(self._row, pose)
         if self._ground is not None:
-            self._ground.settle(self._fleet, self._row)
+            self._ground.place_at_rest(self._fleet, self._row)
         self._now_ns = now_ns
 
     def see(self, track: EyeTrack, now_ns: int) -> None:
@@ -110,9 +108,9 @@ class SimulatedBody:
         """Apply the velocity and position changes of a contact; the next readings include them."""
         fleet, row, yaw = self._fleet, self._row, float(self._fleet.yaw[self._row])
         c, s = math.cos(yaw), math.sin(yaw)
-        fleet.impact_x[row] += (c * contact.dvx_mps + s * contact.dvy_mps) / TICK_S
-        fleet.impact_y[row] += (c * contact.dvy_mps - s * contact.dvx_mps) / TICK_S
-        fleet.impact_yaw[row] += contact.dyaw_rate_radps / TICK_S
+        fleet.contact_accel_x[row] += (c * contact.dvx_mps + s * contact.dvy_mps) / TICK_S
+        fleet.contact_accel_y[row] += (c * contact.dvy_mps - s * contact.dvx_mps) / TICK_S
+        fleet.contact_yaw_accel[row] += contact.dyaw_rate_radps / TICK_S
         self._fleet.push(
             self._row,
             contact.dvx_mps,
@@ -132,7 +130,7 @@ class SimulatedBody:
             speed=float(fleet.speed[row]),
             lateral_speed=float(fleet.lateral_speed[row]),
             yaw_rate=float(fleet.yaw_rate[row]),
-            accel=float(fleet.accel_x[row] + fleet.impact_x[row]),
+            accel=float(fleet.accel_x[row] + fleet.contact_accel_x[row]),
             steering=float(fleet.steer_angle[row]),
             source="simulated",
             battery_v=None if math.isnan(volts) else volts,
@@ -142,23 +140,26 @@ class SimulatedBody:
     def sensors(self, vehicle: str, now_ns: int, *, wanted: bool = True) -> list[VehicleSensors]:
         """Return a message for each new reading of the encoders, with the newest of the others."""
         if not self._banks:
-            self._banks = [Bank(registry.load(SENSORS, kind, "SENSOR", Sensor), self._seed, 1)
-                           for kind in KINDS]  # fmt: skip
+            kinds = (sensor for sensor in all_sensors().values() if sensor.fields is not None)
+            self._banks = [Bank(sensor, self._seed, 1) for sensor in kinds]
             for bank in self._banks:
                 bank.fit(0, vehicle, self._fleet.car, self._fleet, self._row, now_ns)
         counted: list[int] = []
         for bank in self._banks:
             bank.wanted[0] = wanted
             for readings in bank.step(now_ns):
-                self._newest[bank.sensor.name] = readings.values[0]
+                self._newest[bank.sensor.name] = readings.values[:1]
                 if bank.sensor.name == ENCODERS:
                     counted.append(readings.t_ns)
         if not wanted:
             self._newest.clear()
         fleet, row = self._fleet, self._row
-        fleet.impact_x[row] = fleet.impact_y[row] = fleet.impact_yaw[row] = 0.0
-        messages = [sensors_message(vehicle, t_ns, self._newest) for t_ns in counted[-1:]]
-        return [message for message in messages if message is not None]
+        fleet.contact_accel_x[row] = fleet.contact_accel_y[row] = fleet.contact_yaw_accel[row] = 0.0
+        return [
+            message
+            for t_ns in counted[-1:]
+            for message in sensor_messages([vehicle], t_ns, self._newest)
+        ]
 
     def close(self) -> None:
         """Do nothing: it holds no resources."""

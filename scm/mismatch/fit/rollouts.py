@@ -224,11 +224,11 @@ class _Tether:
 
     def __init__(self, fleet: Fleet) -> None:
         self._fleet = fleet
-        self._kernel, slots = fleet._kernel, fleet._slots  # noqa: SLF001 its innermost loop
+        self._kernel, slots = fleet._kernel, fleet._offsets  # noqa: SLF001 its innermost loop
         self._state = (fleet._block, fleet._numbers, fleet._alive, fleet._status)  # noqa: SLF001
         self._cog = np.array([slots[n][0] for n in (*COG, "x", "y")], dtype=np.int64)
-        self._kept = np.array([fleet._slot_of_signal(n) for n in SIGNALS])  # noqa: SLF001
-        self._remembers = fleet._past is not None  # noqa: SLF001
+        self._kept = np.array([fleet._offset_of(n) for n in SIGNALS])  # noqa: SLF001
+        self._remembers = fleet._history is not None  # noqa: SLF001
         self.parts = REMEMBERED if self._remembers else COMMANDED
         self._steps = whole_steps(STEP_S / self.parts, SUBSTEP_S)
         self._by_turn = any("wheel_angle" in reads(term.law) for term in fleet.car.terms)

@@ -1,7 +1,7 @@
-"""The manual of effects: a page and a picture for each, written from the effects themselves.
+"""The manual of effects: a page and a picture for each, generated from the effects.
 
-`shown.toml` says what each picture drives and compares, `manoeuvres.py` how it is driven.
-`term_page.py` writes the text, `picture.py` drives both cars and draws, `folder.py` writes all.
+`shown.toml` defines what each picture compares, `manoeuvres.py` how it is driven. `term_page.py`
+writes the text, `picture.py` simulates both cars and draws, `folder.py` writes all files.
 May import the rest of `scm.vehicles`; nothing there imports this folder.
-To show a new effect: add it to `shown.toml`; without one it is shown at its prior's edge.
+To configure a new effect's picture add it to `shown.toml`; the default shows its prior's edge.
 """

@@ -1,4 +1,4 @@
-"""The manual as a folder: a page and a picture for each effect and fault, and an index."""
+"""Write the manual: a page and a picture for each effect and sensor fault, and an index."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ from scm.vehicles.manual.term_page import term_page
 from scm.vehicles.term import Term
 
 INDEX = "README.md"
-_INTRODUCTION = """# Physical effects and faults of measuring
+_INTRODUCTION = """# Physical effects and sensor faults
 
 A page for each effect that a car file can list under `terms`, and for each fault that a recording
 may carry: equation, numbers, range, source, and the drive that makes it visible.
@@ -20,25 +20,25 @@ Written by `scm show terms --docs docs/physics` from the effects themselves; not
 
 
 def chosen_effects(name: str | None) -> list[Effect]:
-    """Return the effect of a name, or all.
+    """Return the named effect, or all.
 
     Raises:
-        TermError: when there is none of this name.
+        TermError: when there is no such effect.
     """
     return list(all_effects().values()) if name is None else [effect_named(name)]
 
 
 def pages_of(effects: Sequence[Effect]) -> dict[str, str]:
-    """Return every page's text by its file name, without driving anything."""
+    """Return every page's text by file name, without simulating."""
     return {f"{effect.name}.md": _page(effect) for effect in effects}
 
 
 def index_page(effects: Mapping[str, Effect]) -> str:
-    """Return the list of all effects, by what they act on."""
+    """Return the index of all effects, grouped by what they act on."""
     titled = {title: list[Effect]() for title in (*(t for t, _ in CHAPTERS), OTHERS)}
-    titled["Faults of measuring"] = []
+    titled["Sensor faults"] = []
     for effect in effects.values():
-        title = chapter_of(effect) if isinstance(effect, Term) else "Faults of measuring"
+        title = chapter_of(effect) if isinstance(effect, Term) else "Sensor faults"
         titled[title].append(effect)
     lines = [_INTRODUCTION]
     for title, chosen in titled.items():
@@ -52,16 +52,16 @@ def index_page(effects: Mapping[str, Effect]) -> str:
 
 
 def write_manual(
-    folder: Path, effects: Sequence[Effect], tell: Callable[[int, str], None], *, index: bool
+    folder: Path, effects: Sequence[Effect], on_progress: Callable[[int, str], None], *, index: bool
 ) -> None:
-    """Write pages and pictures; `tell` hears how many are done and which comes next."""
+    """Write pages and pictures; `on_progress` gets the number done and the next name."""
     folder.mkdir(parents=True, exist_ok=True)
     if index:
         (folder / INDEX).write_text(index_page(all_effects()), encoding="utf-8")
     for name, text in pages_of(effects).items():
         (folder / name).write_text(text, encoding="utf-8")
     for i, effect in enumerate(effects):
-        tell(i, effect.name)
+        on_progress(i, effect.name)
         (folder / f"{effect.name}.svg").write_text(_picture(effect), encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""Lines over two axes as a small SVG picture: no library, the same text for the same numbers."""
+"""Line plots as small SVG pictures: no library, deterministic output."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -27,7 +27,7 @@ class Axis:
     """Values from `low` to `high` along a picture, from pixel `start` over `length` (negative: up).
 
     Attributes:
-        wanted: About how many ticks there is room for.
+        wanted: Approximate number of ticks.
     """
 
     low: float
@@ -42,10 +42,10 @@ class Axis:
 
     @property
     def step(self) -> float:
-        """A round distance between ticks that gives about as many as wanted."""
-        rough = (self.high - self.low) / self.wanted
-        power = 10.0 ** math.floor(math.log10(rough))
-        return next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= rough * 0.999)
+        """A round distance between ticks that gives about the wanted number."""
+        spacing = (self.high - self.low) / self.wanted
+        power = 10.0 ** math.floor(math.log10(spacing))
+        return next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= spacing * 0.999)
 
     def ticks(self) -> Iterator[float]:
         """Yield round values."""
@@ -57,7 +57,7 @@ class Axis:
 def draw_lines(
     lines: Sequence[Line], x_title: str, y_title: str, *, equal_scale: bool = False
 ) -> str:
-    """Return the picture; with `equal_scale` a metre is as long on both axes, as on a floor."""
+    """Return the picture; with `equal_scale` both axes have the same scale."""
     across = _axis([line.x for line in lines], _LEFT, WIDTH - _LEFT - _RIGHT)
     up = _axis([line.y for line in lines], HEIGHT - _BOTTOM, -(HEIGHT - _TOP - _BOTTOM))
     if equal_scale:
@@ -82,7 +82,7 @@ def _axis(values: Sequence[Floats], start: float, length: float) -> Axis:
 
 
 def equally_scaled(across: Axis, up: Axis) -> tuple[Axis, Axis]:
-    """Return both axes, one of them wider, so that a unit is as long on both."""
+    """Return both axes with the same scale, one of them widened."""
     scale = max(
         (across.high - across.low) / abs(across.length), (up.high - up.low) / abs(up.length)
     )
@@ -123,6 +123,6 @@ def _curve(line: Line, across: Axis, up: Axis, colour: str, place: int) -> Itera
     yield _text(x + 32, 22, line.label, "start")
 
 
-def _text(x: float, y: float, text: str, anchor: str) -> str:
+def _text(x: float, y: float, text: str, align: str) -> str:
     at = f'x="{x:.1f}" y="{y:.1f}"'
-    return f'<text {at} text-anchor="{anchor}" fill="#3a414d">{escape(text)}</text>'
+    return f'<text {at} text-anchor="{align}" fill="#3a414d">{escape(text)}</text>'

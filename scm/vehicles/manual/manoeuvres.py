@@ -1,4 +1,4 @@
-"""Manoeuvres that make an effect visible: commands over time, how it starts, on what floor."""
+"""Manoeuvres that make an effect visible: commands over time, initial state, floor."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -14,13 +14,13 @@ class Manoeuvre:
     """One drive.
 
     Attributes:
-        about: What is driven, in words.
-        seconds: How long.
+        about: Description.
+        seconds: Duration.
         throttle, steering: Commands in [-1, 1] over time [s].
         speed: At the start [m/s].
         sideways: Lateral speed at the start [m/s].
-        numbers: Of the car file, by `section.key`, for every car driven.
-        floor: Says how the floor is, called once before the start.
+        numbers: Overrides of the car file, by `section.key`, for all cars.
+        floor: Sets the floor, called once before the start.
     """
 
     about: str

@@ -1,4 +1,4 @@
-"""What every page of the manual has: equation, story, headings, the table of its numbers."""
+"""Parts of every page of the manual: equation, text, headings, table of numbers."""
 
 import inspect
 import math
@@ -21,19 +21,19 @@ def equations(function: EffectFunction) -> Iterator[str]:
 
 
 def story(function: EffectFunction) -> str:
-    """Return what the file says beside first line, equation and headings."""
+    """Return the docstring's text without first line, equation and headings."""
     body = _document(function).partition("\n")[2].partition(f"{HEADINGS[0]}:")[0]
     return " ".join(line for line in body.splitlines() if line and not line.startswith("    "))
 
 
 def headings(effect: Effect) -> Iterator[str]:
-    """Yield a paragraph for each heading of the file."""
+    """Yield a paragraph for each heading of the docstring."""
     for heading in HEADINGS:
         yield from (f"**{heading}:** {effect.doc_line(heading)}", "")
 
 
 def parameter_table(params: Sequence[Param], neutral: Mapping[str, float]) -> Iterator[str]:
-    """Yield the table of an effect's numbers; nothing for an effect without."""
+    """Yield the table of an effect's numbers, if it has any."""
     if not params:
         return
     yield "| key in the car file | meaning | unit | default | bounds | prior | neutral |"

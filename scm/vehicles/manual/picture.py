@@ -1,4 +1,4 @@
-"""The picture of an effect: the same drive with and without it, in one small SVG."""
+"""The picture of an effect: the same drive with and without it, in one SVG."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -20,8 +20,8 @@ _DEGREES = 180.0 / math.pi
 
 
 @dataclass(frozen=True, slots=True)
-class _Sight:
-    """What is plotted over time; a second view of one car where its two sides are compared."""
+class _Plot:
+    """The plotted quantity; `dashed` is a second one of the same car."""
 
     title: str
     of: Callable[[Fleet], float]
@@ -29,38 +29,38 @@ class _Sight:
     labels: tuple[str, str] | None = None
 
 
-SIGHTS: dict[str, _Sight] = {
-    "path": _Sight("y [m]", lambda fleet: float(fleet.y[0])),
-    "speed": _Sight("speed [m/s]", lambda fleet: float(fleet.speed[0])),
-    "yaw_rate": _Sight("yaw rate [rad/s]", lambda fleet: float(fleet.yaw_rate[0])),
-    "steer_angle": _Sight("wheel angle [°]", lambda f: _DEGREES * float(f.steer_angle[0])),
-    "front_wheels": _Sight(
+PLOTS: dict[str, _Plot] = {
+    "path": _Plot("y [m]", lambda fleet: float(fleet.y[0])),
+    "speed": _Plot("speed [m/s]", lambda fleet: float(fleet.speed[0])),
+    "yaw_rate": _Plot("yaw rate [rad/s]", lambda fleet: float(fleet.yaw_rate[0])),
+    "steer_angle": _Plot("wheel angle [°]", lambda f: _DEGREES * float(f.steer_angle[0])),
+    "front_wheels": _Plot(
         "wheel angle [°]",
         lambda fleet: _DEGREES * float(fleet.wheel_steer[0, 0]),
         lambda fleet: _DEGREES * float(fleet.wheel_steer[0, 1]),
         ("outer, right wheel", "inner, left wheel"),
     ),
-    "roll": _Sight("roll [°]", lambda fleet: _DEGREES * float(fleet.roll[0])),
-    "pitch": _Sight("pitch [°]", lambda fleet: _DEGREES * float(fleet.pitch[0])),
-    "height": _Sight("body height [mm]", lambda fleet: 1e3 * float(fleet.z[0])),
-    "load": _Sight("front wheel load [N]", lambda fleet: float(fleet.wheel_load[0, 0])),
-    "crept": _Sight("way [mm]", lambda fleet: 1e3 * float(fleet.x[0])),
+    "roll": _Plot("roll [°]", lambda fleet: _DEGREES * float(fleet.roll[0])),
+    "pitch": _Plot("pitch [°]", lambda fleet: _DEGREES * float(fleet.pitch[0])),
+    "height": _Plot("body height [mm]", lambda fleet: 1e3 * float(fleet.z[0])),
+    "load": _Plot("front wheel load [N]", lambda fleet: float(fleet.wheel_load[0, 0])),
+    "crept": _Plot("way [mm]", lambda fleet: 1e3 * float(fleet.x[0])),
 }
 
 
 def draw_term(term: Term) -> str:
     """Return the picture of one effect."""
     shown = shown_of(term)
-    manoeuvre, sight = MANOEUVRES[shown.manoeuvre], SIGHTS[shown.see]
+    manoeuvre, plot = MANOEUVRES[shown.manoeuvre], PLOTS[shown.see]
     on_floor = shown.see == "path"
     lines = []
     for i, (car, label) in enumerate(cars_of(term, shown)):
-        view = sight.dashed if sight.dashed and i == 0 else sight.of
+        view = plot.dashed if plot.dashed and i == 0 else plot.of
         time, x, values = _drive(car, manoeuvre, view)
-        name = sight.labels[i] if sight.labels else label
+        name = plot.labels[i] if plot.labels else label
         lines.append(Line(name, x if on_floor else time, values))
     x_title = "x [m]" if on_floor else "time [s]"
-    return draw_lines(lines, x_title, sight.title, equal_scale=on_floor)
+    return draw_lines(lines, x_title, plot.title, equal_scale=on_floor)
 
 
 def cars_of(term: Term, shown: Shown) -> tuple[tuple[Car, str], tuple[Car, str]]:
@@ -87,7 +87,7 @@ def cars_of(term: Term, shown: Shown) -> tuple[tuple[Car, str], tuple[Car, str]]
 
 
 def neutral_numbers(term: Term) -> Mapping[str, float]:
-    """Return the values at which an effect does nothing, by `section.key`."""
+    """Return the values at which an effect changes nothing, by `section.key`."""
     return {
         param.key: part.neutral[param.name]
         for part in flat([term])
@@ -107,7 +107,7 @@ def _label(term: Term, numbers: Mapping[str, float], otherwise: str) -> str:
 
 
 def _drive(
-    car: Car, manoeuvre: Manoeuvre, sight: Callable[[Fleet], float]
+    car: Car, manoeuvre: Manoeuvre, plot: Callable[[Fleet], float]
 ) -> tuple[Floats, Floats, Floats]:
     fleet = Fleet(car, 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
@@ -119,7 +119,7 @@ def _drive(
     time, x, values = np.zeros(steps + 1), np.zeros(steps + 1), np.zeros(steps + 1)
     for i in range(steps + 1):
         t = i * every
-        time[i], x[i], values[i] = t, float(fleet.x[0]), sight(fleet)
+        time[i], x[i], values[i] = t, float(fleet.x[0]), plot(fleet)
         fleet.throttle[0], fleet.steering[0] = manoeuvre.throttle(t), manoeuvre.steering(t)
         fleet.advance(every)
     return time, x, values

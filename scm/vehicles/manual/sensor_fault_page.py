@@ -1,4 +1,4 @@
-"""The page and the picture of one fault of measuring: the same drive, true and as measured."""
+"""The page and the picture of one sensor fault: the same drive, true and measured."""
 
 import math
 from collections.abc import Iterator
@@ -49,7 +49,7 @@ def sensor_fault_page(fault: SensorFault) -> str:
 
 
 def _example(fault: SensorFault) -> Iterator[str]:
-    """What a car file says."""
+    """Yield an example for a car file."""
     where = " on speed" if fault.acts_on == () else ""
     shown = _numbers(fault)
     yield from ("```toml", f'measures = ["{fault.name}{where}"]', "[measure]")
@@ -97,7 +97,7 @@ def _channel(fault: SensorFault) -> str:
 
 
 def _drive() -> dict[str, Series]:
-    """True channels of a slow swing."""
+    """Simulate a slow slalom and return its true channels."""
     fleet = Fleet(load_car("nigel"), 1)
     fleet.add(Pose2(0.3, 0.3, 0.5))
     rows = []

@@ -1,4 +1,4 @@
-"""What each effect's picture compares, of `shown.toml`: a drive, a plot, and the numbers."""
+"""What each effect's picture compares, from `shown.toml`: a drive, a plot, and the numbers."""
 
 import math
 import tomllib
@@ -10,7 +10,7 @@ from scm.vehicles.manual.manoeuvres import MANOEUVRES
 from scm.vehicles.param import LogNormal, Normal, Param
 from scm.vehicles.term import Term
 
-DROPPED: Mapping[str, float] = {"": 0.0}  # the other car does not list the effect at all
+DROPPED: Mapping[str, float] = {"": 0.0}  # the other car does not have the effect
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,13 +19,13 @@ class Shown:
 
     Attributes:
         manoeuvre: Name in `MANOEUVRES`.
-        see: What is plotted, a name in `picture.SIGHTS`.
-        numbers: Of the effect's own, by `section.key`; its curve is drawn with these.
-        other: The numbers of the dashed curve; None is the effect's neutral, else the car's own.
-        car: Which car drives.
-        beside: Effects that both cars list, so that this one has something to act on.
+        see: The plotted quantity, a name in `picture.PLOTS`.
+        numbers: Of the effect's curve, by `section.key`.
+        other: Numbers of the dashed curve; None: the effect's neutral ones.
+        car: Name of the car.
+        beside: Further effects of both cars, which this one needs.
         both: Numbers of both cars.
-        instead: Effects whose place this one takes.
+        instead: Effects that this one replaces.
     """
 
     manoeuvre: str
@@ -56,19 +56,19 @@ def _table() -> dict[str, Shown]:
 
 
 def shown_of(term: Term) -> Shown:
-    """Return what is drawn for an effect; of one that nobody chose a picture for, its prior."""
+    """Return the picture's definition for an effect; the default shows its prior's edge."""
     chosen = _table().get(term.name)
     if chosen is not None:
         return chosen
     known = [name for name in term.shows_in if name in MANOEUVRES]
     numbers = {p.key: strong(p) for p in term.params if p.name in term.neutral}
     name = known[0] if known else "throttle_step"
-    sight = "yaw_rate" if "steer" in name or "circle" in name else "speed"
-    return Shown(name, sight, numbers, None if numbers else DROPPED)
+    plot = "yaw_rate" if "steer" in name or "circle" in name else "speed"
+    return Shown(name, plot, numbers, None if numbers else DROPPED)
 
 
 def strong(param: Param) -> float:
-    """A number far out in the prior, inside the bounds: enough to see the effect."""
+    """Return a number at the prior's edge, inside the bounds, that makes the effect visible."""
     low, high = param.bounds
     match param.prior:
         case Normal(mean, std):

@@ -1,4 +1,4 @@
-"""The page of one effect on a car, as Markdown: everything on it is read from the effect."""
+"""The page of one physical effect, as Markdown, generated from the effect."""
 
 from collections.abc import Iterator, Mapping
 
@@ -6,7 +6,7 @@ from scm.vehicles.car import car_names, load_car
 from scm.vehicles.describe_effects import neutral_of, params_of
 from scm.vehicles.manual.manoeuvres import MANOEUVRES
 from scm.vehicles.manual.page_parts import equations, headings, parameter_table, story
-from scm.vehicles.manual.picture import SIGHTS
+from scm.vehicles.manual.picture import PLOTS
 from scm.vehicles.manual.shown import DROPPED, Shown, shown_of
 from scm.vehicles.physics_variables import SIGNALS
 from scm.vehicles.term import Term, flat, reads
@@ -28,13 +28,13 @@ def term_page(term: Term) -> str:
 
 def _caption(term: Term) -> str:
     shown = shown_of(term)
-    said = [f"{shown.car}, {MANOEUVRES[shown.manoeuvre].about}"]
+    sentences = [f"{shown.car}, {MANOEUVRES[shown.manoeuvre].about}"]
     own = {param.key for param in params_of(term)}
     both = {key: value for key, value in shown.both.items() if key not in own}
-    said += [f"Both with {_numbers(both)}"] if both else []
-    if SIGHTS[shown.see].labels is None:
-        said += [f"Blue: {_numbers(shown.numbers) or 'listed'}", f"Grey: {_other(shown)}"]
-    return f"*{'. '.join(said)}.*"
+    sentences += [f"Both with {_numbers(both)}"] if both else []
+    if PLOTS[shown.see].labels is None:
+        sentences += [f"Blue: {_numbers(shown.numbers) or 'listed'}", f"Grey: {_other(shown)}"]
+    return f"*{'. '.join(sentences)}.*"
 
 
 def _numbers(numbers: Mapping[str, float]) -> str:
@@ -64,9 +64,9 @@ def _reads(term: Term) -> str:
     names = dict.fromkeys(
         name
         for part in flat([term])
-        for law in (part.law, part.damping)
-        if law
-        for name in reads(law)
+        for function in (part.law, part.damping)
+        if function
+        for name in reads(function)
         if name in SIGNALS
     )
     return ", ".join(f"`{name}`" for name in names) or "only its own numbers"

@@ -1,1 +1,1 @@
-"""Sensors of a car: one kind a file, with `SENSOR`. They measure exactly; `Bank` spoils."""
+"""Sensors of a car: one file per kind, with `SENSOR` and `KEYS`. `Bank` adds their errors."""

@@ -1,23 +1,37 @@
-"""Indoor positioning: where the tag on the roof is, and which way it looks, in the map frame.
+"""Indoor positioning: pose of the tag on the roof in the map frame.
 
     (x, y) = (x, y of the body's origin) + R(yaw) (T(roll, pitch) p)_xy        yaw = yaw of the body
 
-p is the tag's place on the body, T tilts it with the body: a tag up high moves as the car leans.
+p is the tag's place on the body, T tilts it with the body: a high tag moves when the car rolls.
 Holds: a tag fixed to the sprung body; small roll and pitch.
 Source: AutoDRIVE simulator (IPS as an exact transform); noise and delay from the car file.
 """
+
+from typing import Any
 
 import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
-from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
+from scm.vehicles.car_file_schema import POSITION, FileKey, device_keys
+from scm.vehicles.sensor import Device, Sensor, Surroundings, Truth
+
+KEYS = {
+    **device_keys("ips", rate_hz=30.0),
+    "ips.position_m": POSITION,
+    "ips.noise_m": FileKey("m", 1, (0.0, 1.0), default=0.0),
+    "ips.noise_rad": FileKey("rad", 1, (0.0, 1.0), default=0.0),
+    "ips.tag_family": FileKey("", 0),
+    "ips.tag_id": FileKey("1", 1, (0.0, 586.0)),
+    "ips.tag_size_m": FileKey("m", 1, (0.001, 2.0)),
+    "ips.map_tag_id": FileKey("1", 1, (0.0, 1e6)),
+}
 
 
-def facts(car: Car) -> Facts:
-    """Return the device of a car file."""
+def device(car: Car) -> Device:
+    """Return the device's properties from a car file."""
     place, angle = car.value("ips.noise_m"), car.value("ips.noise_rad")
-    return Facts(
+    return Device(
         rate_hz=car.value("ips.rate_hz"),
         noise=(place, place, angle),
         latency_s=car.value("ips.latency_s"),
@@ -26,7 +40,7 @@ def facts(car: Car) -> Facts:
     )
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Surroundings | None) -> Floats:
     """Return the tag's pose (k, 3): x, y [m], yaw [rad]."""
     x, y, z = car.vector("ips.position_m")
     yaw, roll, pitch = truth.yaw[rows], truth.roll[rows], truth.pitch[rows]
@@ -39,4 +53,10 @@ def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
     )
 
 
-SENSOR = Sensor("ips", ("x_m", "y_m", "yaw_rad"), ("ips.position_m",), facts, measure)
+def fields(readings: Floats) -> dict[str, list[Any]]:
+    """Return the pose as message fields."""
+    places = list(map(tuple, readings[:, :2].tolist()))
+    return {"ips_m": places, "ips_yaw_rad": readings[:, 2].tolist()}
+
+
+SENSOR = Sensor("ips", ("x_m", "y_m", "yaw_rad"), ("ips.position_m",), device, measure, fields)

@@ -2,11 +2,10 @@
 
     beam i looks at  first + i * field_of_view / beams  from straight ahead, + = left
 
-A full circle starts straight ahead, a narrower field of view at its right-hand end. How the ranges
-come about stands in `scm/vehicles/rays/cast.py`; with `sweep = "moving"` each beam looks at its own
-time of the turn from where the car was then, `scm/vehicles/rays/march.py`. A reading nearer than
-the range's lower end counts as a miss, as everything beyond its upper end.
-Holds: a level scanner, faces without end upwards, all cars where they are at the reading's instant.
+A full circle starts straight ahead, a narrower field of view at its right-hand end. Ray casting is
+in `scm/vehicles/rays/cast.py`; with `sweep = "moving"` each beam has its own time and the car's
+place at that time, `scm/vehicles/rays/march.py`. Readings below or above the range are misses.
+Holds: a level scanner, infinitely high faces, all cars at their places at the reading's instant.
 Source: AutoDRIVE simulator (7 Hz, 0.15 to 12 m, 360 beams, miss = infinity, beam 0 ahead,
 counter-clockwise); noise from the paper's variability test.
 """
@@ -18,15 +17,27 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
+from scm.vehicles.car_file_schema import POSITION, FileKey, device_keys
 from scm.vehicles.rays.cast import cast
 from scm.vehicles.rays.march import march
-from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
+from scm.vehicles.sensor import Device, Sensor, Surroundings, Truth
 
 NOISE_SPREADS = 6.0
 
+KEYS = {
+    **device_keys("lidar"),
+    "lidar.position_m": POSITION,
+    "lidar.beams": FileKey("1", 1, (1.0, 10000.0)),
+    "lidar.field_of_view_rad": FileKey("rad", 1, (0.01, 6.2831854), default=2.0 * math.pi),
+    "lidar.range_m": FileKey("m", 2, (0.0, 200.0)),
+    "lidar.noise_m": FileKey("m", 1, (0.0, 1.0)),
+    "lidar.quantum_m": FileKey("m", 1, (0.0, 1.0), default=0.0),
+    "lidar.sweep": FileKey("", 0, words=("frozen", "moving"), default="frozen"),
+}
+
 
 class Bearings(NamedTuple):
-    """Where the beams look: beam i at `first + i * step` from straight ahead, + = left [rad]."""
+    """Directions of the beams: beam i at `first + i * step` from straight ahead, + = left [rad]."""
 
     first: float
     step: float
@@ -34,7 +45,7 @@ class Bearings(NamedTuple):
 
 
 def bearings_of(car: Car) -> Bearings:
-    """Return the beams of a car's device: a full circle starts ahead, a narrower one at its right.
+    """Return the beams of a car's device: a full circle starts ahead, a narrower view at its right.
 
     The last beam of a narrow field of view is one step short of its left end.
     """
@@ -44,17 +55,17 @@ def bearings_of(car: Car) -> Bearings:
 
 
 def sweep_s(car: Car) -> float:
-    """Return how long a car's device takes from its first beam to one past its last; 0: no time."""
+    """Return the time of a car's device from its first beam to one past its last; 0: none."""
     if car.text("lidar.sweep") == "frozen":
         return 0.0
     _, step, beams = bearings_of(car)
     return beams * step / (2.0 * math.pi) / car.value("lidar.rate_hz")
 
 
-def facts(car: Car) -> Facts:
-    """Return the device of a car file."""
+def device(car: Car) -> Device:
+    """Return the device's properties from a car file."""
     nearest, farthest = car.vector("lidar.range_m")
-    return Facts(
+    return Device(
         rate_hz=car.value("lidar.rate_hz"),
         noise=(car.value("lidar.noise_m"),),
         latency_s=car.value("lidar.latency_s"),
@@ -64,11 +75,11 @@ def facts(car: Car) -> Facts:
     )
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Surroundings | None) -> Floats:
     """Return ranges (k, beams) [m]; infinity is a miss.
 
-    The nearer end of the range is the device's own limit, and noise may carry a hit over its
-    farther end: both are for whoever spoils the readings.
+    The limits of the range are applied to the noisy readings, since noise may carry a hit beyond
+    them.
     """
     bearings = bearings_of(car)
     if around is None:
@@ -88,8 +99,8 @@ def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
     return march(around.scene, scanners, motion, around.own, bearings, farthest, period)
 
 
-def scan(car: Car, scanners: Floats, around: Sight) -> Floats:
-    """Return what scanners like this car's tell at rest, without noise, from poses (k, 3)."""
+def scan(car: Car, scanners: Floats, around: Surroundings) -> Floats:
+    """Return the noiseless ranges of this car's scanner at rest at poses (k, 3)."""
     nearest, farthest = car.vector("lidar.range_m")
     ranges = cast(around.scene, scanners, around.own, bearings_of(car), farthest)
     ranges[ranges < nearest] = np.inf
@@ -100,6 +111,6 @@ SENSOR = Sensor(
     "lidar",
     ("range_m",),
     ("lidar.position_m", "lidar.rate_hz", "lidar.beams", "lidar.range_m", "lidar.noise_m"),
-    facts,
+    device,
     measure,
 )

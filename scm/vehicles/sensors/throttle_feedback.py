@@ -1,8 +1,8 @@
-"""Throttle feedback: what the motor controller was last told, as a share of full throttle.
+"""Throttle feedback: the motor controller's set point, as a share of full throttle.
 
     value = min(1, max(-1, command))                                 + = forward
 
-Holds: a controller that reports its set point; delays and losses behind it are the drive's.
+Holds: a controller that reports its set point; delays and losses after it belong to the drive.
 Source: throttle sensor of the AutoDRIVE paper.
 """
 
@@ -10,12 +10,19 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.vehicles.car import Car
-from scm.vehicles.sensor import Facts, Sensor, Sight, Truth
+from scm.vehicles.car_file_schema import FileKey, device_keys
+from scm.vehicles.sensor import Device, Sensor, Surroundings, Truth
+
+KEYS = {
+    **device_keys("throttle_feedback"),
+    "throttle_feedback.noise": FileKey("1", 1, (0.0, 1.0), default=0.0),
+    "throttle_feedback.quantum": FileKey("1", 1, (0.0, 1.0), default=0.0),
+}
 
 
-def facts(car: Car) -> Facts:
-    """Return the device of a car file."""
-    return Facts(
+def device(car: Car) -> Device:
+    """Return the device's properties from a car file."""
+    return Device(
         rate_hz=car.value("throttle_feedback.rate_hz"),
         noise=(car.value("throttle_feedback.noise"),),
         latency_s=car.value("throttle_feedback.latency_s"),
@@ -24,9 +31,16 @@ def facts(car: Car) -> Facts:
     )
 
 
-def measure(car: Car, truth: Truth, rows: Ints, around: Sight | None) -> Floats:
+def measure(car: Car, truth: Truth, rows: Ints, around: Surroundings | None) -> Floats:
     """Return the throttle in [-1, 1], (k, 1)."""
     return np.clip(truth.throttle[rows], -1.0, 1.0)[:, None]
 
 
-SENSOR = Sensor("throttle_feedback", ("throttle",), ("throttle_feedback.rate_hz",), facts, measure)
+def fields(readings: Floats) -> dict[str, list[float]]:
+    """Return the reading as a message field."""
+    return {"throttle": readings[:, 0].tolist()}
+
+
+SENSOR = Sensor(
+    "throttle_feedback", ("throttle",), ("throttle_feedback.rate_hz",), device, measure, fields
+)

@@ -153,7 +153,7 @@ def test_a_wrong_unit_is_refused(tmp_path):
             ),
             "tyre.lateral_slip_asymptote: expected above the extremum at 0.2, got 0.15",
         ),
-        (('"servo", ', '"servo", "servo", '), "terms: 'servo' stands twice"),
+        (('"servo", ', '"servo", "servo", '), "terms: 'servo' is listed twice"),
         (("terms = [", "terms = [3,"), "terms: expected a list of effect names"),
         (('"tyre_contact", ', ""), "no term sets load"),
         (('name = "nigel"', 'name = "my car"'), "name: expected up to 40 letters, digits"),

@@ -119,7 +119,7 @@ def test_a_hill_of_a_height_map_is_climbed_and_left_level():
 def test_a_plain_map_leaves_the_floor_alone():
     ground = Ground(city())
     assert ground.is_flat
-    assert ground.is_calm
+    assert ground.has_no_wind
     assert felt(ground, 0.0, stood_on=0.123)[0] == 0.123
 
 

@@ -27,7 +27,7 @@ def at(age_ms):
 @pytest.fixture
 def guard():
     made = Guard()
-    assert made.take(command(), START_NS)
+    assert made.accept(command(), START_NS)
     return made
 
 
@@ -69,56 +69,56 @@ def test_silence_holds_then_stops_then_loses_the_lease(guard, age_ms, mode, thro
 
 @pytest.mark.parametrize("age_ms", [150, 299, 300, 999])
 def test_a_command_before_the_loss_drives_again(guard, age_ms):
-    assert guard.take(command(seq=2), at(age_ms))
+    assert guard.accept(command(seq=2), at(age_ms))
     assert guard.output(at(age_ms)).mode == "drive"
 
 
 @pytest.mark.parametrize("age_ms", [1000, 5000])
 def test_a_lost_car_refuses_its_old_epoch_even_if_nobody_looked_meanwhile(guard, age_ms):
-    assert not guard.take(command(seq=2), at(age_ms))
+    assert not guard.accept(command(seq=2), at(age_ms))
     assert guard.lost
     assert guard.output(at(age_ms)).mode == "lost"
 
 
 def test_a_lost_car_obeys_a_newer_epoch(guard):
     guard.output(at(2000))
-    assert guard.take(command(epoch=2), at(2000))
+    assert guard.accept(command(epoch=2), at(2000))
     assert guard.output(at(2000)).mode == "drive"
 
 
 def test_an_older_epoch_is_refused_and_counted(guard):
-    guard.take(command(epoch=5, seq=1), START_NS)
-    assert not guard.take(command(epoch=4, seq=9), START_NS)
+    guard.accept(command(epoch=5, seq=1), START_NS)
+    assert not guard.accept(command(epoch=4, seq=9), START_NS)
     assert guard.refused == 1
     assert guard.epoch == 5
 
 
 @pytest.mark.parametrize(("seq", "accepted"), [(0, False), (1, False), (2, True), (9, True)])
 def test_a_repeated_or_older_sequence_number_is_refused(guard, seq, accepted):
-    assert guard.take(command(seq=seq), START_NS) is accepted
+    assert guard.accept(command(seq=seq), START_NS) is accepted
 
 
 def test_a_newer_epoch_counts_its_own_sequence(guard):
-    guard.take(command(seq=100), START_NS)
-    assert guard.take(command(epoch=2, seq=0), START_NS)
+    guard.accept(command(seq=100), START_NS)
+    assert guard.accept(command(epoch=2, seq=0), START_NS)
 
 
 def test_refused_commands_do_not_keep_a_car_alive(guard):
     for age_ms in range(0, 1000, 50):
-        guard.take(command(seq=1, throttle=1.0), at(age_ms))
+        guard.accept(command(seq=1, throttle=1.0), at(age_ms))
     assert guard.output(at(1000)).mode == "lost"
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("field", ["throttle", "steering"])
 def test_a_command_that_is_no_number_is_refused(guard, bad, field):
-    assert not guard.take(command(seq=2, **{field: bad}), START_NS)
+    assert not guard.accept(command(seq=2, **{field: bad}), START_NS)
     assert guard.output(START_NS).throttle == 0.5
 
 
 @pytest.mark.parametrize(("wished", "given"), [(7.0, 1.0), (-7.0, -1.0), (1.0, 1.0), (-0.3, -0.3)])
 def test_commands_are_limited(guard, wished, given):
-    guard.take(command(seq=2, throttle=wished, steering=-wished), START_NS)
+    guard.accept(command(seq=2, throttle=wished, steering=-wished), START_NS)
     output = guard.output(START_NS)
     assert (output.throttle, output.steering) == (given, -given)
 
@@ -138,10 +138,10 @@ def test_the_city_stop_does_not_hide_a_loss(guard):
 
 def test_a_granted_epoch_fences_before_its_first_command(guard):
     assert guard.set_epoch(2, at(10))
-    assert not guard.take(command(epoch=1, seq=2), at(20))
+    assert not guard.accept(command(epoch=1, seq=2), at(20))
     output = guard.output(at(20))
     assert (output.mode, output.throttle, output.steering) == ("hold", 0.0, 0.25)
-    assert guard.take(command(epoch=2, seq=0), at(30))
+    assert guard.accept(command(epoch=2, seq=0), at(30))
     assert guard.output(at(30)).mode == "drive"
 
 
@@ -167,7 +167,7 @@ def test_a_granted_epoch_ends_a_loss_but_does_not_drive(guard):
 def test_the_age_of_the_newest_command_is_told_once_there_is_one(guard):
     assert Guard().command_age_ns(START_NS) is None
     assert guard.command_age_ns(at(80)) == 80 * NS_PER_MS
-    guard.take(command(seq=1, throttle=0.1), at(90))
+    guard.accept(command(seq=1, throttle=0.1), at(90))
     assert guard.command_age_ns(at(100)) == 100 * NS_PER_MS, "a refused one is none"
     guard.set_epoch(9, at(110))
     assert guard.command_age_ns(at(120)) is None, "the new holder has said nothing"
@@ -177,7 +177,7 @@ def test_a_clock_that_steps_back_never_makes_a_command_younger(guard):
     guard.output(at(900))
     guard.output(at(100))
     assert guard.output(at(100)).mode == "stop"
-    assert guard.take(command(seq=2), at(100))
+    assert guard.accept(command(seq=2), at(100))
     assert guard.output(at(1900)).mode == "lost"
 
 
@@ -204,7 +204,7 @@ class GuardMachine(RuleBasedStateMachine):
     )
     def send(self, epoch, seq, throttle, steering):
         self.note_loss()
-        if self.guard.take(command(epoch, seq, throttle, steering), self.now_ns):
+        if self.guard.accept(command(epoch, seq, throttle, steering), self.now_ns):
             assert epoch >= self.highest
             assert self.lost_epoch is None or epoch > self.lost_epoch
             assert math.isfinite(throttle)

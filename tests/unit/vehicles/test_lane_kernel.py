@@ -185,7 +185,7 @@ def test_a_car_that_freezes_between_kept_steps_is_left_as_it_was_step_by_step():
     rng = np.random.default_rng(5)
     throttle, steering = rng.uniform(-1, 1, (60, 32)), rng.uniform(-1, 1, (60, 32))
     steering[13:, 4] = steering[27, 18] = np.nan
-    slots = np.array([seldom._slot_of_signal(name) for name in ("x", "yaw", "speed", "steering")])
+    slots = np.array([seldom._offset_of(name) for name in ("x", "yaw", "speed", "steering")])
     kept = {every: np.zeros((60 // every, len(slots), 32)) for every in (1, 10)}
     for fleet, every in ((seldom, 10), (often, 1)):
         fleet._kernel.rollout(

@@ -26,9 +26,9 @@ NAMES = [
     "accel_x",
     "accel_y",
     "accel_z",
-    "impact_x",
-    "impact_y",
-    "impact_yaw",
+    "contact_accel_x",
+    "contact_accel_y",
+    "contact_yaw_accel",
     "yaw",
 ]
 
@@ -75,7 +75,7 @@ def test_the_orientation_is_roll_pitch_and_yaw():
 
 def test_a_contact_is_felt_through_the_lever_arm():
     x, y, _ = lever_arm(NIGEL)
-    force = felt(impact_x=-20.0, impact_y=3.0, impact_yaw=50.0)
+    force = felt(contact_accel_x=-20.0, contact_accel_y=3.0, contact_yaw_accel=50.0)
     assert_allclose(force[:2], [-20.0 - 50.0 * y, 3.0 + 50.0 * x])
 
 

@@ -7,10 +7,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scm.clock import NS_PER_S
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import load_car
-from scm.vehicles.external_vehicles import Placed
+from scm.vehicles.external_vehicles import ExternalVehicles
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
-from scm.vehicles.sensor import Sight
+from scm.vehicles.sensor import Surroundings
 from scm.vehicles.sensors.lidar import SENSOR, bearings_of, scan, sweep_s
 
 NIGEL = load_car("nigel")
@@ -19,7 +19,7 @@ NEAREST, FARTHEST = NIGEL.vector("lidar.range_m")
 
 def around(edges, own=(0,), outlines=(), owners=()):
     edges, outlines = (np.array(faces, float).reshape(-1, 4) for faces in (edges, outlines))
-    return Sight(Scene(WallGrid(edges), outlines, np.array(owners, np.int64)), np.array(own))
+    return Surroundings(Scene(WallGrid(edges), outlines, np.array(owners, np.int64)), np.array(own))
 
 
 def room(half):
@@ -114,7 +114,7 @@ def test_a_narrow_field_of_view_begins_at_its_right_hand_end():
 
 
 def test_noise_may_carry_a_hit_over_the_range_but_no_reading_lies_beyond_it():
-    still = Placed(1)
+    still = ExternalVehicles(1)
     x, _, _ = NIGEL.vector("lidar.position_m")
     bank = Bank(SENSOR, 0)
     bank.fit(0, "ann", NIGEL, still, 0, 0)
@@ -146,7 +146,7 @@ def test_a_moving_sweep_smears_what_a_frozen_one_does_not(tmp_path):
     path.write_text(
         text.replace("[lidar]", '[lidar]\nsweep = { value = "moving", source = "test" }')
     )
-    truth = Placed(1)
+    truth = ExternalVehicles(1)
     truth.speed[0] = 0.25
     sight = around([[3.0, -20.0, 3.0, 20.0]])
     frozen, moving = (

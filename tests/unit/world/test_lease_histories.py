@@ -77,8 +77,8 @@ class Leases(RuleBasedStateMachine):
         machine = self
 
         class Watched(Guard):
-            def take(self, command, now_ns):
-                taken = super().take(command, now_ns)
+            def accept(self, command, now_ns):
+                taken = super().accept(command, now_ns)
                 if taken:
                     machine.obeyed.append((command.epoch, command.steering))
                 return taken
