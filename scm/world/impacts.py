@@ -10,7 +10,7 @@ from scm.vehicles.fleet import Fleet
 
 
 class Impacts:
-    """Adds up the tick's contacts in the fleets' `contact_accel_x`, `_y` and `contact_yaw_accel`."""
+    """Adds up the tick's contacts in the fleets' `contact_accel_x` and its siblings."""
 
     def __init__(self) -> None:
         self._struck: list[tuple[Fleet, Ints]] = []

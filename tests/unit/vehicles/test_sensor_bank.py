@@ -46,7 +46,7 @@ def run(bank, seconds=1.0, tick=TICK, start=0):
 
 def values_of(bank, slot=0, **how):
     return np.array(
-        [r.values[list(r.slots).index(slot)] for _, r in run(bank, **how) if slot in r.slots]
+        [r.values[list(r.indices).index(slot)] for _, r in run(bank, **how) if slot in r.indices]
     )
 
 
@@ -93,7 +93,7 @@ def test_one_step_returns_all_cars_of_a_file_together_by_slot():
 def test_cars_of_two_truths_come_out_apart():
     bank = filled(QUIET)
     bank.fit(5, "far", NIGEL, placed(), 7, 0)
-    assert [(list(r.slots), r.values[0, 0]) for r in bank.step(0)] == [([0], 1.5), ([5], 8.5)]
+    assert [(list(r.indices), r.values[0, 0]) for r in bank.step(0)] == [([0], 1.5), ([5], 8.5)]
 
 
 def test_a_car_reads_the_same_alone_in_company_and_in_any_slot():
@@ -171,7 +171,7 @@ def test_readings_under_way_die_with_their_car_and_reach_no_successor():
     bank.unfit(0)
     bank.fit(0, "eve", NIGEL, placed(), 0, TICK)
     out = bank.step(2 * TICK)
-    assert [list(r.slots) for r in out] == [[1]]
+    assert [list(r.indices) for r in out] == [[1]]
 
 
 def test_a_car_whose_file_describes_no_device_gets_none():
