@@ -22,7 +22,7 @@ def second_of(bank: Bank, begin_ns: int) -> tuple[float, int]:
     """Return the processor time [s] of a second of ticks, and the readings that came out."""
     start, count = time.process_time(), 0
     for tick in range(TICKS):
-        count += sum(len(r.slots) for r in bank.step(begin_ns + tick * TICK_NS))
+        count += sum(len(r.indices) for r in bank.step(begin_ns + tick * TICK_NS))
     return time.process_time() - start, count
 
 
