@@ -21,8 +21,8 @@ import numpy as np
 
 from scm.geometry import Pose2
 from scm.vehicles.car import load_car
+from scm.vehicles.compiler.kernel_file import compile_kernel
 from scm.vehicles.fleet import Fleet
-from scm.vehicles.kernel_file import compile_kernel
 
 STEPS = 10  # substeps a call, as the world does: 10 ms of 1 ms
 REPEATS = 7

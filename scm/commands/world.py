@@ -30,7 +30,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.maps.radio import with_radio
     from scm.vehicles.car import car_names
-    from scm.vehicles.drivers.early import compile_later, is_first_start
+    from scm.vehicles.cold_start import compile_later, is_first_start
     from scm.world.part import WorldPart
     from scm.world.restore import read_kept
 
@@ -44,11 +44,11 @@ def _run(arguments: argparse.Namespace) -> int:
             kept=None if state is None else read_kept(state),
         )
         # Compiled when its first car comes, a car file would stop the city for 2.5 s.
-        others = [partial(part.world.garage.prepare, car) for car in car_names()]
+        others = {car: partial(part.world.garage.prepare, car) for car in car_names()}
         if is_first:
             compile_later(others)
         else:
-            for load in others:
+            for load in others.values():
                 load()
         return run_part(part, arguments, state)
 

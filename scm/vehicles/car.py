@@ -15,9 +15,9 @@ from typing import Any
 from scm import registry
 from scm.errors import CarError, TermError, nearest, reading
 from scm.vehicles import body14
-from scm.vehicles.assemble import setters_of
 from scm.vehicles.car_file_schema import FileKey, file_keys
 from scm.vehicles.car_files import OWN_CARS, TYPES_DIR, car_files
+from scm.vehicles.compiler.assemble import setters_of
 from scm.vehicles.correlated import Correlated, read_correlated
 from scm.vehicles.own_term import SUFFIX, load_own_term
 from scm.vehicles.param import Param

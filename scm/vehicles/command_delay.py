@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.jit import allocating_kernel, array_kernel
+from scm.vehicles.jit import array_kernel
 
 KNOTS = 64  # stored instants per car
 SPACING_S = 8e-3  # minimum between two of them: 0.5 s in all, the longest delay
@@ -55,7 +55,7 @@ class CommandHistory:
         )  # fmt: skip
 
 
-@allocating_kernel
+@array_kernel
 def _apply(
     block: Floats, numbers: Floats, all_knots: Floats, newest: Ints, before: Floats,
     block_rows: Ints, columns: Ints, first: int, last: int, span: float,

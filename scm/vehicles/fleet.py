@@ -17,6 +17,8 @@ from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY, STATUS_DIVERGED, STATUS_OK, STATUS_ROLLED, sprung_part
 from scm.vehicles.car import Car
 from scm.vehicles.command_delay import COMMANDS, DELAYS, CommandHistory
+from scm.vehicles.compiler.kernel_file import compile_kernel
+from scm.vehicles.compiler.vector_code import LANES
 from scm.vehicles.fleet_rows import (
     COG,
     COG_CHANGED,
@@ -31,8 +33,6 @@ from scm.vehicles.fleet_rows import (
     whole_steps,
 )  # fmt: skip
 from scm.vehicles.jit import plain
-from scm.vehicles.kernel_file import compile_kernel
-from scm.vehicles.lanes import LANES
 from scm.vehicles.layout import columns_of, find_column, slots_of
 from scm.vehicles.physics_variables import SIGNALS
 from scm.vehicles.shape import Shape, shape_of

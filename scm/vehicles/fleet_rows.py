@@ -9,7 +9,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import RunError
-from scm.vehicles.lanes import LANES
+from scm.vehicles.compiler.vector_code import LANES
 
 # arrays that others write, and that they read: by name, with the block's name where it differs
 WRITTEN = {

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from scm.errors import ScmError, TermError, nearest, reading
-from scm.vehicles.inline import law_problems
+from scm.vehicles.compiler.inline import law_problems
 from scm.vehicles.term import Term, flat
 
 SUFFIX = ".py"

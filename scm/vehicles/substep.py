@@ -1,6 +1,6 @@
 """The skeleton's substep as text, with room for the terms: what happens, stage by stage.
 
-`assemble.py` fills the gaps, `program.py` sorts out what is constant during a call, and `print_*`
+In `compiler/`, `assemble.py` fills the gaps, `program.py` moves what is constant out, and `print_*`
 write it as loops over lanes or over cars. BODY and SOLVE happen once a car, WHEEL and ROLL once a
 wheel; a name like `wheel_speed__0` means the front-left wheel's from outside a wheel's stage.
 """

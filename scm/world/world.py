@@ -22,9 +22,9 @@ from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
+from scm.vehicles.cold_start import compile_together
 from scm.vehicles.drivers.channel import RANGE
 from scm.vehicles.drivers.driver_batch import DriverBatch
-from scm.vehicles.drivers.early import compile_together
 from scm.vehicles.drivers.lane_graph import lane_graph_of
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.trips import Trips
@@ -344,13 +344,13 @@ class World:
         for name in (DEFAULT_CAR, *names):
             self.garage.car(name)  # read once, and not in each process
         compile_together(
-            [
-                self.drivers.warm_up_controller,
-                lambda: self._warm_scanner(scanner),
-                *(partial(self._warm_car, name) for name in names),
-                self.contacts.warm,
-                self.drivers.warm_up_rest,
-            ]
+            {
+                "drivers": self.drivers.warm_up_controller,
+                "LIDAR": lambda: self._warm_scanner(scanner),
+                **{name: partial(self._warm_car, name) for name in names},
+                "contacts": self.contacts.warm,
+                "reception": self.drivers.warm_up_rest,
+            }
         )
 
     def _warm_car(self, name: str) -> None:

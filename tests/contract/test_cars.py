@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scm.geometry import Pose2
-from scm.vehicles.assemble import write_page
 from scm.vehicles.car import STANDARD_TERMS, TYPES_DIR, car_names, load_car
+from scm.vehicles.compiler.assemble import write_page
 from scm.vehicles.describe import describe_car
 from scm.vehicles.fleet import Fleet
 

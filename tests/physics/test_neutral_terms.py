@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from scm.geometry import Pose2
-from scm.vehicles.assemble import write_page
 from scm.vehicles.car import Quantity, all_terms, load_car
+from scm.vehicles.compiler.assemble import write_page
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.term import flat
 

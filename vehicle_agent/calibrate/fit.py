@@ -22,8 +22,8 @@ from scm.arrays import Floats
 from scm.errors import RecordingError
 from scm.geometry import Pose2
 from scm.vehicles.car import Car
+from scm.vehicles.compiler.vector_code import LANES
 from scm.vehicles.fleet import Fleet
-from scm.vehicles.lanes import LANES
 
 TERMS = ("steer_trim", "steer_gain", "drive_deadband", "drive_gain")
 STEP_S = 0.001  # coarser steps shift the delay of a servo at its rate limit

@@ -9,7 +9,7 @@ from scm.arrays import Floats, Ints
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, Values
 from scm.mismatch.discovery.general_effect import SLOW, WEIGHTS
 from scm.mismatch.discovery.impulse_response import Cells
-from scm.vehicles.jit import allocating_kernel
+from scm.vehicles.jit import array_kernel
 
 
 def pushes(law: DictionaryEffect, cells: Cells, values: Values) -> Floats:
@@ -37,7 +37,7 @@ def variable(name: str, curve: Mapping[str, float], cells: Cells) -> Floats:
     return remembered(cells.driven["throttle"], cells.drive, share)
 
 
-@allocating_kernel
+@array_kernel
 def remembered(values: Floats, drive: Ints, share: float) -> Floats:
     """Return what is remembered of values, of which each takes a share; a drive begins with 0."""
     found = np.zeros(len(values))

@@ -23,10 +23,10 @@ from scm.replay.numbers import (
     Numbers,
 )
 from scm.vehicles.car import Car
+from scm.vehicles.compiler.vector_code import LANES, WIDTH
 from scm.vehicles.fleet import SUBSTEP_S, Fleet, VehicleStatus
 from scm.vehicles.fleet_rows import COG, WHEELS, pool, whole_steps
 from scm.vehicles.jit import array_kernel
-from scm.vehicles.lanes import LANES, WIDTH
 from scm.vehicles.term import reads
 
 ROWS, THREADS = LANES, 2

@@ -15,7 +15,7 @@ import pytest
 from starlette.responses import Response
 
 from scm.api import app as application
-from scm.api.acknowledgements import KEPT, Acknowledgements
+from scm.api.acknowledgements import MAX_ACKNOWLEDGEMENTS, Acknowledgements
 from scm.api.app import create_app
 from scm.api.audit_trail import Audited
 from scm.api.event_log import EventLog, id_of
@@ -155,10 +155,10 @@ class TestAcknowledging:
 
     def test_the_oldest_are_forgotten(self, store):
         seen = Acknowledgements(store, StepClock(7))
-        ids = [f"{number:016x}" for number in range(KEPT + 3)]
+        ids = [f"{number:016x}" for number in range(MAX_ACKNOWLEDGEMENTS + 3)]
         seen.add(ids, "ada")
         assert list(seen.rows()) == ids[3:]
-        assert len(list(store.items("seen"))) == KEPT
+        assert len(list(store.items("seen"))) == MAX_ACKNOWLEDGEMENTS
 
     def test_who_looks_does_not_wait_for_a_slow_store(self, store, monkeypatch):
         seen = Acknowledgements(store, StepClock(7))

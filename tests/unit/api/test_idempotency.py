@@ -8,7 +8,7 @@ from starlette.responses import JSONResponse, StreamingResponse
 from starlette.routing import Route
 
 from scm.api import idempotency
-from scm.api.idempotency import KEPT_NS, Idempotent
+from scm.api.idempotency import STORED_NS, Idempotent
 from scm.clock import StepClock
 
 KEY = {"Idempotency-Key": "k1"}
@@ -164,10 +164,10 @@ def test_answers_are_forgotten_after_an_hour_or_when_there_are_too_many(
     client, clock, done, monkeypatch
 ):
     client("POST", "/x", content=b"a", headers=KEY)
-    clock.set_ns(clock.now_ns() + KEPT_NS + 1)
+    clock.set_ns(clock.now_ns() + STORED_NS + 1)
     client("POST", "/x", content=b"a", headers=KEY)
     assert len(done) == 2
-    monkeypatch.setattr(idempotency, "KEPT", 1)
+    monkeypatch.setattr(idempotency, "MAX_ANSWERS", 1)
     for key in ("k2", "k3", "k4"):
         client("POST", "/x", content=b"a", headers={"Idempotency-Key": key})
     client("POST", "/x", content=b"a", headers=KEY)

@@ -69,7 +69,7 @@ def test_a_lent_key_is_good_while_its_lender_s_is_and_until_it_is_taken_back(rin
     found = find(ring, lent)
     assert (found.owner, found.role) == ("anna: watch_city", "engineer")
     assert find(ring, lent[:-1] + ("a" if lent[-1] != "a" else "b")) is None
-    ring.take_back(lent)
+    ring.end_lent(lent)
     assert find(ring, lent) is None
     assert find(ring, key) is not None
     again = ring.lend(ring.lend(key, "outer"), "inner")

@@ -107,7 +107,7 @@ def test_a_lent_key_ends_at_once_with_its_lender_s(keys, ring, anna, end):
     outer = ring.lend(anna, "outer")
     inner = ring.lend(outer, "inner")
     assert find(keys, inner).owner == "anna: outer: inner"
-    ring.take_back(outer) if end == "lent" else ring.revoke(public_part(anna))
+    ring.end_lent(outer) if end == "lent" else ring.revoke(public_part(anna))
     assert find(keys, inner) is None
     assert find_for_stop(keys, inner).record is None
 

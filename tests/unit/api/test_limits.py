@@ -23,21 +23,21 @@ def client(clock, client_of):
 
 def test_a_bucket_gives_what_it_holds_then_what_time_brings_back(clock):
     buckets = Buckets(POLICY, clock)
-    assert [buckets.take("a") for _ in range(3)] == [(2.0, 0.0), (1.0, 0.0), (0.0, 0.0)]
-    assert buckets.take("a") == (0.0, 2.0)
+    assert [buckets.acquire("a") for _ in range(3)] == [(2.0, 0.0), (1.0, 0.0), (0.0, 0.0)]
+    assert buckets.acquire("a") == (0.0, 2.0)
     clock.set_ns(clock.now_ns() + NS_PER_S)
-    assert buckets.take("a") == (0.5, 1.0)
+    assert buckets.acquire("a") == (0.5, 1.0)
     clock.set_ns(clock.now_ns() + NS_PER_S)
-    assert buckets.take("a") == (0.0, 0.0)
+    assert buckets.acquire("a") == (0.0, 0.0)
     clock.set_ns(clock.now_ns() + 3600 * NS_PER_S)
-    assert buckets.take("a") == (2.0, 0.0)  # never more than it holds
+    assert buckets.acquire("a") == (2.0, 0.0)  # never more than it holds
 
 
 def test_callers_have_buckets_of_their_own_and_the_oldest_is_forgotten(clock, monkeypatch):
-    monkeypatch.setattr(limits, "CALLERS_KEPT", 2)
+    monkeypatch.setattr(limits, "MAX_CALLERS", 2)
     buckets = Buckets(POLICY, clock)
     for caller in ("a", "a", "b", "c", "a"):
-        left, _ = buckets.take(caller)
+        left, _ = buckets.acquire(caller)
     assert left == 2.0
 
 

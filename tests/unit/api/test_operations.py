@@ -177,7 +177,7 @@ def test_too_many_that_wait_are_refused(work, held):
 
 
 def test_what_is_long_over_is_forgotten_and_what_runs_is_not(work, held, monkeypatch):
-    monkeypatch.setattr(operations, "KEPT", 3)
+    monkeypatch.setattr(operations, "MAX_OPERATIONS", 3)
     running = work.start("search", "long", held)
     for _ in range(5):
         finish(work.start("export", "a", lambda _tell: ""))

@@ -26,7 +26,7 @@ class ProgressReporter:
             if colour != self._colour:
                 self._colour, self._since_s = colour, self.t_s
             if step >= lost:
-                self.history.take(self._spat(least_s, most_s, likely_s, mode, plan))
+                self.history.receive(self._spat(least_s, most_s, likely_s, mode, plan))
             self.t_s = round(self.t_s + 0.1, 3)
 
     def _spat(self, least_s, most_s, likely_s, mode, plan):
@@ -157,7 +157,7 @@ def test_the_monitors_words_are_kept_when_they_change():
     said = ((None, ""), (None, ""), ("stale", "0.6 s"), ("stale", "0.6 s"), ("stale", "2 s"))
     for t_ns, (fault, detail) in enumerate((*said, (None, ""))):
         status = MonitorStatus(junction="x", t_ns=t_ns, fault=fault, since_ns=0, detail=detail)
-        history.take_monitor(status)
+        history.receive_monitor(status)
     assert [(one.t_ns, one.fault, one.detail) for one in history.verdicts("x")] == [
         (5, None, ""),
         (4, "stale", "2 s"),

@@ -241,7 +241,7 @@ def test_a_listener_behind_takes_no_more_until_it_was_told():
         for _ in range(QUEUE_DEPTH + 1):
             listener.offer(b"x", 0)
         listener.offer(b"y", 0)
-        assert await listener.take() is None
+        assert await listener.next_frame() is None
         assert listener.behind
 
     asyncio.run(scenario())

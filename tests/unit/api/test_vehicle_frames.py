@@ -172,7 +172,7 @@ def test_a_city_that_is_still_silent_keeps_its_viewers_waiting(frames, hear, sna
     async def scenario():
         first = asyncio.create_task(anext(frames.listen()))
         await asyncio.sleep(0)
-        frames._tell()
+        frames._notify()
         await asyncio.sleep(0)
         assert not first.done()
         hear(1.0, snapshot(1.0, n1=(0, 0, 0)))

@@ -27,49 +27,49 @@ def test_before_the_first_packet_the_car_stands(wheel):
 
 
 def test_a_held_key_drives_under_the_lease(wheel):
-    assert wheel.hear(packet(), T0)
+    assert wheel.receive(packet(), T0)
     command = wheel.command(T0)
     assert (command.vehicle, command.epoch) == ("n1", 7)
     assert (command.throttle, command.steering) == (0.5, 0.25)
 
 
 def test_letting_go_stops_at_once_and_holds_the_steering(wheel):
-    wheel.hear(packet(seq=1), T0)
-    wheel.hear(packet(seq=2, held=False), T0)
+    wheel.receive(packet(seq=1), T0)
+    wheel.receive(packet(seq=2, held=False), T0)
     command = wheel.command(T0)
     assert (command.throttle, command.steering) == (0.0, 0.25)
     assert wheel.why(T0) == "released"
 
 
 def test_silence_of_250_ms_stops_though_the_key_was_held(wheel):
-    wheel.hear(packet(), T0)
+    wheel.receive(packet(), T0)
     assert wheel.command(T0 + SILENT_NS - 1).throttle == 0.5
     assert wheel.command(T0 + SILENT_NS).throttle == 0.0
     assert wheel.why(T0 + SILENT_NS) == "silent"
 
 
 def test_after_five_silent_seconds_nobody_is_there(wheel):
-    wheel.hear(packet(), T0)
+    wheel.receive(packet(), T0)
     assert not wheel.is_abandoned(T0 + GONE_NS - 1)
     assert wheel.is_abandoned(T0 + GONE_NS)
 
 
 @pytest.mark.parametrize("seq", [4, 5])
 def test_an_old_or_repeated_packet_neither_drives_nor_keeps_the_hand_on(wheel, seq):
-    wheel.hear(packet(seq=5, throttle=0.1), T0)
-    assert not wheel.hear(packet(seq=seq, throttle=0.9), T0 + SILENT_NS)
+    wheel.receive(packet(seq=5, throttle=0.1), T0)
+    assert not wheel.receive(packet(seq=seq, throttle=0.9), T0 + SILENT_NS)
     assert wheel.why(T0 + SILENT_NS) == "silent"
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf])
 def test_what_is_no_number_is_refused(wheel, wrong):
-    assert not wheel.hear(packet(throttle=wrong), T0)
-    assert not wheel.hear(packet(steering=wrong), T0)
+    assert not wheel.receive(packet(throttle=wrong), T0)
+    assert not wheel.receive(packet(steering=wrong), T0)
     assert wheel.newest is None
 
 
 def test_no_packet_asks_for_more_than_all(wheel):
-    wheel.hear(packet(throttle=-9.0, steering=9.0), T0)
+    wheel.receive(packet(throttle=-9.0, steering=9.0), T0)
     command = wheel.command(T0)
     assert (command.throttle, command.steering) == (-1.0, 1.0)
 

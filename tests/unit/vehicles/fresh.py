@@ -10,7 +10,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 FRESH = get_context("forkserver")
-FRESH.set_forkserver_preload(["scm.vehicles.fleet", "scm.vehicles.kernel_file"])
+FRESH.set_forkserver_preload(["scm.vehicles.fleet", "scm.vehicles.compiler.kernel_file"])
 LONGEST_S = 120.0
 
 
@@ -47,7 +47,7 @@ def small_kernel(folder, calm_after=None):
     That file is given the text `calm_after` once it is loaded.
     """
     from scm.vehicles.car import all_terms
-    from scm.vehicles.kernel_file import compile_kernel
+    from scm.vehicles.compiler.kernel_file import compile_kernel
     from scm.vehicles.physics_variables import Per
     from scm.vehicles.term import Term
 

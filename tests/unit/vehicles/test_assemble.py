@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from scm.errors import RunError, TermError
-from scm.vehicles.assemble import setters_of, write_page
 from scm.vehicles.car import STANDARD_TERMS, all_terms, load_car
+from scm.vehicles.compiler.assemble import setters_of, write_page
+from scm.vehicles.compiler.kernel_file import compile_kernel
 from scm.vehicles.fleet import Fleet
-from scm.vehicles.kernel_file import compile_kernel
 from scm.vehicles.param import Param
 from scm.vehicles.physics_variables import SIGNALS, Per, Role
 from scm.vehicles.term import Term

@@ -3,10 +3,10 @@
 import ast
 from collections import Counter
 
-from scm.vehicles.assemble import write_page
-from scm.vehicles.axles import AXLES, Known
 from scm.vehicles.car import load_car
-from scm.vehicles.inline import Line
+from scm.vehicles.compiler.assemble import write_page
+from scm.vehicles.compiler.axles import AXLES, Known
+from scm.vehicles.compiler.inline import Line
 
 LINES = (
     "slope = front * long * road / (long - road)",

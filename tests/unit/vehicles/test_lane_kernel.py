@@ -6,8 +6,8 @@ import pytest
 from scm.errors import RunError, TermError
 from scm.geometry import Pose2
 from scm.vehicles.car import load_car
+from scm.vehicles.compiler.kernel_file import compile_kernel
 from scm.vehicles.fleet import Fleet, VehicleStatus
-from scm.vehicles.kernel_file import compile_kernel
 
 
 def driving(cars, capacity=None, threads=1):

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from textwrap import indent
 
 from scm.vehicles import body14
+from scm.vehicles.compiler.print_tiles import Slots, loads_of, motion_slots, print_line, range_text
+from scm.vehicles.compiler.program import Program, Stage
 from scm.vehicles.physics_variables import Per
-from scm.vehicles.print_tiles import Slots, loads_of, motion_slots, print_line, range_text
-from scm.vehicles.program import Program, Stage
 
 _PAGE = '''"""{title}
 
@@ -20,13 +20,15 @@ import math
 
 import numpy as np
 
-from scm.vehicles.jit import fleet_kernel
+from scm.vehicles.jit import typed_kernel
 
 # rows of each wheel in `wheel`
 {wheel_rows}
 
 
-@fleet_kernel
+@typed_kernel(
+    "(float64[:,::1], float64[:,::1], boolean[::1], int64[::1], int64, int64, int64, float64)"
+)
 def advance(block, numbers, alive, status, first, last, steps, dt):
     """Advance rows first..last-1 by `steps` substeps; a car that diverges is put back, marked."""
     wheel = np.empty((4, {wheel_count}))

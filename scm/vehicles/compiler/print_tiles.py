@@ -12,10 +12,10 @@ from textwrap import indent
 
 from scm.vehicles import body14
 from scm.vehicles.command_delay import COMMANDS
-from scm.vehicles.inline import Line, copied
-from scm.vehicles.lanes import LANES, WIDTH
+from scm.vehicles.compiler.inline import Line, copied
+from scm.vehicles.compiler.program import Program, Stage, names_in
+from scm.vehicles.compiler.vector_code import LANES, WIDTH
 from scm.vehicles.physics_variables import Per
-from scm.vehicles.program import Program, Stage, names_in
 
 Slots = Mapping[str, tuple[int, int]]
 
@@ -23,12 +23,14 @@ _HEAD = '''"""{title}
 
 Generated from the car's list of terms: {lanes} cars at a time, one in each lane. `car` and `wheel`
 hold a tile of cars while it is worked on; a name in capitals is the row that a quantity waits in.
-A stage works on whole rows, so `a * b` is the product for each car; see `scm/vehicles/lanes.py`.
+A stage works on whole rows, so `a * b` is the product for each car; see
+`scm/vehicles/compiler/vector_code.py`.
 """
 
 import numpy as np
 
-from scm.vehicles.jit import fetch, put, put_lane, rollout_kernel, stage
+from scm.vehicles.compiler.vector_code import fetch, put, put_lane, stage
+from scm.vehicles.jit import typed_kernel
 
 # rows of `car`: those of the fleet's block, then the car's numbers, then what is worked out
 {vehicle_rows}
@@ -41,7 +43,10 @@ WHEEL_ROWS = {wheel_count}
 {stages}
 
 
-@rollout_kernel
+@typed_kernel(
+    "(float64[:,::1], float64[:,::1], boolean[::1], int64[::1], int64, int64, int64, float64, "
+    "float64[:,::1], float64[:,::1], int64[::1], float64[:,:,::1])"
+)
 def rollout(
     block, numbers, alive, status, first, last, steps, dt, throttle, steering, slots, out
 ):
@@ -63,6 +68,14 @@ def rollout(
     for w in range(4):
         wheel[w, FRONT] = 1.0 if w < 2 else 0.0
         wheel[w, SIDE] = 1.0 if w % 2 == 0 else -1.0
+    car_at, wheel_at, block_at, out_at = (
+        car.ctypes.data, wheel.ctypes.data, block.ctypes.data, out.ctypes.data
+    )
+    numbers_at, throttle_at, steering_at = (
+        numbers.ctypes.data, throttle.ctypes.data, steering.ctypes.data
+    )
+    width, number_width, out_width = block.shape[1], numbers.shape[1], out.shape[2]
+    throttle_width, steering_width = throttle.shape[1], steering.shape[1]
     going = np.empty({lanes}, np.bool_)
     for start in range(first // {lanes} * {lanes}, last, {lanes}):
         cars = vectors = 0
@@ -75,17 +88,20 @@ def rollout(
         halt = parts
         fresh = True
         while t < parts:
-            fetch(car, THROTTLE_COMMAND, throttle, t, start * own_throttle, 1, 1)
-            fetch(car, STEERING_COMMAND, steering, t, start * own_steering, 1, 1)
+            own, there = THROTTLE_COMMAND, start * own_throttle
+            fetch(car_at, own, throttle_at, throttle_width, t, there, 1, 1)
+            own, there = STEERING_COMMAND, start * own_steering
+            fetch(car_at, own, steering_at, steering_width, t, there, 1, 1)
             if out.shape[0] > 0:
-                put(car, 0, block, 0, start, {commands}, 1)
+                put(car_at, 0, block_at, width, 0, start, {commands}, 1)
             if cars > 0:
                 if fresh:
-                    fetch(car, {commands}, block, {commands}, start, {body_loads} - {commands}, 1)
-                    fetch(car, {first_wheel}, numbers, 0, start, {columns}, 1)
+                    own, there = {commands}, {commands}
+                    fetch(car_at, own, block_at, width, there, start, {body_loads} - {commands}, 1)
+                    fetch(car_at, {first_wheel}, numbers_at, number_width, 0, start, {columns}, 1)
                     for w in range(4):
-                        own = w * WHEEL_ROWS
-                        fetch(wheel, own, block, {first_wheel} + w, start, {wheel_loads}, 4)
+                        own, there = w * WHEEL_ROWS, {first_wheel} + w
+                        fetch(wheel_at, own, block_at, width, there, start, {wheel_loads}, 4)
                     <once>
                 <commanded>
                 for _ in range(steps):
@@ -109,23 +125,30 @@ def rollout(
                             going[i] = False
                             cars -= 1
                     if cars == {lanes}:
-                        put(car, {body_inputs}, block, {body_inputs}, start, {body_kept}, 1)
+                        own, there = {body_inputs}, {body_inputs}
+                        put(car_at, own, block_at, width, there, start, {body_kept}, 1)
                         for w in range(4):
                             own, there = w * WHEEL_ROWS + {wheel_inputs}, {wheel_kept} + w
-                            put(wheel, own, block, there, start, {wheel_keeps}, 4)
+                            put(wheel_at, own, block_at, width, there, start, {wheel_keeps}, 4)
                     else:
                         for i in range({lanes}):
                             if going[i]:
                                 own, there = {body_inputs}, {body_inputs}
-                                put_lane(car, own, block, there, start, {body_kept}, 1, i)
+                                put_lane(
+                                    car_at, own, block_at, width, there, start, {body_kept}, 1, i
+                                )
                                 for w in range(4):
                                     own, there = w * WHEEL_ROWS + {wheel_inputs}, {wheel_kept} + w
-                                    put_lane(wheel, own, block, there, start, {wheel_keeps}, 4, i)
+                                    put_lane(
+                                        wheel_at, own, block_at, width, there, start,
+                                        {wheel_keeps}, 4, i
+                                    )
             t += 1
             if t % every == 0:
                 for k in range(slots.shape[0]):
-                    fetch(car, VERDICT, block, slots[k], start, 1, 1)
-                    put(car, VERDICT, out, (t // every - 1) * slots.shape[0] + k, start, 1, 1)
+                    row = (t // every - 1) * slots.shape[0] + k
+                    fetch(car_at, VERDICT, block_at, width, slots[k], start, 1, 1)
+                    put(car_at, VERDICT, out_at, out_width, row, start, 1, 1)
 
 
 def advance(block, numbers, alive, status, first, last, steps, dt):
@@ -211,9 +234,9 @@ class _Rows:
     def call(self, stage: Stage) -> str:
         """Return the call of one stage, for each wheel where it is a wheel's."""
         if stage.per is Per.BODY:
-            return f"{_function_name(stage)}(car, wheel, 0, dt, vectors)"
+            return f"{_function_name(stage)}(car_at, wheel_at, 0, dt, vectors)"
         wheels = range_text(stage.wheels)
-        return f"for w in {wheels}:\n    {_function_name(stage)}(car, wheel, w, dt, vectors)"
+        return f"for w in {wheels}:\n    {_function_name(stage)}(car_at, wheel_at, w, dt, vectors)"
 
     def _place(self, name: str) -> str:
         if name[-3:-1] == "__":

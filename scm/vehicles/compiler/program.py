@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import cast
 
-from scm.vehicles.axles import AXLES, Known, fold_body
-from scm.vehicles.inline import Line
+from scm.vehicles.compiler.axles import AXLES, Known, fold_body
+from scm.vehicles.compiler.inline import Line
 from scm.vehicles.physics_variables import Per
 
 

@@ -17,12 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from scm.errors import RunError, TermError
-from scm.vehicles import jit, lanes
-from scm.vehicles.assemble import write_page
+from scm.vehicles import jit
+from scm.vehicles.compiler import vector_code
+from scm.vehicles.compiler.assemble import write_page
 from scm.vehicles.term import Term
 
 # what turns a kernel's text into code, as this process has loaded it
-_MACHINE = "".join(inspect.getsource(module) for module in (jit, lanes))
+_MACHINE = "".join(inspect.getsource(module) for module in (jit, vector_code))
 
 
 # Writing a page takes longer than most drives; the terms are kept so that their ids stay theirs.

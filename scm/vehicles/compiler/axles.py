@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from scm.vehicles.inline import Line, copied
+from scm.vehicles.compiler.inline import Line, copied
 
 
 class Axle(NamedTuple):

@@ -11,12 +11,12 @@ from graphlib import CycleError, TopologicalSorter
 from scm.errors import TermError, nearest
 from scm.vehicles import body14, lane_math, substep
 from scm.vehicles.command_delay import COMMANDS
-from scm.vehicles.inline import Functions, Inliner, Line
+from scm.vehicles.compiler.inline import Functions, Inliner, Line
+from scm.vehicles.compiler.print_plain import print_plain
+from scm.vehicles.compiler.print_tiles import print_tiles
+from scm.vehicles.compiler.program import Program, Stage
 from scm.vehicles.layout import columns_of, slots_of, states_of
 from scm.vehicles.physics_variables import DAMPED_BY, SIGNALS, Per, Role
-from scm.vehicles.print_plain import print_plain
-from scm.vehicles.print_tiles import print_tiles
-from scm.vehicles.program import Program, Stage
 from scm.vehicles.term import Law, Term, reads
 
 # the skeleton's own steps between the terms: what each gives, needs and says
