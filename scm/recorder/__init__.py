@@ -1,5 +1,5 @@
-"""Everything on the bus into one MCAP file that survives a kill, and the way back.
+"""Records all messages of the bus in an MCAP file that survives a kill, and reads such files.
 
-`part.py` listens and writes, `mcap_file.py` is the file, `recover.py` mends one that was cut off,
-`drives.py` makes recordings of its cars of it.
+`part.py` records, `mcap_file.py` writes and reads files, `recover.py` repairs a truncated file,
+`drives.py` reads the recordings of a run's cars, `play.py` drives a written drive and records it.
 """

@@ -1,4 +1,4 @@
-"""A described recording as AutoDRIVE's recorder would have seen it."""
+"""Converts a described recording to the columns of AutoDRIVE's recorder."""
 
 import re
 from collections.abc import Sequence
@@ -27,9 +27,9 @@ SAME = {
 
 
 def car_track(recording: Recording, car: Car | None = None) -> CarTrack:
-    """Return a recording's car by the recorder's columns, its pose at the rear axle.
+    """Return a recording's car in the recorder's columns, its pose at the rear axle.
 
-    A steering command is written as an angle, as far as the car's file says what it means.
+    A steering command is written as an angle if the car file has its limit.
 
     Raises:
         RecordingError: when it has no poses.
@@ -61,7 +61,7 @@ def car_track(recording: Recording, car: Car | None = None) -> CarTrack:
 
 
 def light_tracks(recordings: Sequence[Recording]) -> list[LightTrack]:
-    """Return the lights of recordings; `light.TL3` is number 3, others follow in their order."""
+    """Return the lights of recordings; `light.TL3` is number 3; the others follow in order."""
     found = {
         name.removeprefix(LIGHT): _series(recording, name)
         for recording in recordings

@@ -1,8 +1,8 @@
-"""A run of the city as AutoDRIVE's recorder would have seen it.
+"""Converts a run of the city to the columns of AutoDRIVE's recorder.
 
-Commands are those that led to a car's next report, steering as an angle; what the guard held back
-is not in them. A simulated car is where its own reports say, a real one where the overhead cameras
-do; what an IMU feels is without gravity, as AutoDRIVE's is.
+Commands are those in force before a car's next report, after its guard, with steering as an angle.
+Poses are the reported ones of a simulated car and those of the overhead cameras of a real one.
+Accelerations are without gravity, as AutoDRIVE's.
 """
 
 import math
@@ -57,7 +57,7 @@ _KINDS: tuple[tuple[re.Pattern[str], type[Message]], ...] = tuple(
 
 @dataclass(slots=True)
 class _CarMessages:
-    """What a run tells of one car; `placed` is what the world's snapshots tell."""
+    """The messages of a run about one car; `placed`: from the world's snapshots."""
 
     states: list[VehicleState] = field(default_factory=list)
     placed: list[VehicleState] = field(default_factory=list)
@@ -68,10 +68,10 @@ class _CarMessages:
 
 
 class Run(NamedTuple):
-    """A run, by the recorder's columns; times since `start_ms` [milliseconds since 1970].
+    """A run in the recorder's columns; times since `start_ms` [milliseconds since 1970].
 
     Attributes:
-        remarks: What of the run could not be taken over as it is, in lines.
+        remarks: What could not be converted exactly, one line each.
     """
 
     start_ms: int
@@ -88,7 +88,7 @@ def read_tracks(path: Path, vehicle: str | None = None) -> Run:
         vehicle: One of its cars; None: all.
 
     Raises:
-        RecordingError: when the file is no complete run, or no car reports where it is.
+        RecordingError: when the file is not a complete run, or no car reports its pose.
     """
     cars: dict[str, _CarMessages] = {}
     spats: dict[str, list[Spat]] = {}
@@ -122,7 +122,7 @@ def read_tracks(path: Path, vehicle: str | None = None) -> Run:
 
 
 def pictures_of(path: Path, vehicle: str, camera: int) -> Iterator[bytes]:
-    """Yield the JPEG files of a car's camera, 0 front and 1 rear, in the order of their times."""
+    """Yield the JPEG files of a car's camera, 0 front and 1 rear, in order of time."""
     frames = [
         (message.t_ns, message.payload)
         for message in _messages(path)
@@ -134,7 +134,7 @@ def pictures_of(path: Path, vehicle: str, camera: int) -> Iterator[bytes]:
 
 
 def _messages(path: Path) -> Iterator[Message]:
-    """Yield the relevant messages of a run; unreadable ones are foreign and skipped."""
+    """Yield the relevant messages of a run; unreadable ones are skipped."""
     kinds = {key: kind for key in read_keys(path) for form, kind in _KINDS if form.fullmatch(key)}
     for recorded in read_run(path, set(kinds)):
         message = _decoded(recorded, kinds[recorded.key])
@@ -151,7 +151,7 @@ def _decoded(recorded: Recorded, kind: type[Message]) -> Message | None:
 
 
 def _states_of(snapshot: WorldSnapshot) -> Iterator[VehicleState]:
-    """Yield the cars of a snapshot as reports: they stand in where a sparse run has none."""
+    """Yield the cars of a snapshot as reports, for sparse runs, which have none."""
     for car in snapshot.vehicles:
         yield VehicleState(
             vehicle=car.vehicle,
@@ -170,7 +170,7 @@ def _states_of(snapshot: WorldSnapshot) -> Iterator[VehicleState]:
 
 
 def _add(cars: dict[str, _CarMessages], message: Any) -> None:
-    """Note a message about one car."""
+    """Add a message about one car."""
     car = cars.setdefault(message.vehicle, _CarMessages())
     match message:
         case VehicleState():
@@ -186,12 +186,12 @@ def _add(cars: dict[str, _CarMessages], message: Any) -> None:
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
-    """Return what sorts n2 before n10."""
+    """Return a sort key that puts n2 before n10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
 
 
 class _Car:
-    """One car's part of a run on its way to the recorder's columns."""
+    """Builds the recorder's columns of one car."""
 
     def __init__(
         self, name: str, car: _CarMessages, start_ns: int, is_level: bool, notes: list[str]
@@ -203,7 +203,7 @@ class _Car:
         self._car = _car_of(car.states[-1].car, name, notes)
 
     def track(self) -> CarTrack:
-        """Return the car by the recorder's columns."""
+        """Return the car in the recorder's columns."""
         columns = self._poses() | self._commands() | self._sensed()
         scans = [(one.t_ns, ranges_of(one)) for one in self._messages.scans]
         return CarTrack(
@@ -222,7 +222,7 @@ class _Car:
         return (np.array(t_ns, np.int64) - self._start_ns) / NS_PER_S
 
     def _series(self, rows: Sequence[tuple[int, float]]) -> Series:
-        """Return rows of a time [ns] and a value, without those that do not go forward."""
+        """Return rows of a time [ns] and a value whose times increase."""
         t, values = self._times([t for t, _ in rows]), np.array([v for _, v in rows], np.float64)
         keep = np.concatenate((np.full(min(len(t), 1), fill_value=True), np.diff(t) > 0.0))
         return Series(t[keep], values[keep])
@@ -243,13 +243,13 @@ class _Car:
         }
 
     def _height(self) -> dict[str, Series]:
-        """Return how high the rear axle is, where the ground is level."""
+        """Return the height of the rear axle on level ground."""
         if not self._is_level or self._car is None or not self._car.has(RADIUS):
             return {}
         return {"posZ": Series(np.zeros(1), np.array([self._car.value(RADIUS)]))}
 
     def _commands(self) -> dict[str, Series]:
-        """Return what the car was told, each from the report before on."""
+        """Return the commands in force, each from the previous report on."""
         states = self._messages.states
         since = [states[0].t_ns, *(one.t_ns for one in states[:-1])]
         limit = self._car.value(LIMIT) if self._car and self._car.has(LIMIT) else None
@@ -265,12 +265,12 @@ class _Car:
         }
 
     def _held(self, since: Sequence[int], values: Sequence[float]) -> Series:
-        """Return commands, of those that begin at one time the last."""
+        """Return commands; of several at one time the last."""
         newest = dict(zip(since, values, strict=True))
         return self._series(list(newest.items()))
 
     def _sensed(self) -> dict[str, Series]:
-        """Return encoders, roll, pitch, rates and acceleration without gravity."""
+        """Return encoders, roll, pitch, rates, and acceleration without gravity."""
         read = self._messages.sensors
         columns = {
             "leftTicks": self._series([(one.t_ns, one.encoder_left) for one in read]),
@@ -297,7 +297,7 @@ def _car_of(car: str, name: str, notes: list[str]) -> Car | None:
 
 
 def _state(colour: str, t_ns: int) -> int:
-    """Return a colour as the recorder numbers it; flashing red is on and off by turns."""
+    """Return the recorder's number of a colour; flashing red alternates with off."""
     if colour == "flashing_red":
         return RED if t_ns // FLASH_NS % 2 == 0 else OFF
     return STATES[colour]
@@ -306,7 +306,7 @@ def _state(colour: str, t_ns: int) -> int:
 def _light_tracks(
     spats: dict[str, list[Spat]], lights: Sequence[Light], start_ns: int
 ) -> list[LightTrack]:
-    """Return what each light of the map showed."""
+    """Return the colours over time of each light of the map."""
     tracks = []
     for light in sorted(lights, key=lambda one: one.light_id):
         shown = [

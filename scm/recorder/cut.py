@@ -1,4 +1,4 @@
-"""Cut a part out of a run: a file as a recorder would have written that came and left meanwhile."""
+"""Cuts a part out of a run: the file of a recorder that ran for that time only."""
 
 from collections import defaultdict, deque
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from scm.v2x.message import Delivery
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """What was cut out.
+    """The result of a cut.
 
     Attributes:
         messages: How many were copied.
         span_s: From the first to the last of them [s].
-        damage: What of the run could not be read, a sentence each.
+        damage: What could not be read, one sentence each.
     """
 
     path: Path
@@ -29,20 +29,19 @@ class Cut:
 
 
 def cut(run: Path, part: Path, from_s: float = 0.0, to_s: float | None = None) -> Cut:
-    """Copy the messages of a run from a time to another into a file of its own.
+    """Copy the messages of a run between two times to a new file.
 
-    Of what was said before and still holds, the map for one, the file begins with the last
-    messages, as every station gets them that joins late (`Message.KEEP`).
+    The file begins with earlier messages that are still valid, such as the map, as they reach every
+    station that joins late (`Message.KEEP`).
 
     Args:
-        run: The recording; it is not changed, and may be cut off or still growing.
+        run: The recording; it is not changed, and may be truncated or still growing.
         part: The new file.
         from_s: Since the run began [s].
         to_s: Likewise; None: to its end.
 
     Raises:
-        RecordingError: when nothing was recorded then, the run cannot be read, or `part` is there
-            already.
+        RecordingError: when nothing was recorded then, the run cannot be read, or `part` exists.
     """
     index = read_index(run)
     length_s = (index.end_ns - index.begin_ns) / NS_PER_S
@@ -63,7 +62,7 @@ def cut(run: Path, part: Path, from_s: float = 0.0, to_s: float | None = None) -
 
 
 def _still_true(index: RunIndex, begin_ns: int, damage: list[str]) -> list[Recorded]:
-    """Return the last events of each key before a time, in their order."""
+    """Return the last events of each key before a time, in order."""
     schemas = SchemaTable(index.city)
     most = {
         key: kind.KEEP

@@ -1,12 +1,12 @@
-"""What a run tells of one car, as a recording: its commands, where it was, what it sensed.
+"""Turns the messages of a run about one car into a recording: commands, poses, measurements.
 
-Commands are those that the car itself reports: they passed its guard, and are dated by the motion
-that they led to, whoever drove it: its own driver, a person, a script. Where reports do not tell
-the steering, as those of other programs and of older runs, they are what was sent over the bus, as
-far as the guard lets it through.
+Commands are those that the car reports, whoever sent them: its own driver, a person, a script. They
+have passed its guard and have the time of the motion that they caused. Where reports lack the
+steering, as in older runs and from other programs, the commands sent over the bus are used, as far
+as the guard would have let them through.
 
-Poses count while the commands in force are known and the car obeys them. What follows each hit
-that the city tells of does not count for any car: a second at least, and until the car is away.
+Poses count while the commands in force are known and the car obeys them. After each reported
+collision no car's poses count for at least a second, and until the car is away from it.
 """
 
 import math
@@ -39,7 +39,7 @@ IN_FORCE_NS = NS_PER_S // 4
 TICK_NS, RUN_IN_NS = 20 * NS_PER_MS, NS_PER_S
 HIT, BEFORE_HIT_NS, AFTER_HIT_NS, AWAY_M = "contact", NS_PER_S // 10, NS_PER_S, 0.3
 SIMULATED = "simulated"
-# Why rows of a car do not count: what stands behind their number.
+# Reasons for not counting rows, printed after their number.
 HIT_LATELY = "until a second after a hit and 0.3 m away"
 STOPPED = "while its guard stopped it"
 PLACED = "in the first second after it was placed"
@@ -52,9 +52,9 @@ Span = tuple[int, int]
 
 
 class Report(NamedTuple):
-    """Where a car was by its own account, or by the world's, whom it obeyed, and what it was told.
+    """A car's pose as reported by itself or the world, whom it obeyed, and its commands.
 
-    `throttle` and `steering` were in force until `t_ns`; steering None: not told.
+    `throttle` and `steering` were in force until `t_ns`; steering None: not reported.
     """
 
     t_ns: int
@@ -72,7 +72,7 @@ class Report(NamedTuple):
 
 @dataclass(slots=True)
 class CarMessages:
-    """All that a run tells of one car; `hit_ns` is when it hit something hard enough to tell."""
+    """All messages of a run about one car; `hit_ns`: times of its reported collisions."""
 
     commands: list[DriveCommand] = field(default_factory=list)
     reports: list[Report] = field(default_factory=list)
@@ -81,7 +81,7 @@ class CarMessages:
     hit_ns: list[int] = field(default_factory=list)
 
     def add(self, message: Message) -> None:
-        """Note a message that is about this car."""
+        """Add a message about this car."""
         match message:
             case DriveCommand():
                 self.commands.append(message)
@@ -98,13 +98,13 @@ class CarMessages:
 
     @property
     def lost(self) -> int:
-        """How many of the car's reports are missing between the first and the last."""
+        """Number of the car's reports missing between the first and the last."""
         steps = (now.seq - before.seq for before, now in pairwise(self.reports))
         return sum(step - 1 for step in steps if step > 1)
 
 
 class Stretch(NamedTuple):
-    """From the first command of an owner to where the guard stops the car for want of the next."""
+    """From an owner's first command until the guard stops the car after the last."""
 
     start_ns: int
     end_ns: int
@@ -112,33 +112,33 @@ class Stretch(NamedTuple):
 
 
 def reports_commands(messages: CarMessages) -> bool:
-    """Return whether a car's reports say how it was steered."""
+    """Return whether a car's reports include the steering."""
     return any(report.steering is not None for report in messages.reports)
 
 
 def recording_of(
     messages: CarMessages, path: Path, name: str, start_ns: int = 0, *, sent_only: bool = False
 ) -> Recording:
-    """Return what was heard of a car as a recording, times since `start_ns`.
+    """Return the messages about a car as a recording, with times since `start_ns`.
 
-    Poses are those of the car's own reports where it is simulated, else those of the overhead
-    camera that saw it most.
+    Poses of a simulated car are those it reports, of a real one those of the overhead camera that
+    saw it most.
 
     Args:
-        messages: All of it.
-        path: Of the run, to name it by.
+        messages: All of them.
+        path: Of the run, for messages.
         name: Of the car.
-        start_ns: What times are counted from.
-        sent_only: Leave out where the car obeyed other commands than those in `messages`.
+        start_ns: Time zero of the recording.
+        sent_only: Leave out times when the car obeyed commands that are not in `messages`.
 
     Raises:
-        RecordingError: naming `path` and the car, when it lacks poses, or obeyed no command.
+        RecordingError: naming `path` and the car, when there are no poses or no obeyed commands.
     """
     return _Drive(path, name, messages, start_ns, sent_only=sent_only).recording()
 
 
 class _Drive:
-    """One car's part of a run on its way to being a recording."""
+    """Builds the recording of one car."""
 
     def __init__(
         self, path: Path, name: str, messages: CarMessages, start_ns: int, *, sent_only: bool
@@ -155,10 +155,10 @@ class _Drive:
         self._left_out: tuple[LeftOut, ...] = ()
 
     def recording(self) -> Recording:
-        """Return what stands of this car in the run.
+        """Return the recording of this car.
 
         Raises:
-            RecordingError: when it lacks poses, or the car obeyed no command.
+            RecordingError: when there are no poses or no obeyed commands.
         """
         if not self._messages.reports:
             msg = f"{self._at}: neither it nor the world reports which car it is"
@@ -176,7 +176,7 @@ class _Drive:
         return Recording(self._path, car, channels, self._name, left_out=self._left_out)
 
     def _poses(self) -> dict[str, Channel]:
-        """Return the poses that count, and note how many do not, and why."""
+        """Return the poses that count; record how many do not, and why."""
         rows: list[tuple[float, ...]] = [
             report[:4] for report in self._messages.reports if report.source == SIMULATED
         ]
@@ -204,7 +204,7 @@ class _Drive:
         }
 
     def _sensors(self) -> dict[str, Channel]:
-        """Return encoders and yaw gyro, where the car has them."""
+        """Return encoders and yaw gyro if the car has them."""
         t = np.array([one.t_ns for one in self._messages.sensors], np.int64)
         counts = self._reasons(t) == ""
         if not counts.any():
@@ -229,14 +229,14 @@ class _Drive:
         return Channel(t[fit], values[fit], std, (0.0, 0.0), kind)
 
     def _clipped(self, rows: list[Row]) -> list[Row]:
-        """Return the commands from a little before poses count, so that the servo stands right."""
+        """Return the commands from shortly before poses count, so the servo starts right."""
         spans = [*self._lives, *(stretch[:2] for stretch in self._sent)]
         first_ns = min((start_ns for start_ns, _ in spans), default=0) - RUN_IN_NS
         last_ns = max((end_ns for _, end_ns in spans), default=0)
         return [row for row in rows if first_ns <= row[0] <= last_ns]
 
     def _reasons(self, t_ns: Ints) -> NDArray[np.object_]:
-        """Return for each time why it does not count; empty where it does, shape `(n,)`."""
+        """Return for each time the reason not to count it, empty if it counts, shape `(n,)`."""
         reasons = np.full(len(t_ns), NO_COMMAND, object)
         reported, k = self._reported, self._reported.at(t_ns)
         lives = np.zeros(len(t_ns), np.bool_)
@@ -275,7 +275,7 @@ class _Reported:
         self.stands: Bools = self._stands(reports)
 
     def _stands(self, reports: Sequence[Report]) -> Bools:
-        """Return whether nobody drives the car, and it has not moved for a second."""
+        """Return whether nobody drives the car and it has not moved for a second."""
         idle: Bools = np.array([report.mode == "idle" for report in reports], np.bool_)
         x, y = np.array([(report.x_m, report.y_m) for report in reports]).reshape(-1, 2).T
         before = self.at(self.t_ns - NS_PER_S)
@@ -284,18 +284,18 @@ class _Reported:
         return idle & long_enough & still
 
     def at(self, t_ns: Ints) -> Ints:
-        """Return which report is the newest at each time; before the first, the first."""
+        """Return the index of the newest report at each time; before the first, 0."""
         return np.maximum(np.searchsorted(self.t_ns, t_ns, side="right") - 1, 0)
 
 
 def _counted(reasons: NDArray[np.object_]) -> str:
-    """Return how many rows are left out for which reason."""
+    """Return how many rows are left out for each reason."""
     counts = Counter(reason for reason in reasons if reason)
     return ", ".join(f"{count} {reason}" for reason, count in counts.most_common())
 
 
 def _about_hit(hit_ns: int, reports: Sequence[Report]) -> Span:
-    """Return from when to when what a car hit may move it: until it is away from there [ns]."""
+    """Return the span in which a collision may move the car: until it is away [ns]."""
     k = min(bisect_right(reports, hit_ns, key=lambda report: report.t_ns), len(reports) - 1)
     at = reports[k]
     away = (r for r in reports[k:] if math.hypot(r.x_m - at.x_m, r.y_m - at.y_m) > AWAY_M)
@@ -304,11 +304,10 @@ def _about_hit(hit_ns: int, reports: Sequence[Report]) -> Span:
 
 
 def _commands(reports: Sequence[Report], sent: Sequence[Row]) -> list[Row]:
-    """Return the commands that a car reports, and those that were sent where it reports none.
+    """Return the commands that a car reports, or those sent to it where it reports none.
 
-    A reported command begins with the report before. A car that reports more seldom than it
-    decides keeps what was in force between to itself: then the new one begins, on average, half
-    way through it.
+    A reported command begins at the previous report. If a car reports less often than it decides,
+    the new command began on average half way between the reports.
     """
     spans = [now.t_ns - before.t_ns for before, now in pairwise(reports)] or [TICK_NS]
     unknown_ns = max(0, int(np.median(spans)) - TICK_NS) // 2
@@ -326,9 +325,9 @@ def _commands(reports: Sequence[Report], sent: Sequence[Row]) -> list[Row]:
 
 
 def _lives(reports: Sequence[Report]) -> list[Span]:
-    """Return the spans in which a car reports its commands and is not placed anew [ns].
+    """Return the spans in which a car reports its commands without being moved by hand [ns].
 
-    Each begins when the servo has followed reported commands for `RUN_IN_NS`.
+    Each begins after the servo has followed reported commands for `RUN_IN_NS`.
     """
 
     def goes_on(before: Report, now: Report) -> bool:
@@ -344,9 +343,9 @@ def _lives(reports: Sequence[Report]) -> list[Span]:
 
 
 def _obeyed(commands: Iterable[DriveCommand]) -> tuple[list[Row], list[Stretch]]:
-    """Return what the guard let through: time [ns], throttle, steering; and each owner's stretches.
+    """Return what the guard lets through, time [ns], throttle, steering, and owners' stretches.
 
-    Where the next command is late the throttle is let go, as the guard does.
+    Where the next command is late the throttle is zero, as the guard sets it.
     """
     guard = Guard()
     rows: list[Row] = []

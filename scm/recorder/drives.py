@@ -1,7 +1,7 @@
-"""Runs of the city as recordings of its cars.
+"""Reads runs of the city as recordings of its cars.
 
-A car can be driven again where its reports tell the commands that it obeyed, whoever drove it, or
-where it was commanded over the bus.
+A car can be simulated again where its reports have the commands that it obeyed, or where it was
+commanded over the bus.
 """
 
 import re
@@ -43,16 +43,16 @@ def recordings_of(
     vehicle: str | None = None,
     warn: Warn = lambda _: None,
 ) -> list[Recording]:
-    """Read what was recorded of cars: a run of the city (`.mcap`), or a described recording.
+    """Read the recordings of cars from a run of the city (`.mcap`) or a described recording.
 
     Args:
         path: A run, a description, or the folder of one.
         data: Folder of a description's tables; None: its own.
-        vehicle: The one of several cars; None: all of them.
-        warn: Gets the reason why a car of a run is left out.
+        vehicle: One of its cars; None: all.
+        warn: Receives the reason when a car of a run is left out.
 
     Raises:
-        RecordingError: when there is nothing to read, or no such car.
+        RecordingError: when there is nothing to read or no such car.
     """
     if Path(path).suffix == SUFFIX:
         return read_drives(Path(path), vehicle, warn)
@@ -68,7 +68,7 @@ def recordings_of(
 def recordings_of_one(
     path: Path | str, data: Path | str | None = None, vehicle: str | None = None
 ) -> list[Recording]:
-    """Read what was recorded, as `recordings_of` does; a run must then be of one car.
+    """Read as `recordings_of` does, but only one car of a run.
 
     Raises:
         RecordingError: when several cars of a run can be driven again and none is chosen.
@@ -89,13 +89,13 @@ def read_drives(
     Args:
         path: The `.mcap` that the recorder wrote.
         vehicle: One of its cars; None: all.
-        warn: Gets the reason why a car is left out.
+        warn: Receives the reason when a car is left out.
 
     Returns:
-        One recording a car, by name.
+        One recording per car, by name.
 
     Raises:
-        RecordingError: when the file is no complete run, or holds no car that can be driven again.
+        RecordingError: when the file is not a complete run, or no car can be simulated again.
     """
     keys = read_keys(path, whole=False)
     if keys and not any(_OURS.match(key) for key in keys):
@@ -137,7 +137,7 @@ def read_drives(
 
 
 def _unfinished(path: Path) -> list[LeftOut]:
-    """Return what is to be said of a run whose file has no end."""
+    """Return the warning for a run whose file has no end."""
     if has_end(path):
         return []
     why = "has no end: it is still being written, or its recorder was killed; read as far as it is "
@@ -145,7 +145,7 @@ def _unfinished(path: Path) -> list[LeftOut]:
 
 
 def _of(key: str) -> tuple[str, type[Message] | None]:
-    """Return which car a key is of, if of one, and what travels on it; None for all other keys."""
+    """Return a key's car, if it has one, and message class; None for all other keys."""
     match = _KEY.fullmatch(key)
     if match is not None:
         return match[1] or match[3], _KINDS[match[2]]
@@ -159,9 +159,9 @@ def _names_hint(names: Sequence[str]) -> str:
 def _read_messages(
     path: Path, keys: Iterable[str], chosen: Sequence[str]
 ) -> tuple[dict[str, CarMessages], int]:
-    """Return what a run tells of some cars, and when it began [ns].
+    """Return the messages of a run about some cars, and when it began [ns].
 
-    Snapshots of the world stand in for the reports of a car that a sparse run has not.
+    Snapshots of the world replace the reports that a sparse run lacks.
     """
     of = {key: _of(key) for key in keys}
     reporting = {name for name, kind in of.values() if kind is VehicleState}
@@ -176,7 +176,7 @@ def _read_messages(
         try:
             decoded = decode(kind, message.body)
         except MessageError:
-            continue  # a stranger's, as everybody on the bus ignores it
+            continue  # of an unknown class: everybody on the bus ignores it
         match decoded:
             case WorldSnapshot():
                 for one, report in _reports(decoded):
@@ -190,7 +190,7 @@ def _read_messages(
 
 
 def _reports(snapshot: WorldSnapshot) -> Iterator[tuple[str, Report]]:
-    """Yield where the cars of a snapshot were; a real one's place is the Eye's to say."""
+    """Yield the poses of a snapshot's simulated cars; those of real cars come from the Eye."""
     for car in snapshot.vehicles:
         t_ns = snapshot.t_ns - round(car.age_ms * 1e6)
         source = EYE if car.kind == REAL else SIMULATED

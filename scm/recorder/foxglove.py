@@ -1,6 +1,6 @@
-"""A run as Foxglove draws it: frames, cars, roads, lights, pictures, scans, numbers and the log.
+"""Converts a run for Foxglove: frames, cars, roads, lights, pictures, scans, plots and the log.
 
-The recorder's own file is for our tools: Foxglove lists its channels and cannot read their schemas.
+Foxglove can list the channels of the recorder's own file but not read their schemas.
 """
 
 import math
@@ -35,7 +35,7 @@ BLOCK = 256 * 1024
 CARS_EVERY_NS = NS_PER_S
 NIGEL_M = -0.07, 0.23, 0.175
 LEVELS = {"info": 2, "warning": 3, "error": 4}
-FLOOR = fox.Colour(r=0.13, g=0.15, b=0.18)  # so that lanes show on Foxglove's light ground too
+FLOOR = fox.Colour(r=0.13, g=0.15, b=0.18)  # lanes are visible on Foxglove's light background too
 FLOOR_THICK_M = 0.01
 ROAD, LANE = fox.Colour(r=0.45, g=0.48, b=0.53), fox.Colour(r=0.93, g=0.93, b=0.88)
 WHITE = fox.Colour(r=1.0, g=1.0, b=1.0)
@@ -59,7 +59,7 @@ M = TypeVar("M", bound=Message)
 
 
 def write_foxglove(index: RunIndex) -> Iterator[bytes]:
-    """Yield an MCAP file for Foxglove, in blocks; damaged pieces of the run are left out.
+    """Yield an MCAP file for Foxglove in blocks; damaged parts of the run are left out.
 
     Raises:
         RecordingError: when the run cannot be opened.
@@ -91,7 +91,7 @@ def _decoded(one: Recorded, kind: type[M]) -> M | None:
 
 
 class _Blocks:
-    """A stream for the writer, whose bytes are taken away as they come."""
+    """A stream for the writer; its bytes are removed as they are sent."""
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
@@ -99,20 +99,20 @@ class _Blocks:
         self.held = 0
 
     def write(self, data: bytes) -> int:
-        """Hold bytes until they are taken."""
+        """Store bytes until they are sent."""
         self._parts.append(bytes(data))
         self.held += len(data)
         return len(data)
 
     def tell(self) -> int:
-        """Return how much was written since the begin."""
+        """Return how many bytes were written in total."""
         return self._popped + self.held
 
     def flush(self) -> None:
-        """Do nothing: who takes the bytes sends them."""
+        """Do nothing: the reader of the bytes sends them."""
 
     def pop(self) -> bytes:
-        """Return what is held, and hold it no longer."""
+        """Return and remove the stored bytes."""
         block = b"".join(self._parts)
         self._popped += self.held
         self._parts, self.held = [], 0
@@ -120,7 +120,7 @@ class _Blocks:
 
 
 class _Writing:
-    """The file on its way: what each message of the run becomes."""
+    """Writes the messages of a run to the file."""
 
     def __init__(self, stream: Any) -> None:
         self._writer = Writer(stream)
@@ -144,7 +144,7 @@ class _Writing:
         }
 
     def write(self, t_ns: int, message: Message) -> None:
-        """Write what a message means."""
+        """Write the conversion of a message."""
         self._writers[type(message)](t_ns, message)
 
     def close(self) -> None:
@@ -169,7 +169,7 @@ class _Writing:
         )
 
     def _definition(self, t_ns: int, message: WorldDefinition) -> None:
-        if self._has_map:  # the same is sent every 10 s
+        if self._has_map:  # it is sent again every 10 s
             return
         self._has_map, self._lights = True, message.map.lights
         entity = fox.Entity(
@@ -188,7 +188,7 @@ class _Writing:
         cars = {car.vehicle: (car.car, car.kind, car.alive) for car in message.vehicles}
         if cars == self._cars and t_ns < self._cars_due_ns:
             return
-        # All of them again each second: after a seek Foxglove knows one message a topic.
+        # All of them every second: after a seek Foxglove has one message per topic.
         self._cars_due_ns = t_ns + CARS_EVERY_NS
         gone = tuple(
             fox.Deletion(timestamp=at, type=0, id=name) for name in self._cars if name not in cars
@@ -305,7 +305,7 @@ def _light(at: fox.Time, light: Light, colour: str) -> fox.Entity:
     pose = fox.Pose(position=fox.Vector(x=light.x_m, y=light.y_m, z=0.2))
     size = fox.Vector(x=0.08, y=0.08, z=0.08)
     lamp = fox.Cube(pose=pose, size=size, color=LIGHTS.get(colour, GREY))
-    letter = fox.Label(  # for who cannot tell the colours apart
+    letter = fox.Label(  # for colour-blind people
         pose=fox.Pose(position=fox.Vector(x=light.x_m, y=light.y_m, z=0.3)),
         color=WHITE,
         text=LETTERS.get(colour, "D"),
@@ -323,7 +323,7 @@ def _floor(city_map: CityMap) -> fox.Cube:
 
 
 def _road_lines(city_map: CityMap) -> tuple[fox.Line, ...]:
-    """Return the edge of the floor, and a line along the middle of each lane."""
+    """Return the edge of the floor and the centre line of each lane."""
     roads = Roads(city_map)
     (x0, x1), (y0, y1) = city_map.floor.x_m, city_map.floor.y_m
     corners = ((x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0))
@@ -338,7 +338,7 @@ def _places(points: Any) -> tuple[fox.Vector, ...]:
 
 
 def _points(scan: LidarScan) -> bytes:
-    """Return where a scan's beams hit, in the scanner's frame: three float32 a point."""
+    """Return the points of a scan in the scanner's frame, three float32 each."""
     payload = scan.payload[: len(scan.payload) // 4 * 4]
     ranges = np.frombuffer(payload, "<f4")[: scan.beams]
     step = scan.bearing_step_rad or math.tau / max(1, scan.beams)
@@ -350,7 +350,7 @@ def _points(scan: LidarScan) -> bytes:
 
 @lru_cache(maxsize=64)
 def _outline(car: str) -> tuple[float, float, float]:
-    """Return rear end, front end and width of a car's body [m]; a Nigel's where it is unknown."""
+    """Return rear end, front end and width of a car's body [m]; Nigel's for unknown cars."""
     try:
         known = load_car(car, trusted=False)
     except CarError:
@@ -364,7 +364,7 @@ def _outline(car: str) -> tuple[float, float, float]:
 
 @lru_cache(maxsize=64)
 def _scanner(car: str) -> fox.Vector:
-    """Return where a car's scanner is on its body; the car's origin where its file has none."""
+    """Return the position of a car's scanner; the car's origin if its file has none."""
     try:
         known = load_car(car, trusted=False)
     except CarError:

@@ -1,7 +1,7 @@
-"""What Foxglove draws, by its own schemas' names; and their JSON Schemas, without references.
+"""Foxglove's messages under its own schema names, and their JSON Schemas without references.
 
-Foxglove's reader of JSON Schema wants every object spelled out where it stands, and one type a
-field: our own messages' schemas, which refer and allow null, it refuses.
+Foxglove requires every object to be inline and every field to have one type. It refuses our own
+messages' schemas, which have references and allow null.
 """
 
 from typing import Any
@@ -10,7 +10,7 @@ import msgspec
 
 
 class Time(msgspec.Struct, kw_only=True, frozen=True):
-    """A time, or a span."""
+    """A time or a duration."""
 
     sec: int
     nsec: int
@@ -41,7 +41,7 @@ class Pose(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Colour(msgspec.Struct, kw_only=True, frozen=True):
-    """Shares of red, green, blue, and how opaque, 0 to 1."""
+    """Red, green, blue and opacity, 0 to 1."""
 
     r: float
     g: float
@@ -50,7 +50,7 @@ class Colour(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Transform(msgspec.Struct, kw_only=True, frozen=True):
-    """Where a frame is in its parent."""
+    """Pose of a frame in its parent."""
 
     timestamp: Time
     parent_frame_id: str
@@ -60,13 +60,13 @@ class Transform(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class FrameTransforms(msgspec.Struct, kw_only=True, frozen=True):
-    """Where frames are."""
+    """Poses of frames."""
 
     transforms: tuple[Transform, ...]
 
 
 class Cube(msgspec.Struct, kw_only=True, frozen=True):
-    """A box about its middle."""
+    """A box around its centre."""
 
     pose: Pose
     size: Vector
@@ -87,7 +87,7 @@ class Line(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Label(msgspec.Struct, kw_only=True, frozen=True):
-    """Words at a place."""
+    """A text at a position."""
 
     pose: Pose
     billboard: bool = True
@@ -98,7 +98,7 @@ class Label(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Entity(msgspec.Struct, kw_only=True, frozen=True):
-    """Something in the scene; another of the same id takes its place."""
+    """An object of the scene; a later one of the same id replaces it."""
 
     timestamp: Time
     frame_id: str
@@ -112,7 +112,7 @@ class Entity(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Deletion(msgspec.Struct, kw_only=True, frozen=True):
-    """An entity to take away; `type` 0: the one of this id, 1: all."""
+    """An entity to remove; `type` 0: the one of this id, 1: all."""
 
     timestamp: Time
     type: int
@@ -120,7 +120,7 @@ class Deletion(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SceneUpdate(msgspec.Struct, kw_only=True, frozen=True):
-    """What changes in the scene."""
+    """Changes of the scene."""
 
     deletions: tuple[Deletion, ...] = ()
     entities: tuple[Entity, ...] = ()
@@ -166,7 +166,7 @@ class Log(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class CarState(msgspec.Struct, kw_only=True, frozen=True):
-    """A car's report for plots; `steering` is 0 where it tells none."""
+    """A car's report for plots; `steering` is 0 if not reported."""
 
     timestamp: Time
     x_m: float
@@ -184,7 +184,7 @@ class CarState(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def schema_of(kind: type) -> dict[str, Any]:
-    """Return the JSON Schema of one of these records, every object spelled out in its place."""
+    """Return the JSON Schema of one of these records with all objects inline."""
     (schemas,), parts = msgspec.json.schema_components([kind], ref_template="{name}")
     return _spelled_out(schemas, parts)
 

@@ -1,8 +1,7 @@
-"""A run as an MCAP file: one channel a key, JSON messages, one schema a message class.
+"""A run as an MCAP file: one channel per key, JSON messages, one schema per message class.
 
-The raw key is the channel's topic, so that a replay can publish again. A bulk message becomes JSON
-too, its payload in base64, so that any MCAP tool can read the whole file; so do bytes that are not
-JSON though they should be.
+The channel's topic is the raw key, so a replay can publish it again. Bulk messages, and invalid
+ones, are stored as JSON with their bytes in base64, so any MCAP tool can read the whole file.
 """
 
 import os
@@ -31,8 +30,8 @@ from scm.v2x.message import Message, Request
 
 MESSAGES = "scm.v2x.messages"
 MAGIC = b"\x89MCAP0\r\n"
-MAX_UNPACKED_BYTES = 256 * 2**20  # of one chunk: a file that claims more is damaged or hostile
-UNREADABLE = (  # what a torn or damaged file makes its readers raise
+MAX_UNPACKED_BYTES = 256 * 2**20  # of one chunk; a larger one is damaged or malicious
+UNREADABLE = (  # raised by readers of a truncated or damaged file
     McapError, EOFError, ValueError, LookupError, MemoryError, OverflowError, struct.error,
     zstandard.ZstdError,
 )  # fmt: skip
@@ -42,7 +41,7 @@ class RunFile:
     """Writes one run; a context manager that always ends the file properly.
 
     Raises:
-        RecordingError: when the file is there already, or cannot be written (any more).
+        RecordingError: when the file exists, or can no longer be written.
     """
 
     def __init__(self, path: Path, city: str) -> None:
@@ -64,7 +63,7 @@ class RunFile:
             self._writer.flush()
 
     def write(self, sample: RawSample) -> None:
-        """Add one message as it came from the bus."""
+        """Add one message as received from the bus."""
         with _writing(self.path):
             self._writer.add_message(
                 channel_id=self._channel(sample.key),
@@ -76,22 +75,22 @@ class RunFile:
         self.messages += 1
 
     def kind_of(self, key: str) -> type[Message] | None:
-        """Return the message class that travels on a key; None for a foreign key."""
+        """Return the message class of a key; None for an unknown key."""
         return self._schemas.kind_of(key)
 
     def flush(self) -> None:
-        """Hand everything written so far to the operating system: a kill can no longer lose it."""
+        """Pass everything written so far to the operating system, so a kill cannot lose it."""
         with _writing(self.path):
             self._writer.flush()
 
     def close(self) -> None:
-        """End the file with its index; safe to call twice."""
+        """Complete the file with its index; safe to call twice."""
         if not self._stream.closed:
             with _writing(self.path), self._stream:
                 self._writer.finish()
 
     def discard(self) -> None:
-        """End the file; when it holds no message, take it away as if it had never been there."""
+        """Complete the file; delete it if it has no message."""
         self.close()
         if self.messages == 0:
             self.path.unlink()
@@ -115,7 +114,7 @@ class RunFile:
         return self._channels[key]
 
     def _schema(self, key: str) -> int:
-        """Return the schema of the message class a key belongs to; 0 (none) for a foreign key."""
+        """Return the schema of a key's message class; 0 (none) for an unknown key."""
         kind = self._schemas.kind_of(key)
         if kind is None:
             return 0
@@ -136,7 +135,7 @@ def _writing(path: Path) -> Iterator[None]:
 
 
 class SchemaTable:
-    """Which message class travels on which key."""
+    """Finds the message class of a key."""
 
     def __init__(self, city: str) -> None:
         kinds = [load(MESSAGES, name, "MESSAGE", type) for name in names(MESSAGES)]
@@ -148,7 +147,7 @@ class SchemaTable:
         self._found: dict[str, type[Message] | None] = {}
 
     def kind_of(self, key: str) -> type[Message] | None:
-        """Return the message class of a concrete key, None for a key that is nobody's."""
+        """Return the message class of a concrete key; None for an unknown key."""
         if key not in self._found:
             kinds = (kind for expression, kind in self._expressions if matches(expression, key))
             self._found[key] = next(kinds, None)
@@ -156,7 +155,7 @@ class SchemaTable:
 
 
 def _as_json(body: bytes, attachment: bytes | None) -> bytes:
-    """Return a message as JSON: as it came, or as an object that holds its bytes in base64."""
+    """Return a message as JSON: as received, or as an object with its bytes in base64."""
     try:
         if attachment is None:
             msgspec.json.decode(body, type=msgspec.Raw)
@@ -171,7 +170,7 @@ def _as_json(body: bytes, attachment: bytes | None) -> bytes:
 
 
 class Recorded(NamedTuple):
-    """One message of a run: when it was heard [ns], its key, and its JSON."""
+    """One message of a run: time received [ns], key, and JSON."""
 
     t_ns: int
     key: str
@@ -179,23 +178,23 @@ class Recorded(NamedTuple):
 
 
 class Begin:
-    """The first bytes of a file, however it grows: who read to its end could read for ever."""
+    """The first bytes of a file that may grow: reading to its end might never finish."""
 
     def __init__(self, stream: IO[bytes], size: int) -> None:
         self._stream, self._left = stream, size
 
     def read(self, length: int) -> bytes:
-        """Return so many bytes, or what is left."""
+        """Return so many bytes, or as many as are left."""
         data = self._stream.read(min(length, self._left))
         self._left -= len(data)
         return data
 
 
 def has_end(path: Path) -> bool:
-    """Say whether a run's recorder ended the file; else it still writes it, or was killed.
+    """Return whether the recorder completed the file; if not, it is still writing or was killed.
 
     Raises:
-        RecordingError: when it is no MCAP file, or cannot be read.
+        RecordingError: when it is not an MCAP file or cannot be read.
     """
     with _reading(path), path.open("rb") as stream:
         begin = stream.read(len(MAGIC))
@@ -214,12 +213,12 @@ def _ends(path: Path) -> bool:
 def read_run(
     path: Path, keys: Collection[str] | None = None, *, whole: bool = True
 ) -> Iterator[Recorded]:
-    """Yield the messages of a run in the order of their times; of some keys or of all.
+    """Yield the messages of a run in order of time.
 
     Args:
         path: The `.mcap`.
-        keys: Whose messages; None: all.
-        whole: Refuse a file without its end; else read it as far as it is whole.
+        keys: Keys to read; None: all.
+        whole: Refuse an incomplete file; otherwise read as much as is intact.
 
     Raises:
         RecordingError: when the file is not a complete MCAP file.
@@ -233,7 +232,7 @@ def read_run(
 
 
 def _begun(path: Path, keys: Collection[str] | None) -> Iterator[Recorded]:
-    """Yield the messages of a file without its end, as far as it is whole."""
+    """Yield the intact messages of an incomplete file."""
     topics: dict[int, str] = {}
     with _reading(path), path.open("rb") as stream:
         begin = Begin(stream, os.fstat(stream.fileno()).st_size)
@@ -249,7 +248,7 @@ def _begun(path: Path, keys: Collection[str] | None) -> Iterator[Recorded]:
 
 
 def read_keys(path: Path, *, whole: bool = True) -> list[str]:
-    """Return the keys on which something was heard in a run, sorted.
+    """Return the keys with messages in a run, sorted.
 
     Args:
         path: The `.mcap`.
@@ -266,7 +265,7 @@ def read_keys(path: Path, *, whole: bool = True) -> list[str]:
 
 
 def read_begin_ns(path: Path, *, whole: bool = True) -> int | None:
-    """Return when the first message of a run was heard; None: it holds none.
+    """Return the time of the first message of a run; None if there is none.
 
     Args:
         path: The `.mcap`.

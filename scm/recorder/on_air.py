@@ -1,4 +1,4 @@
-"""What the stations of a recorded run said over the radio, as other people's tools read it."""
+"""Exports the radio messages of a run in the formats of other V2X tools."""
 
 import re
 from collections import Counter
@@ -18,13 +18,13 @@ _KEY = re.compile(r"scm/@v\d+/[^/]+/v2x/tx/([^/]+)/([^/]+)")
 
 
 class RadioMessage(NamedTuple):
-    """One message on the air.
+    """One radio message.
 
     Attributes:
         kind: Its message_type.
-        station: Who sent it.
-        t_ns: When, on the sender's clock.
-        received_ns: When the recorder heard it.
+        station: Its sender.
+        t_ns: Time sent, on the sender's clock.
+        received_ns: Time recorded.
     """
 
     kind: str
@@ -38,15 +38,15 @@ class OnAir:
     """The radio messages of one run.
 
     Attributes:
-        counts: Of each kind that was gone through, once that is done.
-        unreadable: Messages that are not of today's form, as recordings before it have them.
+        counts: Number of each kind, complete after an iteration.
+        unreadable: Number of messages in the format of older versions.
     """
 
     def __init__(self, path: Path) -> None:
-        """Find what there is.
+        """Open a run.
 
         Raises:
-            RecordingError: when the file is no complete run, or nothing was said over the radio.
+            RecordingError: when the file is not a complete run or has no radio messages.
         """
         self._path = path
         self._keys = [
@@ -59,7 +59,7 @@ class OnAir:
         self.unreadable = 0
 
     def __iter__(self) -> Iterator[RadioMessage]:
-        """Yield them in the order in which they were heard; counts begin anew."""
+        """Yield them in the order recorded; the counts start again."""
         self.counts, self.unreadable = Counter(), 0
         classes: dict[str, type[Message]] = {
             kind: load(MESSAGES, f"{kind}_tx", "MESSAGE", type) for kind in KINDS
@@ -78,9 +78,9 @@ class OnAir:
 
 
 def write_pcap(messages: OnAir, stream: BinaryIO) -> int:
-    """Write a run's messages as a capture of ITS-G5 frames; return how many there are in it.
+    """Write a run's messages as a capture of ITS-G5 frames; return their number.
 
-    A CPM is left out: it has no UPER here.
+    CPMs are left out: they are not encoded in UPER here.
 
     Raises:
         MessageError: when the extra for UPER is not installed.
@@ -100,7 +100,7 @@ def write_pcap(messages: OnAir, stream: BinaryIO) -> int:
 
 
 def write_json(messages: OnAir, stream: BinaryIO) -> int:
-    """Write a run's messages in its-client's envelopes, one a line; return how many there are."""
+    """Write a run's messages in its-client's envelopes, one per line; return their number."""
     lines = 0
     for one in messages:
         stream.write(wrap(one.body, one.station, one.t_ns) + b"\n")

@@ -1,4 +1,4 @@
-"""The recorder: a part that hears everything and says nothing but how it is doing."""
+"""The recorder: a part that subscribes to everything and publishes only its status."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -38,16 +38,16 @@ OF_EACH_CAR = (
 
 
 class RecorderPart(BasePart):
-    """Writes every message of the city; what is older than half a second survives a kill.
+    """Writes every message of the city; a kill loses at most the last half second.
 
-    The Eye's pictures alone would be nearly all of the file (some 30 MB a minute at 5 Hz), so of
-    each of its cameras at most `frames_hz` a second are kept; 0 keeps none. The cars' own cameras
-    picture only what somebody asks for: `cameras_hz` above 0 makes them run, all of them or those
-    of the cars in `cameras_of`, and keeps so many of each.
+    The Eye's pictures would be nearly all of the file (some 30 MB a minute at 5 Hz), so at most
+    `frames_hz` a second of each of its cameras are stored; 0 stores none. The cars' own cameras run
+    only for subscribers: `cameras_hz` above 0 subscribes to those of all cars or of the cars in
+    `cameras_of`, and stores that many a second of each.
 
-    In a large city the same would be true of what each car says: a `sparse` recording leaves out
-    the cars' own states, sensors and radio frames, and keys that are not ours, so that the city
-    need not make them; the snapshots tell of all cars.
+    In a large city the cars' own messages would be nearly all of it. A `sparse` recording leaves
+    out their states, sensors and radio frames, and unknown keys, so the city need not make them;
+    the snapshots have all cars.
     """
 
     name = "record"
@@ -82,7 +82,7 @@ class RecorderPart(BasePart):
         self._status_due_ns = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming | RawSample]) -> list[Outgoing]:
-        """Write what came in; flush four times a second."""
+        """Write the inbox; flush four times a second."""
         for item in inbox:
             if isinstance(item, RawSample) and self._is_stored(item):
                 self.file.write(item)
@@ -96,7 +96,7 @@ class RecorderPart(BasePart):
         return [PartStatus(station=self.name, t_ns=now_ns, detail=detail)]
 
     def _is_stored(self, sample: RawSample) -> bool:
-        """Say whether a message goes into the file: everything but pictures before their time."""
+        """Return whether to store a message: all but pictures that are not due yet."""
         kind = self.file.kind_of(sample.key)
         if kind not in self._period_ns:
             return True
@@ -104,20 +104,20 @@ class RecorderPart(BasePart):
         due_ns = self._frame_due_ns.get(sample.key, sample.t_ns)
         if period_ns is None or sample.t_ns < due_ns:
             return False
-        # Counted from when it was due: frames at 5 Hz that jitter still make 1 Hz, not 0.83.
+        # Counted from when it was due: jittering 5 Hz frames give 1 Hz, not 0.83.
         late = sample.t_ns - due_ns >= period_ns
         self._frame_due_ns[sample.key] = (sample.t_ns if late else due_ns) + period_ns
         return True
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """End the file with its index."""
+        """Complete the file with its index."""
         del now_ns
         self.file.close()
         return []
 
 
 def _without_cars() -> tuple[type[Message], ...]:
-    """Return all classes but those that each car multiplies."""
+    """Return all message classes but those that every car sends."""
     kinds = (load(MESSAGES, name, "MESSAGE", type) for name in names(MESSAGES))
     return tuple(
         kind
@@ -129,10 +129,10 @@ def _without_cars() -> tuple[type[Message], ...]:
 
 
 def _cameras(cars: Sequence[str]) -> tuple[Subscription, ...]:
-    """Return the wish for pictures of some cars' own cameras; of all where none is named.
+    """Return the subscriptions to some cars' own cameras, or all cars' if none is named.
 
     Raises:
-        MessageError: when one is no car's name.
+        MessageError: when a name is not a valid car name.
     """
     for name in cars:
         check_name(name, "cameras_of")
@@ -141,7 +141,7 @@ def _cameras(cars: Sequence[str]) -> tuple[Subscription, ...]:
 
 
 def _period_ns(name: str, rate_hz: float) -> int | None:
-    """Return the time between pictures, None for none of them."""
+    """Return the time between pictures; None for no pictures."""
     if not 0.0 <= rate_hz < float("inf"):
         msg = f"{name}: got {rate_hz}, expected 0 or more"
         raise RecordingError(msg)

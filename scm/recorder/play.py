@@ -1,10 +1,10 @@
 """Plays a written drive with a car of a city, open loop, and records it for the mismatch search.
 
-What is recorded is what a run's `.mcap` would tell of the car: the commands that it reports to have
-obeyed, and its poses but for those about a hit.
+The recording is the same as from a run's `.mcap`: the commands that the car reports as obeyed, and
+its poses except around collisions.
 
-A drive is a `.yaml` that names a car, a map, a place to start and a table of commands; `scm
-mismatch` writes such files for the drive that would tell rivals apart.
+A drive is a `.yaml` file with a car, a map, a place to start and a table of commands. `scm
+mismatch` writes one to find out which of several candidate effects is the cause.
 """
 
 import csv
@@ -59,7 +59,7 @@ class Drive(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
 
     Attributes:
         drive: Version of the format, 1.
-        say: What is to be done, for a person.
+        say: Description for a person.
         car: Name or file of the car.
         map: Name or file of the map; `spawn`: where on it the car starts.
         commands: CSV of `t_s, throttle, steering`, each row held until the next.
@@ -75,13 +75,13 @@ class Drive(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """A drive that was played.
+    """The result of a played drive.
 
     Attributes:
-        vehicle: Who drove it.
-        messages: What was sent to it and what the city told of it.
-        lost: How many of the car's messages did not arrive, or had to make room for newer ones.
-        ended: Why it ended before its time; empty: it did not.
+        vehicle: The car.
+        messages: The commands sent and the city's messages about the car.
+        lost: Number of the car's messages that did not arrive or were dropped for newer ones.
+        ended: Why it ended early; empty: it did not.
     """
 
     vehicle: str
@@ -91,7 +91,7 @@ class Played:
 
 
 class _Listener:
-    """Takes in what a city tells of one car, as it comes: on a long drive no queue may fill up."""
+    """Empties the mailboxes of one car during a drive, so that no queue fills up."""
 
     def __init__(self, link: Link, vehicle: str) -> None:
         self._link, self._vehicle, self._messages = link, vehicle, CarMessages()
@@ -125,7 +125,7 @@ class _Listener:
 
 
 def read_drive(path: Path) -> tuple[Drive, list[Row]]:
-    """Return a drive and its rows of time, throttle and steering, in the order of time.
+    """Return a drive and its rows of time, throttle and steering, in order of time.
 
     Raises:
         ScmError: naming the file and what is wrong with it.
@@ -143,19 +143,18 @@ def read_drive(path: Path) -> tuple[Drive, list[Row]]:
 
 
 def play(link: Link, vehicle: str, rows: list[Row], monitor: PlayMonitor | None = None) -> Played:
-    """Command a car row by row and return what it reported; the lease is given back at the end.
+    """Command a car row by row and return its reports; release the lease at the end.
 
-    It is listened to for a second before: the first commands meet a servo that stands somewhere.
+    Its reports are recorded from a second before, to know the servo's angle at the start.
 
     Args:
         link: To the city.
-        vehicle: Who is to drive.
+        vehicle: The car.
         rows: Time, throttle and steering.
-        monitor: Brings the car to rest first, and may end the drive before its time; None: nobody
-            looks.
+        monitor: Stops the car first and may end the drive early; None: no monitor.
 
     Raises:
-        RunError: when the car is not to be had, or the watch does not let it begin.
+        RunError: when the car cannot be leased, or the monitor refuses the drive.
     """
     listener = _Listener(link, vehicle)
     listener.listen_until(link.now_ns + RUN_IN_NS)
@@ -189,7 +188,7 @@ class _LeasedCar:
         self._listener.sent(command)
 
     def rest(self, monitor: PlayMonitor) -> None:
-        """Stop the car and wait until it stands."""
+        """Stop the car and wait until it is at rest."""
         until_ns = self._link.now_ns + MAX_STOPPING_NS
         while (
             not monitor.is_at_rest(self._listener.messages.reports) and self._link.now_ns < until_ns
@@ -202,7 +201,7 @@ class _LeasedCar:
             raise RunError(msg)
 
     def drive(self, rows: list[Row], monitor: PlayMonitor | None) -> str:
-        """Command row by row; return why it ended before its time."""
+        """Command row by row; return why it ended early."""
         began_ns = self._link.now_ns
         for t, throttle, steering in _repeated(rows):
             self._listener.listen_until(began_ns + round(t * 1e9))
@@ -218,7 +217,7 @@ class _LeasedCar:
 
 
 def read_way(drive: Path) -> list[Pose2]:
-    """Return where a drive is thought to lead, from the table beside it; empty: nobody said.
+    """Return the predicted path of a drive from the table beside it; empty: there is none.
 
     Raises:
         ScmError: when the table cannot be read.
@@ -232,10 +231,7 @@ def read_way(drive: Path) -> list[Pose2]:
 
 
 def _repeated(rows: list[Row]) -> Iterator[Row]:
-    """Yield the rows, each again and again until the next: a command that is not repeated expires.
-
-    The last row is sent once: after it the car is given back.
-    """
+    """Yield each row repeatedly until the next, since commands expire; the last row once."""
     for (t, throttle, steering), (end, _, _) in pairwise(rows):
         times = max(1, math.ceil((end - t) / REPEATED_S - 1e-6))
         for k in range(times):
@@ -244,10 +240,10 @@ def _repeated(rows: list[Row]) -> Iterator[Row]:
 
 
 def write_recording(played: Played, car: str, folder: Path) -> Recording:
-    """Write what was played as a recording that `scm mismatch` reads, and return it.
+    """Write a played drive as a recording that `scm mismatch` reads, and return it.
 
     Raises:
-        RecordingError: when nothing of it can be driven again.
+        RecordingError: when nothing of it can be simulated again.
     """
     recording = recording_of(played.messages, folder, played.vehicle, sent_only=True)
     folder.mkdir(parents=True, exist_ok=True)
@@ -268,7 +264,7 @@ def write_recording(played: Played, car: str, folder: Path) -> Recording:
 
 
 def _described(file: str, of: dict[str, str], recording: Recording) -> dict[str, Any]:
-    """Return what a description says of one table."""
+    """Return the description of one table."""
     channels: dict[str, dict[str, Any]] = {}
     for column, name in of.items():
         std = recording.channel(name).std
@@ -278,7 +274,7 @@ def _described(file: str, of: dict[str, str], recording: Recording) -> dict[str,
 
 
 def left_out(played: Played, recording: Recording) -> list[str]:
-    """Return in sentences what of a played drive is not in its recording, or not as it was sent."""
+    """Return sentences on what the recording lacks or has changed of a played drive."""
     messages, sentences = played.messages, [played.ended] if played.ended else []
     first_ns, last_ns = messages.commands[0].t_ns, messages.commands[-1].t_ns
     reports = [report for report in messages.reports if first_ns <= report.t_ns <= last_ns]

@@ -1,8 +1,7 @@
-"""Watches over a drive that is played in a running city: it begins where it fits, and ends in time.
+"""Supervises a drive that is played in a running city, since a written drive is open loop.
 
-A written drive is blind. Whoever plays it among others looks for it: the car comes to rest first,
-the way has to fit on the floor from where it stands, and the drive ends when the car nears the
-floor's edge, hits something, no longer obeys, or somebody asks for it.
+The car is stopped first, the predicted path must fit on the floor from there, and the drive ends
+when the car nears the floor's edge, hits something, no longer obeys, or somebody requests it.
 """
 
 import threading
@@ -21,13 +20,13 @@ MAX_DISOBEYING_NS = NS_PER_S // 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlayMonitor:
-    """What a drive must not do.
+    """The limits of a drive.
 
     Attributes:
-        floor: Its x and y from and to [m]; None: any.
-        margin_m: The rear axle keeps so far from the floor's edges.
-        way: Where the drive is thought to lead; its own start counts for nothing. Empty: unknown.
-        stop_requested: Set by anybody who wants it to end.
+        floor: Range of x and y [m]; None: unlimited.
+        margin_m: Least distance of the rear axle from the floor's edges.
+        way: Predicted path, relative to its first pose. Empty: unknown.
+        stop_requested: Set to end the drive.
     """
 
     floor: tuple[Span, Span] | None = None
@@ -36,7 +35,7 @@ class PlayMonitor:
     stop_requested: threading.Event = field(default_factory=threading.Event)
 
     def is_at_rest(self, reports: Sequence[Report]) -> bool:
-        """Say whether a car has stood still for a moment."""
+        """Return whether a car has stood still for a moment."""
         if not reports:
             return False
         last = reports[-1]
@@ -45,7 +44,7 @@ class PlayMonitor:
         return last.t_ns - since[0].t_ns >= REST_NS // 2 and moved < AT_REST_M
 
     def refuses(self, reports: Sequence[Report]) -> str:
-        """Return why a drive must not begin where the car stands; empty: it may."""
+        """Return why a drive must not begin where the car is; empty: it may."""
         if not reports:
             return "the city tells nothing of where it is"
         if self.floor is None:
@@ -60,7 +59,7 @@ class PlayMonitor:
         )
 
     def ends(self, messages: CarMessages, began_ns: int) -> str:
-        """Return why a drive that began then must end now; empty: it goes on."""
+        """Return why a drive that began then must end now; empty: it continues."""
         if self.stop_requested.is_set():
             return "stopped on request"
         if any(t_ns >= began_ns for t_ns in messages.hit_ns):

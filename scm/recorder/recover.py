@@ -1,4 +1,4 @@
-"""Mend a recording whose writer was killed: copy every whole message into a file with an index."""
+"""Repairs a recording whose writer was killed: copies every intact message to an indexed file."""
 
 import os
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from scm.recorder.mcap_file import UNREADABLE, Begin
 
 @dataclass(frozen=True, slots=True)
 class Recovered:
-    """What a recovery brought back.
+    """The result of a recovery.
 
     Attributes:
         messages: How many were copied.
         span_s: From the first to the last of them [s].
-        whole: Whether the file was complete to begin with.
-        grew: Whether somebody wrote on meanwhile: only what was there at the start is copied.
+        whole: Whether the file was complete already.
+        grew: Whether it was still written: only what it had at the start is copied.
     """
 
     path: Path
@@ -32,14 +32,14 @@ class Recovered:
 
 
 def recover(broken: Path, repaired: Path | None = None) -> Recovered:
-    """Copy what can be read of a cut-off recording.
+    """Copy what can be read of a truncated recording.
 
     Args:
         broken: The recording; it is not changed.
         repaired: Where to write; None: beside it, as `<name>.recovered.mcap`.
 
     Raises:
-        RecordingError: when nothing at all can be read, or the target is the source.
+        RecordingError: when nothing can be read, or the target is the source.
     """
     target = repaired or broken.with_suffix(".recovered.mcap")
     if target.resolve() == broken.resolve():
@@ -70,7 +70,7 @@ def recover(broken: Path, repaired: Path | None = None) -> Recovered:
 
 
 def _copy_all(stream: IO[bytes], size: int, copy: "_Copy") -> bool:
-    """Copy until `size` or where it stops making sense; return whether it has its end record."""
+    """Copy up to `size` or the first invalid record; return whether the end record was found."""
     try:
         for record in StreamReader(cast("IO[bytes]", Begin(stream, size))).records:
             copy.add(record)
@@ -122,6 +122,6 @@ class _Copy:
         self.messages += 1
 
     def close(self) -> None:
-        """End the new file with its index."""
+        """Complete the new file with its index."""
         self._writer.finish()
         self._stream.close()

@@ -1,7 +1,7 @@
-"""Where in a run's file each quarter of a second lies, so that a seek reads no more than it shows.
+"""Index of a run's file by quarter of a second, so that a seek reads no more than it shows.
 
-A complete file brings its index along. One that is still being written, or whose writer was killed,
-is walked from record to record without unpacking them, and only what is new since the last look.
+A complete file has an index. One that is still being written, or whose writer was killed, is
+scanned record by record without decompressing, and only from where the last scan ended.
 """
 
 import struct
@@ -20,18 +20,18 @@ from scm.recorder.mcap_file import MAGIC, MAX_UNPACKED_BYTES, UNREADABLE, Record
 CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, DATA_END = 0x04, 0x05, 0x06, 0x07, 0x0F
 _RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")
-_MESSAGE = struct.Struct("<BQHIQQ")  # behind its record's head
+_MESSAGE = struct.Struct("<BQHIQQ")  # after its record's header
 _LIST, _ENTRY = struct.Struct("<HI"), struct.Struct("<QQ")
 _U16, _U32 = struct.Struct("<H"), struct.Struct("<I")
 
 
 class Chunk(NamedTuple):
-    """A piece of a run: from when to when [ns], where its record lies, and which channels it has.
+    """A piece of a run: its time span [ns], its place in the file, and its channels.
 
     Attributes:
-        start: Of its content in the file, behind the record's head.
+        start: Of its content in the file, after the record's header.
         length: Of that content [bytes].
-        channels: Where in the file the list of each one's messages begins, likewise.
+        channels: Where in the file the message index of each channel begins, likewise.
     """
 
     begin_ns: int
@@ -43,14 +43,14 @@ class Chunk(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RunIndex:
-    """What a run's file holds, and where.
+    """The contents of a run's file by position.
 
     Attributes:
-        size: Of the file when it was looked at.
-        whole: Whether the file has its end; else its writer is at work, or was killed.
+        size: Of the file when it was scanned.
+        whole: Whether the file is complete; if not, its writer is running or was killed.
         topics: The bus key of each channel.
-        read_to: How far a file without its end makes sense [bytes].
-        begin_ns, end_ns: When the first and the last message was heard; 0 in an empty run.
+        read_to: End of the last complete record [bytes].
+        begin_ns, end_ns: Times of the first and last message; 0 in an empty run.
     """
 
     path: Path
@@ -63,7 +63,7 @@ class RunIndex:
     end_ns: int = field(init=False)
 
     def __post_init__(self) -> None:
-        """Find its begin and its end once: they are asked for with each row of a table."""
+        """Compute begin and end once: every row of a table needs them."""
         begin_ns = min((chunk.begin_ns for chunk in self.chunks), default=0)
         end_ns = max((chunk.end_ns for chunk in self.chunks), default=0)
         object.__setattr__(self, "begin_ns", begin_ns)
@@ -71,7 +71,7 @@ class RunIndex:
 
     @property
     def city(self) -> str:
-        """Whose keys were recorded, `scm/@v1/<city>/...`; empty where nothing was."""
+        """Name of the recorded city, from `scm/@v1/<city>/...`; empty in an empty run."""
         found = (key.split("/") for key in self.topics.values())
         return next((chunks[2] for chunks in found if len(chunks) > 3), "")
 
@@ -82,12 +82,12 @@ class RunIndex:
         wanted: Callable[[str], bool],
         damage: list[str] | None = None,
     ) -> Iterator[Recorded]:
-        """Yield messages of some keys from a time to another, chunk after chunk.
+        """Yield messages of some keys between two times, chunk by chunk.
 
-        A damaged chunk is left out, and told in `damage`.
+        A damaged chunk is left out and reported in `damage`.
 
         Raises:
-            RecordingError: when the file cannot be opened (any more).
+            RecordingError: when the file can no longer be opened.
         """
         for chunk, keys, stream in self._holding(begin_ns, end_ns, wanted, self.chunks):
             try:
@@ -100,10 +100,10 @@ class RunIndex:
             yield from found
 
     def newest(self, before_ns: int, wanted: Callable[[str], bool]) -> Recorded | None:
-        """Return the last message of some keys up to a time, None where there is none.
+        """Return the last message of some keys up to a time; None if there is none.
 
         Raises:
-            RecordingError: when the file cannot be opened (any more).
+            RecordingError: when the file can no longer be opened.
         """
         backwards = self._holding(0, before_ns, wanted, reversed(self.chunks))
         for chunk, keys, stream in backwards:
@@ -120,7 +120,7 @@ class RunIndex:
     def _holding(
         self, begin_ns: int, end_ns: int, wanted: Callable[[str], bool], chunks: Iterable[Chunk]
     ) -> Iterator[tuple[Chunk, dict[int, str], BinaryIO]]:
-        """Yield the chunks that have messages of some keys within a time."""
+        """Yield the chunks with messages of some keys in a time span."""
         keys = {number: key for number, key in self.topics.items() if wanted(key)}
         with _opened(self.path) as stream:
             for chunk in chunks:
@@ -130,14 +130,14 @@ class RunIndex:
 
 
 def read_index(path: Path, known: RunIndex | None = None) -> RunIndex:
-    """Find what a run's file holds, as far as it goes.
+    """Scan a run's file.
 
     Args:
         path: The `.mcap`.
-        known: What was found before: a file that only grew is read on from there.
+        known: Result of an earlier scan; if the file only grew, the scan continues there.
 
     Raises:
-        RecordingError: when it is no MCAP file, or cannot be read.
+        RecordingError: when it is not an MCAP file or cannot be read.
     """
     with _opened(path) as stream:
         size = path.stat().st_size
@@ -163,7 +163,7 @@ def _opened(path: Path) -> BinaryIO:
 
 
 def _summary(stream: BinaryIO, path: Path, size: int) -> RunIndex | None:
-    """Return the index that a complete file brings along; None where it has no end."""
+    """Return the index of a complete file; None if it is incomplete."""
     try:
         stream.seek(-len(MAGIC), 2)
         if size < 2 * len(MAGIC) or stream.read(len(MAGIC)) != MAGIC:
@@ -194,7 +194,7 @@ def _chunk_of(index: ChunkIndex) -> Chunk:
 
 
 def _walk(stream: BinaryIO, index: RunIndex, size: int) -> RunIndex:
-    """Go on through a file without an end: chunks count when the file has them entirely."""
+    """Scan an incomplete file; only complete chunks count."""
     chunks, topics = list(index.chunks), dict(index.topics)
     at = index.read_to or len(MAGIC)
     while at + _RECORD.size <= size:
@@ -217,7 +217,7 @@ def _walk(stream: BinaryIO, index: RunIndex, size: int) -> RunIndex:
 
 
 def _channels_in(stream: BinaryIO, path: Path, chunk: Chunk) -> dict[int, str]:
-    """Return the channels that a chunk brings in; none where it is damaged."""
+    """Return the channels that a chunk defines; none if it is damaged."""
     try:
         content = _unpacked(stream, path, chunk)
     except RecordingError:
@@ -240,10 +240,10 @@ def _channel(record: bytes) -> tuple[int, str]:
 def _places(
     stream: BinaryIO, path: Path, chunk: Chunk, keys: Mapping[int, str], begin_ns: int, end_ns: int
 ) -> list[tuple[int, int]]:
-    """Return where in a chunk, unpacked, messages lie and when they were heard, in their order.
+    """Return positions in a decompressed chunk and times of its messages, in order.
 
     Raises:
-        RecordingError: when the lists of its messages are damaged.
+        RecordingError: when its message indexes are damaged.
     """
     found: list[tuple[int, int]] = []
     for number in chunk.channels.keys() & keys.keys():
@@ -264,10 +264,10 @@ def _messages(
     keys: Mapping[int, str],
     places: list[tuple[int, int]],
 ) -> list[Recorded]:
-    """Return messages of a chunk; it is not even read where none are wanted.
+    """Return messages of a chunk, which is read only if any are wanted.
 
     Raises:
-        RecordingError: when it is damaged, or packed in a way that the recorder does not use.
+        RecordingError: when it is damaged or has a compression that the recorder does not use.
     """
     if not places:
         return []
@@ -290,7 +290,7 @@ def _log_ns(place: tuple[int, int]) -> int:
 
 
 def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield the kind, begin and end of each whole record in a chunk's content."""
+    """Yield the kind, begin and end of each complete record in a chunk's content."""
     at = 0
     while at + _RECORD.size <= len(content):
         kind, length = _RECORD.unpack_from(content, at)
@@ -304,7 +304,7 @@ def _unpacked(stream: BinaryIO, path: Path, chunk: Chunk) -> bytes:
     """Return a chunk's records.
 
     Raises:
-        RecordingError: when it is damaged, or packed in a way that the recorder does not use.
+        RecordingError: when it is damaged or has a compression that the recorder does not use.
     """
     stream.seek(chunk.start)
     record = stream.read(chunk.length)

@@ -1,7 +1,6 @@
-"""The city as ROS 2 sees it: a part that speaks rmw_zenoh's wire format, without ROS.
+"""The bridge to ROS 2: a part that speaks rmw_zenoh's wire format, without a ROS installation.
 
-`part.py` ties a city's cars (`car.py`, `pilot.py`) and drawings (`markers.py`) to ROS topics;
-`wire.py` is the only one that opens Zenoh, `names.py` says what travels there and `types.py` how a
-message becomes bytes. To show one more thing of a car: a converter in `convert.py`, a line in
-`car.py`.
+`part.py` connects the city's cars (`car.py`, `pilot.py`) and drawings (`markers.py`) to ROS topics.
+Only `wire.py` opens Zenoh; `names.py` has its keys, and `types.py` encodes messages. To publish
+another topic of a car, add a converter to `convert.py` and a line to `car.py`.
 """

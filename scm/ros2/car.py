@@ -1,14 +1,14 @@
-"""One car as ROS sees it: its topics while it is in the city, and what it wishes to hear for them.
+"""One car in ROS: its topics while it is in the city, and the subscriptions that they need.
 
     <car>/odom              nav_msgs/Odometry            20 Hz       by dead reckoning
     <car>/scan              sensor_msgs/LaserScan        as scanned
     <car>/imu               sensor_msgs/Imu              as measured, 50 Hz
     <car>/camera/compressed sensor_msgs/CompressedImage  15 Hz       front camera
-    <car>/cmd_vel           geometry_msgs/Twist          heard
-    <car>/ackermann_cmd     ackermann_msgs/AckermannDrive  heard
+    <car>/cmd_vel           geometry_msgs/Twist          subscribed
+    <car>/ackermann_cmd     ackermann_msgs/AckermannDrive  subscribed
 
-Scans, measurements and pictures are made by the city only for who asks: it is asked for those that
-some ROS node subscribes to.
+The city makes scans, measurements and pictures only for subscribers: the car subscribes to those
+that some ROS node subscribes to.
 """
 
 from collections.abc import Callable
@@ -47,7 +47,7 @@ class RosCar:
         vehicle: Its name in the city; `name` its name in ROS.
         car: Its car file.
         graph: Where its topics go.
-        owner: Whose lease it is when a node drives it.
+        owner: Holder of the lease when a node drives it.
     """
 
     def __init__(self, vehicle: str, name: str, car: Car, graph: Graph, owner: str) -> None:
@@ -73,10 +73,10 @@ class RosCar:
         }
 
     def subscriptions(self, *, moves: bool) -> list[Subscription]:
-        """Return what it must hear for those who subscribe to it now.
+        """Return the subscriptions needed for the present subscribers of its topics.
 
         Args:
-            moves: Whether its motion is wanted by who hears `/tf`.
+            moves: Whether `/tf` has subscribers, who need its motion.
         """
         wanted = {topic for topic, publisher in self._topics.items() if publisher.is_wanted}
         own = {"vehicle": self.vehicle}
@@ -92,7 +92,7 @@ class RosCar:
         return out
 
     def show(self, message: Message, now_ns: int) -> list[Any]:
-        """Publish what the city says of the car; return transforms for `/tf`."""
+        """Publish a message about the car to ROS; return transforms for `/tf`."""
         return self._show[type(message)](message, now_ns)
 
     def _show_state(self, state: VehicleState, now_ns: int) -> list[Any]:
@@ -101,7 +101,7 @@ class RosCar:
         late_ns = state.t_ns - self._odom_ns
         if -ODOM_NS <= late_ns < 0:
             return []
-        # A grid of its own: every second or third of the 50 states, 20 Hz in the mean.
+        # Every second or third of the 50 states a second: 20 Hz on average.
         self._odom_ns = (self._odom_ns if 0 <= late_ns < ODOM_NS else state.t_ns) + ODOM_NS
         self._topics["odom"].publish(convert.odometry(self.name, state, at), now_ns)
         odom = f"{self.name}/odom"
@@ -125,21 +125,21 @@ class RosCar:
         return []
 
     def command(self, topic: str, message: Any, now_ns: int) -> None:
-        """Take a command of a ROS node, from one of `COMMANDS`."""
+        """Accept the command of a ROS node on one of the topics `COMMANDS`."""
         wheelbase = self._pilot.limits.wheelbase
         speed, angle = convert.speed_and_angle(COMMANDS[topic], message, wheelbase)
         self._pilot.set_command(speed, angle, now_ns)
 
     @property
     def pilot(self) -> Pilot:
-        """Who drives it for ROS."""
+        """The pilot that drives it for ROS."""
         return self._pilot
 
     def drive(self, now_ns: int) -> list[Outgoing]:
-        """Return what its pilot sends now."""
+        """Return the messages that its pilot sends now."""
         return self._pilot.step(now_ns, self._speed_mps)
 
     def close(self) -> None:
-        """Take its topics out of the ROS graph."""
+        """Remove its topics from the ROS graph."""
         for end in (*self._topics.values(), *self._ears):
             end.close()

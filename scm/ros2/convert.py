@@ -1,4 +1,4 @@
-"""The city's messages as ROS knows them; times are the city's, units and axes are the same."""
+"""Conversions of the city's messages to ROS: same times, units and axes."""
 
 import math
 from typing import Any
@@ -44,16 +44,15 @@ def odometry(name: str, state: VehicleState, at: Pose2) -> Any:
 
 
 def scan(name: str, turn: LidarScan, before_ns: int | None) -> Any:
-    """Return `sensor_msgs/LaserScan`: infinity is a miss, as there (REP-117).
+    """Return `sensor_msgs/LaserScan`: infinity means no echo (REP-117).
 
-    The stamp is when the first ray looked; the ray with index i looked `i * time_increment` later.
+    The stamp is the time of the first ray; ray i is `i * time_increment` later.
     A clockwise sweep is listed from its left end, with a negative `angle_increment`.
 
     Args:
         name: The car's in ROS.
         turn: The scan.
-        before_ns: Time of the scan before it, for scans that do not tell their period; None: not
-            known.
+        before_ns: Time of the previous scan, for scans without a period; None: not known.
     """
     step = turn.bearing_step_rad if turn.bearing_step_rad is not None else TAU / max(1, turn.beams)
     ranges = np.frombuffer(turn.payload, "<f4", count=len(turn.payload) // SCAN_BYTES)
@@ -79,7 +78,7 @@ def scan(name: str, turn: LidarScan, before_ns: int | None) -> Any:
 
 
 def imu(name: str, sensors: VehicleSensors) -> Any:
-    """Return `sensor_msgs/Imu`; where nothing is measured the covariance begins with -1."""
+    """Return `sensor_msgs/Imu`; the covariance of what is not measured begins with -1."""
     unknown = np.zeros(9)
     turn = sensors.orientation_rad
     nothing = unknown.copy()
@@ -97,7 +96,7 @@ def imu(name: str, sensors: VehicleSensors) -> Any:
 
 
 def picture(name: str, frame: CameraFrame) -> Any:
-    """Return `sensor_msgs/CompressedImage`, the JPEG file as it came."""
+    """Return `sensor_msgs/CompressedImage` with the JPEG file as received."""
     return ros(
         "sensor_msgs/CompressedImage",
         header=header(frame.t_ns, f"{name}/camera_optical"),
@@ -109,12 +108,12 @@ def picture(name: str, frame: CameraFrame) -> Any:
 def speed_and_angle(kind: str, message: Any, wheelbase_m: float) -> tuple[float, float]:
     """Return speed [m/s] and road-wheel angle [rad, + = left] that a command asks for.
 
-    A car cannot turn on the spot: at standstill a turn is not followed. What is not a number
-    stands still.
+    A car cannot turn on the spot: a yaw rate at standstill is ignored. NaN and infinity mean
+    standstill.
     """
     if kind == "geometry_msgs/Twist":
         speed, rate = message.linear.x, message.angular.z
-        # The angle for v and omega: the same both ways, reversing mirrors it.
+        # The angle for v and omega, also in reverse, where both change their sign.
         angle = math.atan(wheelbase_m * rate / speed) if speed else 0.0
     else:
         speed, angle = message.speed, message.steering_angle

@@ -1,10 +1,10 @@
-"""Frames as ROS names them (REP-105), with ISO 8855 axes, which are those of REP-103.
+"""Coordinate frames named as in REP-105; axes are those of ISO 8855, which REP-103 shares.
 
     map -> <car>/odom -> <car>/base_link -> <car>/laser, /imu, /camera -> <car>/camera_optical
 
 `base_link` is the centre of the rear axle on the floor. `odom` is where the car was first seen: in
-it the car moves by dead reckoning, smoothly for ever and drifting; `map -> odom` takes up whatever
-the car's pose on the map (indoor position, the Eye) corrects. `camera_optical` looks along its z.
+it the car moves by dead reckoning, without jumps but with drift; `map -> odom` holds the correction
+from the car's pose on the map (indoor position, the Eye). `camera_optical` looks along its z.
 """
 
 import math
@@ -24,16 +24,16 @@ Turn = tuple[float, float, float]
 
 
 class DeadReckoning:
-    """Where a car believes to be by its own motion alone, from where it was first seen."""
+    """Dead reckoning of a car: its own motion integrated from where it was first seen."""
 
     def __init__(self) -> None:
         self.odom_T_base = Pose2(0.0, 0.0, 0.0)
         self._before: VehicleState | None = None
 
     def step(self, state: VehicleState) -> Pose2:
-        """Go on to a newer state, by the mean of both motions; return odom_T_base.
+        """Integrate to a newer state by the mean of both motions; return odom_T_base.
 
-        From a state that is not newer, as when its sender starts anew, it goes on without a step.
+        A state that is not newer, as after a restart of its sender, adds no motion.
         """
         before, self._before = self._before, state
         if before is not None and state.t_ns > before.t_ns:
@@ -53,7 +53,7 @@ def time(t_ns: int) -> Any:
 
 
 def header(t_ns: int, frame: str) -> Any:
-    """Return the head of a message: when, and in which frame."""
+    """Return the header of a message: time and frame."""
     return ros("std_msgs/Header", stamp=time(t_ns), frame_id=frame)
 
 
@@ -80,7 +80,7 @@ def quaternion(turn: Turn) -> Any:
 
 
 def pose(at: Pose2, z: float = 0.0) -> Any:
-    """Return a pose over the floor."""
+    """Return a pose at height `z` above the floor."""
     place = point(at.x, at.y, z)
     turn = quaternion((0.0, 0.0, at.yaw))
     return ros("geometry_msgs/Pose", position=place, orientation=turn)
@@ -89,7 +89,7 @@ def pose(at: Pose2, z: float = 0.0) -> Any:
 def transform(
     t_ns: int, parent: str, child: str, at: tuple[float, float, float], turn: Turn = (0.0, 0.0, 0.0)
 ) -> Any:
-    """Return parent_T_child: where the child's origin is in the parent's frame, and its turn."""
+    """Return parent_T_child: the child's origin and rotation in the parent's frame."""
     moved = ros("geometry_msgs/Transform", translation=vector(*at), rotation=quaternion(turn))
     head = header(t_ns, parent)
     return ros("geometry_msgs/TransformStamped", header=head, child_frame_id=child, transform=moved)
@@ -101,7 +101,7 @@ def moving(t_ns: int, parent: str, child: str, at: Pose2) -> Any:
 
 
 def mounts(name: str, car: Car, t_ns: int) -> list[Any]:
-    """Return where the sensors of a car file sit, as far as it has them."""
+    """Return the mounting transforms of the sensors that the car file has."""
     base, out = f"{name}/base_link", []
     for section, frame in (("lidar", "laser"), ("imu", "imu"), ("camera", "camera")):
         if car.has(f"{section}.position_m"):

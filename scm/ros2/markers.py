@@ -1,4 +1,4 @@
-"""The city drawn for RViz and Foxglove: lanes and walls once, cars, boxes and signals again."""
+"""Markers for RViz and Foxglove: lanes and walls once; cars, boxes and signals repeatedly."""
 
 import itertools
 from collections.abc import Iterable, Mapping
@@ -29,7 +29,7 @@ COLOURS = {
     "flashing_red": (0.9, 0.1, 0.1), "dark": (0.2, 0.2, 0.2),
     "hosted": (0.2, 0.5, 0.9), "remote": (0.9, 0.5, 0.1), "real": (0.8, 0.2, 0.8),
 }  # fmt: skip
-_LAMPS = {"green": 0, "yellow": 1}  # the others are the topmost lamp: place tells as colour does
+_LAMPS = {"green": 0, "yellow": 1}  # any other colour is the top lamp
 _GREY = (0.6, 0.6, 0.6)
 _WHITE = (1.0, 1.0, 1.0)
 
@@ -37,7 +37,7 @@ Colour = tuple[float, float, float]
 
 
 def roads(city_map: CityMap, t_ns: int) -> Any:
-    """Return a `MarkerArray` of what never moves: lane edges, walls; it stays until replaced."""
+    """Return a `MarkerArray` of lane edges and walls, which stays until replaced."""
     lanes = Roads(city_map)
     edges = []
     for lane in city_map.lanes:
@@ -57,11 +57,11 @@ def moving(
     spats: Mapping[str, Spat],
     cars: Mapping[str, Car],
 ) -> Any:
-    """Return a `MarkerArray` of cars with their names, boxes, and the lit lamp of each head.
+    """Return a `MarkerArray` of cars with names, boxes, and the lit lamp of each signal head.
 
     Args:
-        city_map: For heads and the size of boxes.
-        snapshot: Of now; its time is that of all markers.
+        city_map: Has the signal heads and the size of boxes.
+        snapshot: The newest; all markers have its time.
         spats: The newest of each junction.
         cars: Car files by name; a car without one is not drawn.
     """

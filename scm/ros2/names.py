@@ -1,4 +1,4 @@
-"""What rmw_zenoh puts on Zenoh: keys of topics, tokens of the graph, attachments of messages.
+"""What rmw_zenoh uses of Zenoh: topic keys, liveliness tokens, and attachments of messages.
 
     key         <domain>/<topic>/<pkg>::msg::dds_::<Type>_/RIHS01_<64 hex digits>
     node        @ros2_lv/<domain>/<zid>/<node>/<node>/NN/%/<namespace>/<name>
@@ -6,9 +6,9 @@
                 <hash>/<reliability>:<durability>:<history>,<depth>:,:,:,,      (MS: a subscription)
     attachment  int64 sequence, int64 source time [ns], byte 16, 16 bytes gid; little-endian
 
-Source: ros2/rmw_zenoh, docs/design.md, liveliness_utils.cpp, attachment_helpers.cpp (Jazzy). The
-gid is there the XXH3 of the endpoint's token and here its BLAKE2: nobody looks it up in the graph,
-it only has to be the publisher's own.
+Source: ros2/rmw_zenoh, docs/design.md, liveliness_utils.cpp, attachment_helpers.cpp (Jazzy). There
+the gid is the XXH3 of the endpoint's token, here its BLAKE2: it only has to be unique, since nobody
+looks it up in the graph.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ _GID_BYTES = 16
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A ROS node at one Zenoh session."""
+    """A ROS node in a Zenoh session."""
 
     domain: int
     zid: str
@@ -59,12 +59,12 @@ class Node:
 
 
 def topic_key(domain: int, topic: str, kind: str) -> str:
-    """Return the key that a topic's messages travel on."""
+    """Return the Zenoh key of a topic."""
     return f"{domain}/{topic.strip('/')}/{kind}"
 
 
 def type_chunks(kind: str, type_hash: str) -> str:
-    """Return the type and hash of a topic's key, of a type such as `nav_msgs/Odometry`."""
+    """Return the type and hash chunks of a topic's key for a type such as `nav_msgs/Odometry`."""
     package, _, name = kind.partition("/")
     return f"{package}::msg::dds_::{name}_/{type_hash}"
 
@@ -75,12 +75,12 @@ def qos(*, latched: bool = False, depth: int = DEFAULT_DEPTH) -> str:
 
 
 def gid_of(token: str) -> bytes:
-    """Return 16 bytes that name an endpoint for ever."""
+    """Return the 16 bytes that identify an endpoint."""
     return hashlib.blake2b(token.encode(), digest_size=_GID_BYTES).digest()
 
 
 def attachment(sequence: int, t_ns: int, gid: bytes) -> bytes:
-    """Return what rmw_zenoh wants beside every message."""
+    """Return the attachment that rmw_zenoh expects with every message."""
     return _ATTACHMENT.pack(sequence, t_ns, _GID_BYTES, gid)
 
 

@@ -1,4 +1,4 @@
-"""The part that shows the city to ROS 2 nodes and lets them drive its cars.
+"""The part that publishes the city to ROS 2 nodes and lets them drive its cars.
 
     /clock          rosgraph_msgs/Clock              20 Hz      the world's time
     /tf             tf2_msgs/TFMessage               20 Hz      map -> odom -> base_link of each car
@@ -6,8 +6,8 @@
     /city/markers   visualization_msgs/MarkerArray   10 Hz      cars, boxes, lit lamps
     /city/roads     visualization_msgs/MarkerArray   latched    lanes and walls
 
-and of each car what `car.py` says. On the city's bus it is a part like any other; the ROS side is
-the `Graph` that it is given. It hears of the city what ROS nodes subscribe to, and no more.
+and the topics of each car in `car.py`. On the city's bus it is a part like any other; the ROS side
+is the given `Graph`. It subscribes only to what ROS nodes subscribe to.
 """
 
 import logging
@@ -40,7 +40,7 @@ _log = logging.getLogger(__name__)
 
 
 class RosPart(BasePart):
-    """The bridge; `graph` stays its owner's to close."""
+    """The bridge; the caller closes `graph`."""
 
     name = "ros2"
     role = "part"
@@ -62,7 +62,7 @@ class RosPart(BasePart):
         self._snapshots = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Publish what the city said; send what ROS nodes want of their cars."""
+        """Publish the city's messages to ROS; send the commands of ROS nodes to their cars."""
         moved: list[Any] = []
         for item in inbox:
             moved += self._process(item, now_ns)
@@ -148,7 +148,7 @@ class RosPart(BasePart):
             self.subscriptions = wanted
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Give back the leases; the cars leave the ROS graph."""
+        """Release the leases and remove the cars from the ROS graph."""
         del now_ns
         out = [item for car in self._cars.values() for item in car.pilot.release()]
         for car in self._cars.values():

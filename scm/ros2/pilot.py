@@ -1,13 +1,13 @@
-"""Drives one car for a ROS node, as anybody drives here: by a lease, and only while it is told to.
+"""Drives one car for a ROS node under a lease, while commands arrive.
 
-    a command arrives       the lease is asked for, then renewed three times in its life
+    a command arrives       the lease is requested, then renewed three times in its duration
     every 50 ms             throttle and steering towards the newest command
     none for 300 ms         zero throttle, steering held
-    none for 1 s            the lease is given back: the car stands
+    none for 1 s            the lease is released: the car stops
 
-Who loses the lease to somebody else does not ask again before the node has been silent for a
-second: a person who took the car over is not fought for it.
-Speed is found by the car's own table of steady throttles and feedback; without one by feedback.
+After losing the lease to somebody else, the pilot requests it again only once the node has been
+silent for a second, so a person who takes over keeps the car. Speed is controlled by the table of
+steady throttles in the car file, if it has one, and by feedback.
 """
 
 import bisect
@@ -35,11 +35,11 @@ _log = logging.getLogger(__name__)
 
 
 class Pilot:
-    """One car's lease and pedals on behalf of ROS.
+    """Holds one car's lease and drives it on behalf of ROS.
 
     Args:
         vehicle: The car.
-        owner: Whose lease it will be: the part's station.
+        owner: Holder of the lease: the station of the part.
         limits: What the car can do.
     """
 
@@ -59,7 +59,7 @@ class Pilot:
 
     @property
     def is_driving(self) -> bool:
-        """Whether a node has spoken within the last second, or the lease is still held."""
+        """Whether a command arrived within the last second, or the lease is still held."""
         return self._command_ns is not None or self._epoch is not None
 
     def set_command(self, speed_mps: float, angle_rad: float, now_ns: int) -> None:
@@ -67,7 +67,7 @@ class Pilot:
         self._speed_mps, self._angle_rad, self._command_ns = speed_mps, angle_rad, now_ns
 
     def step(self, now_ns: int, speed_mps: float) -> list[Outgoing]:
-        """Return what is due: asking for the lease, renewing it, driving, giving it back.
+        """Return the messages due: requests for the lease, its release, and drive commands.
 
         Args:
             now_ns: Now.
@@ -138,7 +138,7 @@ class Pilot:
 
 
 class _SpeedControl:
-    """Throttle for a speed: what the car's table says, and feedback for the rest."""
+    """Speed controller: feedforward from the car's table, and feedback."""
 
     def __init__(self, limits: CarLimits) -> None:
         self._limits = limits
@@ -148,7 +148,7 @@ class _SpeedControl:
         self._then_ns: int | None = None
 
     def throttle(self, target_mps: float, speed_mps: float, now_ns: int) -> float:
-        """Return the throttle, -1 to 1, with which the car comes to a speed at its own pace."""
+        """Return the throttle, -1 to 1, that brings the car to a speed."""
         passed_s = 0.0 if self._then_ns is None else seconds(now_ns - self._then_ns)
         passed_s = min(MAX_STEP_S, passed_s)
         self._then_ns = now_ns

@@ -1,6 +1,6 @@
-"""ROS 2 Jazzy's messages: made, hashed, and turned into CDR bytes and back, by `rosbags`.
+"""Messages of ROS 2 Jazzy: created, hashed, and encoded as CDR and back, by `rosbags`.
 
-A type is called by package and name here: `nav_msgs/Odometry`.
+A type is named by package and name: `nav_msgs/Odometry`.
 """
 
 from functools import cache
@@ -24,7 +24,7 @@ def store() -> Any:
         RunError: when the library is not installed.
     """
     try:
-        from rosbags.typesys import (  # noqa: PLC0415  an extra: only who speaks ROS 2 needs it
+        from rosbags.typesys import (  # noqa: PLC0415  an extra, needed only for ROS 2
             Stores,
             get_types_from_msg,
             get_typestore,
@@ -45,7 +45,7 @@ def hash_of(kind: str) -> str:
 
 
 def ros(kind: str, **fields: Any) -> Any:
-    """Return a new message with all its fields given, in ROS's own names and units."""
+    """Return a new message; all fields are given, with ROS's names and units."""
     return _class_of(kind)(**fields)
 
 
@@ -60,14 +60,14 @@ def to_cdr(kind: str, message: Any) -> bytes:
 
 
 def from_cdr(kind: str, raw: bytes) -> Any:
-    """Return the message that bytes stand for.
+    """Return the decoded message.
 
     Raises:
-        MessageError: when they do not make one.
+        MessageError: when the bytes are not a message of this type.
     """
     try:
         return store().deserialize_cdr(raw, _full(kind))
-    except Exception as cause:  # the library raises whatever its unpacking stumbles over
+    except Exception as cause:  # the library raises many kinds of errors when decoding
         msg = f"{kind}: {len(raw)} bytes cannot be read: {type(cause).__name__}: {cause}"
         raise MessageError(msg) from cause
 

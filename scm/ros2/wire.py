@@ -1,8 +1,8 @@
 """A ROS 2 node on Zenoh, without ROS: its session, publishers and subscriptions.
 
-By default it is a router of its own, that ROS nodes connect to as they do to `rmw_zenohd`; so no
-node of theirs can reach the city's keys, and the city's own router stays as closed as it is. Or it
-joins the `rmw_zenohd` that is there. As in `scm.v2x.bus_zenoh`, callbacks only note the bytes.
+By default it opens its own router, which ROS nodes connect to as to `rmw_zenohd`; so they cannot
+reach the city's keys or its router. Or it joins a running `rmw_zenohd`. As in `scm.v2x.bus_zenoh`,
+callbacks only queue the bytes.
 """
 
 import json
@@ -59,7 +59,7 @@ class Topic(Endpoint, Protocol):
 
 
 class Graph(Protocol):
-    """What the part needs of ROS: `Wire`, or a stand-in of a test."""
+    """What the part needs of ROS: `Wire`, or a fake in a test."""
 
     def publisher(self, topic: str, kind: str, *, latched: bool = False) -> Topic:
         """Return a new publisher; a latched one keeps its last message for late joiners."""
@@ -78,14 +78,14 @@ class Wire:
     """The node `scm` of a ROS domain; a context manager that leaves the graph at its end.
 
     Args:
-        endpoint: Where to listen, or where the router is that ROS nodes connect to.
+        endpoint: Where to listen, or the address of the router that ROS nodes connect to.
         domain: ROS_DOMAIN_ID.
         listen: Whether to be that router.
         node: The node's name.
 
     Raises:
-        AccessError: when other computers could reach where it listens.
-        RunError: when the endpoint cannot be listened at, or rosbags is missing.
+        AccessError: when other computers could reach the endpoint.
+        RunError: when it cannot listen at the endpoint, or rosbags is missing.
         LinkError: when there is no router to connect to.
     """
 
@@ -174,7 +174,7 @@ class Wire:
 
 
 class _End:
-    """One endpoint: what Zenoh declared for it, and its token in the ROS graph."""
+    """One endpoint: its Zenoh declaration and its token in the ROS graph."""
 
     def __init__(self, session: zenoh.Session, token: str, declared: Any) -> None:
         self._declared = declared
@@ -213,8 +213,8 @@ def _declare(session: zenoh.Session, key: str) -> zenoh.Publisher:
 
 
 def _declare_latched(session: zenoh.Session, key: str) -> Any:
-    """Return what rmw_zenoh's TRANSIENT_LOCAL is made of: a publisher with a memory of one."""
-    # The stubs want both arguments.
+    """Return a publisher that keeps one message, as rmw_zenoh's TRANSIENT_LOCAL does."""
+    # The type stubs require both arguments.
     facts: dict[str, Any] = {"sporadic_heartbeat": HEARTBEAT_S}
     return ext.declare_advanced_publisher(
         session,
@@ -227,7 +227,7 @@ def _declare_latched(session: zenoh.Session, key: str) -> Any:
 
 
 def _listening(endpoint: str) -> zenoh.Session:
-    """Return a router with gossip: ROS nodes are peers that learn of each other from it."""
+    """Return a router with gossip, by which ROS nodes, which are peers, find each other."""
     config = json.loads(zenoh_config.router(endpoint))
     config["scouting"] |= {"gossip": {"enabled": True}}
     try:
