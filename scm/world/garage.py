@@ -10,7 +10,7 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.geometry import Pose2
 from scm.log import event
-from scm.vehicles.battery_telemetry import Packs
+from scm.vehicles.battery_pack import Packs
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.ground import Ground

@@ -18,10 +18,10 @@ from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
+from scm.vehicles.battery_pack import pack_of
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.lights import Switches
-from scm.vehicles.pack import pack_of
 from vehicle_agent.body import Body, BodyKind, Motion, Obeyed, Wiring
 from vehicle_agent.lidar_port import LidarPort, open_lidar
 from vehicle_agent.nigel.command_correction import DEADBAND, CommandCorrection, correction_of

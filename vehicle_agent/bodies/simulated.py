@@ -16,7 +16,7 @@ from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.bank import Bank
-from scm.vehicles.battery_telemetry import Packs
+from scm.vehicles.battery_pack import Packs
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet

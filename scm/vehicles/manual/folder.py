@@ -3,8 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from scm.vehicles.chapters import CHAPTERS, OTHERS, chapter_of
-from scm.vehicles.describe_effects import Effect, all_effects, effect_named
+from scm.vehicles.describe_effects import (
+    CHAPTERS,
+    OTHERS,
+    Effect,
+    all_effects,
+    chapter_of,
+    effect_named,
+)
 from scm.vehicles.manual.picture import draw_term
 from scm.vehicles.manual.sensor_fault_page import draw_sensor_fault, sensor_fault_page
 from scm.vehicles.manual.term_page import term_page

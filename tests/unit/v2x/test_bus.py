@@ -7,7 +7,6 @@ from scm.clock import NS_PER_S, StepClock
 from scm.errors import MessageError
 from scm.v2x.bus import Mailbox, RawMailbox
 from scm.v2x.bus_memory import MemoryNetwork
-from scm.v2x.copies import MIN_REMEMBERED
 from scm.v2x.etsi.convert import cam_of
 from scm.v2x.exchange import Incoming, RawSample
 from scm.v2x.mailbox import drain_all
@@ -16,7 +15,7 @@ from scm.v2x.messages.cam_rx import CamRx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState
-from scm.v2x.reader import Reader
+from scm.v2x.reader import MIN_REMEMBERED, Reader
 
 KEY = "scm/@v1/city/part/world/status"
 A_STATE = VehicleState(

@@ -7,12 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scm.geometry import Pose2
-from scm.vehicles.battery_telemetry import Packs
+from scm.vehicles.battery_pack import CUT_OFF_V, Packs, pack_of
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
 from scm.vehicles.lipo import cell_voltage
-from scm.vehicles.pack import CUT_OFF_V, pack_of
 
 HERE = Pose2(0.0, 0.0, 0.0)
 ROW = np.array([0])
