@@ -18,8 +18,8 @@ from bench.mismatch_free_run import gaussian_pushes, position_error, sindy_pushe
 from bench.mismatch_peers import Gaussian, Sindy, calibrated
 from bench.mismatch_residuals import residuals
 from scm.mismatch.trial import labels
-from scm.mismatch.trial.blind import answer_all, by_engine, kept_answers
-from scm.mismatch.trial.reality import Wish, make_cases
+from scm.mismatch.trial.blind import answer_all, by_engine, stored_answers
+from scm.mismatch.trial.reality import CaseRequest, make_cases
 from scm.mismatch.trial.score import score
 from scm.recording.read import read_recordings
 from scm.vehicles.car import load_car
@@ -46,9 +46,11 @@ def main():
         folder = given.cases
         if isinstance(folder, int):
             folder = Path(made) / "cases"
-            make_cases(Wish(seed=given.seed, cases=given.cases), folder, lambda _: None)
+            make_cases(CaseRequest(seed=given.seed, cases=given.cases), folder, lambda _: None)
         healthy = Path(made) / "healthy"
-        make_cases(Wish(seed=HEALTHY_SEED, cases=HEALTHY, kind="none"), healthy, lambda _: None)
+        make_cases(
+            CaseRequest(seed=HEALTHY_SEED, cases=HEALTHY, kind="none"), healthy, lambda _: None
+        )
         compare(folder, healthy)
 
 
@@ -60,7 +62,7 @@ def compare(folder, healthy):
     """Let all judge the cases of a folder and print how they did."""
     sparse = _calibrated(healthy)
     cases, opened = labels.find_cases(folder), _labels(folder)
-    answers = {a.case.name: a for a in kept_answers(cases, folder / "found")}
+    answers = {a.case.name: a for a in stored_answers(cases, folder / "found")}
     wanted = [case for case in cases if case.name not in answers] if not answers else []
     answers |= {a.case.name: a for a in answer_all(wanted, folder / "found", by_engine)}
     table = defaultdict(lambda: defaultdict(list))
@@ -92,7 +94,7 @@ def _one(case, label, answer, sparse, found, table):
     errors = {"nominal car": position_error(again, car, None)}
     if answer.diagnosis is not None:
         outcome = score(label, answer.diagnosis)
-        _count(table["this engine"], label, outcome.exact, outcome.among, bool(outcome.said))
+        _count(table["this engine"], label, outcome.exact, outcome.among, bool(outcome.reported))
         table["this engine"]["seconds"].append(outcome.runtime_s)
         if (found / case.name / "car.toml").is_file():
             patched = load_car(found / case.name / "car.toml")

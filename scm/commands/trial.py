@@ -62,7 +62,7 @@ def _run(arguments: argparse.Namespace) -> int:
 def _table(arguments: argparse.Namespace, out: Path, progress: "Progress") -> list[str]:
     from scm.mismatch.trial import run
     from scm.mismatch.trial.blind import by_engine
-    from scm.mismatch.trial.reality import Wish
+    from scm.mismatch.trial.reality import CaseRequest
 
     workers, report = arguments.workers, progress.step
     if arguments.kept:
@@ -70,14 +70,14 @@ def _table(arguments: argparse.Namespace, out: Path, progress: "Progress") -> li
     if arguments.trials:
         only = [name for name in arguments.only.split(",") if name]
         return run.on_shipped_cases(
-            arguments.trials, out, by_engine, only, workers=workers, say=report
+            arguments.trials, out, by_engine, only, workers=workers, notify=report
         )
     low, high = arguments.strength
-    plan = Wish(
+    plan = CaseRequest(
         seed=arguments.seed, cases=arguments.cases, kind=arguments.kind,
         engine=arguments.engine, strength=(low, high),
     )  # fmt: skip
-    return run.on_own_cases(plan, out, by_engine, workers=workers, say=report)
+    return run.on_own_cases(plan, out, by_engine, workers=workers, notify=report)
 
 
 def _title(arguments: argparse.Namespace) -> str:

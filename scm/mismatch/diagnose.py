@@ -23,10 +23,9 @@ from scm.mismatch.discovery.decide import Lawful, is_discovered
 from scm.mismatch.discovery.seek import Sought, with_general_effect
 from scm.mismatch.effect_catalogue import Candidate, candidates, placed, shown_by, terms_needed
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns, Tried
-from scm.mismatch.experiment.folders import folders_of
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.suggest import Suggestion
-from scm.mismatch.findings import Diagnosis, Effect, Fit, Unanswered, Undecided, Verdict
+from scm.mismatch.findings import Diagnosis, Effect, Fit, Unanswered, Undecided, Verdict, folders_of
 from scm.mismatch.fit.data_split import Parts, split
 from scm.mismatch.fit.fitter import Fitted, Fitter
 from scm.mismatch.fit.likelihood import Likelihood

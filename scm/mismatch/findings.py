@@ -4,12 +4,15 @@ Where an attribute has another name in `report.json`, `field(name=...)` gives it
 a 90 % interval.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
 from msgspec import Struct, field
 
 from scm.data_quality.problem import DataProblem, Span
+
+DRIVE_FOLDER = "next_drive"
+MIN_OFFERED_STDS = 3.2  # of separation; a drive that separates less is not written
 
 
 class Verdict(StrEnum):
@@ -163,3 +166,13 @@ class Diagnosis(Struct, kw_only=True, frozen=True):
     unanswered: tuple[Unanswered, ...] = field(default=(), name="unasked")
     processor_share: float | None = None
     compared_s: float | None = None
+
+
+def folders_of(undecided: Sequence[Undecided]) -> tuple[str, ...]:
+    """Return the folder of each question's drive, numbered from the second on; empty: no drive."""
+    found, count = list[str](), 0
+    for question in undecided:
+        offered = question.expected_separation >= MIN_OFFERED_STDS
+        count += offered
+        found.append((DRIVE_FOLDER if count < 2 else f"{DRIVE_FOLDER}_{count}") if offered else "")
+    return tuple(found)

@@ -1,4 +1,4 @@
-"""Experiments that change something else than the commands, for rivals that no drive separates.
+"""Experiments that change more than the commands, where no drive separates the explanations.
 
 To add one: a function of the nominal car and the pace, and its line in `CHANGED`.
 """
@@ -27,14 +27,14 @@ class Experiment:
     """What to do with the car.
 
     Attributes:
-        said: Before the sentence of the drive itself.
-        asks: Keys of numbers of which a rival must have one; empty: it makes sense for all.
+        preparation: What to do before the drive, the beginning of its sentence.
+        only_for: Keys of numbers of which an explanation must have one; empty: for all.
     """
 
     name: str
     legs: tuple[Leg, ...]
-    said: str = ""
-    asks: tuple[str, ...] = ()
+    preparation: str = ""
+    only_for: tuple[str, ...] = ()
 
 
 def drive_alone(build: Callable[[Pace], Manoeuvre], name: str) -> Experiment:
@@ -44,20 +44,20 @@ def drive_alone(build: Callable[[Pace], Manoeuvre], name: str) -> Experiment:
 
 def ramp(_car: Car) -> Experiment:
     """Up and down a slope that is known."""
-    said = (
+    text = (
         f"lay a ramp that rises {100.0 * SLOPE:g} cm a metre and tell the tool its slope "
         f"(grade.slope = {SLOPE:g}); up and down that ramp: "
     )
-    return Experiment("ramp", (Leg(_climb, _tilted(SLOPE)),), said)
+    return Experiment("ramp", (Leg(_climb, _tilted(SLOPE)),), text)
 
 
 def slope(_car: Car) -> Experiment:
     """Circles on a slope that is known, for cars that roll when they stop."""
-    said = (
+    text = (
         f"take the car to an even slope that rises {100.0 * GENTLE:g} cm a metre and tell the tool "
         f"(grade.slope = {GENTLE:g}); on that slope, starting uphill: "
     )
-    return Experiment("slope", (Leg(manoeuvres.circles, _tilted(GENTLE)),), said)
+    return Experiment("slope", (Leg(manoeuvres.circles, _tilted(GENTLE)),), text)
 
 
 def _climb(pace: Pace) -> Manoeuvre:
@@ -80,12 +80,12 @@ def _tilted(rise: float) -> Change:
 def known_mass(car: Car) -> Experiment:
     """The same drive twice, once with a weight that was weighed."""
     loaded = _load(car)
-    said = (
+    text = (
         f"drive twice, first as the car is, then with a weighed {_mass(car):g} kg over its centre, "
         f"and tell the tool the mass; both times: "
     )
     legs = (Leg(manoeuvres.straight_steps), Leg(manoeuvres.straight_steps, loaded))
-    return Experiment("known mass", legs, said)
+    return Experiment("known mass", legs, text)
 
 
 def ramp_and_mass(car: Car) -> Experiment:
@@ -95,10 +95,10 @@ def ramp_and_mass(car: Car) -> Experiment:
     def change(numbers: Numbers, yaw: float) -> Numbers:
         return loaded(tilted(numbers, yaw), yaw)
 
-    said = alone.said + (
+    text = alone.preparation + (
         f"drive twice, first as the car is, then with a weighed {_mass(car):g} kg over its centre; "
     )
-    return Experiment("known mass on a ramp", (*alone.legs, Leg(_climb, change)), said)
+    return Experiment("known mass on a ramp", (*alone.legs, Leg(_climb, change)), text)
 
 
 def _mass(car: Car) -> float:
@@ -116,9 +116,9 @@ def _load(car: Car) -> Change:
 
 def rotated(_car: Car) -> Experiment:
     """The same drive along the floor and across it."""
-    said = "drive the same course twice, the second time turned by 90 degrees on the floor: "
+    text = "drive the same course twice, the second time turned by 90 degrees on the floor: "
     legs = (Leg(manoeuvres.shuttle), Leg(manoeuvres.shuttle, turned=True))
-    return Experiment("rotated course", legs, said, HEADED)
+    return Experiment("rotated course", legs, text, HEADED)
 
 
 def other_wheels(car: Car) -> Experiment:
@@ -129,9 +129,9 @@ def other_wheels(car: Car) -> Experiment:
     def change(numbers: Numbers, _yaw: float) -> Numbers:
         return {k: neutral.get(k, v) for k, v in numbers.items()}
 
-    said = "drive twice, the second time on new wheels whose radius was measured; both times: "
+    text = "drive twice, the second time on new wheels whose radius was measured; both times: "
     legs = (Leg(manoeuvres.circles), Leg(manoeuvres.circles, change))
-    return Experiment("other wheels", legs, said, WHEELS)
+    return Experiment("other wheels", legs, text, WHEELS)
 
 
 def cooled(_car: Car) -> Experiment:
@@ -140,10 +140,10 @@ def cooled(_car: Car) -> Experiment:
     def build(pace: Pace) -> Manoeuvre:
         laps = manoeuvres.long_laps(pace)
         before, drive, _, again, after = laps.pieces
-        said = laps.said.replace("rest for 30 s", f"rest for {COOLING_S:g} s")
+        text = laps.text.replace("rest for 30 s", f"rest for {COOLING_S:g} s")
         return Manoeuvre(
             "laps, three minutes of rest, laps",
-            (before, drive, (COOLING_S, 0.0, 0.0), again, after), said,
+            (before, drive, (COOLING_S, 0.0, 0.0), again, after), text,
         )  # fmt: skip
 
     return Experiment("rest", (Leg(build),), "", HEATED)

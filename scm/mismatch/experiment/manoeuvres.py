@@ -26,12 +26,12 @@ class Manoeuvre:
     """One drive.
 
     Attributes:
-        said: What to do, a sentence with numbers.
+        text: What to do, a sentence with numbers.
     """
 
     name: str
     pieces: tuple[Piece, ...]
-    said: str
+    text: str
 
     @property
     def lasts_s(self) -> float:
@@ -62,23 +62,23 @@ def _there_and_back(run: list[Piece]) -> list[Piece]:
 def shuttle(pace: Pace) -> Manoeuvre:
     """Forwards and backwards, wheels straight."""
     u, t = pace.throttle, pace.lasts(pace.throttle)
-    said = (
+    text = (
         f"wheels straight, drive forwards for {t:g} s at throttle {u:.2f}, stop for {REST_S:g} s, "
         f"drive backwards for {t:g} s at throttle -{u:.2f}, stop, and so on for half a minute"
     )
-    return Manoeuvre("shuttle", _again(_there_and_back([(t, u, 0.0)])), said)
+    return Manoeuvre("shuttle", _again(_there_and_back([(t, u, 0.0)])), text)
 
 
 def straight_steps(pace: Pace) -> Manoeuvre:
     """Throttle up and down in steps, straight."""
     u, t = pace.throttle, pace.lasts(0.7 * pace.throttle) / 4.0
     levels = [round(f * u, 2) for f in (0.4, 0.7, 1.0, 0.7)]
-    said = (
+    text = (
         f"wheels straight, step the throttle {', '.join(f'{x:.2f}' for x in levels)}, "
         f"{t:.2g} s each, stop, the same backwards, and so on for half a minute"
     )
     run = [(t, level, 0.0) for level in levels]
-    return Manoeuvre("throttle steps", _again(_there_and_back(run)), said)
+    return Manoeuvre("throttle steps", _again(_there_and_back(run)), text)
 
 
 def throttle_noise(pace: Pace) -> Manoeuvre:
@@ -89,35 +89,35 @@ def throttle_noise(pace: Pace) -> Manoeuvre:
         seconds = float(min(rng.integers(6, 20) * ROW_S, left))
         run.append((seconds, u if len(run) % 2 == 0 else low, 0.0))
         left -= seconds
-    said = (
+    text = (
         f"wheels straight, let the throttle jump between {low:.2f} and {u:.2f} every 0.3 to 1 s "
         f"until the floor ends, stop, the same backwards, and so on for half a minute"
     )
-    return Manoeuvre("throttle jumps", _again(_there_and_back(run)), said)
+    return Manoeuvre("throttle jumps", _again(_there_and_back(run)), text)
 
 
 def pulse_and_coast(pace: Pace) -> Manoeuvre:
     """Full throttle for a moment, then none until the car stands."""
     u = pace.throttle
     on = max(round(min(1.5, 0.5 * pace.lasts(u)) / ROW_S) * ROW_S, 0.2)
-    said = (
+    text = (
         f"wheels straight, give throttle {u:.2f} for {on:.2g} s, then none until the car has "
         f"stood for a second, the same backwards, and so on for half a minute"
     )
     off = on + 1.0
     run = [(on, u, 0.0), (off, 0.0, 0.0), (on, -u, 0.0), (off, 0.0, 0.0)]
-    return Manoeuvre("pulse and coast", _again(run), said)
+    return Manoeuvre("pulse and coast", _again(run), text)
 
 
 def launches(pace: Pace) -> Manoeuvre:
     """Creep at low throttle, then launch; straight."""
     u, t = pace.throttle, min(pace.lasts(pace.throttle), 2.0)
     creep = [(0.5, round(f * u, 3), 0.0) for f in (0.05, 0.1, 0.15, 0.2, 0.3)]
-    said = (
+    text = (
         f"wheels straight, raise the throttle slowly from {0.05 * u:.2f} to {0.3 * u:.2f} in "
         f"2.5 s, then launch at {u:.2f} for {0.5 * t:.2g} s, stop, the same backwards, and so on"
     )
-    return Manoeuvre("creep and launch", _again(_there_and_back([*creep, (0.5 * t, u, 0.0)])), said)
+    return Manoeuvre("creep and launch", _again(_there_and_back([*creep, (0.5 * t, u, 0.0)])), text)
 
 
 def _circle(pace: Pace, share: float = 0.7) -> float:
@@ -137,48 +137,48 @@ def circles(pace: Pace) -> Manoeuvre:
     u, s = pace.throttle, _circle(pace)
     slow = round(0.5 * u, 2)
     slowly, fast = _laps(pace, slow, s), _laps(pace, u, s)
-    said = (
+    text = (
         f"circles of {pace.radius(s):.2g} m radius (steering {s:.2f}): {slowly:.2g} s left at "
         f"throttle {slow:.2f}, {fast:.2g} s left at {u:.2f}, then the same to the right"
     )
     pieces = [(slowly, slow, s), (fast, u, s), (slowly, slow, -s), (fast, u, -s)]
-    return Manoeuvre("circles at two speeds", _again(pieces), said)
+    return Manoeuvre("circles at two speeds", _again(pieces), text)
 
 
 def steering_steps(pace: Pace) -> Manoeuvre:
     """Steering that steps from side to side at speed."""
     u, s = round(0.8 * pace.throttle, 2), _circle(pace, 0.5)
     t = min(0.5 * pace.lasts(u), 4.0)
-    said = (
+    text = (
         f"at throttle {u:.2f} steer {s:.2f} left for {0.5 * t:.2g} s, right for {t:.2g} s, left "
         f"for {0.5 * t:.2g} s, stop, the same backwards, and so on for half a minute"
     )
     run = [(0.5 * t, u, s), (t, u, -s), (0.5 * t, u, s)]
-    return Manoeuvre("steering from side to side", _again(_there_and_back(run)), said)
+    return Manoeuvre("steering from side to side", _again(_there_and_back(run)), text)
 
 
 def slalom(pace: Pace) -> Manoeuvre:
     """A slalom out and back."""
     u, s = round(0.7 * pace.throttle, 2), 0.4
     runs = max(int(pace.lasts(u) / 2.0), 1)
-    said = (
+    text = (
         f"a slalom at throttle {u:.2f}: steer {s:g} left and right in turn, 1 s each, for "
         f"{2 * runs} s, stop, the same backwards, and so on for half a minute"
     )
     run = [(0.5, u, s), *([(1.0, u, -s), (1.0, u, s)] * runs)][: 2 * runs]
-    return Manoeuvre("slalom", _again(_there_and_back([*run, (0.5, u, -s)])), said)
+    return Manoeuvre("slalom", _again(_there_and_back([*run, (0.5, u, -s)])), text)
 
 
 def small_reversals(pace: Pace) -> Manoeuvre:
     """Small steering to and fro about straight ahead."""
     u, s = round(0.7 * pace.throttle, 2), 0.1
     runs = max(int(pace.lasts(u) / 2.0), 1)
-    said = (
+    text = (
         f"at throttle {u:.2f} steer only {s:g} left and right in turn, 1 s each, for {2 * runs} s, "
         f"stop, the same backwards, and so on for half a minute"
     )
     run = [(1.0, u, s), (1.0, u, -s)] * runs
-    return Manoeuvre("small steering reversals", _again(_there_and_back(run)), said)
+    return Manoeuvre("small steering reversals", _again(_there_and_back(run)), text)
 
 
 def steer_then_go(pace: Pace) -> Manoeuvre:
@@ -190,11 +190,11 @@ def steer_then_go(pace: Pace) -> Manoeuvre:
         for way in (u, -u):
             gently = [(0.2, round(share * way, 3), side) for share in (0.2, 0.4, 0.6, 0.8)]
             pieces += [(1.5, 0.0, side), *gently, (on, way, side), *reversed(gently)]
-    said = (
+    text = (
         f"standing, steer {s:g} to the left, wait 1.5 s, raise the throttle to {u:.2f} in a "
         f"second, drive for {on:.2g} s, stop as gently, drive back, then the same to the right"
     )
-    return Manoeuvre("steer at rest, then go", _again(pieces), said)
+    return Manoeuvre("steer at rest, then go", _again(pieces), text)
 
 
 def out_and_back(pace: Pace) -> Manoeuvre:
@@ -203,23 +203,23 @@ def out_and_back(pace: Pace) -> Manoeuvre:
     v, radius = pace.speed(u), pace.radius(s)
     straight = max(0.6 * (pace.run_m - 2.0 * radius) / max(v, 1e-3), 0.5)
     turn = math.pi * radius / max(v, 1e-3)
-    said = (
+    text = (
         f"at throttle {u:.2f} drive {straight:.2g} s straight, turn round to the left, steering "
         f"{s:.2f} for {turn:.2g} s, drive straight back as long, and turn round again"
     )
     loop = [(straight, u, 0.0), (turn, u, s)] * 2
-    return Manoeuvre("two headings", _again(loop, 1.0), said)
+    return Manoeuvre("two headings", _again(loop, 1.0), text)
 
 
 def long_laps(pace: Pace) -> Manoeuvre:
     """Long laps at one throttle, and again after a rest in between."""
     u, s = round(0.8 * pace.throttle, 2), _circle(pace, 0.9)
-    said = (
+    text = (
         f"laps of {pace.radius(s):.2g} m radius (steering {s:.2f}) at throttle {u:.2f} for 45 s, "
         f"rest for 30 s, and the same laps for 45 s more"
     )
     pieces = ((REST_S, 0.0, 0.0), (45.0, u, s), (30.0, 0.0, 0.0), (45.0, u, s), (REST_S, 0.0, 0.0))
-    return Manoeuvre("long laps with a rest", pieces, said)
+    return Manoeuvre("long laps with a rest", pieces, text)
 
 
 MANOEUVRES: Mapping[str, Callable[[Pace], Manoeuvre]] = {

@@ -74,7 +74,7 @@ class Pace:
         return min(math.atan(self.wheelbase_m / radius_m) / self.limit_rad, 0.95)
 
     def radius(self, steering: float) -> float:
-        """Return the radius that a steering command asks for [m]."""
+        """Return the radius that a steering command only_for for [m]."""
         return self.wheelbase_m / math.tan(abs(steering) * self.limit_rad)
 
 

@@ -1,4 +1,4 @@
-"""An experiment laid out on the floor, and what its recording would be if a rival were right."""
+"""An experiment laid out on the floor, and its recording if an explanation were right."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ Change = Callable[[Numbers, float], Numbers]
 
 
 @dataclass(frozen=True, slots=True)
-class Rival:
+class Explanation:
     """An explanation: effects with their numbers, in the order of their knobs."""
 
     effects: tuple[Candidate, ...]
@@ -75,23 +75,25 @@ def numbers_of(effects: Sequence[Candidate], values: Floats) -> dict[str, float]
     return found
 
 
-def place(leg: Leg, car: Car, pace: Pace, rivals: Sequence[Numbers]) -> Placed | None:
-    """Return a leg with the most throttle that keeps every rival's car on the floor, upright."""
-    wishes = [leg.build(replace(pace, throttle=round(s * pace.throttle, 3))) for s in SCALES]
-    wishes = [wish for wish in wishes if wish.lasts_s < LONGEST_S]
-    if not wishes:
+def place(leg: Leg, car: Car, pace: Pace, explanations: Sequence[Numbers]) -> Placed | None:
+    """Return a leg with the most throttle that keeps the car on the floor and upright."""
+    scaled = [leg.build(replace(pace, throttle=round(s * pace.throttle, 3))) for s in SCALES]
+    scaled = [manoeuvre for manoeuvre in scaled if manoeuvre.lasts_s < LONGEST_S]
+    if not scaled:
         return None
-    longest = max(round(w.lasts_s / STEP_S) for w in wishes) + 10
-    commands = np.zeros((2, longest, len(wishes) * len(rivals)))
-    for k, wish in enumerate(wishes):
-        rows = np.repeat(wish.rows()[:, 1:], round(ROW_S / STEP_S), axis=0)[:longest]
-        commands[:, : len(rows), k * len(rivals) : (k + 1) * len(rivals)] = rows.T[:, :, None]
-    changed = [leg.change(n, 0.0) if leg.change else n for n in rivals]
-    path, ok = _driven(car, list(changed) * len(wishes), commands)
-    for k, wish in enumerate(wishes):
-        mine = slice(k * len(rivals), (k + 1) * len(rivals))
+    longest = max(round(w.lasts_s / STEP_S) for w in scaled) + 10
+    commands = np.zeros((2, longest, len(scaled) * len(explanations)))
+    for k, manoeuvre in enumerate(scaled):
+        rows = np.repeat(manoeuvre.rows()[:, 1:], round(ROW_S / STEP_S), axis=0)[:longest]
+        commands[:, : len(rows), k * len(explanations) : (k + 1) * len(explanations)] = rows.T[
+            :, :, None
+        ]
+    changed = [leg.change(n, 0.0) if leg.change else n for n in explanations]
+    path, ok = _driven(car, list(changed) * len(scaled), commands)
+    for k, manoeuvre in enumerate(scaled):
+        mine = slice(k * len(explanations), (k + 1) * len(explanations))
         if ok[mine].all():
-            placed = _fitted_in(leg, wish, path[:, :, mine], pace)
+            placed = _fitted_in(leg, manoeuvre, path[:, :, mine], pace)
             if placed is not None:
                 return placed
     return None
@@ -115,8 +117,8 @@ def _driven(car: Car, sets: Sequence[Numbers], commands: Floats) -> tuple[Floats
     return path, upright & (hard <= SIDEWAYS_M_S2)
 
 
-def _fitted_in(leg: Leg, wish: Manoeuvre, path: Floats, pace: Pace) -> Placed | None:
-    """Return where it starts so that every rival's way, and the car around it, is on the floor."""
+def _fitted_in(leg: Leg, manoeuvre: Manoeuvre, path: Floats, pace: Pace) -> Placed | None:
+    """Return where it starts so that all paths, and the car around them, are on the floor."""
     low, high = path[:2].min(axis=(1, 2)), path[:2].max(axis=(1, 2))
     room = high - low + 2.0 * pace.margin_m
     floor = pace.floor
@@ -134,7 +136,9 @@ def _fitted_in(leg: Leg, wish: Manoeuvre, path: Floats, pace: Pace) -> Placed | 
     own = path[:, :, 0].copy()
     own[:2] = turn @ own[:2] + np.array(((x,), (y,)))
     own[2] += yaw
-    return Placed(leg, wish, Pose2(float(x), float(y), yaw), (float(room[0]), float(room[1])), own)
+    return Placed(
+        leg, manoeuvre, Pose2(float(x), float(y), yaw), (float(room[0]), float(room[1])), own
+    )
 
 
 class Planned(Likelihood):
@@ -144,8 +148,8 @@ class Planned(Likelihood):
         self._legs, self._noise = legs, model.noise
         drives = list[Drive]()
         for leg in legs:
-            rough = _imagined(model.drives[0], leg, None)
-            seen = _read(rough, model, leg.change(truth))
+            blank = _imagined(model.drives[0], leg, None)
+            seen = _read(blank, model, leg.change(truth))
             drives.append(_imagined(model.drives[0], leg, seen))
         super().__init__(drives, model.car, model.tiles)
         for drive, leg in zip(drives, legs, strict=True):

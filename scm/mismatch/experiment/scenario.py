@@ -54,14 +54,14 @@ def write_scenario(suggestion: Suggestion, car: str, folder: Path) -> list[Path]
     folder.mkdir(parents=True, exist_ok=True)
     legs = suggestion.best.legs
     names = [NAME] if len(legs) == 1 else [f"{NAME}_{k + 1}" for k in range(len(legs))]
-    said = suggestion.undecided.drive_this
+    text = suggestion.undecided.drive_this
     return [
-        _written(leg, name, said, car, suggestion.floor, folder)
+        _written(leg, name, text, car, suggestion.floor, folder)
         for leg, name in zip(legs, names, strict=True)
     ]
 
 
-def _written(leg: Placed, name: str, said: str, car: str, floor: Floor, folder: Path) -> Path:
+def _written(leg: Placed, name: str, text: str, car: str, floor: Floor, folder: Path) -> Path:
     commands, floor_map = folder / f"{name}.csv", folder / f"{name}.toml"
     description, way = folder / f"{name}.yaml", folder / f"{name}_way.csv"
     with commands.open("w", encoding="utf-8", newline="") as file:
@@ -74,15 +74,15 @@ def _written(leg: Placed, name: str, said: str, car: str, floor: Floor, folder: 
         every = slice(None, None, round(WAY_S / STEP_S))
         times = STEP_S * np.arange(leg.path.shape[1])
         writer.writerows(np.round(np.vstack((times, leg.path))[:, every].T, 4).tolist())
-    text = _MAP.format(name=name, x=floor.x_m, y=floor.y_m, start=leg.start)
-    floor_map.write_text(text, encoding="utf-8")
-    said_all = {
+    map_text = _MAP.format(name=name, x=floor.x_m, y=floor.y_m, start=leg.start)
+    floor_map.write_text(map_text, encoding="utf-8")
+    fields = {
         "drive": 1,
-        "say": said,
+        "say": text,
         "car": str(Path(car).resolve()) if Path(car).is_file() else car,
         "map": floor_map.name,
         "spawn": "start",
         "commands": commands.name,
     }
-    description.write_text(yaml.safe_dump(said_all, sort_keys=False), encoding="utf-8")
+    description.write_text(yaml.safe_dump(fields, sort_keys=False), encoding="utf-8")
     return description

@@ -1,8 +1,8 @@
-"""How far rivals come apart in an experiment: the least that a wrong one must leave unexplained.
+"""How far explanations differ in an experiment: the least that a wrong one leaves unexplained.
 
-`lambda` is the smallest objective that a rival reaches on a noise-free recording of another one,
-its own numbers and the car's ordinary ones refitted (T-optimality); its root is in standard
-deviations. Below 10 nobody can tell, from 25 on anybody.
+`lambda` is the smallest objective that an explanation reaches on a noise-free recording of another
+one, its own numbers and the car's nominal parameters refitted (T-optimality); its root is in
+standard deviations. Below 10 nobody can tell, from 25 on anybody.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.effect_catalogue import Parameter
-from scm.mismatch.experiment.plan import Planned, Rival, numbers_of
+from scm.mismatch.experiment.plan import Explanation, Planned, numbers_of
 from scm.mismatch.fit.fitter import FARTHEST, SMALL, TAIL, Fitted, Fitter
 from scm.mismatch.fit.likelihood import NominalParameter
 
@@ -20,13 +20,13 @@ ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Apart:
-    """How far rivals come apart, and with which numbers the wrong ones come nearest.
+class Separation:
+    """How far explanations come apart, and with which numbers the wrong ones come nearest.
 
     Attributes:
-        lambdas: Of the column's rival where the row's is right, (rivals, rivals).
-        z: The car's ordinary numbers then, (rivals, rivals, numbers).
-        values: Of the rival's effects, one array a pair.
+        lambdas: Of the column's explanation where the row's is right, (explanations, explanations).
+        z: The car's ordinary numbers then, (explanations, explanations, numbers).
+        values: Of the explanation's effects, one array a pair.
     """
 
     lambdas: Floats
@@ -40,15 +40,15 @@ class Apart:
         return float(self.lambdas[off].min())
 
 
-def quick(planned: Planned, rivals: Sequence[Rival]) -> Apart:
-    """Return how far rivals come apart by one linear refit of each.
+def linear_separation(planned: Planned, explanations: Sequence[Explanation]) -> Separation:
+    """Return how far explanations come apart by one linear refit of each.
 
     Args:
-        planned: Of the first rival's motion.
-        rivals: All of them.
+        planned: Of the first explanation's motion.
+        explanations: All of them.
     """
-    own, parameters = planned.nominal, [_parameters(r) for r in rivals]
-    n, e = len(rivals), np.nan_to_num(planned(_sets(planned, rivals))[0])
+    own, parameters = planned.nominal, [_parameters(r) for r in explanations]
+    n, e = len(explanations), np.nan_to_num(planned(_sets(planned, explanations))[0])
     common = (e[:, n : n + len(own)] - e[:, :1]) / np.array([_side(o) for o in own])
     lambdas, z, at = np.zeros((n, n)), np.zeros((n, n, len(own))), n + len(own)
     values = list[list[Floats]]()
@@ -62,45 +62,53 @@ def quick(planned: Planned, rivals: Sequence[Rival]) -> Apart:
         moves = -np.linalg.lstsq(normal, jacobian.T @ gaps, rcond=1e-12)[0]
         lambdas[:, j] = _loss(gaps + jacobian @ moves) + prior @ (moves * moves)
         z[:, j] = np.clip(moves[: len(own)].T, -FARTHEST, FARTHEST)
-        values.append([_moved(rivals[j], mine, move) for move in moves[len(own) :].T])
+        values.append([_moved(explanations[j], mine, move) for move in moves[len(own) :].T])
     np.fill_diagonal(lambdas, 0.0)
-    return Apart(lambdas, z, tuple(zip(*values, strict=True)))
+    return Separation(lambdas, z, tuple(zip(*values, strict=True)))
 
 
-def exact(plan: Callable[[Rival], Planned], rivals: Sequence[Rival], start: Apart) -> Apart:
-    """Return how far rivals come apart when each is refitted with all that is not linear.
+def refitted_separation(
+    plan: Callable[[Explanation], Planned], explanations: Sequence[Explanation], start: Separation
+) -> Separation:
+    """Return how far explanations come apart when each is refitted with all that is not linear.
 
     Args:
-        plan: Gives the recordings that a right rival would leave.
-        rivals: All of them.
+        plan: Gives the recordings that a right explanation would leave.
+        explanations: All of them.
         start: From the linear refit; what it could explain counts as explained.
     """
     lambdas = start.lambdas.copy()
-    for i, right in enumerate(rivals):
+    for i, right in enumerate(explanations):
         planned = plan(right)
-        others = [j for j in range(len(rivals)) if j != i]
+        others = [j for j in range(len(explanations)) if j != i]
         none = np.zeros(0)
         fits = [
-            Fitted(rivals[j].effects, start.z[i, j].copy(), start.values[i][j].copy(), none, 0.0,
-                   np.zeros((0, 0)))
+            Fitted(
+                explanations[j].effects,
+                start.z[i, j].copy(),
+                start.values[i][j].copy(),
+                none,
+                0.0,
+                np.zeros((0, 0)),
+            )
             for j in others
-        ]  # fmt: skip
+        ]
         Fitter(planned, np.ones(len(planned.t))).refine(fits, ROUNDS, fresh=True)
         for j, fitted in zip(others, fits, strict=True):
             lambdas[i, j] = min(lambdas[i, j], fitted.q)
-    return Apart(lambdas, start.z, start.values)
+    return Separation(lambdas, start.z, start.values)
 
 
-def _sets(planned: Planned, rivals: Sequence[Rival]) -> list[dict[str, float]]:
-    """Return each rival's numbers, then small steps of the car's own, then of every knob."""
-    bases = [numbers_of(r.effects, r.values) for r in rivals]
+def _sets(planned: Planned, explanations: Sequence[Explanation]) -> list[dict[str, float]]:
+    """Return each explanation's numbers, then small steps of the car's own, then of every knob."""
+    bases = [numbers_of(r.effects, r.values) for r in explanations]
     sets = list(bases)
     sets += [{**bases[0], o.key: o.mean + _side(o) * o.std} for o in planned.nominal]
-    for rival in rivals:
-        for k, parameter in enumerate(_parameters(rival)):
-            values = np.array(rival.values, dtype=np.float64)
+    for explanation in explanations:
+        for k, parameter in enumerate(_parameters(explanation)):
+            values = np.array(explanation.values, dtype=np.float64)
             values[k] += _step(parameter, values[k])
-            sets.append(numbers_of(rival.effects, values))
+            sets.append(numbers_of(explanation.effects, values))
     return sets
 
 
@@ -108,8 +116,8 @@ def _loss(e: Floats) -> Floats:
     return np.asarray((TAIL * np.log1p(e * e / TAIL)).sum(axis=0))
 
 
-def _parameters(rival: Rival) -> list[Parameter]:
-    return [parameter for effect in rival.effects for parameter in effect.parameters]
+def _parameters(explanation: Explanation) -> list[Parameter]:
+    return [parameter for effect in explanation.effects for parameter in effect.parameters]
 
 
 def _side(nominal: NominalParameter) -> float:
@@ -126,9 +134,9 @@ def _step(parameter: Parameter, value: float) -> float:
     )
 
 
-def _moved(rival: Rival, parameters: Sequence[Parameter], move: Floats) -> Floats:
-    """Return a rival's values moved by so many of the small steps, within their bounds."""
-    values = np.array(rival.values, dtype=np.float64)
+def _moved(explanation: Explanation, parameters: Sequence[Parameter], move: Floats) -> Floats:
+    """Return an explanation's values moved by so many of the small steps, within their bounds."""
+    values = np.array(explanation.values, dtype=np.float64)
     for k, parameter in enumerate(parameters):
         values[k] += move[k] * _step(parameter, values[k])
         values[k] = min(max(values[k], parameter.bounds[0]), parameter.bounds[1])

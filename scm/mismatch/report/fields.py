@@ -14,8 +14,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.evidence import FreeRuns, Residual
-from scm.mismatch.experiment.folders import folders_of
-from scm.mismatch.findings import Diagnosis, Effect
+from scm.mismatch.findings import Diagnosis, Effect, folders_of
 from scm.mismatch.report.record import Report
 from scm.mismatch.report.wording import capital, interval, name_of, title_of
 from scm.vehicles.describe_effects import all_effects, neutral_of, params_of

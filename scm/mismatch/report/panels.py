@@ -4,8 +4,15 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from scm.mismatch.evidence import Evidence
-from scm.mismatch.experiment.folders import folders_of
-from scm.mismatch.findings import Diagnosis, Effect, Equation, Located, Undecided, Verdict
+from scm.mismatch.findings import (
+    Diagnosis,
+    Effect,
+    Equation,
+    Located,
+    Undecided,
+    Verdict,
+    folders_of,
+)
 from scm.mismatch.report.sentences import (
     advice_of,
     alike,

@@ -14,14 +14,14 @@ from scm.mismatch.findings import Diagnosis
 from scm.mismatch.trial.labels import Case
 from scm.runtime.parent_watch import end_with
 
-SAID, BROKEN = "diagnosis.json", "failed.txt"
+DIAGNOSIS, BROKEN = "diagnosis.json", "failed.txt"
 Diagnose = Callable[[Path, Path], Diagnosis]
 """Diagnoses the recording of one folder; may write what it found, and `car.toml`, in another."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What was said of one case; either a diagnosis, or why there is none."""
+    """The answer to one case; either a diagnosis, or why there is none."""
 
     case: Case
     diagnosis: Diagnosis | None
@@ -64,16 +64,16 @@ def _answer(case: Case, out: Path, diagnose: Diagnose) -> Answer:
         words = "".join(traceback.format_exception(error))
         (folder / BROKEN).write_text(words, encoding="utf-8")
         return Answer(case, None, f"{type(error).__name__}: {error}")
-    (folder / SAID).write_bytes(msgspec.json.format(msgspec.json.encode(diagnosis)))
+    (folder / DIAGNOSIS).write_bytes(msgspec.json.format(msgspec.json.encode(diagnosis)))
     return Answer(case, diagnosis)
 
 
-def kept_answers(cases: Sequence[Case], out: Path) -> Iterator[Answer]:
+def stored_answers(cases: Sequence[Case], out: Path) -> Iterator[Answer]:
     """Give the answers that an earlier run left in `out`, of the cases that it came to."""
     for case in cases:
-        said, broken = out / case.name / SAID, out / case.name / BROKEN
-        if said.is_file():
-            yield Answer(case, msgspec.json.decode(said.read_bytes(), type=Diagnosis))
+        found, broken = out / case.name / DIAGNOSIS, out / case.name / BROKEN
+        if found.is_file():
+            yield Answer(case, msgspec.json.decode(found.read_bytes(), type=Diagnosis))
         elif broken.is_file():
             yield Answer(case, None, broken.read_text(encoding="utf-8").strip().split("\n")[-1])
 

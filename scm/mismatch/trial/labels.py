@@ -26,7 +26,7 @@ class Label:
         equations: That are a right answer for a law outside the library.
         needs: Variables it depends on; `allows` are as good, or harmless beside them.
         strength: Of each effect, in multiples of what can be shown at all; empty: not known.
-        ordinary: Numbers in which this car differs from its file, by car file key.
+        nominal: Numbers in which this car differs from its file, by car file key.
     """
 
     case: str
@@ -38,7 +38,7 @@ class Label:
     needs: frozenset[str]
     allows: frozenset[str] = frozenset()
     strength: tuple[float, ...] = ()
-    ordinary: Mapping[str, float] = field(default_factory=dict)
+    nominal: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +61,13 @@ def find_cases(folder: Path, only: Collection[str] = ()) -> list[Case]:
         for path in sorted(folder.glob("case_*"))
         if (path / "drive" / "recording.yaml").is_file()
     }
-    asked = [name if name.startswith("case_") else f"case_{name}" for name in only]
-    missing = [name for name in asked if name not in found]
+    wanted = [name if name.startswith("case_") else f"case_{name}" for name in only]
+    missing = [name for name in wanted if name not in found]
     if missing or not found:
         what = ", ".join(missing) or "case_*/drive/recording.yaml"
         msg = f"{folder}: no {what}; there are {len(found)} cases"
         raise RecordingError(msg)
-    return [found[name] for name in asked] if asked else list(found.values())
+    return [found[name] for name in wanted] if wanted else list(found.values())
 
 
 def read_seals(folder: Path) -> dict[str, str]:
@@ -93,29 +93,31 @@ def open_label(folder: Path, case: str, digest: str) -> Label:
     return label_of(case, held["label"])
 
 
-def label_of(case: str, said: Mapping[str, Any]) -> Label:
+def label_of(case: str, fields: Mapping[str, Any]) -> Label:
     """Return a label of a parsed one, of ours or of the shipped trials."""
-    names = tuple(said["names"])
-    given = said["parameters"]
+    names = tuple(fields["names"])
+    given = fields["parameters"]
     parameters = tuple(given) if isinstance(given, Sequence) else _shared_out(names, given)
     return Label(
         case=case,
-        kind=said["kind"] if said.get("kind") in CONTROLS else _kind(names, listed=said["listed"]),
+        kind=fields["kind"]
+        if fields.get("kind") in CONTROLS
+        else _kind(names, is_known=fields["listed"]),
         names=names,
-        car=said["car"],
+        car=fields["car"],
         parameters=parameters,
-        equations=frozenset((*said["equation"].split("+"), *said.get("or_equation", ()))),
-        needs=frozenset(said["depends_on"]),
-        allows=frozenset(said.get("or_depends_on", ())),
-        strength=tuple(said.get("strength", ())),
-        ordinary=said.get("ordinary", {}),
+        equations=frozenset((*fields["equation"].split("+"), *fields.get("or_equation", ()))),
+        needs=frozenset(fields["depends_on"]),
+        allows=frozenset(fields.get("or_depends_on", ())),
+        strength=tuple(fields.get("strength", ())),
+        nominal=fields.get("ordinary", {}),
     )
 
 
-def _kind(names: tuple[str, ...], *, listed: bool) -> str:
+def _kind(names: tuple[str, ...], *, is_known: bool) -> str:
     if not names:
         return "none"
-    if not listed:
+    if not is_known:
         return "unlisted"
     return "pair" if len(names) > 1 else "single"
 
@@ -133,5 +135,5 @@ def _shared_out(
 
 def shipped_labels(path: Path) -> dict[str, Label]:
     """Return the labels of trials that came as one file, by case."""
-    said = json.loads(path.read_text(encoding="utf-8"))
-    return {case: label_of(case, entry) for case, entry in said.items()}
+    fields = json.loads(path.read_text(encoding="utf-8"))
+    return {case: label_of(case, entry) for case, entry in fields.items()}

@@ -16,7 +16,7 @@ ENGINES = ("own", "mujoco")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wish:
+class CaseRequest:
     """What cases to make.
 
     Attributes:
@@ -47,16 +47,16 @@ def find_root() -> Path:
     return root
 
 
-def make_cases(wish: Wish, out: Path, say: Callable[[int], None]) -> None:
-    """Write recordings, labels and seals into `out`; `say` hears how many cases are made.
+def make_cases(request: CaseRequest, out: Path, notify: Callable[[int], None]) -> None:
+    """Write recordings, labels and seals into `out`; `notify` hears how many cases are made.
 
     Raises:
         RunError: with the reality's own words when it fails.
     """
     command = [
         sys.executable, "-m", PLACE.replace("/", "."), "--out", str(out.absolute()),
-        "--seed", str(wish.seed), "--cases", str(wish.cases), "--kind", wish.kind,
-        "--engine", wish.engine, "--strength", *map(str, wish.strength),
+        "--seed", str(request.seed), "--cases", str(request.cases), "--kind", request.kind,
+        "--engine", request.engine, "--strength", *map(str, request.strength),
     ]  # fmt: skip
     with subprocess.Popen(
         with_parent(command),
@@ -68,7 +68,7 @@ def make_cases(wish: Wish, out: Path, say: Callable[[int], None]) -> None:
         if running.stdout is None or running.stderr is None:
             return
         for line in running.stdout:
-            say(int(line.split()[0]))
+            notify(int(line.split()[0]))
         words = running.stderr.read()
     if running.returncode:
         last = words.strip().splitlines()[-1:] or ["no words"]

@@ -6,21 +6,26 @@ from pathlib import Path
 from scm.errors import RecordingError
 from scm.mismatch.trial import labels, table
 from scm.mismatch.trial.again import Ratio, compare
-from scm.mismatch.trial.blind import Answer, Diagnose, answer_all, kept_answers
-from scm.mismatch.trial.reality import Wish, make_cases
+from scm.mismatch.trial.blind import Answer, Diagnose, answer_all, stored_answers
+from scm.mismatch.trial.reality import CaseRequest, make_cases
 from scm.mismatch.trial.score import Outcome, failed, score
 
 FOUND = "found"
-Say = Callable[[str, int, int], None]
+Notify = Callable[[str, int, int], None]
 """Hears what is being done, how many of it are done, and of how many."""
 
 
 def silent(_what: str, _done: int, _of: int) -> None:
-    """Say nothing."""
+    """Notify nobody."""
 
 
 def on_own_cases(
-    wish: Wish, out: Path, diagnose: Diagnose, *, workers: int = 2, say: Say = silent
+    request: CaseRequest,
+    out: Path,
+    diagnose: Diagnose,
+    *,
+    workers: int = 2,
+    notify: Notify = silent,
 ) -> list[str]:
     """Have cases made in `out`, diagnose them blind, and return the table.
 
@@ -31,18 +36,18 @@ def on_own_cases(
     if (out / labels.SEALED).exists():
         msg = f"{out}: holds a trial already; give another --out, or none"
         raise RecordingError(msg)
-    say("making cases", 0, wish.cases)
-    make_cases(wish, out, lambda done: say("making cases", done, wish.cases))
+    notify("making cases", 0, request.cases)
+    make_cases(request, out, lambda done: notify("making cases", done, request.cases))
     seals = labels.read_seals(out)
     cases = labels.find_cases(out)
-    answers = _answers(cases, out, diagnose, workers, say)
+    answers = _answers(cases, out, diagnose, workers, notify)
     opened = {case: labels.open_label(out, case, digest) for case, digest in seals.items()}
     return _judged(answers, opened, out)
 
 
 def on_shipped_cases(
     folder: Path, out: Path, diagnose: Diagnose, only: Collection[str] = (), *,
-    workers: int = 2, say: Say = silent,
+    workers: int = 2, notify: Notify = silent,
 ) -> list[str]:  # fmt: skip
     """Diagnose cases that lie in `folder`, then open its `labels.json`, and return the table.
 
@@ -50,7 +55,7 @@ def on_shipped_cases(
         RecordingError: when there are no such cases.
     """
     cases = labels.find_cases(folder, only)
-    answers = _answers(cases, out, diagnose, workers, say)
+    answers = _answers(cases, out, diagnose, workers, notify)
     return _judged(answers, labels.shipped_labels(folder / "labels.json"), out)
 
 
@@ -65,7 +70,7 @@ def judged_again(out: Path, folder: Path | None = None) -> list[str]:
         RecordingError: when there are no such cases, or a label is not what was sealed.
     """
     cases = labels.find_cases(folder or out)
-    answers = list(kept_answers(cases, out / FOUND))
+    answers = list(stored_answers(cases, out / FOUND))
     if folder:
         return _judged(answers, labels.shipped_labels(folder / "labels.json"), out)
     seals = labels.read_seals(out)
@@ -74,13 +79,13 @@ def judged_again(out: Path, folder: Path | None = None) -> list[str]:
 
 
 def _answers(
-    cases: Sequence[labels.Case], out: Path, diagnose: Diagnose, workers: int, say: Say
+    cases: Sequence[labels.Case], out: Path, diagnose: Diagnose, workers: int, notify: Notify
 ) -> list[Answer]:
     answers: list[Answer] = []
-    say("diagnosing", 0, len(cases))
+    notify("diagnosing", 0, len(cases))
     for answer in answer_all(cases, out / FOUND, diagnose, workers):
         answers.append(answer)
-        say("diagnosing", len(answers), len(cases))
+        notify("diagnosing", len(answers), len(cases))
     return sorted(answers, key=lambda answer: answer.case.name)
 
 

@@ -1,16 +1,31 @@
-"""Judges one diagnosis by its label: names, laws, parameters."""
+"""Judges one diagnosis by its label: names, formulas, parameters."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from scm.mismatch.findings import Diagnosis, Effect, Verdict
 from scm.mismatch.trial.known import parameters_of
 from scm.mismatch.trial.labels import CONTROLS, Label
-from scm.mismatch.trial.words import same_variables
 
+ALIKE = {
+    "time": ("t", "phase in time", "period"),
+    "heading": ("yaw", "direction", "direction of travel"),
+    "position": ("x", "y", "place", "location", "x_m", "y_m", "map", "distance"),
+    "speed": ("v", "vx", "velocity", "wheel speed"),
+    "steering": (
+        "steering angle", "wheel angle", "steering command", "command", "angle", "steering size",
+    ),
+    "side": ("steering sign", "steering side", "sign", "sign of steering", "left or right"),
+    "phase": ("wheel phase", "wheel turn", "wheel rotation", "wheel position", "wheel revolution"),
+    "throttle": ("drive command", "throttle command", "throttle sign"),
+    "acceleration": ("accel_x", "along acceleration", "longitudinal acceleration"),
+    "lateral acceleration": ("accel_y", "side acceleration"),
+    "yaw rate": ("turn rate", "yaw_rate"),
+}  # fmt: skip
+ONE = {other: name for name, others in ALIKE.items() for other in others}
 # No drive on a level floor, or no stamps, tell these apart: left undecided, they are right.
-TWINS = {
+INDISTINGUISHABLE = {
     "payload": {"motor_gain"},
     "motor_gain": {"payload"},
     "grade": {"wind"},
@@ -23,12 +38,26 @@ TOGETHER = (
 ANGLES = {"uphill_rad", "toward_rad"}
 
 
+def plain(words: Iterable[str]) -> frozenset[str]:
+    """Return variables by their first names."""
+    clean = (word.strip().lower().replace("_", " ") for word in words)
+    return frozenset(ONE.get(word, word) for word in clean)
+
+
+def same_variables(
+    reported: Iterable[str], needs: Iterable[str], allows: Iterable[str] = ()
+) -> bool:
+    """Return whether all that is needed was reported, and nothing beside that is not allowed."""
+    got, needed = plain(reported), plain(needs)
+    return needed <= got <= needed | plain(allows)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
     """What a diagnosis was worth.
 
     Attributes:
-        said: Names it reported, effects outside the library by their own.
+        reported: Names, effects outside the library by their own.
         exact: The right names and nothing else; of a law outside, right in equation and variables.
         among: All that was concealed is among what it reported or left undecided.
         missed: It reported nothing where something was concealed.
@@ -38,7 +67,7 @@ class Outcome:
     """
 
     label: Label
-    said: tuple[str, ...]
+    reported: tuple[str, ...]
     exact: bool
     among: bool
     missed: bool
@@ -51,22 +80,22 @@ class Outcome:
 
 def score(label: Label, diagnosis: Diagnosis) -> Outcome:
     """Judge one diagnosis."""
-    said = tuple(effect.name for effect in diagnosis.effects)
+    names = tuple(effect.name for effect in diagnosis.effects)
     if label.kind in CONTROLS:
-        return _control(label, diagnosis, said)
+        return _control(label, diagnosis, names)
     undecided = {name for group in diagnosis.undecided for name in group.between}
-    right = {name for name in label.names if _was_said(name, label, diagnosis)}
+    right = {name for name in label.names if _was_reported(name, label, diagnosis)}
     false_names = tuple(
         e.name for e in diagnosis.effects
-        if not _belongs(e, label) and not _is_twin(e.name, label, undecided)
+        if not _belongs(e, label) and not _is_indistinguishable(e.name, label, undecided)
     )  # fmt: skip
     reported = right | {name for name in label.names if name in undecided}
-    nothing = diagnosis.verdict == Verdict.NONE and not said and not right
+    nothing = diagnosis.verdict == Verdict.NONE and not names and not right
     pairs = [pair for effect in diagnosis.effects for pair in _compared(effect, label)]
-    everything = len(right) == len(label.names) or _twins_undecided(label, said, undecided)
+    everything = len(right) == len(label.names) or _rightly_undecided(label, names, undecided)
     return Outcome(
         label=label,
-        said=said,
+        reported=names,
         exact=everything and not false_names and (bool(label.names) or nothing),
         among=reported == set(label.names),
         missed=bool(label.names) and nothing,
@@ -77,12 +106,12 @@ def score(label: Label, diagnosis: Diagnosis) -> Outcome:
     )
 
 
-def _control(label: Label, diagnosis: Diagnosis, said: tuple[str, ...]) -> Outcome:
-    """Judge what was said of data that fits no car: a problem of the data, and no effects."""
+def _control(label: Label, diagnosis: Diagnosis, names: tuple[str, ...]) -> Outcome:
+    """Judge what was names of data that fits no car: a problem of the data, and no effects."""
     problems = tuple(problem.name for problem in diagnosis.data)
     return Outcome(
-        label=label, said=(*said, *problems), exact=bool(problems) and not said,
-        among=bool(problems), missed=not problems and not said, false_names=said,
+        label=label, reported=(*names, *problems), exact=bool(problems) and not names,
+        among=bool(problems), missed=not problems and not names, false_names=names,
         errors=(), covered=(), runtime_s=diagnosis.runtime_s,
     )  # fmt: skip
 
@@ -90,13 +119,13 @@ def _control(label: Label, diagnosis: Diagnosis, said: tuple[str, ...]) -> Outco
 def failed(label: Label, words: str) -> Outcome:
     """Return the outcome of a diagnosis that came to no end."""
     return Outcome(
-        label=label, said=(), exact=False, among=False, missed=bool(label.names), false_names=(),
-        errors=(), covered=(), runtime_s=math.nan, failed=words,
+        label=label, reported=(), exact=False, among=False, missed=bool(label.names),
+        false_names=(), errors=(), covered=(), runtime_s=math.nan, failed=words,
     )  # fmt: skip
 
 
-def is_law(effect: Effect, label: Label) -> bool:
-    """Say whether a law outside the library has the right equation and variables."""
+def is_right_discovery(effect: Effect, label: Label) -> bool:
+    """Return whether a law outside the library has the right equation and variables."""
     return (
         not effect.is_known
         and effect.equation.value in label.equations
@@ -104,9 +133,9 @@ def is_law(effect: Effect, label: Label) -> bool:
     )
 
 
-def _was_said(name: str, label: Label, diagnosis: Diagnosis) -> bool:
+def _was_reported(name: str, label: Label, diagnosis: Diagnosis) -> bool:
     if label.kind == "unlisted":
-        return any(is_law(effect, label) for effect in diagnosis.effects)
+        return any(is_right_discovery(effect, label) for effect in diagnosis.effects)
     if name == "unit_error" and any(problem.name == "unit" for problem in diagnosis.data):
         return True
     return any(effect.is_known and effect.name == name for effect in diagnosis.effects)
@@ -114,21 +143,23 @@ def _was_said(name: str, label: Label, diagnosis: Diagnosis) -> bool:
 
 def _belongs(effect: Effect, label: Label) -> bool:
     if label.kind == "unlisted":
-        return is_law(effect, label)
+        return is_right_discovery(effect, label)
     return effect.is_known and effect.name in label.names
 
 
-def _is_twin(name: str, label: Label, undecided: set[str]) -> bool:
-    """Say whether an effect is only one name of what was left undecided, and what it is another."""
+def _is_indistinguishable(name: str, label: Label, undecided: set[str]) -> bool:
+    """Return whether an effect is another name of what was left undecided."""
     alike = {name for name in label.names if name in undecided}
-    return name in undecided and any(name in TWINS.get(other, set()) for other in alike)
+    return name in undecided and any(name in INDISTINGUISHABLE.get(other, set()) for other in alike)
 
 
-def _twins_undecided(label: Label, said: tuple[str, ...], undecided: set[str]) -> bool:
-    """Say whether twins were rightly left undecided."""
+def _rightly_undecided(label: Label, names: tuple[str, ...], undecided: set[str]) -> bool:
+    """Return whether others were rightly left undecided."""
     for name in label.names:
-        twins = TWINS.get(name, set())
-        if name not in said and not (twins and name in undecided and undecided <= twins | {name}):
+        others = INDISTINGUISHABLE.get(name, set())
+        if name not in names and not (
+            others and name in undecided and undecided <= others | {name}
+        ):
             return False
     return bool(label.names)
 

@@ -99,9 +99,9 @@ def _again(ratios: Sequence[Ratio]) -> list[str]:
         found.append(
             f"  the nominal car's, both beyond the true car's: median {np.median(beyond):.2f}"
         )
-    of_laws = [r.found_m / r.nominal_m for r in ratios if r.true_m is None]
-    if of_laws:
-        half = _share(sum(ratio <= 0.5 for ratio in of_laws), len(of_laws))
+    of_discoveries = [r.found_m / r.nominal_m for r in ratios if r.true_m is None]
+    if of_discoveries:
+        half = _share(sum(ratio <= 0.5 for ratio in of_discoveries), len(of_discoveries))
         found.append(f"  the nominal car's, laws outside the library: at most half in {half}")
     return found
 
@@ -119,9 +119,9 @@ def _times(outcomes: Iterable[Outcome]) -> list[str]:
 
 
 def _confusions(outcomes: Iterable[Outcome]) -> list[str]:
-    counted = Counter((_true(o.label), _said(o)) for o in outcomes if not o.exact)
-    rows = [f"  {n} x  {true}  ->  {said}" for (true, said), n in counted.most_common()]
-    return ["not exact: concealed -> said", *rows] if rows else ["all exact"]
+    counted = Counter((_true(o.label), _reported(o)) for o in outcomes if not o.exact)
+    rows = [f"  {n} x  {true}  ->  {reported}" for (true, reported), n in counted.most_common()]
+    return ["not exact: concealed -> reported", *rows] if rows else ["all exact"]
 
 
 def each(outcomes: Iterable[Outcome]) -> list[str]:
@@ -132,7 +132,7 @@ def each(outcomes: Iterable[Outcome]) -> list[str]:
         sizes = " ".join(f"{strength:.1f}x" for strength in label.strength)
         mark = "exact" if outcome.exact else "among" if outcome.among else "wrong"
         found.append(
-            f"{label.case}  {label.car:<8} {mark:<6} {_true(label)} {sizes} -> {_said(outcome)}"
+            f"{label.case}  {label.car:<8} {mark:<6} {_true(label)} {sizes} -> {_reported(outcome)}"
         )
     return found
 
@@ -142,5 +142,5 @@ def _true(label: Label) -> str:
     return " + ".join(label.names) or nothing
 
 
-def _said(outcome: Outcome) -> str:
-    return outcome.failed or " + ".join(outcome.said) or "nothing"
+def _reported(outcome: Outcome) -> str:
+    return outcome.failed or " + ".join(outcome.reported) or "nothing"

@@ -12,7 +12,7 @@ from scm.mismatch.discovery.seek import Sought
 from scm.mismatch.discovery.sensor_effects import SensorEffect
 from scm.mismatch.effect_catalogue import Candidate, Parameter
 from scm.mismatch.evidence import RefittedParameter, Tried
-from scm.mismatch.experiment.plan import Rival as Contender
+from scm.mismatch.experiment.plan import Explanation
 from scm.mismatch.experiment.suggest import Suggestion, suggest
 from scm.mismatch.findings import Alternative, Effect, Equation, Estimate
 from scm.mismatch.fit.fitter import OF_OWN, Fitted
@@ -290,13 +290,13 @@ def undecided_of(
             c for f, c in zip(step.rivals, step.criteria, strict=True) if f.names[-1] == effect.name
         )
         near = [
-            Contender(f.effects, f.values)
+            Explanation(f.effects, f.values)
             for f, c in zip(step.rivals, step.criteria, strict=True)
             if c - f.effects[-1].rare < lowest + TIE and f.names[-1] not in best.names
         ]
         if near:
             notify("designing the drive that would tell")
             mine = next(f for f in step.rivals if f.names[-1] == effect.name)
-            contenders = [Contender(mine.effects, mine.values), *near]
-            found.append(suggest(model, contenders, notify=notify))
+            explanations = [Explanation(mine.effects, mine.values), *near]
+            found.append(suggest(model, explanations, notify=notify))
     return tuple(found)

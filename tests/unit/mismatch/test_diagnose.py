@@ -18,7 +18,7 @@ from scm.mismatch.experiment.changed import drive_alone
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES
 from scm.mismatch.experiment.pace import Floor, pace_of
 from scm.mismatch.experiment.plan import place
-from scm.mismatch.experiment.separation import Apart
+from scm.mismatch.experiment.separation import Separation
 from scm.mismatch.experiment.suggest import Suggestion, Weighed
 from scm.mismatch.findings import Undecided, Verdict
 from scm.mismatch.fit.data_split import split
@@ -37,7 +37,9 @@ def suggested(name, between):
     experiment = drive_alone(MANOEUVRES[name], name)
     leg = place(experiment.legs[0], model.car, pace_of(model.car, model.drives, floor), [{}])
     question = Undecided(between=between, drive_this=f"Drive {name}.", expected_separation=6.0)
-    weighed = Weighed(experiment, (leg,), Apart(np.full((2, 2), 36.0), np.zeros((2, 2, 0)), ()))
+    weighed = Weighed(
+        experiment, (leg,), Separation(np.full((2, 2), 36.0), np.zeros((2, 2, 0)), ())
+    )
     return Suggestion(question, weighed, (weighed,), floor)
 
 
@@ -83,8 +85,8 @@ def test_numbers_that_gained_nothing_on_unseen_parts_stay_as_the_file_has_them(t
     given = as_given(fitter, best)
     assert moved(given) == []
     for key, value in fitter.numbers((), given.z, np.zeros(0)).items():
-        said = 0.0 if key.startswith("clock.") else model.car.value(key)
-        assert value == pytest.approx(said), key  # also what no car file says
+        text = 0.0 if key.startswith("clock.") else model.car.value(key)
+        assert value == pytest.approx(text), key  # also what no car file says
 
 
 def test_free_runs_far_beyond_noise_are_a_mismatch_without_a_name():
@@ -103,7 +105,7 @@ def test_the_drives_of_two_open_questions_lie_side_by_side(tmp_path):
     )
     write(Found(found, nigel(), made_up.evidence(), suggestions=suggestions), tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    for folder, said in (("next_drive", "circles"), ("next_drive_2", "straight_steps")):
+    for folder, name in (("next_drive", "circles"), ("next_drive_2", "straight_steps")):
         text = (tmp_path / folder / "next_drive.yaml").read_text(encoding="utf-8")
-        assert f"Drive {said}." in text
+        assert f"Drive {name}." in text
         assert f"<code>{folder}</code>" in page

@@ -1,4 +1,4 @@
-"""What to drive next: rivals that a drive separates, twins that none does, and files to drive."""
+"""What to drive next: explanations that a drive separates, and files to drive."""
 
 from functools import cache
 from pathlib import Path
@@ -10,10 +10,10 @@ from scm.mismatch.effect_catalogue import by_name, candidates, terms_needed
 from scm.mismatch.experiment.changed import ramp_and_mass
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES
 from scm.mismatch.experiment.pace import Floor, pace_of
-from scm.mismatch.experiment.plan import Leg, Planned, Rival, numbers_of, place
+from scm.mismatch.experiment.plan import Explanation, Leg, Planned, numbers_of, place
 from scm.mismatch.experiment.scenario import write_scenario
-from scm.mismatch.experiment.separation import quick
-from scm.mismatch.experiment.suggest import ANYBODY, NOBODY, names_of, suggest
+from scm.mismatch.experiment.separation import linear_separation
+from scm.mismatch.experiment.suggest import MIN_LAMBDA, SURE_LAMBDA, names_of, suggest
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.recorder.play import read_drive
 from scm.recording.read import Channel, Recording
@@ -44,20 +44,20 @@ def recorded():
     return Likelihood([Drive(Recording(Path("made-up"), "nigel", channels), big)], big)
 
 
-def rival(name, *values):
-    return Rival((by_name(candidates(recorded().car), name),), np.array(values))
+def explanation(name, *values):
+    return Explanation((by_name(candidates(recorded().car), name),), np.array(values))
 
 
-def lambda_of(build, *rivals, change=None):
+def lambda_of(build, *explanations, change=None):
     model = recorded()
-    numbers = [numbers_of(r.effects, r.values) for r in rivals]
+    numbers = [numbers_of(r.effects, r.values) for r in explanations]
     placed = place(Leg(build, change), model.car, pace_of(model.car, model.drives, FLOOR), numbers)
-    return quick(Planned(model, [placed], numbers[0]), rivals).least
+    return linear_separation(Planned(model, [placed], numbers[0]), explanations).least
 
 
 @cache
 def suggested():
-    return suggest(recorded(), [rival("payload", 1.5), rival("motor_gain", 0.6)], FLOOR)
+    return suggest(recorded(), [explanation("payload", 1.5), explanation("motor_gain", 0.6)], FLOOR)
 
 
 def test_payload_and_a_weak_motor_call_for_a_ramp_or_a_known_mass():
@@ -65,44 +65,48 @@ def test_payload_and_a_weak_motor_call_for_a_ramp_or_a_known_mass():
     assert found.undecided.between == ("payload", "motor_gain")
     assert "no drive there tells them apart" in found.undecided.drive_this
     assert "ramp" in found.undecided.drive_this or "weighed" in found.undecided.drive_this
-    assert found.undecided.expected_separation**2 > NOBODY
+    assert found.undecided.expected_separation**2 > MIN_LAMBDA
 
 
 def test_a_slope_or_a_wind_calls_for_a_spirit_level():
-    found = suggest(recorded(), [rival("grade", 0.021, 0.5), rival("wind", -0.3, -0.2)], FLOOR)
-    said = found.undecided.drive_this
-    assert "spirit level" in said
-    assert "rises by 2.1 cm a metre" in said
-    assert "weigh" not in said
+    found = suggest(
+        recorded(), [explanation("grade", 0.021, 0.5), explanation("wind", -0.3, -0.2)], FLOOR
+    )
+    text = found.undecided.drive_this
+    assert "spirit level" in text
+    assert "rises by 2.1 cm a metre" in text
+    assert "weigh" not in text
 
 
 def test_long_drives_tell_a_sagging_battery_from_motors_that_fade():
-    sag, fade = rival("battery_sag", 0.08), rival("motor_fade", 0.2)
-    assert lambda_of(MANOEUVRES["shuttle"], sag, fade) < NOBODY
-    assert lambda_of(MANOEUVRES["long_laps"], sag, fade) > ANYBODY
+    sag, fade = explanation("battery_sag", 0.08), explanation("motor_fade", 0.2)
+    assert lambda_of(MANOEUVRES["shuttle"], sag, fade) < MIN_LAMBDA
+    assert lambda_of(MANOEUVRES["long_laps"], sag, fade) > SURE_LAMBDA
 
 
 def test_driving_to_and_fro_tells_a_trim_from_uneven_motors():
-    trim, uneven = rival("steer_trim", 0.03), rival("drive_asymmetry", -0.08)
-    assert lambda_of(MANOEUVRES["shuttle"], trim, uneven) > ANYBODY
+    trim, uneven = explanation("steer_trim", 0.03), explanation("drive_asymmetry", -0.08)
+    assert lambda_of(MANOEUVRES["shuttle"], trim, uneven) > SURE_LAMBDA
 
 
 def test_creeping_tells_a_dead_band_from_a_gain():
-    rivals = rival("drive_deadband", 0.06), rival("drive_gain", 0.93)
-    steady, creep = (lambda_of(MANOEUVRES[m], *rivals) for m in ("shuttle", "launches"))
-    assert creep > max(steady, ANYBODY)
+    explanations = explanation("drive_deadband", 0.06), explanation("drive_gain", 0.93)
+    steady, creep = (lambda_of(MANOEUVRES[m], *explanations) for m in ("shuttle", "launches"))
+    assert creep > max(steady, SURE_LAMBDA)
 
 
 def test_an_explanation_does_not_come_apart_from_itself():
-    one = rival("steer_trim", 0.03)
+    one = explanation("steer_trim", 0.03)
     assert lambda_of(MANOEUVRES["slalom"], one, one) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_what_all_rivals_share_is_not_what_is_between_them():
     both = by_name(candidates(recorded().car), "steer_trim")
-    first, second = rival("payload", 1.0), rival("motor_gain", 0.7)
-    rivals = [Rival((both, *r.effects), np.array([0.02, *r.values])) for r in (first, second)]
-    assert names_of(rivals) == ("payload", "motor_gain")
+    first, second = explanation("payload", 1.0), explanation("motor_gain", 0.7)
+    explanations = [
+        Explanation((both, *r.effects), np.array([0.02, *r.values])) for r in (first, second)
+    ]
+    assert names_of(explanations) == ("payload", "motor_gain")
 
 
 @pytest.mark.parametrize("name", MANOEUVRES)

@@ -37,9 +37,11 @@ def breaks(recording, out):
 def made(tmp_path_factory):
     """Two healthy cases, diagnosed by somebody who never finds anything."""
     out = tmp_path_factory.mktemp("trial")
-    wish = reality.Wish(seed=11, cases=2, kind="none")
+    request = reality.CaseRequest(seed=11, cases=2, kind="none")
     heard = []
-    lines = on_own_cases(wish, out, says_none, workers=0, say=lambda *what: heard.append(what))
+    lines = on_own_cases(
+        request, out, says_none, workers=0, notify=lambda *what: heard.append(what)
+    )
     return out, lines, heard
 
 
@@ -60,7 +62,7 @@ def test_kept_diagnoses_are_judged_again_alike(made):
 
 def test_a_second_trial_in_the_same_place_is_refused(made):
     with pytest.raises(RecordingError, match="holds a trial already"):
-        on_own_cases(reality.Wish(cases=1), made[0], says_none, workers=0)
+        on_own_cases(reality.CaseRequest(cases=1), made[0], says_none, workers=0)
 
 
 def test_a_label_changed_after_it_was_sealed_is_told(made, tmp_path):
