@@ -32,7 +32,7 @@ from scm.traffic.signals.part import TrafficPart
 from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.etsi.convert import read_cam
 from scm.v2x.message import Refused
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest

@@ -20,7 +20,7 @@ from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.etsi.convert import cam_of
 from scm.v2x.fleet_file import Fleet, add
 from scm.v2x.message import decode, encode
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.signed_cams import SignedCams
 from scm.v2x.signing import CAM, Signer, Verifier, issue, make_authority

@@ -17,10 +17,10 @@ from scm.runtime.part import IsWanted, Service, Subscription
 from scm.v2x.exchange import Answer, Incoming, Outgoing
 from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused
-from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.contact import Contact
-from scm.v2x.messages.denm_rx import DenmRx
+from scm.v2x.messages.denm import DenmRx
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.echo_request import EchoReply, EchoRequest
 from scm.v2x.messages.eye_track import EyeTrack
@@ -30,7 +30,7 @@ from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.radio_status import RadioStatus
 from scm.v2x.messages.route_request import RouteRequest
-from scm.v2x.messages.spatem_rx import SpatemRx
+from scm.v2x.messages.spatem import SpatemRx
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.world_definition import WorldDefinition
 from vehicle_agent.body import BodyKind, Wiring

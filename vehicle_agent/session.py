@@ -16,9 +16,9 @@ from scm.v2x.etsi.convert import cam_of
 from scm.v2x.etsi.events import CarWarnings
 from scm.v2x.etsi.path import LowFrequencySender
 from scm.v2x.exchange import Outgoing
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.contact import Contact
-from scm.v2x.messages.denm_tx import DenmTx
+from scm.v2x.messages.denm import DenmTx
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.vehicle_state import VehicleState

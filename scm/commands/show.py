@@ -154,14 +154,12 @@ def _manual(folder: Path, name: str | None) -> str:
 
 
 def _messages(arguments: argparse.Namespace) -> str:
-    from scm.registry import load, names
-    from scm.v2x.message import Message, Request
+    from scm.v2x.message import Request
+    from scm.v2x.messages import message_classes
 
     del arguments
-    modules = names("scm.v2x.messages")
-    kinds: list[type[Message]] = [load("scm.v2x.messages", n, "MESSAGE", type) for n in modules]
     rows = []
-    for kind in kinds:
+    for kind in message_classes():
         reply = f" -> {kind.REPLY.__name__}" if issubclass(kind, Request) else ""
         rate = f"{kind.RATE_HZ:g} Hz" if kind.RATE_HZ else ""
         about = (kind.__doc__ or "").partition("\n")[0]

@@ -54,7 +54,7 @@ from scm.v2x.key import is_name
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.calibration_request import CalibrationReply, CalibrationRequest
 from scm.v2x.messages.city_event import CityEvent
-from scm.v2x.messages.cpm_tx import CpmTx
+from scm.v2x.messages.cpm import CpmTx
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_preview import EyePreview

@@ -23,10 +23,10 @@ from mcap.writer import Writer
 
 from scm import __version__
 from scm.errors import MAX_REASON, RecordingError
-from scm.registry import load, names
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import matches, prefix, variables
 from scm.v2x.message import Message, Request
+from scm.v2x.messages import message_classes
 
 MESSAGES = "scm.v2x.messages"
 MAGIC = b"\x89MCAP0\r\n"
@@ -138,11 +138,10 @@ class SchemaTable:
     """Finds the message class of a key."""
 
     def __init__(self, city: str) -> None:
-        kinds = [load(MESSAGES, name, "MESSAGE", type) for name in names(MESSAGES)]
         self._expressions = [
             (prefix(city) + kind.KEY.format(**dict.fromkeys(variables(kind), "*")), kind)
-            for kind in kinds
-            if issubclass(kind, Message) and not issubclass(kind, Request)
+            for kind in message_classes()
+            if not issubclass(kind, Request)
         ]
         self._found: dict[str, type[Message] | None] = {}
 

@@ -62,7 +62,7 @@ class OnAir:
         """Yield them in the order recorded; the counts start again."""
         self.counts, self.unreadable = Counter(), 0
         classes: dict[str, type[Message]] = {
-            kind: load(MESSAGES, f"{kind}_tx", "MESSAGE", type) for kind in KINDS
+            kind: load(MESSAGES, kind, "MESSAGES", tuple)[0] for kind in KINDS
         }
         for one in read_run(self._path, self._keys):
             match = _KEY.fullmatch(one.key)

@@ -5,26 +5,23 @@ from pathlib import Path
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RecordingError
-from scm.recorder.mcap_file import MESSAGES, RunFile
-from scm.registry import load, names
+from scm.recorder.mcap_file import RunFile
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing, RawSample
 from scm.v2x.key import check_name
 from scm.v2x.message import Delivery, Message
-from scm.v2x.messages.cam_rx import CamRx
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages import message_classes
+from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.messages.camera_frame import CameraFrame
-from scm.v2x.messages.cpm_rx import CpmRx
-from scm.v2x.messages.denm_rx import DenmRx
-from scm.v2x.messages.denm_tx import DenmTx
+from scm.v2x.messages.cpm import CpmRx
+from scm.v2x.messages.denm import DenmRx, DenmTx
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.lidar_scan import LidarScan
-from scm.v2x.messages.mapem_rx import MapemRx
+from scm.v2x.messages.mapem import MapemRx
 from scm.v2x.messages.part_status import PartStatus
-from scm.v2x.messages.spatem_rx import SpatemRx
-from scm.v2x.messages.srem_rx import SremRx
-from scm.v2x.messages.srem_tx import SremTx
-from scm.v2x.messages.ssem_rx import SsemRx
+from scm.v2x.messages.spatem import SpatemRx
+from scm.v2x.messages.srem import SremRx, SremTx
+from scm.v2x.messages.ssem import SsemRx
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 
@@ -118,13 +115,10 @@ class RecorderPart(BasePart):
 
 def _without_cars() -> tuple[type[Message], ...]:
     """Return all message classes but those that every car sends."""
-    kinds = (load(MESSAGES, name, "MESSAGE", type) for name in names(MESSAGES))
     return tuple(
         kind
-        for kind in kinds
-        if issubclass(kind, Message)
-        and kind.DELIVERY not in (Delivery.RPC, Delivery.PRESENCE)
-        and kind not in OF_EACH_CAR
+        for kind in message_classes()
+        if kind.DELIVERY not in (Delivery.RPC, Delivery.PRESENCE) and kind not in OF_EACH_CAR
     )
 
 

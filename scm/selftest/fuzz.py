@@ -14,14 +14,12 @@ import msgspec
 import zenoh  # noqa: TID251  no bus sends what cannot be read
 
 from scm.clock import NS_PER_S, WallClock
-from scm.recorder.mcap_file import MESSAGES
-from scm.registry import load, names
 from scm.v2x import zenoh_config
 from scm.v2x.bus import RawMailbox
 from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import prefix, variables
-from scm.v2x.message import Message
+from scm.v2x.messages import message_classes
 
 LISTENED_S = 3.0
 AT_ONCE = 50
@@ -81,10 +79,8 @@ def _break(body: bytes, places: list[tuple[int, int]], rng: random.Random) -> by
 
 def _own_keys(city: str) -> Iterator[str]:
     """Yield one key of every message class that is published."""
-    for name in names(MESSAGES):
-        kind = load(MESSAGES, name, "MESSAGE", type)
-        if issubclass(kind, Message):
-            yield prefix(city) + kind.KEY.format(**dict.fromkeys(variables(kind), "n1"))
+    for kind in message_classes():
+        yield prefix(city) + kind.KEY.format(**dict.fromkeys(variables(kind), "n1"))
 
 
 def _listen(endpoint: str, city: str) -> list[RawSample]:

@@ -16,7 +16,7 @@ from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.v2x.messages.spatem import SpatemTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.vehicles.drivers.signal_table import SignalTable

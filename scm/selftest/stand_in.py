@@ -18,7 +18,7 @@ from scm.v2x.credentials import Credentials
 from scm.v2x.etsi.convert import roadside_station, spatem_of
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.v2x.messages.spatem import SpatemTx
 
 
 class FaultyTraffic(BasePart):

@@ -15,8 +15,7 @@ import msgspec
 from scm.errors import AccessError
 from scm.v2x.credentials import Credentials
 from scm.v2x.message import Message
-from scm.v2x.messages.cam_rx import CamRx
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.signing import CAM, Signer, Ticket, Verifier
 from scm.v2x.tickets import certificate_of, read_ticket
 

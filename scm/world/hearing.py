@@ -9,7 +9,7 @@ from typing import Any
 from scm.runtime.part import Subscription
 from scm.v2x.exchange import Answer, Incoming
 from scm.v2x.message import Message, Request
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.presence import Presence

@@ -21,7 +21,7 @@ from scm.v2x.etsi.events import (
     CarWarnings,
 )
 from scm.v2x.messages.contact import Contact
-from scm.v2x.messages.denm_tx import DenmTx
+from scm.v2x.messages.denm import DenmTx
 from scm.world.publish import states_of
 from scm.world.slots import DRIVE
 from scm.world.world import World

@@ -46,7 +46,11 @@ def messages() -> Any:
     for name in names("scm.v2x.messages"):
         module = importlib.import_module(f"scm.v2x.messages.{name}")
         for kind in vars(module).values():
-            if isinstance(kind, type) and issubclass(kind, Message):
+            if (
+                isinstance(kind, type)
+                and issubclass(kind, Message)
+                and not getattr(kind, "__parameters__", ())
+            ):
                 found[kind.__name__] = _message(kind)
     return found
 

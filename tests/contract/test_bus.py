@@ -14,7 +14,7 @@ from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.etsi.convert import cam_of
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.message import Refused, decode
-from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop

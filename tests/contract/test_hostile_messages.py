@@ -16,7 +16,6 @@ from scm.api.vehicle_rows import vehicles_topic
 from scm.api.view import CityView
 from scm.errors import MessageError
 from scm.maps.load import load_map
-from scm.registry import load, names
 from scm.runtime.lockstep import Lockstep
 from scm.traffic.demand.part import DemandPart
 from scm.traffic.demand.table import Flow
@@ -27,6 +26,7 @@ from scm.traffic.signals.part import TrafficPart
 from scm.v2x.exchange import Call
 from scm.v2x.key import key_of
 from scm.v2x.message import Request, decode, encode
+from scm.v2x.messages import message_classes
 from scm.world.part import WorldPart
 from vehicle_agent.agent import AgentPart
 
@@ -52,8 +52,9 @@ MADE_BY_THE_BUS_OR_ONCE = {"presence", "world_definition"}
 
 
 SENT = [
-    load(PACKAGE, name, "MESSAGE", type)
-    for name in sorted(set(names(PACKAGE)) - MADE_BY_THE_BUS_OR_ONCE)
+    kind
+    for kind in message_classes()
+    if kind.__module__.rpartition(".")[2] not in MADE_BY_THE_BUS_OR_ONCE
 ]
 
 

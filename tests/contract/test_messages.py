@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from scm.registry import names
 from scm.v2x.key import agrees, key_of, matches, parse, selector, variables
 from scm.v2x.message import Delivery, Message, Request, decode, encode, is_bulk
+from scm.v2x.messages import message_classes
 
 PACKAGE = "scm.v2x.messages"
 
@@ -87,7 +88,7 @@ UNITS = tuple(
 ETSI = "scm.v2x.etsi."  # modules whose numbers are in the units of the standards
 
 
-def message_classes():
+def defined_classes():
     classes = []
     for name in names(PACKAGE):
         module = importlib.import_module(f"{PACKAGE}.{name}")
@@ -98,8 +99,8 @@ def message_classes():
     return list(dict.fromkeys(classes))
 
 
-CLASSES = message_classes()
-SENT = [importlib.import_module(f"{PACKAGE}.{name}").MESSAGE for name in names(PACKAGE)]
+CLASSES = defined_classes()
+SENT = message_classes()
 every_class = pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
 every_sent = pytest.mark.parametrize("kind", SENT, ids=lambda kind: kind.__name__)
 
@@ -207,8 +208,10 @@ def test_bytes_with_a_field_from_the_future_decode(kind, data):
 
 @pytest.mark.parametrize("name", names(PACKAGE))
 def test_the_file_is_named_after_its_class(name):
-    kind = importlib.import_module(f"{PACKAGE}.{name}").MESSAGE
-    assert kind.__name__ == "".join(word.capitalize() for word in name.split("_"))
+    module = importlib.import_module(f"{PACKAGE}.{name}")
+    own = "".join(word.capitalize() for word in name.split("_"))
+    kinds = [kind.__name__ for kind in message_classes() if kind.__module__ == module.__name__]
+    assert kinds in ([own], [f"{own}Tx", f"{own}Rx"])
 
 
 @pytest.mark.parametrize("kind", [kind for kind in SENT if issubclass(kind, Request)])

@@ -1,7 +1,5 @@
 """The table of rights holds what every part of a city really does, and no more than it means."""
 
-import importlib
-
 import pytest
 
 from scm.api.view import CityView
@@ -10,7 +8,6 @@ from scm.clock import StepClock
 from scm.eye.part import EyePart
 from scm.maps.load import load_map
 from scm.recorder.part import RecorderPart
-from scm.registry import names
 from scm.runtime.lockstep import Lockstep
 from scm.traffic.demand.part import DemandPart
 from scm.traffic.demand.table import load_demand
@@ -21,6 +18,7 @@ from scm.traffic.signals.part import TrafficPart
 from scm.v2x.exchange import Call
 from scm.v2x.key import key_of, prefix, selector
 from scm.v2x.message import Message, Request
+from scm.v2x.messages import message_classes
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.rights import EVERY_REQUEST, rights_of
@@ -139,11 +137,7 @@ def test_the_city_of_this_test_really_did_something(city):
 
 
 def test_an_operator_may_ask_every_request_that_is_no_car_s_own():
-    kinds = [
-        importlib.import_module(f"scm.v2x.messages.{name}").MESSAGE
-        for name in names("scm.v2x.messages")
-    ]
-    requests = {kind for kind in kinds if issubclass(kind, Request)}
+    requests = {kind for kind in message_classes() if issubclass(kind, Request)}
     left_out = {
         kind.__name__
         for kind in requests

@@ -25,7 +25,7 @@ from scm.traffic.signals.proof.kernel_proof import in_steps, prove
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanRequest
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.v2x.messages.spatem import SpatemTx
 
 MAPS = [city_map for city_map in map(load_map, map_names()) if city_map.junctions]
 CASES = [

@@ -28,7 +28,7 @@ from scm.v2x.etsi.cpm import (
     VelocityComponent,
 )
 from scm.v2x.etsi.parts import PROTOCOL_VERSION, ReferencePosition
-from scm.v2x.messages.cpm_tx import CpmTx
+from scm.v2x.messages.cpm import CpmTx
 
 SIGMAS_95 = 1.96
 """Number of standard deviations of a 95 % interval."""

@@ -21,8 +21,7 @@ from scm.runtime.part import IsWanted, Part, Service, Subscription
 from scm.traffic.misbehaviour.attack import Frame, Scene, Transform, load_attack
 from scm.traffic.misbehaviour.ground import Ground
 from scm.v2x.exchange import Incoming, Outgoing
-from scm.v2x.messages.cam_rx import CamRx
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 
 Cam = CamTx | CamRx

@@ -21,7 +21,7 @@ from scm.traffic.misbehaviour.limits import Limits, limits_of
 from scm.v2x.etsi.convert import roadside_station
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
-from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.misbehaviour_report import (

@@ -22,12 +22,12 @@ from scm.v2x.etsi.mapem import MapemBody
 from scm.v2x.etsi.topology import mapem_at
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.city_event import CityEvent
-from scm.v2x.messages.mapem_tx import MapemTx
+from scm.v2x.messages.mapem import MapemTx
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.signal_request import SignalReply, SignalRequest
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.v2x.messages.spatem import SpatemTx
 
 MONITOR_SILENT_NS = 3_000 * NS_PER_MS
 SPATEM_EVERY_NS = 500 * NS_PER_MS

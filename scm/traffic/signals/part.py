@@ -37,12 +37,12 @@ from scm.v2x.etsi.convert import roadside_station
 from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.message import Refused
-from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanRequest
 from scm.v2x.messages.signal_request import SignalRequest
-from scm.v2x.messages.srem_rx import SremRx
+from scm.v2x.messages.srem import SremRx
 
 _log = logging.getLogger(__name__)
 

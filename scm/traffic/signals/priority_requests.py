@@ -17,8 +17,8 @@ from scm.traffic.signals.policy import PriorityCall, Status
 from scm.v2x.etsi.convert import roadside_station, station_id
 from scm.v2x.etsi.priority_requests import PriorityAnswer, PriorityRequest, requests_of, ssem_of
 from scm.v2x.etsi.topology import topology_of
-from scm.v2x.messages.srem_rx import SremRx
-from scm.v2x.messages.ssem_tx import SsemTx
+from scm.v2x.messages.srem import SremRx
+from scm.v2x.messages.ssem import SsemTx
 
 AFTER_NS = 10 * NS_PER_S
 QUIET_NS = 5 * NS_PER_S

@@ -9,7 +9,7 @@ import math
 from scm.clock import NS_PER_S
 from scm.traffic.signals.detectors import Seen
 from scm.v2x.etsi.convert import ASSUMED_LENGTH_M, generated_ns, read_cam, station_id
-from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.eye_track import EyeTrack
 
 NIGEL_FRONT_M = 0.23

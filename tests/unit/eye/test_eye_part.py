@@ -17,7 +17,7 @@ from scm.maps.load import load_map
 from scm.v2x.exchange import Incoming
 from scm.v2x.key import key_of
 from scm.v2x.messages.city_event import CityEvent
-from scm.v2x.messages.cpm_tx import CpmTx
+from scm.v2x.messages.cpm import CpmTx
 from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose

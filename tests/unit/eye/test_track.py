@@ -12,7 +12,7 @@ from scm.eye.track.sighting import Sighting
 from scm.eye.track.tracks import DROPPED_NS, MAX_CAMERAS, MAX_CARS, Tracks
 from scm.geometry import Pose2
 from scm.v2x.message import decode, encode
-from scm.v2x.messages.cpm_tx import CpmTx
+from scm.v2x.messages.cpm import CpmTx
 
 FRAME_NS = 33_000_000
 START_NS = 1_000_000_000

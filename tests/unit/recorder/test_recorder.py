@@ -16,7 +16,7 @@ from scm.runtime.lockstep import Lockstep
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of
 from scm.v2x.message import encode
-from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.part_status import PartStatus

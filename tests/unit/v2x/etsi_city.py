@@ -28,17 +28,17 @@ from scm.v2x.etsi.topology import mapem_at, mapem_of, topology_of
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import key_of
 from scm.v2x.message import encode
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.contact import Contact
-from scm.v2x.messages.cpm_tx import CpmTx
-from scm.v2x.messages.denm_tx import DenmTx
-from scm.v2x.messages.mapem_tx import MapemTx
+from scm.v2x.messages.cpm import CpmTx
+from scm.v2x.messages.denm import DenmTx
+from scm.v2x.messages.mapem import MapemTx
 from scm.v2x.messages.plan_request import PlanRequest
 from scm.v2x.messages.route_request import RouteRequest
-from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.v2x.messages.spatem import SpatemTx
 from scm.v2x.messages.spawn_request import SpawnRequest
-from scm.v2x.messages.srem_tx import SremTx
-from scm.v2x.messages.ssem_tx import SsemTx
+from scm.v2x.messages.srem import SremTx
+from scm.v2x.messages.ssem import SsemTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.part import WorldPart
 

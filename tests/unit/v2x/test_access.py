@@ -22,7 +22,7 @@ from scm.v2x.etsi.convert import cam_of
 from scm.v2x.exchange import Answer
 from scm.v2x.fleet_file import Fleet, add, name_hosts, remove
 from scm.v2x.message import Refused, encode
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.drive_command import DriveCommand

@@ -11,7 +11,7 @@ from scm.v2x.etsi.convert import cam_of
 from scm.v2x.exchange import Incoming, RawSample
 from scm.v2x.mailbox import drain_all
 from scm.v2x.message import Refused, decode, encode
-from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState

@@ -41,7 +41,7 @@ from scm.v2x.etsi.priority_requests import (
     ssem_of,
 )
 from scm.v2x.etsi.topology import mapem_of
-from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.spat import Spat
 from scm.v2x.pcap import Positions
 from scm.v2x.uper import cam, codec, denm, mapem, spatem, srem, ssem

@@ -4,7 +4,7 @@ import pytest
 
 from scm.errors import MessageError
 from scm.v2x.key import agrees, check_name, everything, intersects, key_of, matches, parse, selector
-from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_pose import EyePose

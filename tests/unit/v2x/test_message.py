@@ -10,7 +10,7 @@ import pytest
 from scm.errors import MessageError
 from scm.v2x.etsi.convert import cam_of
 from scm.v2x.message import Message, Refused, decode, encode
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.spawn_request import SpawnReply

@@ -11,8 +11,7 @@ from scm.v2x.credentials import read_credentials
 from scm.v2x.etsi.convert import cam_of
 from scm.v2x.fleet_file import Fleet, add, complete
 from scm.v2x.message import decode, encode
-from scm.v2x.messages.cam_rx import CamRx
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.reader import Reader
 from scm.v2x.signed_cams import SignedCams

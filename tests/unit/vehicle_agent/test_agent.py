@@ -15,7 +15,7 @@ from scm.maps.route import Roads
 from scm.records.city_map import RadioChannel
 from scm.v2x.exchange import Answer, Call, Incoming
 from scm.v2x.message import Refused
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.echo_request import EchoReply, EchoRequest

@@ -16,15 +16,14 @@ from scm.maps.radio_check import radio_problems
 from scm.records.city_map import RadioChannel
 from scm.v2x.etsi.convert import cam_of
 from scm.v2x.etsi.events import ACCIDENT, DenmSender, Event
-from scm.v2x.messages.cam_rx import CamRx
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.messages.city_event import CityEvent
-from scm.v2x.messages.cpm_tx import CpmTx
-from scm.v2x.messages.denm_tx import DenmTx
-from scm.v2x.messages.mapem_tx import MapemTx
+from scm.v2x.messages.cpm import CpmTx
+from scm.v2x.messages.denm import DenmTx
+from scm.v2x.messages.mapem import MapemTx
 from scm.v2x.messages.radio_status import RadioStatus
-from scm.v2x.messages.srem_tx import SremTx
-from scm.v2x.messages.ssem_tx import SsemTx
+from scm.v2x.messages.srem import SremTx
+from scm.v2x.messages.ssem import SsemTx
 from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.drivers.channel import channel_of, has_arrived
 from scm.world.air import OF_ROADSIDE, RECEIVED, transmit

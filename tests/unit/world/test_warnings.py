@@ -9,8 +9,7 @@ from scm.v2x.etsi.events import (
     STATIONARY_VEHICLE,
 )
 from scm.v2x.messages.city_event import CityEvent
-from scm.v2x.messages.denm_rx import DenmRx
-from scm.v2x.messages.denm_tx import DenmTx
+from scm.v2x.messages.denm import DenmRx, DenmTx
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.stop_request import StopRequest
 

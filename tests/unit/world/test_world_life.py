@@ -8,8 +8,7 @@ from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.records.signals import SignalGroup
 from scm.v2x.etsi.convert import roadside_station, spatem_of
-from scm.v2x.messages.cam_rx import CamRx
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.join_request import JoinRequest
@@ -17,7 +16,7 @@ from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.v2x.messages.spatem import SpatemTx
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.trip import Trip

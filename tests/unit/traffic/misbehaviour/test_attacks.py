@@ -15,7 +15,7 @@ from scm.runtime.part import Subscription
 from scm.traffic.misbehaviour.attack import Frame, Scene, attack_names, load_attack
 from scm.traffic.signals.part import TrafficPart
 from scm.v2x.etsi.convert import read_cam
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.world_snapshot import WorldSnapshot

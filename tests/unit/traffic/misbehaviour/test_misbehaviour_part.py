@@ -16,8 +16,7 @@ from scm.traffic.misbehaviour.part import MisbehaviourPart, limits_by_car
 from scm.traffic.signals.part import TrafficPart
 from scm.v2x.etsi.convert import read_cam, station_id
 from scm.v2x.exchange import Incoming
-from scm.v2x.messages.cam_rx import CamRx
-from scm.v2x.messages.cam_tx import CamTx
+from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores

@@ -12,12 +12,12 @@ from scm.traffic.signals.part import TrafficPart
 from scm.v2x.etsi.convert import cam_of, station_id
 from scm.v2x.etsi.priority_requests import PriorityRequest, answers_of, srem_of
 from scm.v2x.message import Refused
-from scm.v2x.messages.cam_rx import CamRx
+from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.signal_request import SignalReply, SignalRequest
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.srem_rx import SremRx
-from scm.v2x.messages.ssem_tx import SsemTx
+from scm.v2x.messages.srem import SremRx
+from scm.v2x.messages.ssem import SsemTx
 from scm.v2x.messages.vehicle_state import VehicleState
 
 MAP = load_map("driving_school")

@@ -17,7 +17,7 @@ from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.v2x.messages.spatem import SpatemTx
 
 MAP = load_map("driving_school")
 GROUPS = {"south_east": 1, "south_west": 2}

@@ -14,7 +14,7 @@ from scm.maps.route import Roads
 from scm.records.city_map import RadioChannel
 from scm.traffic.signals.part import TrafficPart
 from scm.v2x.messages.spat import Spat
-from scm.v2x.messages.spatem_tx import SpatemTx
+from scm.v2x.messages.spatem import SpatemTx
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers.channel import channel_of, has_arrived
 from scm.vehicles.drivers.driver_batch import DriverBatch

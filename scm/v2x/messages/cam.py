@@ -1,18 +1,28 @@
-"""Off the air, as heard by one station: a car tells where it is and how it moves."""
+"""CAM: a car reports where it is and how it moves."""
 
 from typing import ClassVar
 
 from scm.v2x.etsi.cam_spatem import CamBody
-from scm.v2x.message import Message
+from scm.v2x.on_air import Received, Sent
 
 
-class CamRx(Message, kw_only=True, frozen=True, omit_defaults=True):
+class CamTx(Sent[CamBody], kw_only=True, frozen=True, omit_defaults=True):
+    """A CAM leaves a station's antenna.
+
+    Attributes:
+        signed: Signature in a guarded city, base64 of IEEE 1609.2; empty in others.
+    """
+
+    KEY: ClassVar[str] = "v2x/tx/{station}/cam"
+    RATE_HZ: ClassVar[float | None] = 10.0
+
+    signed: str = ""
+
+
+class CamRx(Received[CamBody], kw_only=True, frozen=True, omit_defaults=True):
     """A CAM reaches a station.
 
     Attributes:
-        receiver: Who hears it.
-        station: Who sent it.
-        t_ns: When it was sent.
         signed: The sender's signature, see `CamTx`.
         lost_ns: How much time, since the sender came, has passed without its car being moved: the
             computer that simulates it was too slow. This and what follows is by the world, and no
@@ -26,10 +36,6 @@ class CamRx(Message, kw_only=True, frozen=True, omit_defaults=True):
     KEY: ClassVar[str] = "v2x/rx/{receiver}/{station}/cam"
     RATE_HZ: ClassVar[float | None] = 10.0
 
-    receiver: str
-    station: str
-    t_ns: int
-    body: CamBody
     signed: str = ""
     lost_ns: int = 0
     car: str = ""
@@ -38,4 +44,4 @@ class CamRx(Message, kw_only=True, frozen=True, omit_defaults=True):
     touches: bool = False
 
 
-MESSAGE = CamRx
+MESSAGES = (CamTx, CamRx)
