@@ -81,7 +81,7 @@ def steps(car: Car) -> dict[str, Callable[[Recording], object]]:
             free_run(p, car) for p in prepare(r, car).recordings
         ],
         "drives, likelihood, parts": lambda r: split(
-            Likelihood([Drive(part, car) for part in prepare(r, car).recordings], car)
+            Likelihood.of([Drive(part, car) for part in prepare(r, car).recordings], car)
         ),
     }
 

@@ -15,9 +15,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from scm.data_quality.prepare import prepare
-from scm.mismatch.diagnose import Found, diagnose, write
 from scm.mismatch.evidence import FreeRuns
 from scm.mismatch.fit.data_split import split
+from scm.mismatch.pipeline import Result, diagnose, write
 from scm.mismatch.validate.free_runs import judge
 from scm.recording.read import read_recordings
 from scm.replay.free_run import FreeRun, free_run
@@ -104,7 +104,7 @@ def _strays(runs: Sequence[FreeRun]) -> str:
     return "; ".join(found)
 
 
-def _figures(found: Found) -> None:
+def _figures(found: Result) -> None:
     """Print the verdict, each effect, and position errors of free runs held out."""
     diagnosis = found.diagnosis
     _print(f"verdict: {diagnosis.verdict.value}")

@@ -12,8 +12,8 @@ from scm.command import Command
 from scm.mismatch.budget import DEFAULT_S, Budget
 
 if TYPE_CHECKING:
-    from scm.mismatch.diagnose import Found
     from scm.mismatch.progress import Progress
+    from scm.mismatch.validate.conclude import Result
     from scm.recording.read import Recording
 
 FOLDER = "mismatch"
@@ -63,7 +63,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
     from scm.mismatch.progress import Progress
-    from scm.mismatch.several.diagnose import with_told
+    from scm.mismatch.several.diagnose import with_played
 
     name = arguments.recording[0].resolve()
     title = name.parent.name if name.name == "recording.yaml" else name.stem
@@ -73,7 +73,7 @@ def _run(arguments: argparse.Namespace) -> int:
     try:
         if arguments.car is None and arguments.vehicle is None:
             cars, failed = _cars(arguments)
-            cars = with_told(cars, arguments.told)
+            cars = with_played(cars, arguments.told)
             text, failed = _of_cars(cars, failed, arguments, out, progress, budget)
         else:
             text, failed = _of_one(arguments, out, progress), ()
@@ -106,12 +106,12 @@ def _cars(arguments: argparse.Namespace) -> "tuple[dict[str, list[Recording]], t
 
 def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> str:
     """Diagnose one car, write its report, and return what to print."""
-    from scm.mismatch.diagnose import diagnose, write
+    from scm.mismatch.pipeline import diagnose, write
     from scm.mismatch.report.summary import summary
 
     found = diagnose(
         arguments.recording, arguments.car, arguments.data, vehicle=arguments.vehicle,
-        span_s=(arguments.from_s, arguments.to_s), told=arguments.told,
+        span_s=(arguments.from_s, arguments.to_s), played=arguments.told,
         budget_s=arguments.budget_s, strict=arguments.strict, notify=progress.notify,
     )  # fmt: skip
     progress.notify("writing the report")
@@ -134,7 +134,7 @@ def _of_cars(
     Returns:
         What to print, and why other cars could not be diagnosed.
     """
-    from scm.mismatch.diagnose import write
+    from scm.mismatch.pipeline import write
     from scm.mismatch.report.cars_page import several_summary
     from scm.mismatch.report.summary import summary
     from scm.mismatch.several.diagnose import diagnose_one, diagnose_several, write_all
@@ -173,7 +173,7 @@ def _check(arguments: argparse.Namespace, out: Path, vehicle: str = "") -> str:
     return "" if arguments.told and spanned else shlex.join(words)
 
 
-def _with_account(found: "Found", text: str, check: str) -> str:
+def _with_account(found: "Result", text: str, check: str) -> str:
     """Return the summary between the lines on which rows were read and how to check it."""
     again = (f"  the figures again: {check}",) if check and found.diagnosis.fit else ()
     return "\n".join((*found.account, text, *again))

@@ -1,7 +1,8 @@
-"""How long a search may take, and the questions that there was no time for.
+"""How long a diagnosis may take, and the questions that there was no time for.
 
-What may be given up is an attempt: once time is up, the next sets that it wants driven are refused,
-and its question counts as left. What must be done whatever the time, like the first fit, is none.
+Work that may be given up is an attempt: once time is up, it ends at the next sets that it wants
+driven, and its question counts as unanswered. What must be done anyhow, like the first fit, is no
+attempt.
 """
 
 import math
@@ -12,68 +13,68 @@ from typing import TypeVar
 from scm.clock import Clock, processor_s, seconds
 from scm.mismatch.findings import Unanswered
 
-DEFAULT_S = 1800.0  # enough for all that is looked for, on a slow and busy computer too
-MOST_KEPT = 0.5  # of what was allowed
-COMPARED = 3.0  # seconds of a recording for each second: a first fit of them takes half of it
-LEAST_COMPARED_S = 90.0  # less shows too little, however short the time
+DEFAULT_S = 1800.0  # enough for a whole diagnosis, on a slow and busy computer too
+MAX_RESERVED = 0.5  # share of the budget
+COMPARED_PER_S = 3.0  # seconds of a recording: their first fit takes half of the budget
+MIN_COMPARED_S = 90.0  # less shows too little, however short the time
 _Answer = TypeVar("_Answer")
 
 
 class Question(StrEnum):
-    """What a search asks, as a report names what it left."""
+    """A question that a selection answers, by its name in `report.json`."""
 
     EFFECTS = "effects"
     FURTHER = "further_effects"
-    CALM = "calm"
-    LAWS = "laws"
+    LOW_NOISE = "calm"
+    DISCOVERY = "laws"
     BESIDE = "beside_law"
-    STRIDES = "strides"
+    WINDOWS = "strides"
 
 
 WORDS = {
-    Question.EFFECTS: "Effects of the library were not tried",
-    Question.FURTHER: "Effects beside those found were not sought",
-    Question.CALM: "Effects that the noise believed in may hide were not sought",
-    Question.LAWS: "Laws outside the library were not sought",
-    Question.BESIDE: "Effects beside the law found were not sought",
-    Question.STRIDES: "The car differs in many ways, and these were not sought",
+    Question.EFFECTS: "The effects of the catalogue were not tried",
+    Question.FURTHER: "Effects beside those found were not searched for",
+    Question.LOW_NOISE: "Effects that the assumed noise may hide were not searched for",
+    Question.DISCOVERY: "Effects outside the catalogue were not searched for",
+    Question.BESIDE: "Effects beside the one discovered were not searched for",
+    Question.WINDOWS: "The car differs in many ways, which were not searched for",
 }
 
 
 class OutOfTimeError(Exception):
-    """Time is up in the midst of an attempt; it never leaves a search."""
+    """Time is up during an attempt; it never leaves the diagnosis."""
 
 
 def needed_s(compared_s: float) -> float:
-    """Return the least budget in which recordings of that length are compared whole [s]."""
-    return math.ceil(compared_s / COMPARED)
+    """Return the smallest budget in which recordings of that length are compared whole [s]."""
+    return math.ceil(compared_s / COMPARED_PER_S)
 
 
 class Budget:
-    """Time for a search, from now on; without a clock it never ends.
+    """Time for a diagnosis, from now on; without a clock it never ends.
 
     Args:
-        asked_s: After so long a diagnosis is to be there.
-        clock: Says how late it is.
-        processor: Says how much processor time the process has had [s].
+        limit_s: When the diagnosis is to be finished.
+        clock: For the time.
+        processor: Returns how much processor time the process has had [s].
     """
 
     def __init__(
         self,
-        asked_s: float = math.inf,
+        limit_s: float = math.inf,
         clock: Clock | None = None,
         processor: Callable[[], float] = processor_s,
     ) -> None:
-        self._asked_s, self._clock = asked_s, clock
+        self._limit_s, self._clock = limit_s, clock
         self._processor, self._processor_s = processor, processor()
         self._began_ns = clock.now_ns() if clock else 0
-        self._kept_s, self._attempts = 0.0, False
-        self._left: dict[Question, Unanswered] = {}
+        self._reserved_s, self._attempts = 0.0, False
+        self._unanswered: dict[Question, Unanswered] = {}
 
     @property
-    def unasked(self) -> tuple[Unanswered, ...]:
-        """Questions that were left, in the order in which they came up, each once."""
-        return tuple(self._left.values())
+    def unanswered(self) -> tuple[Unanswered, ...]:
+        """Questions that were left, in the order in which they arose, each once."""
+        return tuple(self._unanswered.values())
 
     def spent_s(self) -> float:
         """Return how long it has been [s]."""
@@ -84,21 +85,21 @@ class Budget:
         spent_s = self.spent_s()
         return (self._processor() - self._processor_s) / spent_s if spent_s else 1.0
 
-    def allowed_s(self) -> float:
+    def compared_s(self) -> float:
         """Return how long recordings can be that are compared whole in that time [s]."""
-        return max(LEAST_COMPARED_S, COMPARED * self._asked_s)
+        return max(MIN_COMPARED_S, COMPARED_PER_S * self._limit_s)
 
-    def keep(self, kept_s: float) -> None:
-        """Keep time for what follows a search, half of all at most."""
-        self._kept_s = min(kept_s, MOST_KEPT * self._asked_s)
+    def reserve(self, reserved_s: float) -> None:
+        """Reserve time for what follows the selection, half of all at most."""
+        self._reserved_s = min(reserved_s, MAX_RESERVED * self._limit_s)
 
     def is_over(self) -> bool:
-        """Say whether what is left is needed for what follows."""
-        return self.spent_s() >= self._asked_s - self._kept_s
+        """Return whether the time left is needed for what follows the selection."""
+        return self.spent_s() >= self._limit_s - self._reserved_s
 
     def is_spent(self) -> bool:
-        """Say whether nothing is left, not even for what follows."""
-        return self.spent_s() >= self._asked_s
+        """Return whether no time is left, not even for what follows."""
+        return self.spent_s() >= self._limit_s
 
     def check(self) -> None:
         """Give up the present attempt, if there is one, where time is up.
@@ -110,7 +111,7 @@ class Budget:
             raise OutOfTimeError
 
     def attempt(self, question: Question, work: Callable[[], _Answer]) -> _Answer | None:
-        """Return what work finds; None where time is up before, then the question is left."""
+        """Return what work finds, or None if time is up before; then the question is left."""
         begun, outer = not self.is_over(), self._attempts
         self._attempts = True
         try:
@@ -123,5 +124,5 @@ class Budget:
 
     def _leave(self, question: Question, *, begun: bool) -> None:
         how = " to the end" if begun else ""
-        said = f"{WORDS[question]}{how}: the budget of {self._asked_s:g} s ended."
-        self._left.setdefault(question, Unanswered(name=question.value, text=said))
+        text = f"{WORDS[question]}{how}: the budget of {self._limit_s:g} s ended."
+        self._unanswered.setdefault(question, Unanswered(name=question.value, text=text))

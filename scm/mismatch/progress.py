@@ -13,13 +13,13 @@ from scm.progress import ProgressLine, bar
 
 WIDTH = 100
 CREEP_S = 12.0
-# What a step's words begin with, and the usual share of the work that is done when it begins.
+# What the text of a step begins with, and the usual share of the work done when it begins.
 STEPS = (
-    ("doubting", 0.0), ("fitting", 0.04), ("trying", 0.15), ("refitting", 0.22),
-    ("asking", 0.6), ("laying", 0.66), ("judging", 0.88), ("designing", 0.93),
+    ("checking", 0.0), ("fitting", 0.04), ("trying", 0.15), ("refitting", 0.22),
+    ("computing", 0.6), ("screening", 0.66), ("judging", 0.88), ("designing", 0.93),
     ("simulating", 0.94), ("no drive", 0.95), ("writing", 0.98),
 )  # fmt: skip
-ANOTHER_EFFECT, LAST_EFFECT, LAWS = 0.16, 0.56, 0.7
+ANOTHER_EFFECT, LAST_EFFECT, DISCOVERY = 0.16, 0.56, 0.7
 
 
 class Progress:
@@ -52,7 +52,7 @@ class Progress:
             self._of, self._from, self._part = f"{name}: ", number / count, 1.0 / count
 
     def notify(self, text: str) -> None:
-        """Say what is tried from now on."""
+        """Show what is tried from now on."""
         with self._lock:
             self._shown = self._done()
             self._share = _share(text, self._share)
@@ -92,7 +92,7 @@ def _share(text: str, before: float) -> float:
     """Return about how much is done when a step begins, never less than before."""
     if text.startswith("trying") and before >= STEPS[3][1]:
         return max(before, min(before + ANOTHER_EFFECT, LAST_EFFECT))
-    if text.startswith("refitting") and "laws" in text:
-        return max(before, LAWS)
+    if text.startswith("refitting") and "outside" in text:
+        return max(before, DISCOVERY)
     known = next((share for words, share in STEPS if text.startswith(words)), before)
     return max(before, known)

@@ -141,7 +141,7 @@ _ALL = (
         otherwise="0.0",
     ),
     _body(
-        "law_shape",
+        "learned_shape",
         "1",
         Role.CHAIN,
         "a learned law's shape over what it depends on",

@@ -17,6 +17,7 @@ from scm import registry
 from scm.arrays import Floats
 from scm.errors import TermError, nearest
 from scm.vehicles import effect_text
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Param
 
 SENSOR_FAULTS = "scm.vehicles.sensor_faults"
@@ -46,6 +47,7 @@ class SensorFault:
             must name them.
         stands_for: Key of the car file that its first parameter multiplies. A simulation changes
             either that number or the parameter, never both.
+        identification: How recordings show it; None: a search never proposes it.
     """
 
     functions: Mapping[str, ArrayFunction]
@@ -55,6 +57,7 @@ class SensorFault:
     stamps: bool = False
     acts_on: tuple[str, ...] | None = None
     stands_for: str = ""
+    identification: Identification | None = None
 
     @property
     def function(self) -> ArrayFunction:

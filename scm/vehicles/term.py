@@ -12,6 +12,7 @@ from functools import cache
 
 from scm.errors import TermError
 from scm.vehicles import effect_text
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import plain
 from scm.vehicles.param import Param
 from scm.vehicles.physics_variables import Per
@@ -44,6 +45,7 @@ class Term:
         neutral: Parameter values at which the effect does nothing, bit for bit.
         shows_in: Manoeuvres that make the effect visible.
         also: Further laws of the same file that come with this one: wind has two directions.
+        identification: How recordings show it; None: a search never proposes it.
     """
 
     law: Law
@@ -57,6 +59,7 @@ class Term:
     neutral: Mapping[str, float] = field(default_factory=dict)
     shows_in: tuple[str, ...] = ()
     also: tuple["Term", ...] = ()
+    identification: Identification | None = None
 
     def __post_init__(self) -> None:
         if (self.adds is None) == (self.sets is None):

@@ -8,10 +8,13 @@ import pytest
 
 from scm.clock import WallClock
 from scm.mismatch import budget
-from scm.mismatch import diagnose as module
-from scm.mismatch.diagnose import diagnose_car, write
+from scm.mismatch import usable_data as sample
+from scm.mismatch.budget import Budget
+from scm.mismatch.discovery import decide
 from scm.mismatch.effect_catalogue import candidates
-from scm.mismatch.fit import sample
+from scm.mismatch.pipeline import diagnose_car, write
+from scm.mismatch.select import selected
+from scm.mismatch.select.search import Explanation
 from scm.mismatch.validate.check_report import check_report
 from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import made_drive, nigel
@@ -21,7 +24,7 @@ TRIM = (("steering.trim_rad", 0.06),)
 
 
 def interrupted_after(batches):
-    def made_with(_asked_s, clock):
+    def made_with(_limit_s, clock):
         made = Batches(1.0, clock)
         made.left = batches
         return made
@@ -48,14 +51,18 @@ def test_every_figure_of_a_report_is_that_of_its_car_file(case, tmp_path, monkey
     numbers, sense, how = CASES[case]
     more = {} if sense is None else {"sense": sense}
     recording = made_drive(numbers, seconds=20.0, **more)
+    made = Budget
     if "batches" in how:
-        monkeypatch.setattr(module, "Budget", interrupted_after(how["batches"]))
+        made = interrupted_after(how["batches"])
     if "finds" in how:
         few = [effect for effect in candidates(nigel()) if effect.name in FEW]
-        monkeypatch.setattr(module, "candidates", lambda _car: few)
-        monkeypatch.setattr(module.Lawful, "decide", lambda _laws, best: (best, None))
-    found = diagnose_car([recording], nigel(), budget_s=how.get("budget_s", 600.0),
-                         clock=WallClock())  # fmt: skip
+        monkeypatch.setattr(selected, "candidates", lambda _car: few)
+        monkeypatch.setattr(
+            decide, "explain", lambda _context, _unseen, _found: Explanation(ends=False)
+        )
+        monkeypatch.setattr(decide, "decide", lambda _context, found, _unseen: (found.best, None))
+    limited = made(how.get("budget_s", 600.0), WallClock())
+    found = diagnose_car([recording], nigel(), budget=limited)
     if "finds" in how:
         assert [effect.name for effect in found.diagnosis.effects] == [how["finds"]]
     assert_figures_are_the_car_file_s(found, recording, tmp_path)
@@ -65,7 +72,7 @@ def test_every_figure_of_a_report_is_that_of_its_car_file(case, tmp_path, monkey
 def untimed():
     """A drive, and what is found in it in no time."""
     recording = made_drive(TRIM, seconds=20.0)
-    return recording, diagnose_car([recording], nigel(), budget_s=0.0, clock=WallClock())
+    return recording, diagnose_car([recording], nigel(), budget=Budget(0.0, WallClock()))
 
 
 def test_every_figure_of_a_report_made_in_no_time_is_that_of_its_car_file(untimed, tmp_path):
@@ -78,7 +85,7 @@ def test_every_figure_of_a_recording_with_a_pause_of_a_day_is_that_of_its_car_fi
     for name, channel in recording.channels.items():
         late = np.where(channel.t >= 9.0, channel.t + 86_400.0, channel.t)
         recording.channels[name] = replace(channel, t=late)
-    found = diagnose_car([recording], nigel(), budget_s=0.0, clock=WallClock())
+    found = diagnose_car([recording], nigel(), budget=Budget(0.0, WallClock()))
     write(found, tmp_path)
     figures = check_report(tmp_path, [recording])
     assert {figure.part for figure in figures} == {"fit", "choose", "confirm"}
@@ -87,10 +94,10 @@ def test_every_figure_of_a_recording_with_a_pause_of_a_day_is_that_of_its_car_fi
 
 
 def test_every_figure_of_pieces_that_a_budget_allows_is_that_of_its_car_file(tmp_path, monkeypatch):
-    monkeypatch.setattr(budget, "LEAST_COMPARED_S", 15.0)
+    monkeypatch.setattr(budget, "MIN_COMPARED_S", 15.0)
     monkeypatch.setattr(sample, "PIECE_S", 4.0)
     recording = made_drive(TRIM, seconds=20.0)
-    found = diagnose_car([recording], nigel(), budget_s=0.0, clock=WallClock())
+    found = diagnose_car([recording], nigel(), budget=Budget(0.0, WallClock()))
     assert "partly_compared" in {problem.name for problem in found.diagnosis.data}
     write(found, tmp_path)
     figures = check_report(tmp_path, [recording])

@@ -54,7 +54,7 @@ ANGLE = Channel(
 )  # fmt: skip
 DEMAND = Channel(
     "wheel angle", "turn_rad", Equation.STEERING,
-    (_amount("angle_rad", "rad", 0.005, (-1.0, 1.0)),), _only("asked_rad"),
+    (_amount("angle_rad", "rad", 0.005, (-1.0, 1.0)),), _only("demand_rad"),
     "The servo is asked for {angle_rad} that nobody meant,", "{angle_rad} * {g}",
     (Written("sets steer_scaled", ("steer_demand",), "gain * steer_demand + angle_rad * g",
              "Mean road-wheel angle meant, + left [rad]."),),

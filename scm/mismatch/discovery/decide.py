@@ -1,10 +1,11 @@
-"""Whether a law outside the library is to be believed in place of what the library offers.
+"""Whether an effect outside the catalogue replaces what the catalogue offers.
 
-A law alone is held against the best listed model under one belief about noise: it must be the
-better hypothesis by its price and a margin, and explain a part that no fit has seen better too.
+One alone is compared with the best hypothesis of the catalogue, each under the noise that it
+leaves: it must be better by its penalty and a margin, and explain unseen data better too.
 """
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -13,195 +14,249 @@ import numpy as np
 from scm.arrays import Floats
 from scm.mismatch.budget import Question
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect
-from scm.mismatch.discovery.seek import Sought, criterion, seek
-from scm.mismatch.discovery.sensor_effects import SensorEffect, SensorLikelihood
-from scm.mismatch.fit.fitter import Fitted, Fitter
-from scm.mismatch.fit.noise import Noise, calmed
-from scm.mismatch.select.search import Search
+from scm.mismatch.discovery.sensor_effects import SensorEffect
+from scm.mismatch.discovery.try_dictionary import Tried, criterion, try_dictionary
+from scm.mismatch.effect_catalogue import Candidate
+from scm.mismatch.findings import Alternative
+from scm.mismatch.fit.fitter import Fitter
+from scm.mismatch.fit.hypothesis import Hypothesis
+from scm.mismatch.fit.noise import lowered
+from scm.mismatch.select.round import Context, extend, fit_with_noise
+from scm.mismatch.select.search import Explanation, Selection
 
-MARGIN = 10.0  # a law that is hardly better than a known effect is that effect
-MOST_BESIDE, SETTLED = 2, 2
-HOPELESS = 50.0  # no belief about noise makes good so much
-BY_FAR = 300.0  # what a listed effect more that hardly pays its price never makes good
-Notify = Callable[[str], None]
+MARGIN = 10.0  # criterion; what is hardly better than a known effect is that effect
+MAX_BESIDE, MAX_FITTED = 2, 2
+HOPELESS = 50.0  # score that no noise model makes up for
+BY_FAR = 300.0  # cost that one more known effect that hardly pays never makes up for
+MAX_KNOWN_SHOWN, MAX_DISCOVERED_SHOWN = 4, 2  # alternatives in a report
+TIE = 6.0  # difference of two criteria that proves nothing
 
 
 def is_discovered(effect: object) -> bool:
-    """Say whether an effect is a law outside the library."""
+    """Return whether an effect is outside the catalogue."""
     return isinstance(effect, DictionaryEffect | SensorEffect)
 
 
 @dataclass(frozen=True, slots=True)
-class _Settled:
-    """A hypothesis under the noise that it leaves, and what both cost together.
+class Compared:
+    """A hypothesis, and what it and the noise that it leaves cost together.
 
     Attributes:
         unseen: Loss on the part that no fit has seen.
     """
 
-    fitted: Fitted
-    noise: Noise
+    fitted: Hypothesis
     cost: float
     unseen: float
 
 
 @dataclass(frozen=True, slots=True)
-class _Best:
-    """The best law that was settled, None where none was near; what was asked, and all tried."""
+class Discovery:
+    """What the dictionary offers beside the car without effects.
 
-    asked: tuple[Noise, tuple[str, ...], bytes, bytes]
-    law: _Settled | None
-    sought: Sought
+    Attributes:
+        beside: The hypothesis of the catalogue that it was compared with.
+        best: The best effect of the dictionary, settled; None where none was near.
+        tried: All that were tried.
+    """
+
+    beside: Hypothesis
+    best: Compared | None
+    tried: Tried
 
 
-class Lawful:
-    """Holds laws outside the library against what a search finds.
+@dataclass(frozen=True, slots=True)
+class Offered:
+    """What the catalogue offered before a discovered effect took its place.
+
+    Attributes:
+        name: Of the best hypothesis, `grade and wind`; empty where no effect paid its penalty.
+        cost: Of that hypothesis, with the noise that it leaves; lower is better.
+        behind: By how much other effects, each alone, cost more than that hypothesis, by name.
+        has_unseen: Whether there was unseen data, on which a discovered effect must be better too.
+    """
+
+    name: str
+    cost: float
+    behind: Mapping[str, float]
+    has_unseen: bool
+
+
+def explain(context: Context, unseen: Floats, found: Selection) -> Explanation:
+    """Return whether a discovered effect leaves nothing that known effects could explain.
+
+    Then no further ones need be searched for: it is better than the best hypothesis by far, on
+    unseen data too, and no known effect beside it pays its penalty. It is asked once.
 
     Args:
-        search: Its model comes from `with_general_effect`.
+        context: Of the selection.
         unseen: Weight of each innovation that no fit has seen, (events,); may be all zero.
-        notify: Is told what is being tried.
+        found: So far.
     """
-
-    def __init__(self, search: Search, unseen: Floats, notify: Notify = lambda _: None) -> None:
-        self._search, self._unseen, self._notify = search, unseen, notify
-        self._asked = False
-        self._last: _Best | None = None
-        self._won: _Best | None = None
-
-    def explains_all(self, listed: Fitted) -> bool:
-        """Say whether a law alone leaves nothing that listed effects could explain.
-
-        Then no further ones need be looked for: it is better than the listed model by far, on what
-        no fit has seen too, and no listed effect beside it is worth its price. It is asked once.
-
-        Args:
-            listed: The best listed model so far, settled under the noise believed now.
-        """
-        search, usual = self._search, self._search.model.noise
-        if self._asked or not isinstance(search.model, SensorLikelihood):
-            return False
-        self._asked = True
-        held = _settled(search, listed, self._unseen)
-        found = self._best(listed)
-        law = found.law
-        if law and law.cost < held.cost - BY_FAR and not self._worse(law, held):
-            search.model.believe(law.noise)
-            step = search.extend(law.fitted)
-            if not step.rivals or _price(search, step.rivals[0]) > _price(search, law.fitted):
-                self._won = found
-        search.model.believe(usual)
-        return self._won is not None
-
-    def decide(self, best: Fitted) -> tuple[Fitted, Sought | None]:
-        """Return the better of a listed model and a law, with known effects beside it, settled.
-
-        Where the budget ends before one could be held against the other, it is the listed model.
-
-        Args:
-            best: The listed model, or the car with its own numbers refitted.
-        """
-        search = self._search
-        if not isinstance(search.model, SensorLikelihood):
-            return best, None
-        if self._won and self._won.law:
-            search.model.believe(self._won.law.noise)
-            return self._won.law.fitted, self._won.sought
-        decided = search.within(Question.LAWS, partial(self._decided, best), best)
-        if decided is None:
-            return best, None
-        better, law, sought = decided
-        return (better if law is None else _with_known(search, law, self._unseen)), sought
-
-    def _decided(self, best: Fitted) -> tuple[Fitted, _Settled | None, Sought | None]:
-        """Return the better model alone, and as what it was settled and sought if it is a law."""
-        search = self._search
-        found = self._best(best)
-        law = found.law
-        if law is None:
-            return best, None, None
-        best = search.settle(best)  # as often as a law will be
-        listed = _settled(search, best, self._unseen)
-        if law.cost > listed.cost - MARGIN or self._worse(law, listed):
-            search.model.believe(listed.noise)
-            return best, None, None
-        search.model.believe(law.noise)
-        return law.fitted, law, found.sought
-
-    def _best(self, listed: Fitted) -> _Best:
-        """Return the best law beside the car without effects, sought under a calm belief.
-
-        Asked again of the same model under the same belief, it is what was found then.
-        """
-        search, model, usual = self._search, self._search.model, self._search.model.noise
-        calm = calmed(usual, model.drives)
-        asked = calm, listed.names, listed.z.tobytes(), listed.values.tobytes()
-        if self._last is None or self._last.asked != asked:
-            model.believe(calm)
-            sought = seek(model, _bare(search, listed), search.fitter.part, self._notify)
-            settled = list[_Settled]()
-            for fitted in _near(search, listed, sought.found):
-                model.believe(calm)
-                settled.append(_settled(search, search.settle(fitted), self._unseen))
-            model.believe(usual)
-            law = min(settled, key=lambda one: one.cost, default=None)
-            self._last = _Best(asked, law, sought)
-        return self._last
-
-    def _worse(self, law: _Settled, listed: _Settled) -> bool:
-        """Say whether a law explains what no fit has seen worse than the listed model."""
-        return bool(self._unseen.any()) and law.unseen > listed.unseen
+    if found.explanation is not None:
+        return Explanation(ends=False, discovery=found.explanation.discovery)
+    known = _compared(context, found.best, unseen)
+    discovery = discover(context, found, unseen)
+    best, ends = discovery.best, False
+    if best and best.cost < known.cost - BY_FAR and not _is_worse(best, known, unseen):
+        ends = _one_beside(context, best.fitted) is None
+    return Explanation(ends, discovery)
 
 
-def _near(search: Search, best: Fitted, laws: Sequence[Fitted]) -> list[Fitted]:
-    """Return the best laws that are not hopelessly worse, as noise is now.
+def decide(
+    context: Context, found: Selection, unseen: Floats
+) -> tuple[Hypothesis, Discovery | None]:
+    """Return the better of the best hypothesis and a discovered effect, known effects beside it.
 
-    Neither than the listed model nor than the best law.
+    Where the budget ends before the two could be compared, it is the one of the catalogue.
+
+    Args:
+        context: Of the selection.
+        found: By it.
+        unseen: As in `explain`.
     """
-    fitter = search.fitter
-    e, _ = search.model([fitter.numbers(best.effects, best.z, best.values)])
-    held = float(fitter.score(e, best.z)[0])
-    least = min([held, *(law.q for law in laws[:1])])
-    return [law for law in laws[:SETTLED] if law.q < least + HOPELESS]
+    why = found.explanation
+    if why and why.ends and why.discovery and why.discovery.best:
+        return why.discovery.best.fitted, why.discovery
+    work = partial(_decided, context, found, unseen)
+    decided = context.budget.attempt(Question.DISCOVERY, work)
+    if decided is None:
+        return found.best, None
+    better, discovery = decided
+    if discovery is None:
+        return better.fitted, None
+    return _with_known(context, better, unseen), discovery
 
 
-def _with_known(search: Search, law: _Settled, unseen: Floats) -> Fitted:
-    """Return a law with the listed effects that it leaves to be found."""
-    for _ in range(MOST_BESIDE):
-        more = search.within(Question.BESIDE, partial(_with_one, search, law, unseen))
-        if more is None or more is law:
+def _decided(
+    context: Context, found: Selection, unseen: Floats
+) -> tuple[Compared, Discovery | None]:
+    """Return the better hypothesis, and what was discovered if it is that."""
+    discovery = found.explanation.discovery if found.explanation else None
+    if discovery is None or discovery.beside is not found.best:
+        discovery = discover(context, found, unseen)
+    best = discovery.best
+    if best is None:
+        return _compared(context, found.best, unseen), None
+    again = fit_with_noise(context, found.best)  # as often as the discovered one
+    known = _compared(context, again, unseen)
+    if best.cost > known.cost - MARGIN or _is_worse(best, known, unseen):
+        return known, None
+    return best, discovery
+
+
+def discover(context: Context, found: Selection, unseen: Floats) -> Discovery:
+    """Return the best effect of the dictionary beside the car without effects, under low noise."""
+    known = found.best
+    low = known.model.under(lowered(known.noise, known.model.drives))
+    fitter = context.fitter(low)
+    (bare,) = fitter.refine([fitter.unfitted(known.z)], rounds=3, fresh=True)
+    tried = try_dictionary(bare, fitter.part, context.notify)
+    e, _ = low([known.numbers])
+    least = min([float(fitter.score(e, known.z)[0]), *(f.score for f in tried.found[:1])])
+    near = [f for f in tried.found[:MAX_FITTED] if f.score < least + HOPELESS]
+    refitted = [_compared(context, fit_with_noise(context, fitted), unseen) for fitted in near]
+    return Discovery(known, min(refitted, key=lambda one: one.cost, default=None), tried)
+
+
+def _is_worse(discovered: Compared, known: Compared, unseen: Floats) -> bool:
+    """Return whether a discovered effect explains what no fit has seen worse."""
+    return bool(unseen.any()) and discovered.unseen > known.unseen
+
+
+def _with_known(context: Context, discovered: Compared, unseen: Floats) -> Hypothesis:
+    """Return a discovered effect with the known effects that it leaves to be found."""
+    for _ in range(MAX_BESIDE):
+        work = partial(_with_one, context, discovered, unseen)
+        more = context.budget.attempt(Question.BESIDE, work)
+        if more is None or more is discovered:
             break
-        law = more
-    return law.fitted
+        discovered = more
+    return discovered.fitted
 
 
-def _with_one(search: Search, law: _Settled, unseen: Floats) -> _Settled:
-    """Return a law with the best listed effect beside it; the same where none pays."""
-    step = search.extend(law.fitted)
-    if not step.rivals or _price(search, step.rivals[0]) > _price(search, law.fitted):
-        return law
-    more = _settled(search, search.settle(step.rivals[0]), unseen)
-    if more.cost > law.cost:
-        search.model.believe(law.noise)
-        return law
-    return more
+def _with_one(context: Context, discovered: Compared, unseen: Floats) -> Compared:
+    """Return a discovered effect with the best known one beside it; the same where none pays."""
+    beside = _one_beside(context, discovered.fitted)
+    if beside is None:
+        return discovered
+    more = _compared(context, fit_with_noise(context, beside), unseen)
+    return discovered if more.cost > discovered.cost else more
 
 
-def _bare(search: Search, best: Fitted) -> Fitted:
-    """Return the car without effects, refitted under the noise that is believed now."""
-    start = search.fitter.null(best.z)
-    (base,) = search.fitter.refine([start], rounds=3, fresh=True)
-    return base
+def _one_beside(context: Context, fitted: Hypothesis) -> Hypothesis | None:
+    """Return the best known effect beside a hypothesis; None where none pays its penalty."""
+    best = next(iter(extend(context, fitted).alternatives), None)
+    return None if best is None or _criterion(context, best) > _criterion(context, fitted) else best
 
 
-def _price(search: Search, fitted: Fitted) -> float:
-    return criterion(fitted, search.events, len(search.listed))
+def _criterion(context: Context, fitted: Hypothesis) -> float:
+    return criterion(fitted, context.events, len(context.catalogue))
 
 
-def _settled(search: Search, fitted: Fitted, unseen: Floats) -> _Settled:
-    """Return a hypothesis with the noise believed now: whoever needs more noise pays for it."""
-    sizes = search.model.log_size
-    judge = Fitter(search.model, unseen)
-    loss = float(judge.score(fitted.e[:, None], np.zeros_like(fitted.z))[0])
-    cost = _price(search, fitted) + float(search.fitter.part @ sizes)
-    return _Settled(fitted, search.model.noise, cost, loss + float(unseen @ sizes))
+def _cost(context: Context, fitted: Hypothesis) -> float:
+    """Return what a hypothesis and the noise that it leaves cost together."""
+    sizes = float(context.fitter(fitted.model).part @ fitted.model.log_size)
+    return _criterion(context, fitted) + sizes
+
+
+def _compared(context: Context, fitted: Hypothesis, unseen: Floats) -> Compared:
+    """Return a hypothesis under the noise that it leaves: whoever needs more noise pays for it."""
+    loss = Fitter(fitted.model, unseen).score(fitted.innovations[:, None], np.zeros_like(fitted.z))
+    sizes = float(unseen @ fitted.model.log_size)
+    return Compared(fitted, _cost(context, fitted), float(loss[0]) + sizes)
+
+
+def offered(context: Context, found: Selection, *, has_unseen: bool) -> Offered:
+    """Return what the catalogue offers, under the noise that its best hypothesis leaves."""
+    known, behind = found.best, dict[str, float]()
+    for tried in found.rounds[:1]:
+        best = tried.criteria[0] if known.effects else context.criterion(tried.base)
+        for fitted, cost in zip(tried.alternatives, tried.criteria, strict=True):
+            name = fitted.names[-1]
+            if name not in known.names:
+                behind[name] = min(max(cost - best, 0.0), behind.get(name, math.inf))
+    return Offered(" and ".join(known.names), _cost(context, known), behind, has_unseen)
+
+
+def alternatives_to(
+    context: Context, best: Hypothesis, effect: Candidate, known: Offered, discovery: Discovery
+) -> tuple[float, tuple[Alternative, ...]]:
+    """Return a discovered effect's probability among its alternatives, and the next ones."""
+    worse = known.cost - _cost(context, best)
+    others = sorted(known.behind.items(), key=lambda one: one[1])[:MAX_KNOWN_SHOWN]
+    rows = [(name, worse + more) for name, more in others]
+    if known.name:
+        rows = [(known.name, worse), *rows[: MAX_KNOWN_SHOWN - 1]]
+    tried = sorted([*rows, *_others_discovered(effect, discovery.tried)], key=lambda one: one[1])
+    weights = [math.exp(-0.5 * min(max(w, 0.0), 1400.0)) for _, w in tried]
+    total = 1.0 + sum(weights)
+    return 1.0 / total, tuple(
+        Alternative(name=name, probability=weight / total,
+                    ruled_out_by=against(w, unseen=known.has_unseen and name == known.name))
+        for (name, w), weight in zip(tried, weights, strict=True)
+    )  # fmt: skip
+
+
+def against(worse: float, *, unseen: bool = False) -> str:
+    """Return what rules an alternative out that costs so much more [squared std].
+
+    Args:
+        worse: Than what was found.
+        unseen: Whether it explains a part that no fit has seen worse as well.
+    """
+    if worse < TIE:
+        return "nothing in this recording"
+    text = f"the recording: it explains it worse by {math.sqrt(worse):.1f} standard deviations"
+    return f"{text}, and parts that no fit has seen worse too" if unseen else text
+
+
+def _others_discovered(effect: Candidate, tried: Tried) -> Sequence[tuple[str, float]]:
+    """Return other effects of the dictionary, and how much more each costs; the best of a name."""
+    every = [(f.effects[-1], c) for f, c in zip(tried.found, tried.criteria, strict=True)]
+    mine = next((c for one, c in every if one is effect), math.inf)
+    found = dict[str, float]()
+    for one, c in every:
+        if one.name != effect.name and c > mine:
+            found.setdefault(one.name, c - mine)
+    return list(found.items())[:MAX_DISCOVERED_SHOWN]

@@ -21,7 +21,7 @@ class Channel:
         response: The general effect's number whose comb asks the same of each moment.
         parameters: How much; the first is the amount.
         numbers: Of the general effect, from the knobs' values.
-        says: The sentence's beginning; braces take the knobs.
+        sentence: The sentence's beginning; braces take the knobs.
         formula: Of the law; braces take the knobs, `{g}` the curve.
         text: Of the written law, by the sum or signal it acts on; `g` is the curve.
     """
@@ -31,7 +31,7 @@ class Channel:
     equation: Equation
     parameters: tuple[Parameter, ...]
     numbers: ToNumbers
-    says: str
+    sentence: str
     formula: str
     text: tuple["Written", ...]
 
@@ -75,7 +75,7 @@ class Curve:
     word: str
     parameters: tuple[Parameter, ...]
     numbers: ToNumbers
-    says: str
+    sentence: str
     formula: str
     signals: tuple[str, ...]
     text: str
@@ -124,7 +124,7 @@ def dictionary_effect(channel: Channel, curve: Curve) -> DictionaryEffect:
         depends_on=(curve.word,),
         parameters=(*channel.parameters, *curve.parameters),
         starts=(),
-        sentence=f"{channel.says} {curve.says}.",
+        sentence=f"{channel.sentence} {curve.sentence}.",
         rare=curve.rare,
         channel=channel,
         curve=curve,

@@ -25,53 +25,57 @@ _WITH = {
 """What a signal's own effect does, by target: the law that takes its place does it too."""
 
 
-def file_name(law: DictionaryEffect) -> str:
+def file_name(effect: DictionaryEffect) -> str:
     """Return the name of a law's file, which is its effect's: `drive_force_against_heading`."""
-    return re.sub(r"\W+", "_", law.name)
+    return re.sub(r"\W+", "_", effect.name)
 
 
-def number_keys(law: DictionaryEffect) -> dict[str, str]:
+def number_keys(effect: DictionaryEffect) -> dict[str, str]:
     """Return the car file's key of each of a law's knobs."""
-    return {parameter.name: f"{file_name(law)}.{parameter.name}" for parameter in law.parameters}
+    return {
+        parameter.name: f"{file_name(effect)}.{parameter.name}" for parameter in effect.parameters
+    }
 
 
-def as_term(law: DictionaryEffect, values: Values, folder: Path) -> tuple[Term, dict[str, float]]:
+def as_term(
+    effect: DictionaryEffect, values: Values, folder: Path
+) -> tuple[Term, dict[str, float]]:
     """Write a law's file, and return the effect it holds and the car file's numbers for it.
 
     Raises:
         TermError: when what was written does not load; then it is our fault.
     """
-    write_effect_file(law, values, folder / (file_name(law) + SUFFIX))
-    term = load_own_term(folder, file_name(law) + SUFFIX)
-    keys = number_keys(law)
-    return term, {keys[k.name]: v for k, v in zip(law.parameters, values, strict=True)}
+    write_effect_file(effect, values, folder / (file_name(effect) + SUFFIX))
+    term = load_own_term(folder, file_name(effect) + SUFFIX)
+    keys = number_keys(effect)
+    return term, {keys[k.name]: v for k, v in zip(effect.parameters, values, strict=True)}
 
 
-def write_effect_file(law: DictionaryEffect, values: Values, path: Path) -> None:
+def write_effect_file(effect: DictionaryEffect, values: Values, path: Path) -> None:
     """Write the file of a law; `values` of its knobs are the defaults' place in its docstring.
 
     Raises:
         TermError: when the file is not named like the law.
     """
-    if path.name != file_name(law) + SUFFIX:
-        msg = f"{path.name}: expected {file_name(law) + SUFFIX}, the law's own name"
+    if path.name != file_name(effect) + SUFFIX:
+        msg = f"{path.name}: expected {file_name(effect) + SUFFIX}, the law's own name"
         raise TermError(msg)
-    parts = [_function(law, part) for part in law.written]
-    lines = [_docstring(law, values), "", *_imports(parts), "", _params(law), ""]
+    parts = [_function(effect, part) for part in effect.written]
+    lines = [_docstring(effect, values), "", *_imports(parts), "", _params(effect), ""]
     for part in parts:
         lines += ["", "@law", part, ""]
-    lines += ["", _term(law), ""]
+    lines += ["", _term(effect), ""]
     path.write_text("\n".join(lines), encoding="utf-8")
 
 
-def _docstring(law: DictionaryEffect, values: Values) -> str:
-    first = f"{law.name.capitalize()}: a law that no library holds, learned from a recording."
-    sentence = law.sentence.format(**{k.name: f"`{k.name}`" for k in law.parameters})
+def _docstring(effect: DictionaryEffect, values: Values) -> str:
+    first = f"{effect.name.capitalize()}: a law that no library holds, learned from a recording."
+    sentence = effect.sentence.format(**{k.name: f"`{k.name}`" for k in effect.parameters})
     equations = [
         f"{part.target.split()[1]} {'+=' if _adds(part) else '='} {_plain(part.returns)}"
-        for part in law.written
+        for part in effect.written
     ]
-    rows = [*equations, _plain(law.curve.text), f"found as {law.formula(values)}"]
+    rows = [*equations, _plain(effect.curve.text), f"found as {effect.formula(values)}"]
     body = [
         f'"""{first}', "", *(_wrapped(row, "    ") for row in rows), "", _wrapped(sentence, ""),
         "Holds: within what the recording showed; the form is the best of a dictionary.",
@@ -108,32 +112,32 @@ def _imports(functions: Sequence[str]) -> list[str]:
     ]
 
 
-def _params(law: DictionaryEffect) -> str:
-    rows = [_param(law, parameter) for parameter in law.parameters]
-    more = [_WITH[part.target] for part in law.written if part.target in _WITH]
+def _params(effect: DictionaryEffect) -> str:
+    rows = [_param(effect, parameter) for parameter in effect.parameters]
+    more = [_WITH[part.target] for part in effect.written if part.target in _WITH]
     rows += [f'    Param("{name}", {rest}),' for name, rest in more]
     return "\n".join(["_PARAMS = (", *rows, ")"])
 
 
-def _param(law: DictionaryEffect, p: Parameter) -> str:
+def _param(effect: DictionaryEffect, p: Parameter) -> str:
     low, high = p.bounds
-    start = p.neutral if p is law.parameters[0] else min(max(1.0, low), high)
+    start = p.neutral if p is effect.parameters[0] else min(max(1.0, low), high)
     return (
-        f'    Param("{p.name}", {start}, "{p.unit}", "{number_keys(law)[p.name]}",\n'
+        f'    Param("{p.name}", {start}, "{p.unit}", "{number_keys(effect)[p.name]}",\n'
         f'          ({low}, {high}), "found by the search"),'
     )
 
 
-def _function(law: DictionaryEffect, part: Written) -> str:
-    curve = f"{law.curve.text}\n" if part.keeps is None else ""
+def _function(effect: DictionaryEffect, part: Written) -> str:
+    curve = f"{effect.curve.text}\n" if part.keeps is None else ""
     body, names = _straight(f"{curve}result = {part.returns}")
-    signals = [s for s in dict.fromkeys((*part.signals, *law.curve.signals)) if s in names]
-    arguments = [*signals, *(k.name for k in law.parameters if k.name in names)]
+    signals = [s for s in dict.fromkeys((*part.signals, *effect.curve.signals)) if s in names]
+    arguments = [*signals, *(k.name for k in effect.parameters if k.name in names)]
     arguments += [_WITH[part.target][0]] if part.target in _WITH else []
-    listed = textwrap.wrap(", ".join(f"{a}: float" for a in arguments) + ",", _WIDE - 4)
+    wrapped = textwrap.wrap(", ".join(f"{a}: float" for a in arguments) + ",", _WIDE - 4)
     *lines, last = body
     return "\n".join([
-        f"def {file_name(law)}{part.suffix}(", *(f"    {line}" for line in listed),
+        f"def {file_name(effect)}{part.suffix}(", *(f"    {line}" for line in wrapped),
         ") -> float:  # fmt: skip", f'    """{part.about}"""', *(f"    {line}" for line in lines),
         f"    return {last.removeprefix('result = ')}",
     ])  # fmt: skip
@@ -168,18 +172,18 @@ def _straight(text: str) -> tuple[list[str], set[str]]:
     return lines, names
 
 
-def _term(law: DictionaryEffect) -> str:
-    first, *more = (_term_of(law, part) for part in law.written)
+def _term(effect: DictionaryEffect) -> str:
+    first, *more = (_term_of(effect, part) for part in effect.written)
     also = "".join(f"\n        Term({row})," for row in more)
     also = f"\n    also=({also}\n    )," if also else ""
     return f"TERM = Term(\n    {first}{also}\n)  # fmt: skip"
 
 
-def _term_of(law: DictionaryEffect, part: Written) -> str:
+def _term_of(effect: DictionaryEffect, part: Written) -> str:
     how, target = part.target.split()
-    still = f'neutral={{"{law.parameters[0].name}": 0.0}},' if part.keeps is None else ""
-    kept = "" if part.keeps is None else f"keeps={part.keeps},"
+    still = f'neutral={{"{effect.parameters[0].name}": 0.0}},' if part.keeps is None else ""
+    chosen = "" if part.keeps is None else f"keeps={part.keeps},"
     return (
-        f'{file_name(law)}{part.suffix}, per=Per.{part.per.name}, {how}="{target}",\n'
-        f"    params=_PARAMS, {still}{kept}"
+        f'{file_name(effect)}{part.suffix}, per=Per.{part.per.name}, {how}="{target}",\n'
+        f"    params=_PARAMS, {still}{chosen}"
     )

@@ -74,8 +74,8 @@ def mixed(
     """The mix of variables."""
     place = by_x * x_cog + by_y * y_cog + by_yaw * yaw
     motion = by_speed * vx + by_rate * yaw_rate + by_side * accel_y
-    asked = by_steer * linkage_angle + by_throttle * throttle_command + by_memory * throttle_memory
-    return by_time * time + place + motion + asked + phase
+    drive = by_steer * linkage_angle + by_throttle * throttle_command + by_memory * throttle_memory
+    return by_time * time + place + motion + drive + phase
 
 
 @law
@@ -94,7 +94,7 @@ def shaped(
 
 
 @law
-def law_shape(
+def learned_shape(
     time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
     throttle_command: float, yaw_rate: float, accel_y: float, throttle_memory: float,
     by_time: float, by_x: float, by_y: float, by_yaw: float, by_speed: float, by_steer: float,
@@ -117,53 +117,53 @@ def law_shape(
 
 @law
 def learned_push(
-    law_shape: float, vx: float, cos_yaw: float, sin_yaw: float, along_n: float, drag_n: float,
+    learned_shape: float, vx: float, cos_yaw: float, sin_yaw: float, along_n: float, drag_n: float,
     world_x_n: float, world_y_n: float,
 ) -> float:  # fmt: skip
     """Force along the body, + forward [N]."""
     floor = world_x_n * cos_yaw + world_y_n * sin_yaw
-    return law_shape * (along_n - drag_n * soft_sign(vx / SLOW) + floor)
+    return learned_shape * (along_n - drag_n * soft_sign(vx / SLOW) + floor)
 
 
 @law
 def learned_push_across(
-    law_shape: float, cos_yaw: float, sin_yaw: float, world_x_n: float, world_y_n: float
+    learned_shape: float, cos_yaw: float, sin_yaw: float, world_x_n: float, world_y_n: float
 ) -> float:
     """Force across the body, + to its left [N]."""
-    return law_shape * (world_y_n * cos_yaw - world_x_n * sin_yaw)
+    return learned_shape * (world_y_n * cos_yaw - world_x_n * sin_yaw)
 
 
 @law
-def learned_twist(law_shape: float, moment_nm: float) -> float:
+def learned_twist(learned_shape: float, moment_nm: float) -> float:
     """Moment about z [N*m]."""
-    return law_shape * moment_nm
+    return learned_shape * moment_nm
 
 
 @law
 def learned_turn(
-    law_shape: float, linkage_angle: float, turn_rad: float, turn_gain: float, offset: float
+    learned_shape: float, linkage_angle: float, turn_rad: float, turn_gain: float, offset: float
 ) -> float:
     """Road-wheel angle with the linkage's misalignment, + left [rad]."""
-    return linkage_angle + offset + law_shape * (turn_rad + turn_gain * linkage_angle)
+    return linkage_angle + offset + learned_shape * (turn_rad + turn_gain * linkage_angle)
 
 
 @law
 def learned_demand(
     steer_demand: float, gain: float, by_steer: float, size: float, ramp: float, cube: float,
-    asked_rad: float,
+    demand_rad: float,
 ) -> float:  # fmt: skip
     """Mean road-wheel angle meant, + left [rad]: the shape over the angle asked of the servo."""
     q = by_steer * steer_demand
     g = abs(q) * size + ramp * max(q, 0.0) + cube * q * q * q
-    return gain * steer_demand + asked_rad * g
+    return gain * steer_demand + demand_rad * g
 
 
 @law
 def learned_throttle(
-    law_shape: float, throttle_command: float, throttle_add: float, throttle_gain: float
+    learned_shape: float, throttle_command: float, throttle_add: float, throttle_gain: float
 ) -> float:
     """Throttle as it reaches the car, + forward."""
-    return throttle_command + law_shape * (throttle_add + throttle_gain * throttle_command)
+    return throttle_command + learned_shape * (throttle_add + throttle_gain * throttle_command)
 
 
 @law
@@ -186,7 +186,7 @@ _OFFSET = Param("offset", 0.0, "rad", TRIM, (-0.3, 0.3), "added to the wheels' a
                 report="offset_rad")  # fmt: skip
 MEMORY = Term(throttle_memory, per=Per.BODY, sets="throttle_memory", keeps=0.0, params=(_MEMORY,))
 SHAPE = Term(
-    law_shape, per=Per.BODY, sets="law_shape", params=_MIX,
+    learned_shape, per=Per.BODY, sets="learned_shape", params=_MIX,
     neutral={p.name: 0.0 for p in _SHAPES},
 )  # fmt: skip
 _WORLD = ("world_x_n", "world_y_n")
@@ -199,8 +199,8 @@ TURN = _term(
 _MEANT = Param("gain", 1.0, "1", GAIN, (0.2, 2.0), "angle over the angle meant", report="gain")
 _BY_STEER = [p for p in _MIX if p.key.removeprefix(PREFIX) in ("by_steer", "size", "ramp", "cube")]
 DEMAND = Term(
-    learned_demand, per=Per.BODY, sets="steer_scaled", neutral={"asked_rad": 0.0},
-    params=(*_BY_STEER, _number("asked_rad", "how much of the shape is asked for"), _MEANT),
+    learned_demand, per=Per.BODY, sets="steer_scaled", neutral={"demand_rad": 0.0},
+    params=(*_BY_STEER, _number("demand_rad", "how much of the shape is asked for"), _MEANT),
 )  # fmt: skip
 THROTTLE = _term(
     learned_throttle, channels=("throttle_add", "throttle_gain"), sets="throttle_received"
@@ -220,5 +220,5 @@ TERMS = (MEMORY, SHAPE, PUSH, ACROSS, TWIST, TURN, DEMAND, THROTTLE, RIPPLE)
 
 def learned_terms(car: Car) -> list[Term]:
     """Return the general effect's parts that a car can carry; steering keeps its trim and gain."""
-    taken = {term.sets for term in car.terms if term.sets}
-    return [term for term in TERMS if term is not THROTTLE or term.sets not in taken]
+    set_by_car = {term.sets for term in car.terms if term.sets}
+    return [term for term in TERMS if term is not THROTTLE or term.sets not in set_by_car]

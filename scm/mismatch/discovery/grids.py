@@ -13,9 +13,9 @@ FASTEST_HZ = 1.0
 SHORTEST = 2.2  # cells in a wave
 
 
-def grid_of(law: DictionaryEffect, cells: Cells) -> Iterator[Values]:
+def grid_of(effect: DictionaryEffect, cells: Cells) -> Iterator[Values]:
     """Yield values of a law's knobs but for its amount, which is 1; a wave's phase is 0."""
-    names = [parameter.name for parameter in law.parameters][1:]
+    names = [parameter.name for parameter in effect.parameters][1:]
     if "length_m" in names:
         yield from ((1.0, length, way, 0.0) for length, way in _vectors(cells))
         return

@@ -1,8 +1,8 @@
-"""What a push at each moment would explain: responses of the weighed residuals to hats of time.
+"""What a push at each moment would explain: responses of the weighted residuals to hats of time.
 
-Hats a comb's pitch apart are felt one at a time, so one rollout asks many moments at once. What
-they would explain together is a quadratic form, in which any law is a vector: thousands of them are
-compared without another rollout. The car's own numbers and the effects known are refitted linearly.
+Hats a comb's pitch apart are felt one at a time, so one rollout tests many moments at once. What
+they would explain together is a quadratic form, in which any effect is a vector: thousands are
+compared without another rollout. The car's own numbers and known effects are refitted linearly.
 """
 
 from collections.abc import Iterator, Mapping
@@ -12,9 +12,9 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.mismatch.discovery.general_effect import PREFIX
-from scm.mismatch.fit.fitter import Fitted, Fitter
+from scm.mismatch.fit.fitter import Fitter
+from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.fit.rollouts import Rollouts
 
 PITCH_S = 8.0  # a hat's response has died away before the next one's begins
 LEAST_S, MOST_CELLS = 0.1, 900
@@ -27,7 +27,7 @@ AMOUNTS: Mapping[str, float] = {
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """The moments asked, and what the car did then.
+    """The moments, and what the car did then.
 
     Attributes:
         wide: Between moments [s].
@@ -61,14 +61,14 @@ class Response:
         return top / bottom, top * top / bottom
 
 
-def cells_of(model: Likelihood, fitter: Fitter, base: Fitted) -> Cells:
-    """Return the moments of a model's drives, with what the car does under `base`."""
+def cells_of(base: Hypothesis) -> Cells:
+    """Return the moments of the drives, with what the car does under a hypothesis."""
+    model = base.model
     spans = [float(d.edges[-1] - d.edges[0]) for d in model.drives]
     wide = max(LEAST_S, sum(spans) / MOST_CELLS)
     parts, numbers = list[dict[str, Floats]](), list[Ints]()
-    values = fitter.numbers(base.effects, base.z, base.values)
     for i, drive in enumerate(model.drives):
-        motion = Rollouts(drive, model.car, model.tiles).run([values])
+        motion = model.simulator.rollouts[i].run([base.numbers])
         edges = drive.edges
         t = wide * np.arange(int(spans[i] / wide) + 1, dtype=np.float64)
         x, y, yaw = (drive.smoothed[f"pose.{n}"].at(edges[0] + t) for n in ("x", "y", "yaw"))
@@ -85,12 +85,11 @@ def cells_of(model: Likelihood, fitter: Fitter, base: Fitted) -> Cells:
     return Cells(wide, np.concatenate(numbers), driven)
 
 
-def respond(
-    model: Likelihood, fitter: Fitter, base: Fitted, cells: Cells, channel: str
-) -> Response:
-    """Return what pushes in one channel would explain beside `base`."""
+def respond(fitter: Fitter, base: Hypothesis, cells: Cells, channel: str) -> Response:
+    """Return what pushes in one channel would explain beside a hypothesis."""
+    model = fitter.model
     count = round(PITCH_S / cells.wide)
-    values = fitter.numbers(base.effects, base.z, base.values)
+    values = base.numbers
     amount = AMOUNTS[channel]
     if channel in ("along_n", "moment_nm"):
         amount *= 9.81 * model.car.value("body.mass_kg")
@@ -102,17 +101,17 @@ def respond(
     ]
     e, _ = model([values, *sets])
     changes = (e[:, 1:] - e[:, :1]) / amount
-    weights, jacobian = fitter.weights(base.e), base.jacobian
+    weights, jacobian = fitter.weights(base.innovations), base.jacobian
     prior = np.zeros(jacobian.shape[1])
     prior[: len(base.z)] = 1.0
     normal = (jacobian.T * weights) @ jacobian + np.diag(prior + 1e-6)
-    tilt = (jacobian.T * weights) @ base.e
+    tilt = (jacobian.T * weights) @ base.innovations
     tilt[: len(base.z)] += base.z
     own = np.zeros((jacobian.shape[1], len(cells)))
     slope, bend = np.zeros(len(cells)), np.zeros((len(cells), len(cells)))
     for rows, places, felt in _windows(model, cells, count, changes):
         weighed = felt * weights[rows, None]
-        slope[places] += weighed.T @ base.e[rows]
+        slope[places] += weighed.T @ base.innovations[rows]
         own[:, places] += jacobian[rows].T @ weighed
         bend[np.ix_(places, places)] += felt.T @ weighed
     held = np.linalg.solve(normal, own)

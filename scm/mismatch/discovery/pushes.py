@@ -12,10 +12,10 @@ from scm.mismatch.discovery.impulse_response import Cells
 from scm.vehicles.jit import array_kernel
 
 
-def pushes(law: DictionaryEffect, cells: Cells, values: Values) -> Floats:
+def pushes(effect: DictionaryEffect, cells: Cells, values: Values) -> Floats:
     """Return a law's force, angle, throttle or moment at each moment, (cells,)."""
-    n = len(law.channel.parameters)
-    curve, channel = law.curve.numbers(values[n:]), law.channel.numbers(values[:n])
+    n = len(effect.channel.parameters)
+    curve, channel = effect.curve.numbers(values[n:]), effect.channel.numbers(values[:n])
     return shape(curve, cells) * amount(channel, cells)
 
 
@@ -69,7 +69,7 @@ _SHAPES: Mapping[str, Callable[[Floats], Floats]] = {
 }  # fmt: skip
 _FACTORS: Mapping[str, Callable[[Mapping[str, Floats]], Floats]] = {
     "along_n": _ones, "drag_n": _drag, "world_x_n": lambda d: np.cos(d["yaw"]),
-    "world_y_n": lambda d: np.sin(d["yaw"]), "turn_rad": _ones, "asked_rad": _ones,
+    "world_y_n": lambda d: np.sin(d["yaw"]), "turn_rad": _ones, "demand_rad": _ones,
     "turn_gain": lambda d: d["steer"], "throttle_gain": lambda d: d["throttle"],
     "moment_nm": _ones,
 }  # fmt: skip

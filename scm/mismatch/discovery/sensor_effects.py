@@ -1,22 +1,22 @@
-"""Laws of sensors: what a channel reads too much, as an amount of something known at each sample.
+"""Sensor effects of the dictionary: an error proportional to something known at each sample.
 
-They need no rollout: what is measured moves, not the car. A model that knows them takes them off
-its residuals, so they are fitted beside everything else.
+They need no rollout: what is measured moves, not the car. A likelihood with their signatures
+subtracts them from its residuals, so they are fitted beside everything else.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
-from scm.arrays import Bools, Floats
+from scm.arrays import Floats
 from scm.mismatch.effect_catalogue import Candidate, Parameter
 from scm.mismatch.findings import Equation
-from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.fit.rollouts import Motions, Tiles
+from scm.mismatch.fit.hypothesis import Hypothesis
+from scm.mismatch.fit.likelihood import Signatures
+from scm.mismatch.fit.rollouts import Motions
 from scm.replay.drive import STEP_S, Drive
-from scm.replay.numbers import Numbers
-from scm.vehicles.car import Car
 
 PREFIX = "sensed."
 GYROS = ("imu.gyro_z", "yaw_rate")
@@ -27,24 +27,25 @@ Reads = Mapping[str, Floats]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorEffect(Candidate):
-    """A law of a sensor, as a candidate like the library's.
+    """An error of a sensor, a candidate like those of the catalogue.
 
     Attributes:
-        reads: Too much in each channel on a drive's edges, for one unit, from what is known there.
+        formula_text: The error as a formula; braces take its amount.
+        reads: What one unit adds to each channel on a drive's edges, from what is known there.
     """
 
-    law: str
+    formula_text: str
     reads: Callable[[Known], Reads]
 
     @property
     def fault(self) -> str:
         """The key under which a car file has such a fault of measurement; empty: it has none."""
-        return IN_FILE.get(self.law, "")
+        return IN_FILE.get(self.formula_text, "")
 
     def formula(self, values: tuple[float, ...]) -> str:
-        """Return the law with its number and unit."""
+        """Return the formula with its number and unit."""
         unit = "" if self.parameters[0].unit == "1" else f" {self.parameters[0].unit}"
-        return self.law.format(f"{values[0]:.3g}{unit}")
+        return self.formula_text.format(f"{values[0]:.3g}{unit}")
 
 
 LENS = "camera_lens"
@@ -53,7 +54,7 @@ IN_FILE: Mapping[str, str] = {
     "measured = true * (1 + {} * |y|)": "measure.camera_lens_y_per_m",
     "measured = true * (1 + {} * (x^2 + y^2))": "measure.camera_lens_per_m2",
 }
-"""Laws of the camera that are numbers of the fault `LENS`."""
+"""Errors of the camera that are numbers of the sensor fault `LENS`."""
 _Row = tuple[str, str, str, str, float, str, str, Callable[[Known], Reads]]
 
 
@@ -125,55 +126,31 @@ _TABLE: tuple[_Row, ...] = (
 )  # fmt: skip
 
 
+@cache
 def sensor_effects() -> tuple[SensorEffect, ...]:
-    """Return every sensor law that may be tried."""
+    """Return every sensor effect that may be tried."""
     return tuple(
         SensorEffect(
             name=f"{channel} against {word}", equation=Equation.SENSOR, depends_on=(word,),
             parameters=(Parameter(parameter, f"{PREFIX}{i}", unit, (-10.0, 10.0), 0.0, step),),
-            starts=(), sentence=sentence + ".", law=law, reads=reads,
+            starts=(), sentence=sentence + ".", formula_text=formula, reads=reads,
         )
-        for i, (channel, word, parameter, unit, step, sentence, law, reads) in enumerate(_TABLE)
+        for i, (channel, word, parameter, unit, step, sentence, formula, reads) in enumerate(_TABLE)
     )  # fmt: skip
 
 
-class SensorLikelihood(Likelihood):
-    """A likelihood that knows laws of sensors beside the car's.
-
-    Attributes:
-        learned: What each law reads too much for one unit, by key, for each drive and stream.
-    """
-
-    def __init__(self, model: Likelihood, car: Car) -> None:
-        super().__init__(model.drives, car, Tiles(car, model.tiles))
-        self.believe(model.noise)
-        self.learned: dict[str, list[list[Floats]]] = {}
-
-    def learn(self, numbers: Numbers) -> None:
-        """Work out what sensors would read too much, where the car drives with these numbers."""
-        known = [
-            _known(drive, rollouts.run([numbers]))
-            for drive, rollouts in zip(self.drives, self._rollouts, strict=True)
-        ]
-        for law in sensor_effects():
-            parts = [_read(d, law.reads(now)) for d, now in zip(self.drives, known, strict=True)]
-            if any(part.any() for one in parts for part in one):
-                self.learned[law.parameters[0].key] = parts
-
-    def residuals(self, sets: Sequence[Numbers]) -> tuple[list[list[Floats]], Bools]:
-        """Return residuals of every drive's streams, sensor laws taken off."""
-        found, ok = super().residuals(sets)
-        for row, numbers in enumerate(sets):
-            for key in self.learned.keys() & numbers.keys():
-                for streams, reads in zip(found, self.learned[key], strict=True):
-                    for residual, read in zip(streams, reads, strict=True):
-                        residual[:, row] -= numbers[key] * read
-        return found, ok
-
-    def felt(self, law: SensorEffect) -> Floats:
-        """Return what one unit of a law changes in the unit innovations, (events,)."""
-        moved = [[-r[:, None] for r in one] for one in self.learned[law.parameters[0].key]]
-        return np.asarray(self.weigh(moved)[:, 0])
+def signatures_of(base: Hypothesis) -> Signatures:
+    """Return what one unit of each sensor effect adds to every stream, where the car drives."""
+    model, found = base.model, dict[str, list[list[Floats]]]()
+    known = [
+        _known(drive, rollouts.run([base.numbers]))
+        for drive, rollouts in zip(model.drives, model.simulator.rollouts, strict=True)
+    ]
+    for effect in sensor_effects():
+        parts = [_read(d, effect.reads(now)) for d, now in zip(model.drives, known, strict=True)]
+        if any(part.any() for one in parts for part in one):
+            found[effect.parameters[0].key] = parts
+    return found
 
 
 def _known(drive: Drive, motion: Motions) -> dict[str, Floats]:
@@ -194,7 +171,7 @@ def _known(drive: Drive, motion: Motions) -> dict[str, Floats]:
 
 
 def _read(drive: Drive, reads: Reads) -> list[Floats]:
-    """Return what each stream reads too much at its samples; zero where a law says nothing."""
+    """Return what each stream reads too much at its samples; zero where it reads right."""
     return [
         np.interp(s.taps, drive.edges, reads[s.name]).mean(axis=1)
         if s.name in reads

@@ -13,8 +13,8 @@ from scm.arrays import Floats
 from scm.mismatch.discovery.dictionary import dictionary
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, Values
 from scm.mismatch.discovery.shapes import PHASE
-from scm.mismatch.fit.fitter import Fitted, Fitter
-from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.fitter import Fitter
+from scm.mismatch.fit.hypothesis import Hypothesis
 
 WAVES = tuple(float(n) for n in range(1, 13))
 SIZE = 0.01  # of the torque on a wheel that would lift the car: small, so that all is linear
@@ -23,13 +23,13 @@ _HALVES = (0.0, 0.5 * math.pi)
 
 @cache
 def by_turn() -> DictionaryEffect:
-    """Return the law of a torque over a wheel's turn."""
-    return next(law for law in dictionary() if law.curve is PHASE)
+    """Return the effect of a torque over a wheel's turn."""
+    return next(effect for effect in dictionary() if effect.curve is PHASE)
 
 
-def ripples(model: Likelihood, fitter: Fitter, base: Fitted) -> Iterator[tuple[Values, float]]:
+def ripples(fitter: Fitter, base: Hypothesis) -> Iterator[tuple[Values, float]]:
     """Yield the best torque of each number of waves in a turn, and what it would explain."""
-    slope, bend = asked(model, fitter, base)
+    slope, bend = waves_response(fitter, base)
     for i, waves in enumerate(WAVES):
         both = slice(2 * i, 2 * i + 2)
         sine, cosine = map(float, -np.linalg.pinv(bend[both, both]) @ slope[both])
@@ -37,27 +37,27 @@ def ripples(model: Likelihood, fitter: Fitter, base: Fitted) -> Iterator[tuple[V
         yield (math.hypot(sine, cosine), waves, math.atan2(cosine, sine)), gain
 
 
-def asked(model: Likelihood, fitter: Fitter, base: Fitted) -> tuple[Floats, Floats]:
+def waves_response(fitter: Fitter, base: Hypothesis) -> tuple[Floats, Floats]:
     """Return slope and bend of the objective by a sine and a cosine [N*m] of each of `WAVES`."""
+    model, values = fitter.model, base.numbers
     amount = SIZE * 9.81 * model.car.value("body.mass_kg") * model.car.value("wheel.radius_m")
-    values = fitter.numbers(base.effects, base.z, base.values)
     waves = [by_turn().numbers((amount, n, half)) for n in WAVES for half in _HALVES]
     e, _ = model([values, *(values | wave for wave in waves)])
     return beside(fitter, base, (e[:, 1:] - e[:, :1]) / amount)
 
 
-def beside(fitter: Fitter, base: Fitted, felt: Floats) -> tuple[Floats, Floats]:
+def beside(fitter: Fitter, base: Hypothesis, felt: Floats) -> tuple[Floats, Floats]:
     """Return slope and bend of the objective by amounts of what is felt, (events, n).
 
     All that is fitted already follows linearly.
     """
-    weights, jacobian = fitter.weights(base.e), base.jacobian
+    weights, jacobian = fitter.weights(base.innovations), base.jacobian
     weighted = jacobian.T * weights
     prior = np.full(jacobian.shape[1], 1e-6)
     prior[: len(base.z)] = 1.0
-    tilt = weighted @ base.e
+    tilt = weighted @ base.innovations
     tilt[: len(base.z)] += base.z
     own = weighted @ felt
     held = np.linalg.solve(weighted @ jacobian + np.diag(prior), own)
     mine = felt.T * weights
-    return mine @ base.e - held.T @ tilt, mine @ felt - own.T @ held
+    return mine @ base.innovations - held.T @ tilt, mine @ felt - own.T @ held

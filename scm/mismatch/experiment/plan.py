@@ -11,8 +11,7 @@ from scm.geometry import Pose2
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.experiment.manoeuvres import ROW_S, Manoeuvre
 from scm.mismatch.experiment.pace import SIDEWAYS_M_S2, Pace
-from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.fit.noise import Noise
+from scm.mismatch.fit.likelihood import Likelihood, Simulator
 from scm.mismatch.fit.rollouts import Rollouts
 from scm.mismatch.fit.sensor_prediction import Prediction
 from scm.recording.read import Channel, Recording
@@ -63,16 +62,6 @@ class Placed:
     def change(self, numbers: Numbers) -> Numbers:
         """Return a car's numbers on this leg."""
         return self.leg.change(numbers, self.start.yaw) if self.leg.change else numbers
-
-
-def numbers_of(effects: Sequence[Candidate], values: Floats) -> dict[str, float]:
-    """Return the numbers of effects by key, ordinary ones left at the file's."""
-    found, at = dict[str, float](), 0
-    for effect in effects:
-        n = len(effect.parameters)
-        found |= effect.numbers(tuple(values[at : at + n]))
-        at += n
-    return found
 
 
 def place(leg: Leg, car: Car, pace: Pace, explanations: Sequence[Numbers]) -> Placed | None:
@@ -141,30 +130,36 @@ def _fitted_in(leg: Leg, manoeuvre: Manoeuvre, path: Floats, pace: Pace) -> Plac
     )
 
 
-class Planned(Likelihood):
-    """Recordings that nobody has made yet: noise-free, of the sensors of one that was made."""
+def planned(model: Likelihood, legs: Sequence[Placed], truth: Numbers) -> Likelihood:
+    """Return the likelihood of noise-free recordings that nobody has made yet.
+
+    Args:
+        model: Of a recording that was made: its sensors, car and noise.
+        legs: The drives.
+        truth: Numbers of the car that would make them.
+    """
+    return Likelihood(_PlannedSimulator(model, legs, truth), model.noise)
+
+
+class _PlannedSimulator(Simulator):
+    """Drives legs that nobody has driven yet."""
 
     def __init__(self, model: Likelihood, legs: Sequence[Placed], truth: Numbers) -> None:
-        self._legs, self._noise = legs, model.noise
+        self._legs = legs
         drives = list[Drive]()
         for leg in legs:
             blank = _imagined(model.drives[0], leg, None)
             seen = _read(blank, model, leg.change(truth))
             drives.append(_imagined(model.drives[0], leg, seen))
-        super().__init__(drives, model.car, model.tiles)
+        super().__init__(drives, model.car, model.simulator.tiles)
         for drive, leg in zip(drives, legs, strict=True):
             _read(drive, model, leg.change(truth))
-
-    def believe(self, noise: Noise) -> None:
-        """Take the belief about noise that the recording gave, whichever these drives would."""
-        del noise
-        super().believe(self._noise)
 
     def residuals(self, sets: Sequence[Numbers]) -> tuple[list[list[Floats]], Bools]:
         """Return residuals of every leg, each with what was changed for it."""
         self.runs += len(sets)
         found = [
-            self._left(i, [leg.change(numbers) for numbers in sets])
+            self.residuals_of(i, [leg.change(numbers) for numbers in sets])
             for i, leg in enumerate(self._legs)
         ]
         return [left for left, _ in found], np.all([ok for _, ok in found], axis=0)
@@ -172,7 +167,7 @@ class Planned(Likelihood):
 
 def _read(drive: Drive, model: Likelihood, truth: Numbers) -> dict[str, Floats]:
     """Let a drive's sensors have read what this car would have done; return the values."""
-    motions = Rollouts(drive, model.car, model.tiles).run([truth])
+    motions = Rollouts(drive, model.car, model.simulator.tiles).run([truth])
     residuals = Prediction(drive).residuals(motions, [truth])
     drive.streams = [
         replace(stream, values=stream.values - left[:, 0])

@@ -12,9 +12,10 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.effect_catalogue import Parameter
-from scm.mismatch.experiment.plan import Explanation, Planned, numbers_of
-from scm.mismatch.fit.fitter import FARTHEST, SMALL, TAIL, Fitted, Fitter
-from scm.mismatch.fit.likelihood import NominalParameter
+from scm.mismatch.experiment.plan import Explanation
+from scm.mismatch.fit.fitter import FARTHEST, SMALL, TAIL, Fitter
+from scm.mismatch.fit.hypothesis import Hypothesis, numbers_of
+from scm.mismatch.fit.likelihood import Likelihood, NominalParameter
 
 ROUNDS = 3
 
@@ -40,7 +41,7 @@ class Separation:
         return float(self.lambdas[off].min())
 
 
-def linear_separation(planned: Planned, explanations: Sequence[Explanation]) -> Separation:
+def linear_separation(planned: Likelihood, explanations: Sequence[Explanation]) -> Separation:
     """Return how far explanations come apart by one linear refit of each.
 
     Args:
@@ -68,7 +69,9 @@ def linear_separation(planned: Planned, explanations: Sequence[Explanation]) -> 
 
 
 def refitted_separation(
-    plan: Callable[[Explanation], Planned], explanations: Sequence[Explanation], start: Separation
+    plan: Callable[[Explanation], Likelihood],
+    explanations: Sequence[Explanation],
+    start: Separation,
 ) -> Separation:
     """Return how far explanations come apart when each is refitted with all that is not linear.
 
@@ -83,23 +86,17 @@ def refitted_separation(
         others = [j for j in range(len(explanations)) if j != i]
         none = np.zeros(0)
         fits = [
-            Fitted(
-                explanations[j].effects,
-                start.z[i, j].copy(),
-                start.values[i][j].copy(),
-                none,
-                0.0,
-                np.zeros((0, 0)),
-            )
+            Hypothesis(planned, explanations[j].effects, start.z[i, j], start.values[i][j],
+                       none, 0.0, np.zeros((0, 0)))
             for j in others
-        ]
-        Fitter(planned, np.ones(len(planned.t))).refine(fits, ROUNDS, fresh=True)
-        for j, fitted in zip(others, fits, strict=True):
-            lambdas[i, j] = min(lambdas[i, j], fitted.q)
+        ]  # fmt: skip
+        refined = Fitter(planned, np.ones(len(planned.t))).refine(fits, ROUNDS, fresh=True)
+        for j, fitted in zip(others, refined, strict=True):
+            lambdas[i, j] = min(lambdas[i, j], fitted.score)
     return Separation(lambdas, start.z, start.values)
 
 
-def _sets(planned: Planned, explanations: Sequence[Explanation]) -> list[dict[str, float]]:
+def _sets(planned: Likelihood, explanations: Sequence[Explanation]) -> list[dict[str, float]]:
     """Return each explanation's numbers, then small steps of the car's own, then of every knob."""
     bases = [numbers_of(r.effects, r.values) for r in explanations]
     sets = list(bases)

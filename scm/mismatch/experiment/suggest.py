@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from scm.mismatch.experiment.changed import CHANGED, Experiment, drive_alone
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES
 from scm.mismatch.experiment.pace import Floor, Pace, pace_of
-from scm.mismatch.experiment.plan import Explanation, Placed, Planned, numbers_of, place
+from scm.mismatch.experiment.plan import Explanation, Placed, place, planned
 from scm.mismatch.experiment.separation import Separation, linear_separation, refitted_separation
 from scm.mismatch.findings import Undecided
+from scm.mismatch.fit.hypothesis import numbers_of
 from scm.mismatch.fit.likelihood import Likelihood
 
 MIN_LAMBDA, SURE_LAMBDA = 10.0, 25.0  # below nobody can tell, above anybody can
@@ -127,7 +128,7 @@ def _search(
         legs = [place(leg, model.car, pace, numbers) for leg in experiment.legs]
         placed = tuple(leg for leg in legs if leg is not None)
         if len(placed) == len(legs):
-            apart = linear_separation(Planned(model, placed, numbers[0]), explanations)
+            apart = linear_separation(planned(model, placed, numbers[0]), explanations)
             found.append(Weighed(experiment, placed, apart))
             if apart.least > ENOUGH_LAMBDA:
                 found[-1] = _refitted(model, explanations, found[-1])
@@ -147,8 +148,8 @@ def _search(
 
 
 def _refitted(model: Likelihood, explanations: Sequence[Explanation], weighed: Weighed) -> Weighed:
-    def plan(right: Explanation) -> Planned:
-        return Planned(model, weighed.legs, numbers_of(right.effects, right.values))
+    def plan(right: Explanation) -> Likelihood:
+        return planned(model, weighed.legs, numbers_of(right.effects, right.values))
 
     apart = refitted_separation(plan, explanations, weighed.separation)
     return Weighed(weighed.experiment, weighed.legs, apart, sure=True)

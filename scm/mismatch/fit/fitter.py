@@ -1,16 +1,17 @@
 """Fits of many hypotheses at once: Gauss-Newton, all rollouts of a round in one batch.
 
-A hypothesis is a tuple of effects. Its numbers are free; the car's own are free too, held by the
-scatter that the car file states.
+The numbers of a hypothesis' effects are free; the car's own are free too, held by the standard
+deviations that the car file states.
 """
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from scm.arrays import Bools, Floats
-from scm.mismatch.effect_catalogue import Candidate, Parameter
+from scm.mismatch.effect_catalogue import Candidate
+from scm.mismatch.fit.hypothesis import Hypothesis, numbers_of
 from scm.mismatch.fit.likelihood import Likelihood
 
 ROUNDS = 5
@@ -34,117 +35,82 @@ OF_OWN: Mapping[str, str] = {
 Trial = tuple[tuple[Candidate, ...], Floats]
 
 
-@dataclass(slots=True)
-class Fitted:
-    """A hypothesis with its best numbers so far.
-
-    Attributes:
-        z: The car's own numbers, standard deviations from the file's.
-        values: The effects' numbers, in the order of their knobs.
-        e: Unit innovations, (events,); `q`: their loss on the fitted part, and the prior's.
-        jacobian: Of `e` by `z` and then by values over their knobs' steps, (events, n).
-    """
-
-    effects: tuple[Candidate, ...]
-    z: Floats
-    values: Floats
-    e: Floats
-    q: float
-    jacobian: Floats
-    done: bool = False
-    covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The effects' names."""
-        return tuple(effect.name for effect in self.effects)
-
-    @property
-    def parameters(self) -> int:
-        """How many numbers the effects have."""
-        return len(self.values)
-
-
 class Fitter:
-    """Fits hypotheses on a part of the innovations.
+    """Fits hypotheses on a part of the innovations, under one noise model.
 
     Attributes:
         part: Weight of each innovation, 0 or 1, (events,); a drive's first second never counts.
     """
 
     def __init__(self, model: Likelihood, part: Floats) -> None:
-        self.model, self.part = model, part * model.settled
+        self.model, self.part = model, part * model.valid
 
-    def numbers(self, effects: Sequence[Candidate], z: Floats, values: Floats) -> dict[str, float]:
-        """Return the numbers by key of a hypothesis."""
-        found, at = self.model.numbers(z), 0
-        for effect in effects:
-            n = len(effect.parameters)
-            found |= effect.numbers(tuple(values[at : at + n]))
-            at += n
-        return found
+    def under(self, model: Likelihood) -> "Fitter":
+        """Return what fits the same part of the same recordings under another noise model."""
+        return self if model is self.model else Fitter(model, self.part)
 
     def score(self, e: Floats, z: Floats) -> Floats:
-        """Return Q of each column of innovations."""
+        """Return the score of each column of innovations."""
         losses = self.part @ (TAIL * np.log1p(e * e / TAIL))
         return np.asarray(losses + self.prior_loss(z))
 
     def prior_loss(self, z: Floats) -> Floats:
         """Return what the car file makes of each row of the car's own numbers, (n,)."""
         rows = np.atleast_2d(z)
-        return np.asarray(((rows @ self.model.prior) * rows).sum(axis=1))
+        return np.asarray(((rows @ self.model.simulator.prior) * rows).sum(axis=1))
 
     def weights(self, e: Floats) -> Floats:
         """Return how much each innovation counts in a least-squares step, (events,)."""
         return self.part / (1.0 + e * e / TAIL)
 
-    def null(self, z: Floats | None = None) -> Fitted:
+    def unfitted(self, z: Floats | None = None) -> Hypothesis:
         """Return the car as its file says, not fitted yet."""
         z = np.zeros(len(self.model.nominal)) if z is None else z
-        e, _ = self.model([self.numbers((), z, np.zeros(0))])
-        return Fitted((), z, np.zeros(0), e[:, 0], float(self.score(e, z)[0]), np.zeros((0, 0)))
+        e, _ = self.model([self.model.simulator.numbers(z)])
+        score = float(self.score(e, z)[0])
+        return Hypothesis(self.model, (), z, np.zeros(0), e[:, 0], score, np.zeros((0, 0)))
 
-    def nominal(self, base: Fitted) -> Fitted:
+    def at(self, base: Hypothesis) -> Hypothesis:
+        """Return a hypothesis at its own numbers, with derivatives."""
+        return self._differentiated([base], [True])[0]
+
+    def with_nominal_car(self, base: Hypothesis) -> Hypothesis:
         """Return a hypothesis with the car's own numbers where they are likeliest, unfitted."""
         return self.at(replace(base, z=np.zeros_like(base.z)))
 
-    def at(self, base: Fitted) -> Fitted:
-        """Return a hypothesis at its own numbers, with derivatives."""
-        fitted = replace(base, values=base.values.copy())
-        self._differentiate([fitted], {id(fitted)})
-        return fitted
-
     def begin(
-        self, base: Fitted, trials: Sequence[Trial], *, amplified: bool = False
-    ) -> list[Fitted]:
+        self, base: Hypothesis, trials: Sequence[Trial], *, amplified: bool = False
+    ) -> list[Hypothesis]:
         """Return hypotheses at trial values, the car's own numbers refitted linearly from `base`.
 
-        A trial that leaves physical bounds has an infinite `q`.
+        A trial that leaves physical bounds has an infinite score.
 
         Args:
-            base: Fitted, with derivatives.
+            base: Hypothesis, with derivatives.
             trials: Effects and their values.
             amplified: Try each last effect also as strong, and of such a sign, as its trials say
                 that it suits best: one that is small or negative is not found by trials of 0.1.
         """
         sets = [
-            self.numbers(effects, base.z * self._free(effects), values)
+            self._numbers(effects, base.z * self._free(effects), values)
             for effects, values in trials
         ]
         e, ok = self.model(sets)
-        weights = self.weights(base.e)
+        weights = self.weights(base.innovations)
         jacobian = base.jacobian[:, : len(base.z)]
-        normal = _normal(jacobian, weights) + self.model.prior
+        normal = _normal(jacobian, weights) + self.model.simulator.prior
         slopes = (
             jacobian.T @ (weights[:, None] * np.nan_to_num(e))
-            + (self.model.prior @ base.z)[:, None]
+            + (self.model.simulator.prior @ base.z)[:, None]
         )
-        masked, found = dict[bytes, Floats](), list[Fitted]()
+        masked, found = dict[bytes, Floats](), list[Hypothesis]()
         better = dict[int, list[tuple[float, Trial]]]()
         for i, (effects, values) in enumerate(trials):
             column = e[:, i].copy()
             if not ok[i] or not np.isfinite(column).all():
-                found.append(Fitted(effects, base.z, values, column, np.inf, jacobian))
+                found.append(
+                    Hypothesis(self.model, effects, base.z, values, column, np.inf, jacobian)
+                )
                 continue
             mine = self._free(effects)
             dz = -base.z * ~mine  # a number that an effect sets is not the car's to move
@@ -156,17 +122,19 @@ class Fitter:
                 masked[alike] = jacobian if mine.all() else jacobian * mine
             own = masked[alike]
             moved = column + own @ dz
-            q = float(self.score(moved[:, None], base.z + dz)[0])
-            found.append(Fitted(effects, base.z + dz, values, moved, q, own))
+            score = float(self.score(moved[:, None], base.z + dz)[0])
+            found.append(Hypothesis(self.model, effects, base.z + dz, values, moved, score, own))
             if amplified:
-                gain, by = self._amplitude(base, column - base.e, weights, own, own_normal)
+                gain, by = self._amplitude(
+                    base, column - base.innovations, weights, own, own_normal
+                )
                 trial = effects, _amplified(effects, values, by)
                 better.setdefault(id(effects[-1]), []).append((gain, trial))
         again = [trial for same in better.values() for trial in _most_gaining(same)]
         return [*found, *(self.begin(base, again) if again else ())]
 
     def _amplitude(
-        self, base: Fitted, change: Floats, weights: Floats, jacobian: Floats, normal: Floats
+        self, base: Hypothesis, change: Floats, weights: Floats, jacobian: Floats, normal: Floats
     ) -> tuple[float, float]:
         """Return what a change of the innovations gains at its best amplitude, and that amplitude.
 
@@ -174,101 +142,123 @@ class Fitter:
         """
         own = np.linalg.pinv(normal) @ (jacobian.T @ (weights * change))
         left = weights * (change - jacobian @ own)
-        slope = float(left @ base.e) - float(own @ self.model.prior @ base.z)
+        slope = float(left @ base.innovations) - float(own @ self.model.simulator.prior @ base.z)
         size = float(left @ change)
         return (slope * slope / size, -slope / size) if size > 1e-9 else (0.0, 1.0)
 
     def _free(self, effects: Sequence[Candidate]) -> Bools:
         """Return which of the car's own numbers no effect sets, or means the same by."""
-        taken = {parameter.key for effect in effects for parameter in effect.parameters}
-        taken |= {OF_OWN[key] for key in taken & OF_OWN.keys()}
-        return np.array([own.key not in taken for own in self.model.nominal])
+        set_by_effects = {parameter.key for effect in effects for parameter in effect.parameters}
+        set_by_effects |= {OF_OWN[key] for key in set_by_effects & OF_OWN.keys()}
+        return np.array([own.key not in set_by_effects for own in self.model.nominal])
+
+    def _numbers(self, effects: Sequence[Candidate], z: Floats, values: Floats) -> dict[str, float]:
+        return self.model.simulator.numbers(z) | numbers_of(effects, values)
 
     def refine(
-        self, fits: Sequence[Fitted], rounds: int = ROUNDS, *, fresh: bool = False
-    ) -> list[Fitted]:
-        """Fit hypotheses together; `fresh` renews the derivatives by the car's own numbers too."""
-        fits = [f for f in fits if np.isfinite(f.q)]
-        for fitted in fits:
-            fitted.done = False
-            fitted.q = np.inf  # a linear guess is no fit: the first round says what it really is
-            fitted.z = fitted.z * self._free(fitted.effects)
-        stalled = set[int]()  # by derivatives that were not new: that says nothing yet
+        self, fits: Sequence[Hypothesis], rounds: int = ROUNDS, *, fresh: bool = False
+    ) -> list[Hypothesis]:
+        """Return hypotheses fitted together; those beyond physical bounds are left out.
+
+        Args:
+            fits: To begin from; a linear guess is no fit: the first round computes its true score.
+            rounds: At most.
+            fresh: Renew the derivatives by the car's own numbers too.
+        """
+        now = [
+            replace(f, model=self.model, z=f.z * self._free(f.effects), score=np.inf)
+            for f in fits
+            if np.isfinite(f.score)
+        ]
+        active, stalled = list(range(len(now))), set[int]()
         for count in range(rounds):
-            active = [f for f in fits if not f.done]
-            if not active or (count and self.model.is_late()):
+            if not active or (count and self.model.simulator.budget.is_spent()):
                 break
-            renewed = {id(f) for f in active if fresh and (count % 3 == 0 or id(f) in stalled)}
-            self._differentiate(active, renewed)
-            self._step(active)
-            stalled = {id(f) for f in active if f.done and fresh and id(f) not in renewed}
-            for f in active:
-                f.done = f.done and (id(f) not in stalled or not np.isfinite(f.q))
-        return list(fits)
+            renewed = [fresh and (count % 3 == 0 or i in stalled) for i in active]
+            begun = self._differentiated([now[i] for i in active], renewed)
+            going, stalled = list[int](), set()
+            for i, before, after, new in zip(
+                active, begun, self._stepped(begun), renewed, strict=True
+            ):
+                now[i] = after
+                if not np.isfinite(before.score):
+                    continue
+                ends = before.score - after.score < ENOUGH
+                if ends and fresh and not new:  # by derivatives that were not new: no proof yet
+                    stalled.add(i)
+                if not ends or i in stalled:
+                    going.append(i)
+            active = going
+        return now
 
-    def _differentiate(self, fits: Sequence[Fitted], renewed: Collection[int]) -> None:
-        """Renew `e` and the derivatives of each fit, all in one batch.
+    def _differentiated(
+        self, fits: Sequence[Hypothesis], renewed: Sequence[bool]
+    ) -> list[Hypothesis]:
+        """Return fits with innovations and derivatives renewed, all in one batch.
 
-        `renewed` holds, by `id`, whose derivatives by the car's own numbers are to be new as well.
+        `renewed` says of which the derivatives by the car's own numbers are to be new as well.
         """
         own = len(self.model.nominal)
-        wanted = [self._moving(f, fresh=id(f) in renewed) for f in fits]
+        wanted = [
+            list(range(own)) if new or f.jacobian.shape[1] < own else list[int]()
+            for f, new in zip(fits, renewed, strict=True)
+        ]
         sets = list[dict[str, float]]()
         for f, moving in zip(fits, wanted, strict=True):
-            sets.append(self.numbers(f.effects, f.z, f.values))
+            sets.append(f.numbers)
             sets += self._beside(f, f.z, f.values, moving)
         e, ok = self.model(sets)
         e[:, ~ok] = np.nan
-        at = 0
+        found, at = list[Hypothesis](), 0
         for f, moving in zip(fits, wanted, strict=True):
-            now, jacobian = e[:, at].copy(), np.zeros((len(e), own + f.parameters))
+            now, jacobian = e[:, at].copy(), np.zeros((len(e), own + len(f.values)))
             at += 1
             if len(moving) < own:
                 jacobian[:, :own] = f.jacobian[:, :own]
             for j in moving:
                 jacobian[:, j] = (e[:, at] - now) / self._side(f, j)
                 at += 1
-            for j, step in enumerate(self._parameter_steps(f, f.values)):
-                scale = _parameters(f)[j].step
-                jacobian[:, own + j] = (e[:, at] - now) / (step / scale)
+            steps = zip(_small_steps(f, f.values), f.parameters, strict=True)
+            for j, (step, parameter) in enumerate(steps):
+                jacobian[:, own + j] = (e[:, at] - now) / (step / parameter.step)
                 at += 1
             if not np.isfinite(now).all():
-                f.done, f.q = True, np.inf
+                found.append(replace(f, score=np.inf))
                 continue
-            f.jacobian = np.nan_to_num(jacobian)
-            f.e, f.q = now, float(self.score(now[:, None], f.z)[0])
-
-    def _moving(self, f: Fitted, *, fresh: bool) -> list[int]:
-        """Return which of the car's own numbers' derivatives are to be renewed."""
-        own = len(self.model.nominal)
-        return list(range(own)) if fresh or f.jacobian.shape[1] < own else []
+            score = float(self.score(now[:, None], f.z)[0])
+            jacobian = np.nan_to_num(jacobian)
+            found.append(replace(f, innovations=now, score=score, jacobian=jacobian))
+        return found
 
     def _beside(
-        self, f: Fitted, z: Floats, values: Floats, moving: Sequence[int]
+        self, f: Hypothesis, z: Floats, values: Floats, moving: Sequence[int]
     ) -> list[dict[str, float]]:
-        """Return sets a small step away, in the car's own numbers named and in every knob."""
+        """Return sets a small step away, in the car's own numbers named and in each parameter."""
         sets = list[dict[str, float]]()
         for j in moving:
             other = z.copy()
             other[j] += self._side(f, j)
-            sets.append(self.numbers(f.effects, other, values))
-        for j, step in enumerate(self._parameter_steps(f, values)):
+            sets.append(self._numbers(f.effects, other, values))
+        for j, step in enumerate(_small_steps(f, values)):
             moved = values.copy()
             moved[j] += step
-            sets.append(self.numbers(f.effects, z, moved))
+            sets.append(self._numbers(f.effects, z, moved))
         return sets
 
-    def _plan(self, f: Fitted) -> "_Plan":
-        """Return the quadratic that one fit's next step is to lower; renew its covariance."""
-        own, parameters = len(f.z), _parameters(f)
-        prior = np.diag(np.concatenate((np.ones(own), np.full(f.parameters, 1e-6))))
-        prior[:own, :own] = self.model.prior
-        weights = self.weights(f.e)
+    def _side(self, f: Hypothesis, j: int) -> float:
+        """Return a small step of a nominal parameter that stays within its bounds."""
+        o = self.model.nominal[j]
+        return -SMALL if o.mean + (f.z[j] + SMALL) * o.std > o.bounds[1] else SMALL
+
+    def _plan(self, f: Hypothesis) -> "_Plan":
+        """Return the quadratic that one fit's next step is to lower."""
+        own, parameters, inverse = len(f.z), f.parameters, self.model.simulator.prior
+        prior = np.diag(np.concatenate((np.ones(own), np.full(len(f.values), 1e-6))))
+        prior[:own, :own] = inverse
+        weights = self.weights(f.innovations)
         normal = _normal(f.jacobian, weights) + prior
-        f.covariance = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
-        slope = f.jacobian.T @ (weights * f.e) + prior @ np.concatenate(
-            (f.z, np.zeros(f.parameters))
-        )
+        z = np.concatenate((f.z, np.zeros(len(f.values))))
+        slope = f.jacobian.T @ (weights * f.innovations) + prior @ z
         bounds = [
             [(k.bounds[side] - v) / k.step for k, v in zip(parameters, f.values, strict=True)]
             for side in (0, 1)
@@ -277,65 +267,47 @@ class Fitter:
         low = np.concatenate((np.where(mine, -FARTHEST - f.z, 0.0), bounds[0]))
         high = np.concatenate((np.where(mine, FARTHEST - f.z, 0.0), bounds[1]))
         scales = np.concatenate((np.ones(own), [k.step for k in parameters]))
-        return _Plan(f, normal, slope, low, high, scales)
+        covariance = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
+        return _Plan(replace(f, covariance=covariance), normal, slope, low, high, scales)
 
-    def _side(self, f: Fitted, j: int) -> float:
-        """Return a small step of an ordinary number that stays within its bounds."""
-        o = self.model.nominal[j]
-        return -SMALL if o.mean + (f.z[j] + SMALL) * o.std > o.bounds[1] else SMALL
-
-    def _parameter_steps(self, f: Fitted, values: Floats) -> list[float]:
-        """Return small steps of the effects' numbers that stay within their bounds."""
-        return [
-            -0.5 * k.step if v + 0.5 * k.step > k.bounds[1] else 0.5 * k.step
-            for k, v in zip(_parameters(f), values, strict=True)
-        ]
-
-    def _step(self, fits: Sequence[Fitted]) -> None:
-        """Move each fit along its Gauss-Newton step, by the best of a few lengths."""
-        plans = [self._plan(f) for f in fits if not f.done]
+    def _stepped(self, fits: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return each fit moved along its Gauss-Newton step, by the best of a few lengths."""
+        plans = {i: self._plan(f) for i, f in enumerate(fits) if np.isfinite(f.score)}
         if not plans:
-            return
-        before = {id(f): f.q for f in fits}
-        trials = [(plan, move) for plan in plans for move in (plan.whole, *plan.others())]
-        self._try(trials, ahead=plans if len(plans) <= FEW else ())
-        for f in fits:
-            f.done = f.done or before[id(f)] - f.q < ENOUGH
-
-    def _try(self, trials: Sequence[tuple["_Plan", Floats]], ahead: Sequence["_Plan"] = ()) -> None:
-        """Move fits to the best of some moves, if any is better than where they are.
-
-        Args:
-            trials: Plans, each with a move.
-            ahead: Whose next derivatives are driven too, about the whole step: a tile has room,
-                and the model remembers them.
-        """
-        if not trials:
-            return
-        moved = [(plan.fitted, *plan.moved(move)) for plan, move in trials]
-        sets = [self.numbers(f.effects, z, v) for f, z, v in moved]
-        for plan in ahead:
-            sets += self._beside(plan.fitted, *plan.moved(plan.whole), ())
+            return list(fits)
+        best = [plans[i].start if i in plans else f for i, f in enumerate(fits)]
+        moved = [
+            (i, *plan.moved(move))
+            for i, plan in plans.items()
+            for move in (plan.whole, *plan.others())
+        ]
+        sets = [self._numbers(fits[i].effects, z, values) for i, z, values in moved]
+        if len(plans) <= FEW:  # a tile has room: drive the next derivatives too, for the cache
+            for plan in plans.values():
+                sets += self._beside(plan.start, *plan.moved(plan.whole), ())
         e, ok = self.model(sets)
-        for i, (f, z, values) in enumerate(moved):
-            if ok[i] and np.isfinite(e[:, i]).all():
-                q = float(self.score(e[:, i : i + 1], z)[0])
-                if q < f.q:
-                    f.q, f.z, f.values, f.e = q, z, values, e[:, i].copy()
+        for column, (i, z, values) in enumerate(moved):
+            if ok[column] and np.isfinite(e[:, column]).all():
+                score = float(self.score(e[:, column : column + 1], z)[0])
+                if score < best[i].score:
+                    now = e[:, column].copy()
+                    best[i] = replace(best[i], score=score, z=z, values=values, innovations=now)
+        return best
 
 
 class _Plan:
     """A quadratic about a fit where it was, and the steps that should lower it.
 
     Attributes:
+        start: The fit, with the covariance that this quadratic gives.
         whole: The Gauss-Newton step within bounds.
     """
 
     def __init__(
-        self, fitted: Fitted, normal: Floats, slope: Floats, low: Floats, high: Floats,
+        self, start: Hypothesis, normal: Floats, slope: Floats, low: Floats, high: Floats,
         scales: Floats,
     ) -> None:  # fmt: skip
-        self.fitted, self._z, self._values = fitted, fitted.z, fitted.values
+        self.start = start
         self._normal, self._slope, self._low, self._high = normal, slope, low, high
         self._scales = scales
         self.whole = _bounded(normal, slope, low, high)
@@ -353,8 +325,8 @@ class _Plan:
 
     def moved(self, move: Floats) -> tuple[Floats, Floats]:
         """Return the numbers after a move."""
-        own, by = len(self._z), move * self._scales
-        return self._z + by[:own], self._values + by[own:]
+        own, by = len(self.start.z), move * self._scales
+        return self.start.z + by[:own], self.start.values + by[own:]
 
 
 def _most_gaining(same: Sequence[tuple[float, Trial]]) -> list[Trial]:
@@ -407,5 +379,9 @@ def _bounded(normal: Floats, slope: Floats, low: Floats, high: Floats) -> Floats
     return step
 
 
-def _parameters(f: Fitted) -> list[Parameter]:
-    return [parameter for effect in f.effects for parameter in effect.parameters]
+def _small_steps(f: Hypothesis, values: Floats) -> list[float]:
+    """Return small steps of the effects' numbers that stay within their bounds."""
+    return [
+        -0.5 * k.step if v + 0.5 * k.step > k.bounds[1] else 0.5 * k.step
+        for k, v in zip(f.parameters, values, strict=True)
+    ]

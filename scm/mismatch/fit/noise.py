@@ -1,4 +1,4 @@
-"""How far a right model may be off: the least that is believed of any."""
+"""How far a right model may be off: the least that any noise model allows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from scm.replay.drive import Drive
 ALIKE, ABRUPT = 0.003, 0.1
 JOLTS = 0.05
 LASTS_S = 2.0
-CALM = 3.0  # times the least noise: what is believed beyond that may be what is sought
+MAX_LOW_NOISE = 3.0  # times the least noise: beyond that, noise may hide what is searched for
 SLOWEST_MPS, STRAIGHTEST_RAD_S = 0.01, 0.01  # a drive straight ahead, without noise, turns by none
 
 
@@ -38,17 +38,19 @@ class Noise:
     turn: float = 0.0
 
 
-def calmed(noise: Noise, drives: Sequence[Drive]) -> Noise:
-    """Return a belief with disturbances of at most `CALM` times a car's usual."""
+def lowered(noise: Noise, drives: Sequence[Drive]) -> Noise:
+    """Return a noise model with disturbances of at most `MAX_LOW_NOISE` times a car's usual."""
     least = usual_noise(drives)
     return replace(
         noise,
-        speed=min(noise.speed, CALM * least.speed),
-        side=min(noise.side, CALM * least.side),
-        yaw_rate=min(noise.yaw_rate, CALM * least.yaw_rate),
-        own={name: min(value, CALM * least.own[name]) for name, value in noise.own.items()},
-        launch=min(noise.launch, CALM * least.launch),
-        turn=min(noise.turn, CALM * least.turn),
+        speed=min(noise.speed, MAX_LOW_NOISE * least.speed),
+        side=min(noise.side, MAX_LOW_NOISE * least.side),
+        yaw_rate=min(noise.yaw_rate, MAX_LOW_NOISE * least.yaw_rate),
+        own={
+            name: min(value, MAX_LOW_NOISE * least.own[name]) for name, value in noise.own.items()
+        },
+        launch=min(noise.launch, MAX_LOW_NOISE * least.launch),
+        turn=min(noise.turn, MAX_LOW_NOISE * least.turn),
     )
 
 
@@ -56,7 +58,7 @@ def usual_noise(drives: Sequence[Drive]) -> Noise:
     """Return the least that any car model is off: 0.3 % of the usual speed and turning.
 
     A launch leaves a tenth of a throttle leap's speed open, a steering leap a tenth of its turning.
-    Less is never believed: two simulators of the same car differ by as much.
+    It is never less: two simulators of the same car differ by as much.
     """
     speeds = [drive.pose_speed for drive in drives]
     turns = [np.abs(d.smoothed["pose.yaw"].rate) for d in drives]

@@ -1,4 +1,4 @@
-"""The belief about noise under which what is left of a fit is most likely."""
+"""The noise model under which the residuals of a fit are most likely."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -19,24 +19,25 @@ Change = Callable[[Noise, float], Noise]
 _Key = tuple[object, ...]
 
 
-def learn_noise(model: Likelihood, residuals: Sequence[Sequence[Floats]], rounds: int = 2) -> Noise:
-    """Return the belief under which residuals are most likely, by steps of two.
+def fit_noise(
+    model: Likelihood, residuals: Sequence[Sequence[Floats]], rounds: int = 2
+) -> Likelihood:
+    """Return the likelihood whose noise model makes residuals most likely, by steps of two.
 
-    Steps begin at what is believed now and at the least: a poor model before this one may have
+    Steps begin at the present noise model and at the least one: a poor fit before this one may have
     raised disturbances that no single step takes back.
     """
     least, costs = usual_noise(model.drives), _Costs(model, residuals)
     starts = [model.noise] if model.noise == least else [model.noise, least]
     found = [_descended(costs, start, least, rounds) for start in starts]
     best = min(found, key=lambda one: one[1] if math.isfinite(one[1]) else math.inf)[0]
-    model.believe(best)
-    return best
+    return model.under(best)
 
 
 class _Costs:
-    """What residuals cost under beliefs about noise, each belief asked once.
+    """What residuals cost under noise models, each computed once.
 
-    Where a belief is asked, the next one that is not known is worked out beside it.
+    Beside the noise model requested, the next one that is not known yet is computed.
     """
 
     def __init__(self, model: Likelihood, residuals: Sequence[Sequence[Floats]]) -> None:
@@ -44,25 +45,25 @@ class _Costs:
         self._known = dict[_Key, float]()
 
     def __call__(self, noise: Noise, soon: Iterable[Noise] = ()) -> float:
-        """Return the cost of a belief.
+        """Return the cost of a noise model.
 
         Args:
-            noise: The belief.
-            soon: What will be asked if this one is no better.
+            noise: The noise model.
+            soon: What will be requested if this one is no better.
         """
         key = _key(noise)
         if key not in self._known:
             new = (n for n in soon if _key(n) != key and _key(n) not in self._known)
-            asked = [noise, *islice(new, THREADS - 1)]
-            for one, cost in zip(asked, pool(THREADS).map(self._cost, asked), strict=True):
+            batch = [noise, *islice(new, THREADS - 1)]
+            for one, cost in zip(batch, pool(THREADS).map(self._cost, batch), strict=True):
                 self._known[_key(one)] = cost
         return self._known[key]
 
     def _cost(self, noise: Noise) -> float:
-        whiteners = self._model.under(noise)
+        whiteners = [whitener.under(noise) for whitener in self._model.whiteners]
         e = self._model.weigh(self._residuals, whiteners)
         log_size = np.concatenate([w.log_size for w in whiteners])
-        return float(self._model.settled @ ((e * e).sum(axis=1) + log_size))
+        return float(self._model.valid @ ((e * e).sum(axis=1) + log_size))
 
 
 def _key(noise: Noise) -> _Key:
@@ -72,7 +73,7 @@ def _key(noise: Noise) -> _Key:
 
 
 def _descended(costs: _Costs, best: Noise, least: Noise, rounds: int) -> tuple[Noise, float]:
-    """Return where steps from one belief end, and its cost."""
+    """Return where steps from one noise model end, and its cost."""
     lowest = costs(best, _steps(best, 0, least))
     for _ in range(rounds):
         for i, change in enumerate(_CHANGES):
@@ -89,14 +90,14 @@ def _descended(costs: _Costs, best: Noise, least: Noise, rounds: int) -> tuple[N
 
 
 def _steps(noise: Noise, first: int, least: Noise) -> Iterator[Noise]:
-    """Yield the beliefs a step from one, by the changes from one on."""
+    """Yield the noise models one step from `noise`, by the changes from `first` on."""
     for change in _CHANGES[first:]:
         for factor in FACTORS:
             yield _at_least(change(noise, factor), least)
 
 
 def _at_least(noise: Noise, least: Noise) -> Noise:
-    """Return a belief no smaller than another one in anything."""
+    """Return a noise model no smaller than another one in anything."""
     return Noise(
         max(noise.speed, least.speed), max(noise.side, least.side),
         max(noise.yaw_rate, least.yaw_rate),

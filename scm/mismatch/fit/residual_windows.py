@@ -1,11 +1,11 @@
-"""How well a car with given numbers drives strides: what it misses in each second of a recording.
+"""Residual windows: what a car with given numbers misses in each second of a recording.
 
-Where a simulator lacks many things at once, no belief about slow disturbances can tell their shapes
-from noise: it would swallow them. Then what counts is how far each second's drive strays, along the
-body, across it and in heading, and what every other sensor shows in that second. How far is usual
-for each sensor is learned with the fit.
+Where a simulator lacks many things at once, no noise model can separate their shapes from slow
+disturbances: it would absorb them. Then what counts is how far each second's drive strays, along
+the body, across it and in heading, and what every other sensor shows in that second. How far is
+usual for each sensor is fitted too.
 
-A stride starts on the measured pose; the car's own motion, its wheels and actuators are those of
+A window starts on the measured pose; the car's own motion, its wheels and actuators are those of
 one drive through the whole recording. All of it is linear in the residuals, as in `whiten`.
 """
 
@@ -17,22 +17,23 @@ import numpy as np
 from scm.arrays import Floats, Ints
 from scm.mismatch.fit.data_split import blocks
 from scm.mismatch.fit.fitter import TAIL
-from scm.mismatch.fit.likelihood import SETTLED_S, Likelihood
+from scm.mismatch.fit.likelihood import TRANSIENT_S, Likelihood
 from scm.mismatch.fit.noise import Noise, usual_noise
+from scm.mismatch.fit.whitening import Whitener
 from scm.replay.drive import Drive
 
-LENGTH_S, SHORT_S = 1.0, 0.5  # of a stride, and where all drives are shorter than ten
-OVERLAP = 2  # strides begin so many times within one's length
-LEAST_SETTLED = 0.1  # of a drive, where it is shorter than ten seconds
+LENGTH_S, SHORT_S = 1.0, 0.5  # of a window, and where all drives are shorter than ten
+OVERLAP = 2  # windows begin so many times within one's length
+MAX_TRANSIENT_SHARE = 0.1  # of a drive that is shorter than ten seconds
 ROUNDS = 20
 _POSES = ("pose.x", "pose.y", "pose.yaw")
 
 
 class WindowWhitener:
-    """Weighs residuals of one drive, stride by stride.
+    """Weighs residuals of one drive, window by window.
 
     Attributes:
-        t: Middle of the stride of each value, (events,) [s]; `stream`: the number of its stream;
+        t: Middle of the window of each value, (events,) [s]; `stream`: the number of its stream;
             `pose.x` stands for the way along the body, `pose.y` for that across it.
         log_size: Logarithm of each value's variance, (events,).
     """
@@ -49,7 +50,7 @@ class WindowWhitener:
         self.t: Floats = np.tile(middle, len(self._names))
         self.stream: Ints = np.repeat([names.index(n) for n in self._names], count)
         size = np.array([noise.own[name] for name in self._names])
-        # strides overlap, so each counts for the part that is its own
+        # windows overlap, so each counts for the part that is its own
         self._weight = np.repeat(np.sqrt(1.0 / OVERLAP) / size, count)
         self.log_size: Floats = np.repeat(2.0 * np.log(size), count) / OVERLAP
         x, y, psi = (drive.smoothed[name] for name in _POSES)
@@ -62,7 +63,7 @@ class WindowWhitener:
         return np.asarray(self.misses(residuals) * self._weight[:, None])
 
     def misses(self, residuals: Sequence[Floats]) -> Floats:
-        """Return misses in their own units, (events, sets); rates as means over a stride."""
+        """Return misses in their own units, (events, sets); rates as means over a window."""
         left = dict(zip(self.drive.names, residuals, strict=True))
         along_x, along_y, turn = self._poses(left)
         found = [
@@ -74,7 +75,7 @@ class WindowWhitener:
         return np.concatenate(found, axis=0)
 
     def _poses(self, left: dict[str, Floats]) -> tuple[Floats, Floats, Floats]:
-        """Return what strides miss along x and y, a wrong heading's way included, and in turn."""
+        """Return what windows miss along x and y, a wrong heading's way included, and in turn."""
         x, y, yaw = (self._grown(name, left[name]) for name in _POSES)
         t, r = self.drive.stream("pose.yaw").t, left["pose.yaw"]
         first = _at(t, r, self._begin)
@@ -100,24 +101,26 @@ class WindowWhitener:
 
 
 class WindowedLikelihood(Likelihood):
-    """One car's recordings, judged by strides; its noise says how far each sensor strays."""
+    """Recordings judged by residual windows; the noise model is how far each sensor strays."""
 
-    def believe(self, noise: Noise) -> None:
-        """Take another belief about noise; without one, the least that any car model is off."""
-        own = {name: noise.own.get(name, 0.0) for name in self.drives[0].names}
+    def _allowed(self, noise: Noise) -> Noise:
         least = least_sizes(self.drives)
-        own = {name: max(size, least[name]) for name, size in own.items()}
-        self.noise = Noise(noise.speed, noise.side, noise.yaw_rate, own, noise.scale)
-        self.whiteners = [
+        own = {name: max(noise.own.get(name, 0.0), size) for name, size in least.items()}
+        return Noise(noise.speed, noise.side, noise.yaw_rate, own, noise.scale)
+
+    def _whiteners(self, like: Sequence[Whitener]) -> Sequence[Whitener]:
+        del like
+        return [
             WindowWhitener(drive, self.noise, cuts, length_of(self.drives))  # type: ignore[misc]
             for drive, cuts in zip(self.drives, blocks(self.drives), strict=True)
         ]
-        self.t = np.concatenate([w.t for w in self.whiteners])
-        self.settled = np.ones(len(self.t))
+
+    def _valid(self) -> Floats:
+        return np.ones(len(self.t))
 
 
 def least_sizes(drives: Sequence[Drive]) -> dict[str, float]:
-    """Return how far a stride strays at least, by stream: measuring noise and a car's usual."""
+    """Return how far a window strays at least, by stream: sensor noise and a car's usual error."""
     usual, drive = usual_noise(drives), drives[0]
     sizes = dict[str, float]()
     for s in drive.streams:
@@ -131,36 +134,35 @@ def least_sizes(drives: Sequence[Drive]) -> dict[str, float]:
     return sizes
 
 
-def learn_sizes(
+def fit_sizes(
     model: Likelihood, residuals: Sequence[Sequence[Floats]], rounds: int = ROUNDS
-) -> Noise:
-    """Return and believe how far each sensor strays, where that is most likely."""
+) -> Likelihood:
+    """Return the likelihood whose noise model is how far each sensor most likely strays."""
     every = np.concatenate(_by_stream(model, model.weigh(residuals)[:, 0]), axis=0)
     now, names = model.noise, model.drives[0].names
     own = {
         name: now.own[name] * _size(column, max(rounds, ROUNDS)) * np.sqrt(OVERLAP)
         for name, column in zip(names, every.T, strict=True)
     }
-    model.believe(Noise(now.speed, now.side, now.yaw_rate, own, now.scale))
-    return model.noise
+    return model.under(Noise(now.speed, now.side, now.yaw_rate, own, now.scale))
 
 
-def independent_share(model: Likelihood, e: Floats) -> float:
-    """Return the share of unit misses, (events,), that tell something new.
+def independent_share(model: Likelihood, innovations: Floats) -> float:
+    """Return the share of unit misses, (events,), that is independent of the others.
 
-    What a wrong model misses comes together: in several sensors, and stride after stride.
+    What a wrong model misses comes together: in several sensors, and window after window.
     """
-    tame = [np.clip(one, -3.0, 3.0) for one in _by_stream(model, e)]
-    every = np.concatenate(tame, axis=0)
+    clipped = [np.clip(one, -3.0, 3.0) for one in _by_stream(model, innovations)]
+    every = np.concatenate(clipped, axis=0)
     together = np.atleast_2d(np.corrcoef(every.T))
     of_streams = len(together) / float((together * together).sum())
-    again = sum(float((one[OVERLAP:] * one[:-OVERLAP]).sum()) for one in tame)
+    again = sum(float((one[OVERLAP:] * one[:-OVERLAP]).sum()) for one in clipped)
     again = min(max(again / float((every * every).sum()), 0.0), 0.9)
     return of_streams * (1.0 - again) / (1.0 + again)
 
 
 def _by_stream(model: Likelihood, e: Floats) -> list[Floats]:
-    """Return unit misses of each drive by stride and stream, (strides, streams)."""
+    """Return unit misses of each drive by window and stream, (windows, streams)."""
     found, at = list[Floats](), 0
     for weigher in model.whiteners:
         mine, streams = e[at : at + len(weigher.t)], range(len(weigher.drive.streams))
@@ -178,17 +180,17 @@ def _size(misses: Floats, rounds: int) -> float:
 
 
 def length_of(drives: Sequence[Drive]) -> float:
-    """Return how long strides are."""
+    """Return how long windows are."""
     longest = max(float(drive.edges[-1] - drive.edges[0]) for drive in drives)
-    return LENGTH_S if longest > SETTLED_S / LEAST_SETTLED else SHORT_S
+    return LENGTH_S if longest > TRANSIENT_S / MAX_TRANSIENT_SHARE else SHORT_S
 
 
 def _begins(drive: Drive, cuts: Floats, length_s: float) -> Floats:
-    """Return when strides begin: each within one block, in sight, none before a car has settled."""
+    """Return when windows begin: in one block, with poses, none in a drive's first transient."""
     begins = [np.arange(a, b - length_s + 1e-6, length_s / OVERLAP) for a, b in pairwise(cuts)]
     every, length = np.concatenate(begins), float(drive.edges[-1] - drive.edges[0])
-    settled = every >= drive.edges[0] + min(SETTLED_S, LEAST_SETTLED * length)
-    return np.asarray(every[settled & ~drive.is_blind(every, length_s)])
+    begun = every >= drive.edges[0] + min(TRANSIENT_S, MAX_TRANSIENT_SHARE * length)
+    return np.asarray(every[begun & ~drive.is_blind(every, length_s)])
 
 
 def _at(t: Floats, values: Floats, when: Floats) -> Floats:

@@ -1,6 +1,6 @@
 """A drive driven again by many parameter sets at once: rows of one fleet, one compiled car.
 
-The car has every listed effect at its neutral numbers, which leave the motion as it was bit for
+The car has every known effect at its neutral numbers, which leave the motion as it was bit for
 bit, so one kernel serves all hypotheses. Motion of the body contracts under recorded commands and
 needs no restart; the pose does not, and is carried back to the measured one twice a second.
 """
@@ -64,21 +64,21 @@ class Tiles:
 
     Attributes:
         params: The car's numbers; `columns`: where each stands in a fleet, by key.
-        lean: Of the same car with fewer effects, for sets that name none of the others.
+        smaller: Of the same car with fewer effects, for sets that name none of the others.
     """
 
-    def __init__(self, car: Car, lean: "Tiles | None" = None) -> None:
-        self.car, self.lean = car, lean
+    def __init__(self, car: Car, smaller: "Tiles | None" = None) -> None:
+        self.car, self.smaller = car, smaller
         self.fleets = [Fleet(car, ROWS) for _ in range(THREADS)]
         self.params = tuple(column.param for column in self.fleets[0].columns)
         self.columns = {param.key: i for i, param in enumerate(self.params)}
 
     def enough_for(self, sets: Sequence[Numbers]) -> "Tiles":
         """Return the tiles of the smallest car that has all the numbers named."""
-        if self.lean is None:
+        if self.smaller is None:
             return self
-        more = self.columns.keys() - self.lean.columns.keys()
-        return self if any(more & numbers.keys() for numbers in sets) else self.lean
+        more = self.columns.keys() - self.smaller.columns.keys()
+        return self if any(more & numbers.keys() for numbers in sets) else self.smaller
 
 
 def _shares(sets: int) -> list[list[range]]:
@@ -224,10 +224,10 @@ class _Tether:
 
     def __init__(self, fleet: Fleet) -> None:
         self._fleet = fleet
-        self._kernel, slots = fleet._kernel, fleet._offsets  # noqa: SLF001 its innermost loop
+        self._kernel, places = fleet._kernel, fleet._offsets  # noqa: SLF001 its innermost loop
         self._state = (fleet._block, fleet._numbers, fleet._alive, fleet._status)  # noqa: SLF001
-        self._cog = np.array([slots[n][0] for n in (*COG, "x", "y")], dtype=np.int64)
-        self._kept = np.array([fleet._offset_of(n) for n in SIGNALS])  # noqa: SLF001
+        self._cog = np.array([places[n][0] for n in (*COG, "x", "y")], dtype=np.int64)
+        self._saved = np.array([fleet._offset_of(n) for n in SIGNALS])  # noqa: SLF001
         self._remembers = fleet._history is not None  # noqa: SLF001
         self.parts = REMEMBERED if self._remembers else COMMANDED
         self._steps = whole_steps(STEP_S / self.parts, SUBSTEP_S)
@@ -243,7 +243,7 @@ class _Tether:
             return
         self._kernel.rollout(
             *self._state, 0, self._fleet.capacity, self._steps, SUBSTEP_S, throttle, steering,
-            self._kept, out,
+            self._saved, out,
         )  # fmt: skip
 
     def carry(self, n: int, x: float, y: float, yaw: float) -> None:
@@ -268,9 +268,9 @@ class _Tether:
 
 @array_kernel
 def _carry(
-    block: Floats, status: Ints, slots: Ints, n: int, x: float, y: float, yaw: float
+    block: Floats, status: Ints, places: Ints, n: int, x: float, y: float, yaw: float
 ) -> None:
-    cog_x, cog_y, heading, vx, vy, _, rear_x, rear_y = slots
+    cog_x, cog_y, heading, vx, vy, _, rear_x, rear_y = places
     for row in range(n):
         if status[row] != 0:
             continue

@@ -31,9 +31,9 @@ class _Taps:
 
         `late_s` says by how much each set's car does everything later, (sets,).
         """
-        taken = np.empty((len(self._at), len(late_s)))
-        _tapped(self._at, late_s / STEP_S, signal, taken)
-        return taken
+        sampled = np.empty((len(self._at), len(late_s)))
+        _tapped(self._at, late_s / STEP_S, signal, sampled)
+        return sampled
 
 
 class Prediction:
@@ -101,11 +101,11 @@ class Prediction:
             if name.endswith("x"):
                 return c * ax + s * ay + now["measure.accel_bias_x_m_s2"]
             return c * ay - s * ax + now["measure.accel_bias_y_m_s2"]
-        kept = 1.0 - now["measure.encoder_loss"]
+        counted = 1.0 - now["measure.encoder_loss"]
         if name.startswith("encoder."):
-            return kept * self._counts * motions[f"wheel_angle.{WHEELS[name]}"]
+            return counted * self._counts * motions[f"wheel_angle.{WHEELS[name]}"]
         if name.startswith("wheel_speed."):
-            return kept * np.gradient(motions[f"wheel_angle.{name[-2:]}"], STEP_S, axis=0)
+            return counted * np.gradient(motions[f"wheel_angle.{name[-2:]}"], STEP_S, axis=0)
         plain = {"speed": "speed", "velocity.x": "speed", "velocity.y": "lateral_speed"}
         signal = motions[plain.get(name, "yaw_rate")]
         return now["measure.speed_scale"] * signal if name == "speed" else signal

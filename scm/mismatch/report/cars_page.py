@@ -28,14 +28,14 @@ from scm.mismatch.report.wording import (
     unit_text,
 )
 from scm.mismatch.report.write import PAGE
-from scm.mismatch.several.findings import CarSight, Cause, Common, Sight
+from scm.mismatch.several.findings import Agreement, CarAgreement, Cause, Common
 
 CARS, POSITION = "cars.json", "position_m"
-_ANSWERS: Mapping[Sight, str] = {
-    Sight.SEES: "sees it",
-    Sight.ADDS: "too weak alone, adds to the others",
-    Sight.CANNOT_TELL: "cannot tell",
-    Sight.OTHERWISE: "contradicts it",
+_ANSWERS: Mapping[Agreement, str] = {
+    Agreement.CONFIRMS: "sees it",
+    Agreement.SUPPORTS: "too weak alone, adds to the others",
+    Agreement.UNDECIDED: "cannot tell",
+    Agreement.CONTRADICTS: "contradicts it",
 }
 _LABELS: Mapping[Cause, str] = {
     Cause.CAMERA: "The camera", Cause.TAGS: "Tags and camera", Cause.FLOOR: "The floor",
@@ -162,13 +162,13 @@ def _errors(diagnosis: Diagnosis) -> str:
 def _shared_effect(common: Common, cars: Mapping[str, Diagnosis]) -> str:
     effects = [e for one in cars.values() for e in one.effects if e.name == common.name]
     rows = [
-        ("What", pretty(common.said)),
+        ("What", pretty(common.text)),
         ("How much", "\n".join(amounts(common.parameters))),
         ("Cause", common.conclusion),
         ("What to do", advice_of(effects[0]) if effects else ""),
     ]
     label = _LABELS[common.cause] if common.shared else "One car's own"
-    is_contradicted = any(c.sight is Sight.OTHERWISE for c in common.cars)
+    is_contradicted = any(c.agreement is Agreement.CONTRADICTS for c in common.cars)
     label = label if common.shared or is_contradicted else "Cause undecided"
     return panel_html(Panel("effect", label, capital(title_of(common.name)), rows))
 
@@ -193,11 +193,11 @@ def _seen(common: Common) -> str:
     )
 
 
-def _row(one: CarSight) -> tuple[str, ...]:
+def _row(one: CarAgreement) -> tuple[str, ...]:
     alone = "yes" if one.alone else "no"
     numbers = (f"{value:.0f}" for value in (one.gain, one.needed))
     own = "\n".join(amounts(one.own))
-    return one.car, own, _ANSWERS[one.sight], alone, *numbers, f"{one.misses:.1f}"
+    return one.car, own, _ANSWERS[one.agreement], alone, *numbers, f"{one.misses:.1f}"
 
 
 def _picture(common: Common, name: str, shared: Estimate) -> Picture | None:

@@ -10,19 +10,21 @@ from threadpoolctl import threadpool_limits
 from scm.clock import Clock, WallClock, seconds
 from scm.errors import RecordingError, ScmError
 from scm.mismatch.budget import DEFAULT_S, Budget
-from scm.mismatch.diagnose import Found, diagnose_car, told, write
+from scm.mismatch.discovery.decide import TIE
+from scm.mismatch.effect_catalogue import identifications
 from scm.mismatch.findings import Effect, Undecided, Verdict
+from scm.mismatch.pipeline import diagnose_car, write
 from scm.mismatch.report.cars_page import write_several
-from scm.mismatch.select.alternatives import TIE
-from scm.mismatch.several.findings import Common, Sight
-from scm.mismatch.several.shared_effects import CAUSES, compared
+from scm.mismatch.select.round import Notify
+from scm.mismatch.several.findings import Agreement, Common
+from scm.mismatch.several.shared_effects import compared
 from scm.mismatch.several.verdict import all_alike
+from scm.mismatch.validate.conclude import Result, conclude
 from scm.mismatch.validate.explain import sentence_of
 from scm.recorder.drives import SUFFIX, recordings_of
 from scm.recording.read import Recording
 from scm.vehicles.car import load_car
 
-Notify = Callable[[str], None]
 Turn = Callable[[str, int, int], None]
 TOGETHER = "all cars"
 
@@ -37,7 +39,7 @@ class Several:
         failed: Why a car could not be diagnosed, a sentence each.
     """
 
-    cars: Mapping[str, Found]
+    cars: Mapping[str, Result]
     common: tuple[Common, ...]
     runtime_s: float
     failed: tuple[str, ...] = ()
@@ -77,18 +79,18 @@ def cars_of(
     return found
 
 
-def with_told(
-    cars: Mapping[str, list[Recording]], told: Sequence[Path | str]
+def with_played(
+    cars: Mapping[str, list[Recording]], played: Sequence[Path | str]
 ) -> dict[str, list[Recording]]:
     """Return the recordings with drives that `scm play` recorded of the same car since.
 
     Raises:
         RecordingError: when they cannot be read, or there are several cars that they may be of.
     """
-    if told and len(cars) != 1:
-        msg = f"{told[0]}: a drive of one of {', '.join(cars)}; say of which with --vehicle"
+    if played and len(cars) != 1:
+        msg = f"{played[0]}: a drive of one of {', '.join(cars)}; say of which with --vehicle"
         raise RecordingError(msg)
-    more = [recording for path in told for recording in recordings_of(path)]
+    more = [recording for path in played for recording in recordings_of(path)]
     return {name: [*recordings, *more] for name, recordings in cars.items()}
 
 
@@ -100,7 +102,7 @@ def diagnose_one(
     strict: bool = False,
     notify: Notify = lambda _: None,
     clock: Clock | None = None,
-) -> Found:
+) -> Result:
     """Return what a simulator lacks to explain one car, by the file that its recordings name.
 
     Args:
@@ -108,7 +110,7 @@ def diagnose_one(
         budget_s: As in `diagnose`.
         budget: One that began with the reading, in place of `budget_s`.
         strict: As in `diagnose`, like `notify` and `clock`.
-        notify: Is told what is being tried.
+        notify: Receives what is being tried.
         clock: For the time it takes.
 
     Raises:
@@ -116,7 +118,11 @@ def diagnose_one(
     """
     car = load_car(recordings[0].vehicle, trusted=False)
     return diagnose_car(
-        recordings, car, budget_s=budget_s, budget=budget, strict=strict, notify=notify, clock=clock
+        recordings,
+        car,
+        budget=budget or Budget(budget_s, clock or WallClock()),
+        strict=strict,
+        notify=notify,
     )
 
 
@@ -135,7 +141,7 @@ def diagnose_several(
         cars: Recordings by car, as `cars_of` returns them.
         budget_s: For each car, as in `diagnose`.
         strict: As in `diagnose`.
-        notify: Is told what is being tried; `turn` for whom, which turn it is, and of how many.
+        notify: Receives what is being tried; `turn` for whom, which turn it is, and of how many.
         turn: None of both matters to the result.
         clock: For the time it took.
 
@@ -143,7 +149,7 @@ def diagnose_several(
         ScmError: when no car's recording or file can be used.
     """
     clock = clock or WallClock()
-    began_ns, turns, found = clock.now_ns(), len(cars) + 1, dict[str, Found]()
+    began_ns, turns, found = clock.now_ns(), len(cars) + 1, dict[str, Result]()
     failed = list[str]()
     for number, (name, recordings) in enumerate(cars.items()):
         turn(name, number, turns)
@@ -156,13 +162,13 @@ def diagnose_several(
     if not found:
         raise RecordingError("\n".join(failed))
     turn(TOGETHER, len(cars), turns)
-    searches = {name: one.searched for name, one in found.items() if one.searched is not None}
+    searches = {name: one.selected for name, one in found.items() if one.selected is not None}
     common = list[Common]()
     if len(searches) > 1:
         with threadpool_limits(1):
-            common, taken = compared(searches, notify)
-            changed = {n: one for n, one in taken.items() if one is not searches[n]}
-            anew = {name: told(one, notify) for name, one in changed.items()}
+            common, adopted = compared(searches, notify)
+            changed = {n: one for n, one in adopted.items() if one is not searches[n]}
+            anew = {name: conclude(one, notify) for name, one in changed.items()}
             for name, one in anew.items():
                 found[name] = _sharing(name, found[name], one, common, anew)
     return Several(found, tuple(common), seconds(clock.now_ns() - began_ns), tuple(failed))
@@ -174,7 +180,7 @@ def write_all(several: Several, out: Path, check: Callable[[str], str] = lambda 
     Args:
         several: To be written.
         out: The folder.
-        check: Gives, by a car's name, the command that works out its figures again.
+        check: Gives, by a car's name, the command that computes its figures again.
 
     Raises:
         ScmError: when a folder cannot be written.
@@ -188,8 +194,8 @@ def write_all(several: Several, out: Path, check: Callable[[str], str] = lambda 
 
 
 def _sharing(
-    name: str, found: Found, anew: Found, common: Sequence[Common], all_anew: Mapping[str, Found]
-) -> Found:
+    name: str, found: Result, anew: Result, common: Sequence[Common], all_anew: Mapping[str, Result]
+) -> Result:
     """Return a car's diagnosis with the effects that it shares, at the shared estimates."""
     shared = {c.name: c for c in common if c.shared and _sees(c, name)}
     effects = tuple(
@@ -199,7 +205,7 @@ def _sharing(
         for effect in anew.diagnosis.effects
     )
     suggestions = tuple(
-        s for s in anew.suggestions if not _is_settled(s.undecided, shared, all_anew)
+        s for s in anew.suggestions if not _is_decided(s.undecided, shared, all_anew)
     )
     undecided = tuple(s.undecided for s in suggestions)
     verdict = Verdict.UNDECIDED if undecided else anew.diagnosis.verdict
@@ -212,41 +218,49 @@ def _sharing(
     return replace(anew, diagnosis=diagnosis, suggestions=suggestions)
 
 
-def _is_settled(
-    question: Undecided, shared: Mapping[str, Common], all_anew: Mapping[str, Found]
+def _is_decided(
+    question: Undecided, shared: Mapping[str, Common], all_anew: Mapping[str, Result]
 ) -> bool:
-    """Say whether all cars together answer what one leaves open.
+    """Return whether all cars together answer what one leaves open.
 
     That each has an effect of its own that looks alike would be chance; of effects of what they
     share, the one found must explain their recordings better by as much as one car's would have to.
     """
-    asked = [name for name in question.between if name in shared]
-    if not asked:
+    mine = next((name for name in question.between if name in shared), None)
+    if mine is None:
         return False
-    seeing = [one for name, one in all_anew.items() if _sees(shared[asked[0]], name)]
-    rivals = [name for name in question.between if name not in shared and name in CAUSES]
-    return all(sum(_ahead(one, asked[0], name) for one in seeing) > TIE for name in rivals)
+    seeing = [one for name, one in all_anew.items() if _sees(shared[mine], name)]
+    others = [name for name in question.between if name not in shared and is_shareable(name)]
+    return all(sum(_ahead(one, mine, other) for one in seeing) > TIE for other in others)
 
 
-def _ahead(found: Found, name: str, rival: str) -> float:
+def is_shareable(name: str) -> bool:
+    """Return whether an effect of the catalogue may come from what several cars share."""
+    known = identifications().get(name)
+    return known is not None and bool(known.shared)
+
+
+def _ahead(found: Result, name: str, other: str) -> float:
     """Return how much better an effect explains a car's recordings than another in its place."""
-    steps = found.searched.search.steps if found.searched is not None else []
-    for step in steps:
-        names = [fitted.names[-1] for fitted in step.rivals]
-        best = dict(zip(names[::-1], step.criteria[::-1], strict=True))  # the first, best, stays
+    for one in found.selected.selection.rounds if found.selected is not None else ():
+        names = [fitted.names[-1] for fitted in one.alternatives]
+        best = dict(zip(names[::-1], one.criteria[::-1], strict=True))  # the first, best, stays
         if name in best:
-            return best.get(rival, max(step.criteria)) - best[name]
+            return best.get(other, max(one.criteria)) - best[name]
     return 0.0
 
 
 def _sees(common: Common, name: str) -> bool:
-    return any(c.car == name and c.sight in (Sight.SEES, Sight.ADDS) for c in common.cars)
+    return any(
+        c.car == name and c.agreement in (Agreement.CONFIRMS, Agreement.SUPPORTS)
+        for c in common.cars
+    )
 
 
 def _with_shared(
-    effect: Effect, common: Common, name: str, all_anew: Mapping[str, Found]
+    effect: Effect, common: Common, name: str, all_anew: Mapping[str, Result]
 ) -> Effect:
-    """Return an effect as all cars together tell it, as sure as the surest of them is."""
+    """Return an effect as all cars together show it, as sure as the surest of them is."""
     best = all_anew[name].best
     if set(effect.parameters) != set(common.parameters) or best is None:
         return effect

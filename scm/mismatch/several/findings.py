@@ -1,8 +1,9 @@
 """What several cars show together: the contract between their comparison and its page."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
+
+from msgspec import Struct, field
 
 from scm.mismatch.findings import Estimate
 
@@ -15,34 +16,34 @@ class Cause(StrEnum):
     FLOOR = "floor"
 
 
-class Sight(StrEnum):
-    """What one car's recordings say of an effect at the value that the others share.
+class Agreement(StrEnum):
+    """What one car's recordings show of an effect at the value that the others share.
 
-    `SEES`: they are explained better by more than its numbers cost. `ADDS`: by less, yet all cars'
-    sum pays. `CANNOT_TELL`: they fit with it and without. `OTHERWISE`: they contradict the value.
+    `CONFIRMS`: they are explained better by more than its numbers cost. `SUPPORTS`: by less, yet
+    the sum over all cars pays. `UNDECIDED`: they fit with it and without. `CONTRADICTS`: they fit
+    another value.
     """
 
-    SEES = "sees"
-    ADDS = "adds"
-    CANNOT_TELL = "cannot tell"
-    OTHERWISE = "otherwise"
+    CONFIRMS = "sees"
+    SUPPORTS = "adds"
+    UNDECIDED = "cannot tell"
+    CONTRADICTS = "otherwise"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CarSight:
-    """How one car sees an effect.
+class CarAgreement(Struct, kw_only=True, frozen=True):
+    """How far one car agrees with an effect.
 
     Attributes:
         alone: Whether its own diagnosis had found the effect.
         gain: Decrease of the objective at the shared value, in squared standard deviations;
             `needed`: what the effect's numbers cost, for nobody searched for them here.
         misses: Squared deviation of the car's own value from that of the others, in standard
-            deviations; `parameters` of them would be usual.
-        own: What the car's recordings alone say of the effect's numbers.
+            deviations; the number of parameters would be usual.
+        own: The effect's numbers by the car's recordings alone.
     """
 
     car: str
-    sight: Sight
+    agreement: Agreement = field(name="sight")
     alone: bool
     gain: float
     needed: float
@@ -50,14 +51,13 @@ class CarSight:
     own: Mapping[str, Estimate]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Common:
+class Common(Struct, kw_only=True, frozen=True):
     """An effect of what cars may share.
 
     Attributes:
         shared: Whether it is what several cars have in common, and not one's own.
-        parameters: That all who see it share, or of the one that sees it.
-        said: Of the effect, for a mechanic; `conclusion`: whose it is.
+        parameters: That all who confirm it share, or of the one that does.
+        text: About the effect, for a mechanic; `conclusion`: whose it is.
         cars: In the recordings' order.
     """
 
@@ -65,6 +65,6 @@ class Common:
     cause: Cause
     shared: bool
     parameters: Mapping[str, Estimate]
-    said: str
+    text: str = field(name="said")
     conclusion: str
-    cars: tuple[CarSight, ...]
+    cars: tuple[CarAgreement, ...]

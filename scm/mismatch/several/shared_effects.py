@@ -1,4 +1,4 @@
-"""Which effects several cars have in common: found by one, asked of all, fitted together.
+"""Which effects several cars have in common: found in one, tried in all, fitted together.
 
 Each car keeps its own numbers, its own other effects and its own noise; only the numbers of the
 effect in question are one. Their normal equations, everything else profiled out, add up over the
@@ -6,45 +6,37 @@ cars, and Gauss-Newton steps on the sum are checked by refitting every car: no a
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.diagnose import Searched
 from scm.mismatch.discovery.decide import is_discovered
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.findings import Equation, Estimate
-from scm.mismatch.select.search import price
-from scm.mismatch.several.findings import CarSight, Cause, Common, Sight
+from scm.mismatch.select.round import Notify, penalty
+from scm.mismatch.select.selected import Selected
+from scm.mismatch.several.effect_in_car import LOOSE, EffectInCar, Quadratic, is_same
+from scm.mismatch.several.findings import Agreement, CarAgreement, Cause, Common
 from scm.mismatch.several.verdict import conclusion
-from scm.mismatch.several.witness import LOOSE, Told, Witness, is_same
-from scm.mismatch.validate.explain import LAW, NINETY, WIDER, sentence_of
+from scm.mismatch.validate.explain import EQUATION_ERROR, NINETY, WIDER, sentence_of
 
-CAUSES: Mapping[str, Cause] = {
-    "pose_latency": Cause.CAMERA, "clock_offset": Cause.CAMERA, "clock_drift": Cause.CAMERA,
-    "pose_scale": Cause.CAMERA, "camera_tilt": Cause.CAMERA, "pose_point": Cause.TAGS,
-    "pose_heading": Cause.TAGS, "grade": Cause.FLOOR, "surface_patch": Cause.FLOOR,
-    "wind": Cause.FLOOR,
-}  # fmt: skip
-"""Effects of what all cars may share, by name; laws against position are the floor's too."""
 UNLIKELY = (10.8, 13.8, 16.3, 18.5)  # chi-square that one agreement in a thousand exceeds, by knobs
 STEPS, ENOUGH = 3, 0.5
-HOPEFUL, MOST_HOPES = 0.4, 2
-Notify = Callable[[str], None]
+LIKELY_SHARE, MAX_LIKELY = 0.4, 2
 
 
 @dataclass(slots=True)
 class Shared:
-    """An effect that was asked of all cars.
+    """An effect that was tried in all cars.
 
     Attributes:
-        taken: By car, the search with the effect at the shared value; where it is adopted.
+        adopted: By car, the selection with the effect at the shared value; where it is adopted.
     """
 
     common: Common
-    taken: dict[str, Searched]
+    adopted: dict[str, Selected]
 
 
 def cause_of(effect: Candidate) -> Cause | None:
@@ -52,201 +44,204 @@ def cause_of(effect: Candidate) -> Cause | None:
     if is_discovered(effect):
         on_floor = "position" in effect.depends_on and effect.equation is not Equation.SENSOR
         return Cause.FLOOR if on_floor else None
-    return CAUSES.get(effect.name)
+    return Cause(effect.shared) if effect.shared else None
 
 
 def compared(
-    cars: Mapping[str, Searched], notify: Notify
-) -> tuple[list[Common], dict[str, Searched]]:
+    cars: Mapping[str, Selected], notify: Notify
+) -> tuple[list[Common], dict[str, Selected]]:
     """Return every effect of what cars share that one found, or that all find only together.
 
     Args:
-        cars: Searches by the cars' names.
-        notify: Is told what is asked of whom.
+        cars: Selections by the cars' names.
+        notify: Receives what is being tried.
 
     Returns:
-        The effects, and the searches with the shared ones in their models.
+        The effects, and the selections with the shared ones in their hypotheses.
     """
     now, found = dict(cars), list[Common]()
     for effect, start in _found_by_any(cars):
-        shared = _asked(now, effect, start, notify, searched_for=False)
+        shared = _try_in_all(now, effect, start, notify, searched_for=False)
         if shared is not None:
             found.append(shared.common)
-            now |= shared.taken
-    asked = {common.name for common in found}
-    for effect, start in _hoped_for(now, asked):
-        shared = _asked(now, effect, start, notify, searched_for=True)
+            now |= shared.adopted
+    tried = {common.name for common in found}
+    for effect, start in _likely_together(now, tried):
+        shared = _try_in_all(now, effect, start, notify, searched_for=True)
         if shared is not None:
             found.append(shared.common)
-            now |= shared.taken
+            now |= shared.adopted
     return found, now
 
 
-def _found_by_any(cars: Mapping[str, Searched]) -> list[tuple[Candidate, Floats]]:
+def _found_by_any(cars: Mapping[str, Selected]) -> list[tuple[Candidate, Floats]]:
     """Return the effects of shared things that some car found, each once, with its values."""
     found = list[tuple[Candidate, Floats]]()
-    for searched in cars.values():
-        at = 0
-        for effect in searched.best.effects:
-            values = searched.best.values[at : at + len(effect.parameters)]
-            at += len(effect.parameters)
+    for selected in cars.values():
+        for effect, place in selected.best.each():
+            values = selected.best.values[place]
             new = not any(is_same(effect, other) for other, _ in found)
             if cause_of(effect) is not None and new:
-                found.append((effect, values.copy()))
+                found.append((effect, values))
     return found
 
 
-def _hoped_for(cars: Mapping[str, Searched], asked: set[str]) -> list[tuple[Candidate, Floats]]:
+def _likely_together(
+    cars: Mapping[str, Selected], tried: set[str]
+) -> list[tuple[Candidate, Floats]]:
     """Return effects that no car found, and of which all together may gain enough."""
     gains, starts = dict[str, float](), dict[str, tuple[float, Candidate, Floats]]()
-    for searched in cars.values():
-        for name, (gain, effect, values) in _tried(searched).items():
+    for selected in cars.values():
+        for name, (gain, effect, values) in _tried(selected).items():
             gains[name] = gains.get(name, 0.0) + gain
             if gain > starts.get(name, (-math.inf,))[0]:
                 starts[name] = gain, effect, values
-    listed = max(len(s.search.listed) for s in cars.values())
-    asks = {name: price((effect,), listed) for name, (_, effect, _) in starts.items()}
-    hopes = [n for n, gain in gains.items() if n not in asked and gain > HOPEFUL * asks[n]]
-    hopes.sort(key=lambda name: -gains[name])
-    return [starts[name][1:] for name in hopes[:MOST_HOPES]]
+    catalogue = max(len(s.context.catalogue) for s in cars.values())
+    needed = {name: penalty((effect,), catalogue) for name, (_, effect, _) in starts.items()}
+    likely = [n for n, gain in gains.items() if n not in tried and gain > LIKELY_SHARE * needed[n]]
+    likely.sort(key=lambda name: -gains[name])
+    return [starts[name][1:] for name in likely[:MAX_LIKELY]]
 
 
-def _tried(searched: Searched) -> dict[str, tuple[float, Candidate, Floats]]:
+def _tried(selected: Selected) -> dict[str, tuple[float, Candidate, Floats]]:
     """Return what each effect of a shared thing gained alone in a car's first round, and where."""
     best: dict[str, tuple[float, Candidate, Floats]] = {}
-    steps = [] if searched.rough else searched.search.steps[:1]
-    for step in steps:
-        bare = searched.search.criterion(step.base)
-        for rival, criterion in zip(step.rivals, step.criteria, strict=True):
-            effect = rival.effects[-1]
-            if CAUSES.get(effect.name) is None:
+    context = selected.context
+    rounds = () if context.by_windows else selected.selection.rounds[:1]
+    for one in rounds:
+        bare = context.criterion(one.base)
+        for alternative, criterion in zip(one.alternatives, one.criteria, strict=True):
+            effect = alternative.effects[-1]
+            if not effect.shared:
                 continue
-            paid = searched.search.price((effect,))
+            paid = context.penalty((effect,))
             gain = bare + paid - criterion
             if gain > best.get(effect.name, (0.0,))[0]:
-                best[effect.name] = gain, effect, rival.values[-len(effect.parameters) :].copy()
+                best[effect.name] = (
+                    gain,
+                    effect,
+                    alternative.values[-len(effect.parameters) :].copy(),
+                )
     return best
 
 
-def _asked(
-    cars: Mapping[str, Searched],
+def _try_in_all(
+    cars: Mapping[str, Selected],
     effect: Candidate,
     start: Floats,
     notify: Notify,
     *,
     searched_for: bool,
 ) -> Shared | None:
-    """Ask all cars about an effect; None where they were asked in vain.
+    """Return an effect tried in all cars; None where no two share it.
 
     Args:
-        cars: Searches by name.
+        cars: Selections by name.
         effect: Of a shared thing.
         start: Its values where somebody found it.
-        notify: Is told.
-        searched_for: Whether no car found it: then the sum must pay for the whole library.
+        notify: Receives what is being tried.
+        searched_for: Whether no car found it: then the sum must pay for the whole catalogue.
     """
-    witnesses = dict[str, Witness]()
-    for name, searched in cars.items():
-        notify(f"asking {name} about {effect.name.replace('_', ' ')}")
-        witnesses[name] = Witness(searched, effect, start)
+    in_cars = dict[str, EffectInCar]()
+    for name, selected in cars.items():
+        notify(f"trying in {name}: {effect.name.replace('_', ' ')}")
+        in_cars[name] = EffectInCar(selected, effect, start)
     notify(f"fitting {effect.name.replace('_', ' ')} to all cars together")
-    agreeing = _agreeing(witnesses)
-    group = [witnesses[name] for name in agreeing]
+    agreeing = _agreeing(in_cars)
+    group = [in_cars[name] for name in agreeing]
     values, precision = _together(group)
-    gains = {name: w.gain(w.at(values)) for name, w in witnesses.items()}
+    gains = {name: w.gain(w.at(values)) for name, w in in_cars.items()}
     if searched_for:
-        listed = max(len(s.search.listed) for s in cars.values())
-        if sum(gains[name] for name in agreeing) < price((effect,), listed):
-            _leave(witnesses)
+        catalogue = max(len(s.context.catalogue) for s in cars.values())
+        if sum(gains[name] for name in agreeing) < penalty((effect,), catalogue):
             return None
-    sights = {
-        name: _sight(w, gains[name], agrees=name in agreeing, in_sum=searched_for)
-        for name, w in witnesses.items()
+    agreements = {
+        name: _agreement(w, gains[name], agrees=name in agreeing, in_sum=searched_for)
+        for name, w in in_cars.items()
     }
-    seeing = [name for name, sight in sights.items() if sight in (Sight.SEES, Sight.ADDS)]
+    seeing = [
+        name
+        for name, agreement in agreements.items()
+        if agreement in (Agreement.CONFIRMS, Agreement.SUPPORTS)
+    ]
     shared = len(seeing) > 1
-    taken = dict[str, Searched]()
-    for name, witness in witnesses.items():
-        if shared and name in seeing and (witness.alone or not is_discovered(effect)):
-            taken[name] = witness.taken(witness.at(values))
-        else:
-            witness.left()
+    adopted = dict[str, Selected]()
+    for name, in_car in in_cars.items():
+        if shared and name in seeing and (in_car.alone or not is_discovered(effect)):
+            adopted[name] = in_car.selected_with(in_car.at(values))
     if not shared:
-        values, precision = _of_one(witnesses, values, precision)
-        sights = _against_one(witnesses, sights)
-        gains = {name: w.gain(w.at(values)) for name, w in witnesses.items()}
-    common = _common(effect, witnesses, sights, gains, values, precision, shared=shared)
-    return Shared(common, taken) if shared or not searched_for else None
-
-
-def _leave(witnesses: Mapping[str, Witness]) -> None:
-    for witness in witnesses.values():
-        witness.left()
+        values, precision = _of_one(in_cars, values, precision)
+        agreements = _against_one(in_cars, agreements)
+        gains = {name: w.gain(w.at(values)) for name, w in in_cars.items()}
+    common = _common(effect, in_cars, agreements, gains, values, precision, shared=shared)
+    return Shared(common, adopted) if shared or not searched_for else None
 
 
 def _of_one(
-    witnesses: Mapping[str, Witness], values: Floats, precision: Floats
+    in_cars: Mapping[str, EffectInCar], values: Floats, precision: Floats
 ) -> tuple[Floats, Floats]:
     """Return the value of the one car that found an effect, and how sure it is."""
-    finders = [w.free for w in witnesses.values() if w.alone]
+    finders = [w.free for w in in_cars.values() if w.alone]
     best = max(finders, key=lambda t: float(np.trace(t.precision)), default=None)
     return (values, precision) if best is None else (best.values, best.precision)
 
 
-def _against_one(witnesses: Mapping[str, Witness], sights: Mapping[str, Sight]) -> dict[str, Sight]:
-    """Return what each car says of the only one that found an effect."""
-    finders = [name for name, w in witnesses.items() if w.alone]
+def _against_one(
+    in_cars: Mapping[str, EffectInCar], agreements: Mapping[str, Agreement]
+) -> dict[str, Agreement]:
+    """Return what each car shows of an effect that only one found."""
+    finders = [name for name, w in in_cars.items() if w.alone]
     if len(finders) != 1:
-        return dict(sights)
-    found = {finders[0]: Sight.SEES}
-    for name in witnesses:
+        return dict(agreements)
+    found = {finders[0]: Agreement.CONFIRMS}
+    for name in in_cars:
         if name not in found:
-            far = misses_of(name, finders, witnesses) >= _limit(witnesses[name])
-            found[name] = Sight.OTHERWISE if far else Sight.CANNOT_TELL
-    return {name: found[name] for name in witnesses}
+            far = misses_of(name, finders, in_cars) >= _limit(in_cars[name])
+            found[name] = Agreement.CONTRADICTS if far else Agreement.UNDECIDED
+    return {name: found[name] for name in in_cars}
 
 
-def _limit(witness: Witness) -> float:
-    return UNLIKELY[min(len(witness.effect.parameters), len(UNLIKELY)) - 1]
+def _limit(in_car: EffectInCar) -> float:
+    return UNLIKELY[min(len(in_car.effect.parameters), len(UNLIKELY)) - 1]
 
 
-def _sight(witness: Witness, gain: float, *, agrees: bool, in_sum: bool) -> Sight:
+def _agreement(in_car: EffectInCar, gain: float, *, agrees: bool, in_sum: bool) -> Agreement:
     if not agrees:
-        return Sight.OTHERWISE
-    if witness.alone or gain >= witness.needed:
-        return Sight.SEES
+        return Agreement.CONTRADICTS
+    if in_car.alone or gain >= in_car.needed:
+        return Agreement.CONFIRMS
     if in_sum and gain > 0.0:
-        return Sight.ADDS
-    return Sight.CANNOT_TELL
+        return Agreement.SUPPORTS
+    return Agreement.UNDECIDED
 
 
-def _agreeing(witnesses: Mapping[str, Witness]) -> list[str]:
+def _agreeing(in_cars: Mapping[str, EffectInCar]) -> list[str]:
     """Return the cars whose own values agree; those that agree least with the others are left out.
 
     Where only two are left and disagree, the one that found nothing alone goes.
     """
-    group = list(witnesses)
+    group = list(in_cars)
     while len(group) > 1:
-        misses = {name: misses_of(name, group, witnesses) for name in group}
-        worst = max(group, key=lambda name: (misses[name], _certain_of_none(witnesses[name])))
-        if misses[worst] < _limit(witnesses[worst]):
+        misses = {name: misses_of(name, group, in_cars) for name in group}
+        worst = max(group, key=lambda name: (misses[name], _certain_of_none(in_cars[name])))
+        if misses[worst] < _limit(in_cars[worst]):
             break
         if len(group) == 2:
-            worst = min(group, key=lambda name: witnesses[name].gain(witnesses[name].free))
+            worst = min(group, key=lambda name: in_cars[name].gain(in_cars[name].free))
         group.remove(worst)
     return group
 
 
-def _certain_of_none(witness: Witness) -> float:
-    return -witness.gain(witness.free)
+def _certain_of_none(in_car: EffectInCar) -> float:
+    return -in_car.gain(in_car.free)
 
 
-def misses_of(name: str, group: Sequence[str], witnesses: Mapping[str, Witness]) -> float:
-    """Return the squared deviation of a car's own value from that of others, in its scatter."""
-    others = [witnesses[other].free for other in group if other != name]
+def misses_of(name: str, group: Sequence[str], in_cars: Mapping[str, EffectInCar]) -> float:
+    """Return the squared deviation of a car's own value from that of others, in its std."""
+    others = [in_cars[other].free for other in group if other != name]
     if not others:
         return 0.0
-    mine, effect = witnesses[name].free, witnesses[name].effect
+    mine, effect = in_cars[name].free, in_cars[name].effect
     value, precision = _combined(others, effect, mine.values)
     off = _apart(effect, mine.values, value) / _steps(effect)
     spread = _covariance(mine.precision) + _covariance(precision)
@@ -255,11 +250,11 @@ def misses_of(name: str, group: Sequence[str], witnesses: Mapping[str, Witness])
 
 
 def _unsure(effect: Candidate, values: Floats) -> Floats:
-    """Return by how many steps an effect's equation may be off, (knobs,)."""
+    """Return by how many steps an effect's equation may be off, (parameters,)."""
     if effect.equation is Equation.SENSOR:
         return np.zeros(len(values))
     neutral = np.array([k.neutral for k in effect.parameters])
-    return np.asarray(LAW * np.abs(values - neutral) * effect.amounts / _steps(effect))
+    return np.asarray(EQUATION_ERROR * np.abs(values - neutral) * effect.amounts / _steps(effect))
 
 
 def _steps(effect: Candidate) -> Floats:
@@ -277,16 +272,16 @@ def _covariance(precision: Floats) -> Floats:
     return np.asarray(np.linalg.inv(precision + LOOSE * np.eye(len(precision))))
 
 
-def _combined(told: Sequence[Told], effect: Candidate, near: Floats) -> tuple[Floats, Floats]:
+def _combined(parts: Sequence[Quadratic], effect: Candidate, near: Floats) -> tuple[Floats, Floats]:
     """Return the values at which several quadratics together are lowest, and their precision."""
     steps = _steps(effect)
-    precision = np.sum([t.precision for t in told], axis=0) + LOOSE * np.eye(len(near))
-    moves = [t.precision @ (_apart(effect, t.values, near) / steps) - t.slope for t in told]
+    precision = np.sum([t.precision for t in parts], axis=0) + LOOSE * np.eye(len(near))
+    moves = [t.precision @ (_apart(effect, t.values, near) / steps) - t.slope for t in parts]
     lowest = near + steps * np.linalg.solve(precision, np.sum(moves, axis=0))
     return lowest, np.asarray(precision)
 
 
-def _together(group: Sequence[Witness]) -> tuple[Floats, Floats]:
+def _together(group: Sequence[EffectInCar]) -> tuple[Floats, Floats]:
     """Return the numbers that suit several cars best, and their precision: Gauss-Newton."""
     effect = group[0].effect
     low = np.max([[k.bounds[0] for k in w.effect.parameters] for w in group], axis=0)
@@ -306,8 +301,8 @@ def _together(group: Sequence[Witness]) -> tuple[Floats, Floats]:
     return best[0].values, _combined(best, effect, best[0].values)[1]
 
 
-def _cost(told: Sequence[Told]) -> float:
-    return sum(t.cost for t in told)
+def _cost(parts: Sequence[Quadratic]) -> float:
+    return sum(t.cost for t in parts)
 
 
 def estimates(effect: Candidate, values: Floats, precision: Floats) -> dict[str, Estimate]:
@@ -326,8 +321,8 @@ def estimates(effect: Candidate, values: Floats, precision: Floats) -> dict[str,
 
 def _common(
     effect: Candidate,
-    witnesses: Mapping[str, Witness],
-    sights: Mapping[str, Sight],
+    in_cars: Mapping[str, EffectInCar],
+    agreements: Mapping[str, Agreement],
     gains: Mapping[str, float],
     values: Floats,
     precision: Floats,
@@ -335,18 +330,20 @@ def _common(
     shared: bool,
 ) -> Common:
     cause = cause_of(effect) or Cause.CAMERA
-    agreeing = [name for name, sight in sights.items() if sight is not Sight.OTHERWISE]
+    agreeing = [
+        name for name, agreement in agreements.items() if agreement is not Agreement.CONTRADICTS
+    ]
     cars = tuple(
-        CarSight(
-            car=name, sight=sights[name], alone=w.alone, gain=gains[name], needed=w.needed,
-            misses=misses_of(name, [*agreeing, name], witnesses),
+        CarAgreement(
+            car=name, agreement=agreements[name], alone=w.alone, gain=gains[name], needed=w.needed,
+            misses=misses_of(name, [*agreeing, name], in_cars),
             own=estimates(w.effect, w.free.values, w.free.precision),
         )
-        for name, w in witnesses.items()
+        for name, w in in_cars.items()
     )  # fmt: skip
     numbers = estimates(effect, values, precision)
     return Common(
         name=effect.name, cause=cause, shared=shared, parameters=numbers,
-        said=sentence_of(effect, numbers),
+        text=sentence_of(effect, numbers),
         conclusion=conclusion(cause, cars, shared=shared), cars=cars,
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from scm.mismatch.report.wording import capital, joined
-from scm.mismatch.several.findings import CarSight, Cause, Common, Sight
+from scm.mismatch.several.findings import Agreement, CarAgreement, Cause, Common
 
 WHOSE: Mapping[Cause, str] = {
     Cause.CAMERA: "it is the camera, not the cars",
@@ -29,11 +29,11 @@ TWO = 2
 VERBS: Mapping[Cause, str] = {Cause.CAMERA: "see", Cause.TAGS: "see", Cause.FLOOR: "feel"}
 
 
-def conclusion(cause: Cause, cars: Sequence[CarSight], *, shared: bool) -> str:
+def conclusion(cause: Cause, cars: Sequence[CarAgreement], *, shared: bool) -> str:
     """Return whose an effect is, as the cars together say."""
-    seeing = [c.car for c in cars if c.sight in (Sight.SEES, Sight.ADDS)]
-    against = [c.car for c in cars if c.sight is Sight.OTHERWISE]
-    silent = [c.car for c in cars if c.sight is Sight.CANNOT_TELL]
+    seeing = [c.car for c in cars if c.agreement in (Agreement.CONFIRMS, Agreement.SUPPORTS)]
+    against = [c.car for c in cars if c.agreement is Agreement.CONTRADICTS]
+    silent = [c.car for c in cars if c.agreement is Agreement.UNDECIDED]
     verb = VERBS[cause]
     if not shared:
         return _of_one(cause, cars, against, silent)
@@ -47,19 +47,19 @@ def conclusion(cause: Cause, cars: Sequence[CarSight], *, shared: bool) -> str:
             f"{joined(seeing)} have in common."
         )
     if silent:
-        says = "the drives of" if len(silent) > 1 else "the drive of"
+        drives = "the drives of" if len(silent) > 1 else "the drive of"
         return (
-            f"{joined(seeing)} {verb} it alike: {WHOSE[cause]}. {says.capitalize()} "
+            f"{joined(seeing)} {verb} it alike: {WHOSE[cause]}. {drives.capitalize()} "
             f"{joined(silent)} cannot tell, and {_do(silent)} not contradict."
         )
     every = "both cars" if len(cars) == TWO else f"all {len(cars)} cars"
-    if any(c.sight is Sight.ADDS for c in cars):
+    if any(c.agreement is Agreement.SUPPORTS for c in cars):
         return f"Too weak for one car alone, {every} together show it: {WHOSE[cause]}."
     return f"{capital(every)} {verb} it alike: {WHOSE[cause]}."
 
 
 def _of_one(
-    cause: Cause, cars: Sequence[CarSight], against: Sequence[str], silent: Sequence[str]
+    cause: Cause, cars: Sequence[CarAgreement], against: Sequence[str], silent: Sequence[str]
 ) -> str:
     finders = [c.car for c in cars if c.alone]
     verb = VERBS[cause]
@@ -72,9 +72,9 @@ def _of_one(
     others = [name for name in against if name not in finders]
     if others:
         return f"Only {who} {verb}s it, {joined(others)} {_would(others)}: {OWN[cause]}."
-    says = "the drives of" if len(silent) > 1 else "the drive of"
+    drives = "the drives of" if len(silent) > 1 else "the drive of"
     return (
-        f"Only {who} {verb}s it; {says} {joined([n for n in silent if n not in finders])} cannot "
+        f"Only {who} {verb}s it; {drives} {joined([n for n in silent if n not in finders])} cannot "
         f"tell {UNSURE[cause]}."
     )
 
@@ -89,8 +89,8 @@ def _would(names: Sequence[str]) -> str:
 
 def all_alike(common: Common, name: str) -> str:
     """Return in a sentence for one car's report who else sees what it sees."""
-    seeing = (Sight.SEES, Sight.ADDS)
-    others = [c.car for c in common.cars if c.sight in seeing and c.car != name]
+    seeing = (Agreement.CONFIRMS, Agreement.SUPPORTS)
+    others = [c.car for c in common.cars if c.agreement in seeing and c.car != name]
     alone = any(c.alone for c in common.cars if c.car == name)
     found = "" if alone else " This car alone would not have shown it for sure."
     return f"Estimated together with {joined(others)}, {ALIKE[common.cause]}.{found}"

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import msgspec
 
-from scm.mismatch.diagnose import diagnose, write
 from scm.mismatch.findings import Diagnosis
+from scm.mismatch.pipeline import diagnose, write
 from scm.mismatch.trial.labels import Case
 from scm.runtime.parent_watch import end_with
 

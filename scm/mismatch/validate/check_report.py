@@ -12,10 +12,10 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import RecordingError
-from scm.mismatch.diagnose import usable_of
 from scm.mismatch.fit.data_split import NAMES
 from scm.mismatch.report.car_file import FILE
 from scm.mismatch.report.write import FIELDS, GIVEN, WINDOWS
+from scm.mismatch.usable_data import usable_of
 from scm.recording.read import Recording
 from scm.replay.free_run import free_run
 from scm.vehicles.car import Car, load_car

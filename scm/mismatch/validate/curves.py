@@ -5,7 +5,7 @@ of a second, is told as the force along the body or the angle of the wheels that
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,14 +13,14 @@ from scm.arrays import Floats
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.evidence import Curve
 from scm.mismatch.findings import Equation
-from scm.mismatch.fit.fitter import Fitted, Fitter
+from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.validate.residual_forces import (
     ANGLE,
     ANGLE_RAD,
     FORCE,
     GRAVITY,
-    LEAN,
+    HORIZONTAL_G,
     MOVED,
     RUN_S,
     inverse_of,
@@ -62,18 +62,19 @@ class _Own:
     std: Floats
 
 
-def curve(model: Likelihood, best: Fitted, effect: Candidate) -> Curve | None:
+def curve(best: Hypothesis, effect: Candidate) -> Curve | None:
     """Return an effect of the model found as a curve, or None where a curve would say nothing.
 
     Several drives count as one; their times follow the recordings' clocks.
     """
-    own = _own(best, effect)
+    model = best.model
     if effect.name in _SENSORS:
-        return _sensor_curve(model, effect, own)
+        return _sensor_curve(model, effect, _own(best, effect))
     if effect.equation is Equation.SENSOR or not effect.depends_on:
         return None
+    own = _own(best, effect)
     turning = effect.equation in (Equation.STEERING, Equation.TYRE) or effect.name in _TURNING
-    parts = [_acted(drive, model, best, effect, own, int(turning)) for drive in model.drives]
+    parts = [_acted(drive, best, effect, own, int(turning)) for drive in model.drives]
     x, y, band = (np.concatenate([part[i] for part in parts]) for i in range(3))
     (y_name, y_unit), (x_name, x_unit) = (FORCE, ANGLE)[turning], _variable(effect)
     middle, mean, half = _binned(x, y, band)
@@ -85,13 +86,8 @@ def curve(model: Likelihood, best: Fitted, effect: Candidate) -> Curve | None:
     )  # fmt: skip
 
 
-def _own(best: Fitted, effect: Candidate) -> _Own:
-    at = 0
-    for one in best.effects:
-        if one is effect:
-            break
-        at += len(one.parameters)
-    mine = slice(at, at + len(effect.parameters))
+def _own(best: Hypothesis, effect: Candidate) -> _Own:
+    mine = best.place_of(effect)
     steps = np.array([parameter.step for parameter in effect.parameters])
     own = len(best.z)
     variance = np.zeros(len(steps))
@@ -130,15 +126,15 @@ def _seen(drive: Drive, variable: str, axis: int) -> Floats:
 
 
 def _acted(
-    drive: Drive, model: Likelihood, best: Fitted, effect: Candidate, own: _Own, which: int
+    drive: Drive, best: Hypothesis, effect: Candidate, own: _Own, which: int
 ) -> tuple[Floats, Floats, Floats]:
     """Return what an effect depends on along a drive, what it does, and the band around that."""
-    fitter, car = Fitter(model, np.ones(len(model.t))), model.car
+    car = best.model.car
 
     def numbers(values: Floats) -> Numbers:
         changed = best.values.copy()
         changed[own.at] = values
-        return fitter.numbers(best.effects, best.z, changed)
+        return replace(best, values=changed).numbers
 
     neutral = np.array([parameter.neutral for parameter in effect.parameters])
     low, high = (
@@ -148,7 +144,7 @@ def _acted(
         np.clip(own.values + np.where(np.arange(len(neutral)) == j, own.std, 0.0), low, high)
         for j in range(len(neutral))
     ]
-    force, found = LEAN * GRAVITY * car.value("body.mass_kg"), numbers(own.values)
+    force, found = HORIZONTAL_G * GRAVITY * car.value("body.mass_kg"), numbers(own.values)
     camera = Camera(drive, found)
     sides = [
         Side(found, camera),

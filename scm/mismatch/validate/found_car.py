@@ -21,10 +21,9 @@ from scm.mismatch.discovery.effect_file import as_term, number_keys
 from scm.mismatch.discovery.sensor_effects import LENS, PREFIX, SensorEffect
 from scm.mismatch.evidence import Evidence, RefittedParameter
 from scm.mismatch.findings import Diagnosis, Effect, Verdict
-from scm.mismatch.fit.fitter import Fitted
-from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.report.car_file import FILE, write_car
-from scm.mismatch.validate.explain import NINETY, ordinary_of
+from scm.mismatch.validate.explain import NINETY, refitted
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.correlated import Correlated
 from scm.vehicles.term import Term
@@ -41,13 +40,13 @@ class CarFiles:
     The folder lives as long as this object: effects outside the library are files in it.
     """
 
-    def __init__(self, car: Car, model: Likelihood, recordings: tuple[str, ...]) -> None:
-        self._car, self._model, self._recordings = car, model, recordings
+    def __init__(self, car: Car, recordings: tuple[str, ...]) -> None:
+        self._car, self._recordings = car, recordings
         self._folder = Path(mkdtemp(prefix="scm-found-"))
         weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         self._count = 0
 
-    def written(self, fitted: Fitted, effects: Sequence[Effect]) -> Car:
+    def written(self, fitted: Hypothesis, effects: Sequence[Effect]) -> Car:
         """Return the car with what was found, as its written file says.
 
         Where all its numbers together contradict one another, those that the recordings say nothing
@@ -65,33 +64,36 @@ class CarFiles:
                 continue
         return self._written(fitted, effects, np.zeros(len(fitted.z), dtype=np.bool_))
 
-    def _written(self, fitted: Fitted, effects: Sequence[Effect], own: Bools) -> Car:
+    def _written(self, fitted: Hypothesis, effects: Sequence[Effect], own: Bools) -> Car:
         self._count += 1
         folder = self._folder / f"{self._count}"
         folder.mkdir()
-        found = patched(self._car, self._model, fitted, folder, own)
-        ordinary = ordinary_of(self._model, fitted, self._car)
+        found = patched(self._car, fitted, folder, own)
         diagnosis = Diagnosis(
             verdict=Verdict.NONE, located=(), effects=tuple(effects), undecided=(), fit=None,
             runtime_s=0.0,
         )  # fmt: skip
-        evidence = Evidence(vehicle=self._car.name, recordings=self._recordings, refitted=ordinary)
+        evidence = Evidence(
+            vehicle=self._car.name,
+            recordings=self._recordings,
+            refitted=refitted(fitted, self._car),
+        )
         write_car(diagnosis, evidence, self._car, found, folder)
         return load_car(folder / FILE)
 
 
-def as_written(ordinary: Sequence[RefittedParameter], car: Car) -> tuple[RefittedParameter, ...]:
+def as_written(found: Sequence[RefittedParameter], car: Car) -> tuple[RefittedParameter, ...]:
     """Return the car's own numbers as its file says them, where it says other than was found."""
-    found = list[RefittedParameter]()
-    for one in ordinary:
+    written = list[RefittedParameter]()
+    for one in found:
         value = car.value(one.key) if car.has(one.key) else one.found.value
         if not math.isclose(value, one.found.value, rel_tol=1e-4, abs_tol=1e-12):
             spread = NINETY * one.given_std
             stays = structs.replace(one.found, value=value, low=value - spread, high=value + spread)
-            found.append(replace(one, found=stays, found_std=one.given_std))
+            written.append(replace(one, found=stays, found_std=one.given_std))
         else:
-            found.append(one)
-    return tuple(found)
+            written.append(one)
+    return tuple(written)
 
 
 def on(base: Car, car: Car) -> Car:
@@ -111,16 +113,13 @@ def on(base: Car, car: Car) -> Car:
     return replace(same, path=car.path, measures=car.measures, values={**same.values, **car.values})
 
 
-def patched(
-    car: Car, model: Likelihood, fitted: Fitted, folder: Path, own: Bools | None = None
-) -> Car:
+def patched(car: Car, fitted: Hypothesis, folder: Path, own: Bools | None = None) -> Car:
     """Return the given car with effects found and with its own numbers refitted.
 
     A sensor's law outside the library has no place in a car file, but for the lens of a camera.
 
     Args:
         car: As given.
-        model: That `fitted` belongs to.
         fitted: What was found.
         folder: Gets the files of laws outside the library; the car needs them while it is used.
         own: Which of the car's own numbers are refitted; None: all.
@@ -128,23 +127,24 @@ def patched(
     Raises:
         ScmError: when a law's file cannot be written.
     """
-    which = [True] * len(model.nominal) if own is None else list(own)
+    nominal = fitted.model.nominal
+    which = [True] * len(nominal) if own is None else list(own)
+    of_car = fitted.model.simulator.numbers(fitted.z)
     numbers = {
         o.key: number
-        for o, moves in zip(model.nominal, which, strict=True)
+        for o, moves in zip(nominal, which, strict=True)
         if moves and not o.key.startswith(CLOCKS)
-        for number in (model.numbers(fitted.z)[o.key],)
+        for number in (of_car[o.key],)
         if not car.has(o.key) or not math.isclose(number, car.value(o.key), rel_tol=1e-9)
     }
-    terms, faults, at = list[str | Term](), list[str](), 0
+    terms, faults = list[str | Term](), list[str]()
     known = {term.name for term in car.terms}
-    for effect in fitted.effects:
-        values = tuple(float(v) for v in fitted.values[at : at + len(effect.parameters)])
-        at += len(values)
+    for effect, place in fitted.each():
+        values = tuple(float(v) for v in fitted.values[place])
         if isinstance(effect, DictionaryEffect):
-            term, of_law = as_term(effect, values, folder)
+            term, more = as_term(effect, values, folder)
             terms.append(term)
-            numbers |= of_law
+            numbers |= more
             continue
         if isinstance(effect, SensorEffect):
             if effect.fault:
@@ -162,21 +162,20 @@ def patched(
     driven = {key: value for key, value in numbers.items() if key not in sensed}
     found = car.with_terms(terms, driven)
     found = found.with_measures(list(dict.fromkeys(faults)), sensed) if faults else found
-    return replace(found, correlated=correlated(model, fitted, which))
+    return replace(found, correlated=correlated(fitted, which))
 
 
-def correlated(model: Likelihood, fitted: Fitted, own: Sequence[bool]) -> tuple[Correlated, ...]:
+def correlated(fitted: Hypothesis, own: Sequence[bool]) -> tuple[Correlated, ...]:
     """Return the groups of numbers whose errors come together, as the recordings leave them.
 
     Args:
-        model: That `fitted` belongs to.
         fitted: What was found.
         own: Which of the car's own numbers count.
     """
     covariance = fitted.covariance
     if not covariance.size:
         return ()
-    keys = [o.key if moves else CLOCKS for o, moves in zip(model.nominal, own, strict=True)]
+    keys = [o.key if moves else CLOCKS for o, moves in zip(fitted.model.nominal, own, strict=True)]
     for effect in fitted.effects:
         named = number_keys(effect) if isinstance(effect, DictionaryEffect) else {}
         keys += [named.get(parameter.name, parameter.key) for parameter in effect.parameters]

@@ -13,12 +13,13 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.data_quality.problem import Span
 from scm.mismatch.effect_catalogue import Candidate
-from scm.mismatch.evidence import Residual
-from scm.mismatch.findings import Equation, Located, Place
-from scm.mismatch.fit.fitter import TAIL, Fitted, Fitter
+from scm.mismatch.evidence import FreeRuns, Residual
+from scm.mismatch.findings import Equation, Fit, Located, Place
+from scm.mismatch.fit.fitter import TAIL, Fitter
+from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.validate.residual_forces import leftover, on_one_axis
-from scm.mismatch.validate.sensor_residuals import sensed
+from scm.mismatch.validate.residual_forces import on_one_axis, residual_forces
+from scm.mismatch.validate.sensor_residuals import sensor_residuals
 from scm.replay.numbers import NEUTRAL
 
 BLOCK_S = 2.5
@@ -29,6 +30,7 @@ MOST_TIME = 0.4  # what acts for longer, or comes and goes, acts all the time
 MOST_SPANS = 3
 MOST_FLOOR = 0.35
 NOISE_LOSS = 0.862  # mean loss of an innovation that is nothing but noise
+MIN_STRAY_SHARE = 0.1  # of the error of free runs, to be reported
 LEAST_SHARE = 0.03  # of a sensor in the gain, to be named
 _OWN = {  # sensors by the keys of their faults
     "measure.gyro": "imu.gyro", "measure.accel": "imu.accel", "measure.imu": "imu.accel",
@@ -49,31 +51,30 @@ class _Looked:
 
 
 def locate(
-    model: Likelihood, retuned: Fitted, best: Fitted
+    retuned: Hypothesis, best: Hypothesis
 ) -> tuple[tuple[Located, ...], tuple[Residual, ...]]:
     """Return where the error that the effects of `best` explain lies, and what is left over.
 
     Args:
-        model: With the belief about noise under which `best` was fitted.
         retuned: The car with its own numbers refitted alone.
         best: The car with all effects found; with none, nothing is located.
     """
-    numbers = Fitter(model, np.ones(len(model.t))).numbers(best.effects, best.z, best.values)
-    residuals = leftover(model.drives, model.car, {}, numbers)
+    model, numbers = best.model, best.numbers
+    residuals = residual_forces(model.drives, model.car, {}, numbers)
     if not best.effects:
         return (), residuals
-    gains, rest = _gains(model, retuned, best)
+    gains, rest = _gains(retuned, best)
     looked = _looked(model)
     total = rest + sum(max(float(gain.sum()), 0.0) for gain in gains)
     located = [
-        _located(effect, values, gain, looked, total)
-        for (effect, values), gain in zip(_each(best), gains, strict=True)
+        _located(effect, best.values[place], gain, looked, total)
+        for (effect, place), gain in zip(best.each(), gains, strict=True)
         if gain.sum() > chance(1)
     ]
     shown = [name for one in located if one.equation is Equation.SENSOR for name in one.channels]
     faults = {key for effect in best.effects for key in _faults(effect)}
     if shown and faults:
-        residuals = (*sensed(model, numbers, faults, shown), *residuals)
+        residuals = (*sensor_residuals(model, numbers, faults, shown), *residuals)
     return tuple(sorted(located, key=lambda one: -one.share_of_error)), residuals
 
 
@@ -87,29 +88,27 @@ def chance(places: int) -> float:
     return 2.0 * math.log(places / ALARM)
 
 
-def _gains(model: Likelihood, retuned: Fitted, best: Fitted) -> tuple[list[Floats], float]:
+def _gains(retuned: Hypothesis, best: Hypothesis) -> tuple[list[Floats], float]:
     """Return what each effect gains at each innovation, and what all of them leave beyond noise.
 
     An effect's gain is over the same car without it, its own numbers refitted.
     """
-    fitter, own = Fitter(model, np.ones(len(model.t))), len(best.z)
-    alone = [retuned.z if len(best.effects) == 1 else best.z for _ in best.effects]
-    without = list[tuple[tuple[Candidate, ...], Floats]]()
-    at = 0
-    for i, effect in enumerate(best.effects):
-        values = np.delete(best.values, slice(at, at + len(effect.parameters)))
-        without.append(((*best.effects[:i], *best.effects[i + 1 :]), values))
-        at += len(effect.parameters)
-    e, _ = model([fitter.numbers(best.effects, best.z, best.values)])
+    model, own = best.model, len(best.z)
+    fitter = Fitter(model, np.ones(len(model.t)))
+    alone = retuned.z if len(best.effects) == 1 else best.z
+    e, _ = model([best.numbers])
     after, jacobian, gains = _loss(e[:, 0]), best.jacobian[:, :own], list[Floats]()
-    for z, trial in zip(alone, without, strict=True):
-        before, _ = model([fitter.numbers(*trial[:1], z, trial[1])])
-        base = replace(best, z=z, e=before[:, 0], jacobian=jacobian)
-        (moved,) = fitter.begin(base, [trial])
-        without_it = moved.e if np.isfinite(moved.q) else before[:, 0]
-        gains.append(model.settled * (_loss(without_it) - after))
-    events = float(model.settled.sum())
-    rest = float((model.settled * after).sum()) - NOISE_LOSS * events - 2.0 * math.sqrt(events)
+    for i, (_, place) in enumerate(best.each()):
+        effects = (*best.effects[:i], *best.effects[i + 1 :])
+        values = np.delete(best.values, place)
+        without = replace(best, effects=effects, z=alone, values=values, jacobian=jacobian)
+        before, _ = model([without.numbers])
+        base = replace(without, innovations=before[:, 0])
+        (moved,) = fitter.begin(base, [(effects, values)])
+        without_it = moved.innovations if np.isfinite(moved.score) else before[:, 0]
+        gains.append(model.valid * (_loss(without_it) - after))
+    events = float(model.valid.sum())
+    rest = float((model.valid * after).sum()) - NOISE_LOSS * events - 2.0 * math.sqrt(events)
     return gains, max(rest, 0.0)
 
 
@@ -131,14 +130,6 @@ def _looked(model: Likelihood) -> _Looked:
         stream.append(number[whitener.stream])
     whole = [np.concatenate(parts) for parts in (t, x, y)]
     return _Looked(whole[0], whole[1], whole[2], np.concatenate(stream), tuple(names))
-
-
-def _each(fitted: Fitted) -> Iterator[tuple[Candidate, Floats]]:
-    """Yield each effect with its own values."""
-    at = 0
-    for effect in fitted.effects:
-        yield effect, fitted.values[at : at + len(effect.parameters)]
-        at += len(effect.parameters)
 
 
 def _located(
@@ -233,3 +224,47 @@ def _named(effect: Candidate, values: Floats) -> Place | None:
         return None
     x, y, radius = known["x_m"], known["y_m"], known["radius_m"]
     return Place(x_m=(x - radius, x + radius), y_m=(y - radius, y + radius))
+
+
+def strayed(runs: FreeRuns, fit: Fit) -> tuple[Located, ...]:
+    """Return where the error of the free runs `after` lies, the larger part first.
+
+    Args:
+        runs: Of the re-tuned car.
+        fit: Judged with them; noise of measuring alone is taken off by its floor.
+    """
+    floor_m = fit.confirm.noise_floor.get("position_m", 0.0)
+    along, across = _along_and_across(runs)
+    known: Bools = np.isfinite(along) & np.isfinite(across)
+    if not known.any() or floor_m <= 0.0:
+        return ()
+    middle = runs.measured["x"].shape[1] // 2
+    x, y = (runs.measured[name][:, middle] for name in ("x", "y"))
+    known &= np.isfinite(x) & np.isfinite(y)
+    t = runs.start_s + 0.5 * float(runs.t_s[-1])
+    beyond = {
+        equation: 2.0 * (apart[known] / floor_m) ** 2 - 1.0
+        for equation, apart in ((Equation.DRIVE, along), (Equation.STEERING, across))
+    }
+    sums = {equation: max(float(gain.sum()), 0.0) for equation, gain in beyond.items()}
+    total = sum(sums.values())
+    located = [
+        Located(
+            equation=equation,
+            channels=("pose.x", "pose.y"),
+            depends_on=(),
+            when_s=spans_of(beyond[equation], t[known]),
+            where=box_of(beyond[equation], x[known], y[known]),
+            share_of_error=mine / total,
+        )
+        for equation, mine in sums.items()
+        if mine > MIN_STRAY_SHARE * total
+    ]
+    return tuple(sorted(located, key=lambda one: -one.share_of_error))
+
+
+def _along_and_across(runs: FreeRuns) -> tuple[Floats, Floats]:
+    """Return how far windows end along the recorded heading and across it [m]."""
+    dx, dy = (runs.after[name][:, -1] - runs.measured[name][:, -1] for name in ("x", "y"))
+    yaw = runs.measured["yaw"][:, -1]
+    return np.cos(yaw) * dx + np.sin(yaw) * dy, np.cos(yaw) * dy - np.sin(yaw) * dx

@@ -24,7 +24,10 @@ RUN_S = 0.4
 EVERY_S = 0.2
 APART_S = 1.0  # between drives on one axis
 WIDTH_S = 0.4  # of the smoothing, one standard deviation
-LEAN, ANGLE_RAD = 0.02, 0.02  # pushes that measure the response: force over weight, wheel angle
+HORIZONTAL_G, ANGLE_RAD = (
+    0.02,
+    0.02,
+)  # pushes that measure the response: force over weight, wheel angle
 GRAVITY = 9.80665
 LEAP = 0.15  # of a change within a window that smoothing misplaces
 LEAST_BAND = 0.5  # of what noise alone is thought to make
@@ -43,7 +46,7 @@ class _Track:
     found: Mapping[tuple[str, str], tuple[Floats, Floats, Floats]]
 
 
-def leftover(
+def residual_forces(
     drives: Sequence[Drive], car: Car, before: Numbers, after: Numbers
 ) -> tuple[Residual, ...]:
     """Return the force and the wheel angle left over by two cars, smoothed, with their bands.
@@ -93,7 +96,7 @@ def honest(after: Floats, std: Floats) -> Floats:
 
 
 def _track(drive: Drive, car: Car, before: Numbers, after: Numbers) -> _Track | None:
-    force = LEAN * GRAVITY * car.value("body.mass_kg")
+    force = HORIZONTAL_G * GRAVITY * car.value("body.mass_kg")
     camera = Camera(drive, after)
     sides = [
         Side(before, camera),

@@ -36,7 +36,7 @@ class _Line:
     std: Floats
 
 
-def sensed(
+def sensor_residuals(
     model: Likelihood, found: Numbers, faults: Set[str], channels: Sequence[str]
 ) -> tuple[Residual, ...]:
     """Return what the named channels read beyond the prediction, without and with faults.

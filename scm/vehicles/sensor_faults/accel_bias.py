@@ -7,6 +7,7 @@ Shows in: standing still.   Source: IEEE Std 1293, accelerometer model; + forwar
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -30,5 +31,10 @@ SENSOR_FAULT = SensorFault(
               "added, + forward", Normal(0.0, 0.1), report="x_mps2"),
         Param("across", 0.0, "m/s^2", "measure.accel_bias_y_m_s2", (-5.0, 5.0),
               "added, + left", Normal(0.0, 0.1), report="y_mps2"),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("constant",), starts=((0.1, 0.0), (0.0, 0.1)),
+        steps=(0.02, 0.02),
+        sentence="The accelerometer reads {x_mps2} and {y_mps2} too much along and across.",
     ),
 )  # fmt: skip

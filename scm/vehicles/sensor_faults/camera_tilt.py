@@ -16,6 +16,7 @@ Source: pinhole projection (Hartley and Zisserman, Multiple View Geometry, chapt
 import numpy as np
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -43,5 +44,12 @@ SENSOR_FAULT = SensorFault(
               "+ where the floor at +x looks too small", Normal(0.0, 0.03)),
         Param("tilt_y", 0.0, "1/m", "measure.camera_tilt_y_per_m", (-0.3, 0.3),
               "+ where the floor at +y looks too small", Normal(0.0, 0.03)),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("position",),
+        starts=((0.03, 0.0), (-0.03, 0.0), (0.0, 0.03), (0.0, -0.03)), steps=(0.005, 0.005),
+        shared="camera",
+        sentence="The camera looks askew: its scale changes by {tilt_x} along x and {tilt_y} "
+                 "along y.",
     ),
 )  # fmt: skip

@@ -7,6 +7,7 @@ Source: crystal tolerance is 1e-4; interpolating drivers and virtual machines re
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -25,5 +26,10 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("rate", 0.0, "1", "measure.clock_rate", (-0.1, 0.1),
               "seconds gained a second", Normal(0.0, 0.003)),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("time",), starts=((0.003,), (-0.003,)), steps=(0.0005,),
+        shared="camera",
+        sentence="The camera's clock runs fast by {rate}.",
     ),
 )  # fmt: skip

@@ -8,6 +8,7 @@ Source: unsynchronised computers; + where the poses' clock is ahead. A positive 
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -26,5 +27,11 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("offset", 0.0, "s", "measure.clock_offset_s", (-5.0, 5.0),
               "ahead of the car's clock", Normal(0.0, 0.1), report="offset_s"),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("speed",), starts=((-0.02,), (-0.04,), (-0.1,)),
+        steps=(0.01,), bounds={"offset_s": (-0.3, 0.0)}, shared="camera",
+        sentence="The poses' clock is {offset_s} against the car's: commands and sensors are "
+                 "stamped late.",
     ),
 )  # fmt: skip

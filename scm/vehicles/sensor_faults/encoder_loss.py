@@ -8,6 +8,7 @@ Source: dirty disc, missed interrupts; the definition is ours. On encoders alone
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -24,5 +25,9 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("fraction", 0.0, "1", "measure.encoder_loss", (0.0, 0.95),
               "share of the counts that is lost", LogNormal(0.03, 1.0)),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("wheel",), starts=((0.03,), (0.1,)), steps=(0.01,),
+        sentence="The encoders lose {fraction} of their counts.",
     ),
 )  # fmt: skip

@@ -7,6 +7,7 @@ Source: IEEE Std 952, gyro error model; + shows a turn to the left.
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -23,5 +24,9 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("bias", 0.0, "rad/s", "measure.gyro_bias_rad_s", (-1.0, 1.0),
               "added, + left", Normal(0.0, 0.02), report="bias_rad_s"),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("constant",), starts=((0.02,), (-0.02,)), steps=(0.005,),
+        sentence="The gyro reads {bias_rad_s} too much.",
     ),
 )  # fmt: skip

@@ -7,6 +7,7 @@ Source: IEEE Std 952, scale factor error.
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -23,5 +24,9 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("scale", 1.0, "1", "measure.gyro_scale", (0.2, 5.0),
               "measured over true rate", Normal(1.0, 0.03)),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("yaw rate",), starts=((1.03,), (0.97,)), steps=(0.01,),
+        sentence="The gyro shows {scale} of the true yaw rate.",
     ),
 )  # fmt: skip

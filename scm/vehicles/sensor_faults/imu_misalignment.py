@@ -10,6 +10,7 @@ Source: rotation of axes; + where the sensor is turned counter-clockwise (left) 
 import math
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -31,5 +32,9 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("angle", 0.0, "rad", "measure.imu_angle_rad", (-3.15, 3.15),
               "sensor's turn on the car, + left", Normal(0.0, 0.05), report="angle_rad"),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("acceleration",), starts=((0.05,), (-0.05,)), steps=(0.01,),
+        sentence="The IMU is turned by {angle_rad} in the car.",
     ),
 )  # fmt: skip

@@ -8,6 +8,7 @@ Source: rigid-body geometry; + where the marker is turned counter-clockwise on t
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -24,5 +25,10 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("offset", 0.0, "rad", "measure.pose_heading_rad", (-3.15, 3.15),
               "marker's turn on the car, + left", Normal(0.0, 0.03), report="offset_rad"),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("constant",), starts=((0.02,), (-0.02,)), steps=(0.005,),
+        shared="tags",
+        sentence="The camera's heading is off by {offset_rad}.",
     ),
 )  # fmt: skip

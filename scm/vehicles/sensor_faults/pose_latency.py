@@ -9,6 +9,7 @@ Source: textbook dead time; camera exposure, detection and radio together.
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -26,5 +27,10 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("delay", 0.0, "s", "measure.pose_delay_s", (0.0, 1.0),
               "from the moment shown to the stamp", LogNormal(0.05, 0.8), report="delay_s"),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("speed",), starts=((0.02,), (0.04,), (0.08,), (0.16,)),
+        steps=(0.01,), shared="camera",
+        sentence="The camera's poses are {delay_s} old when they are stamped.",
     ),
 )  # fmt: skip

@@ -11,6 +11,7 @@ believed one: + ahead of it, + to its left.
 import numpy as np
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -34,5 +35,10 @@ SENSOR_FAULT = SensorFault(
               "marker ahead of where it is believed", Normal(0.0, 0.03), report="x_m"),
         Param("aside", 0.0, "m", "measure.pose_point_y_m", (-1.0, 1.0),
               "marker left of where it is believed", Normal(0.0, 0.02), report="y_m"),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("yaw rate",),
+        starts=((0.03, 0.0), (-0.03, 0.0), (0.0, 0.02)), steps=(0.005, 0.005), shared="tags",
+        sentence="The tracked point lies {x_m} ahead and {y_m} left of where it is said to be.",
     ),
 )  # fmt: skip

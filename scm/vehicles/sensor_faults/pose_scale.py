@@ -7,6 +7,7 @@ Source: ground-plane calibration; a camera believed at the wrong height does thi
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -23,5 +24,10 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("scale", 1.0, "1", "measure.pose_scale", (0.2, 5.0),
               "measured over true distance", Normal(1.0, 0.03)),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("position",), starts=((1.02,), (0.98,)), steps=(0.005,),
+        shared="camera",
+        sentence="The camera shows {scale_cm} for every 100 cm on the floor.",
     ),
 )  # fmt: skip

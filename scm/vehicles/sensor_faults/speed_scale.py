@@ -7,6 +7,7 @@ Source: rolling without slip; an odometer knows its wheels' radius and gearing o
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -23,5 +24,10 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("scale", 1.0, "1", "measure.speed_scale", (0.2, 5.0),
               "measured over true speed", Normal(1.0, 0.03)),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("speed",), starts=((1.03,), (0.97,)), steps=(0.005,),
+        needs_odometer=True,
+        sentence="The speed sensor shows {scale} of the true speed.",
     ),
 )  # fmt: skip

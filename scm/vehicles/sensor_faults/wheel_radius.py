@@ -9,6 +9,7 @@ Source: rolling without slip; worn, soft or wrong tyres.
 """
 
 from scm.arrays import Floats
+from scm.vehicles.identification import Identification
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -26,5 +27,9 @@ SENSOR_FAULT = SensorFault(
     params=(
         Param("scale", 1.0, "1", "measure.wheel_radius_scale", (0.5, 2.0),
               "true rolling radius over nominal", Normal(1.0, 0.02)),
+    ),
+    identification=Identification(
+        equation="sensor", depends_on=("wheel",), starts=((1.03,), (0.97,)), steps=(0.005,),
+        sentence="The wheels roll as if their radius were {scale} of the nominal one.",
     ),
 )  # fmt: skip

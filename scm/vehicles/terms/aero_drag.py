@@ -9,6 +9,7 @@ Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 4; coefficie
 
 import math
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -55,4 +56,9 @@ TERM = Term(
     neutral={"coefficient": 0.0}, params=_PARAMS, shows_in=("coast_down",),
     also=(Term(aero_drag_across, per=Per.BODY, adds="force_y", damping=aero_drag_damping,
                passive=True, neutral={"coefficient": 0.0}, params=_PARAMS, shows_in=("wind",)),),
+    identification=Identification(
+        equation="body", depends_on=("speed",), starts=((0.1,), (0.5,)), steps=(0.05,),
+        needs_mps=0.5, adds=True,
+        sentence="Something brakes the car with the square of its speed, {coefficient}.",
+    ),
 )  # fmt: skip

@@ -7,6 +7,7 @@ Holds: minutes, on the flat part of the discharge curve.   Shows in: the same la
 Source: first order of a discharge at constant current; definition ours.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -27,5 +28,9 @@ TERM = Term(
     params=(
         Param("fraction_per_min", 0.0, "1/min", "drive.sag_per_min", (0.0, 0.6),
               "share of the voltage lost a minute", LogNormal(0.03, 1.0)),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("time",), starts=((0.03,), (0.12,)), steps=(0.01,),
+        sentence="The drive weakens by {fraction_per_min} a minute, as a battery that runs down.",
     ),
 )  # fmt: skip

@@ -8,6 +8,7 @@ Shows in: fast circles, steering steps at speed.
 Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 6.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -28,5 +29,11 @@ TERM = Term(
     params=(
         Param("shift", 0.0, "m", "com_shift.shift_m", (-0.4, 0.4),
               "+ forward", Normal(0.0, 0.02), report="shift_m"),
+    ),
+    identification=Identification(
+        equation="body", depends_on=("lateral acceleration",),
+        starts=((0.015,), (-0.015,), (0.05,), (-0.05,)), steps=(0.005,), needs_m_s2=1.0,
+        also_moves={"measure.pose_point_x_m": 1.0},
+        sentence="The centre of gravity lies {shift_m} further forward than the file says.",
     ),
 )  # fmt: skip

@@ -7,6 +7,7 @@ Holds: forward and backward, below the tyres' peak.   Shows in: circles slower t
 Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 6 (cornering drag).
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -35,5 +36,10 @@ TERM = Term(
     params=(
         Param("coefficient", 0.0, "1", "corner_drag.coefficient", (0.0, 3.0),
               "drag over cornering force", LogNormal(0.1, 1.0)),
+    ),
+    identification=Identification(
+        equation="body", depends_on=("steering angle", "speed"), starts=((0.3,), (1.0,)),
+        steps=(0.1,),
+        sentence="Turning the wheels brakes the car: coefficient {coefficient}.",
     ),
 )  # fmt: skip

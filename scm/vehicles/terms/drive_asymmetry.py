@@ -6,6 +6,7 @@ Holds: each driven wheel has its motor.   Shows in: straight drives, forward aga
 Source: geometry of unequal motors; + makes the left side stronger and the car turn right.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -26,5 +27,10 @@ TERM = Term(
     params=(
         Param("difference", 0.0, "1", "drive.asymmetry", (-0.6, 0.6),
               "half the difference left to right, over the mean", Normal(0.0, 0.1)),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("side",), starts=((0.05,), (-0.05,), (0.15,), (-0.15,)),
+        steps=(0.02,),
+        sentence="The left motor pulls {difference} more than nominal, the right one as much less.",
     ),
 )  # fmt: skip

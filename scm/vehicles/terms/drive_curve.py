@@ -8,6 +8,7 @@ Holds: the same both ways.   Shows in: steady speed at several throttles.
 Source: CPM Lab's vehicle model has sign(f) |f|^p with p = 1.3 to 1.6 for it; the parabola is ours.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -28,5 +29,10 @@ TERM = Term(
     params=(
         Param("curvature", 0.0, "1", "drive.curvature", (-1.0, 1.0),
               "share of the parabola", Normal(0.0, 0.3)),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("throttle",), starts=((0.2,), (-0.2,)), steps=(0.03,),
+        rare=10.0,
+        sentence="Throttle and drive are not proportional: curvature {curvature}.",
     ),
 )  # fmt: skip

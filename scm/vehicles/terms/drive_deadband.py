@@ -6,6 +6,7 @@ Holds: the same both ways.   Shows in: throttle ramps, crawling.
 Source: textbook dead zone; the real Nigel needs about 0.2 throttle to move.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -26,5 +27,10 @@ TERM = Term(
     params=(
         Param("threshold", 0.0, "1", "drive.deadband", (0.0, 0.6),
               "throttle below which nothing happens", LogNormal(0.05, 0.8)),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("throttle",), starts=((0.015,), (0.04,), (0.1,)),
+        steps=(0.01,),
+        sentence="Throttle below {threshold} does nothing.",
     ),
 )  # fmt: skip

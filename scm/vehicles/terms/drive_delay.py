@@ -6,6 +6,7 @@ Holds: constant dead time; the skeleton keeps the commands.   Shows in: throttle
 Source: textbook dead time; radio, bus and controller cycle together.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -26,5 +27,10 @@ TERM = Term(
     params=(
         Param("delay", 0.0, "s", "drive.delay_s", (0.0, 0.5),
               "from command to motor", LogNormal(0.05, 0.8), report="delay_s"),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("throttle",), starts=((0.02,), (0.04,), (0.08,), (0.16,)),
+        steps=(0.01,),
+        sentence="The motor answers the throttle {delay_s} late.",
     ),
 )  # fmt: skip

@@ -7,6 +7,7 @@ Holds: below full throttle's limit.   Shows in: steady speed at any throttle.
 Source: a motor controller's scale (voltage, pulse width); the definition is ours.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -27,5 +28,10 @@ TERM = Term(
     params=(
         Param("gain", 1.0, "1", "drive.gain", (0.1, 3.0),
               "throttle taken over throttle given", LogNormal(1.0, 0.3)),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("throttle",), starts=((0.9,), (1.1,), (0.75,), (1.3,)),
+        steps=(0.02,),
+        sentence="The car drives as if the throttle were {gain} of the command.",
     ),
 )  # fmt: skip

@@ -11,6 +11,7 @@ Shows in: throttle held in several headings, rolling from rest.   Source: static
 
 import math
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.lane_math import sin_cos
 from scm.vehicles.param import Normal, Param
@@ -49,4 +50,10 @@ TERM = Term(
     shows_in=("headings", "roll_from_rest"),
     also=(Term(grade_across, per=Per.BODY, adds="force_y", neutral={"slope": 0.0},
                params=_PARAMS, shows_in=("headings",)),),
+    identification=Identification(
+        equation="body", depends_on=("heading",),
+        starts=((0.02, 0.0), (0.02, 1.57), (0.02, 3.14), (0.02, -1.57)), steps=(0.005, 0.1),
+        rare=4.0, like="wind", shared="floor",
+        sentence="The floor rises by {slope} towards {uphill_rad} from world x.",
+    ),
 )  # fmt: skip

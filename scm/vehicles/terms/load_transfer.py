@@ -7,6 +7,7 @@ Holds: while all wheels carry load.   Shows in: fast circles, hard braking.
 Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapters 1 and 6.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -27,5 +28,11 @@ TERM = Term(
     params=(
         Param("height", 0.0, "m", "load_transfer.height_m", (-0.2, 0.3),
               "+ higher", Normal(0.0, 0.02), report="height_m"),
+    ),
+    identification=Identification(
+        equation="tyre", depends_on=("lateral acceleration",), starts=((0.05,), (-0.03,)),
+        steps=(0.01,), rare=6.0, needs_m_s2=1.0,
+        sentence="Load moves between the wheels as if the centre of gravity were {height_m} "
+                 "higher.",
     ),
 )  # fmt: skip

@@ -9,6 +9,7 @@ Holds: one time constant of warming.   Shows in: long drives with a pause.
 Source: first-order warming (Fitzgerald, Electric Machinery); the strength's form is ours.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -36,5 +37,9 @@ TERM = Term(
               "drive lost when warm at a usual load", LogNormal(0.1, 0.8)),
         Param("warm_time", 60.0, "s", "drive.fade_time_s", (1.0, 3600.0),
               "63 % of the way to warm", fit=False),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("load", "time"), starts=((0.1,), (0.3,)), steps=(0.03,),
+        sentence="The motors lose up to {fraction} of their drive as they warm up.",
     ),
 )  # fmt: skip

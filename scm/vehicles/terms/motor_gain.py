@@ -7,6 +7,7 @@ Holds: torque-speed line scaled as a whole, no-load speed as it was.   Shows in:
 Source: DC motor with other resistance (Fitzgerald, Electric Machinery); definition ours.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -27,5 +28,10 @@ TERM = Term(
     params=(
         Param("gain", 1.0, "1", "motor.gain", (0.1, 3.0),
               "torque over nominal", LogNormal(1.0, 0.3)),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("torque",), starts=((0.9,), (1.1,), (0.75,), (1.3,)),
+        steps=(0.03,), rare=14.0, like="payload",
+        sentence="The motors give {gain} of their torque.",
     ),
 )  # fmt: skip

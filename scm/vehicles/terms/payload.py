@@ -8,6 +8,7 @@ ramp, or a known load added, tells them apart.
 Shows in: throttle steps, ramps.   Source: Newton's second law.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -28,5 +29,10 @@ TERM = Term(
     params=(
         Param("mass", 0.0, "kg", "payload.mass_kg", (-0.1, 20.0),
               "carried beside the car file's mass", Normal(0.0, 1.0), report="mass_kg"),
+    ),
+    identification=Identification(
+        equation="body", depends_on=("acceleration",), starts=((0.3,), (1.0,), (2.5,)),
+        steps=(0.1,), bounds={"mass_kg": (0.0, 20.0)}, like="motor_gain",
+        sentence="The car carries {mass_kg} more than its file says.",
     ),
 )  # fmt: skip

@@ -8,6 +8,7 @@ Holds: hard floor, below 15 m/s.   Shows in: coast-down that stops too late.
 Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 4.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -33,5 +34,10 @@ TERM = Term(
             "coefficient", 0.0, "1", "wheel.rolling_resistance", (0.0, 0.2),
             "resisting force over load", LogNormal(0.015, 0.7),
         ),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("constant",), starts=((0.01,), (0.03,), (0.08,)),
+        steps=(0.005,), adds=True,
+        sentence="Rolling resistance is {coefficient} of the weight.",
     ),
 )  # fmt: skip

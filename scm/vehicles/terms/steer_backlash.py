@@ -6,6 +6,7 @@ Holds: wheels that stay where they are within the play.   Shows in: small revers
 Source: play operator (Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989).
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -27,5 +28,10 @@ TERM = Term(
     params=(
         Param("width", 0.0, "rad", "steering.backlash_rad", (0.0, 0.3),
               "full width of the play, at the wheels", LogNormal(0.03, 0.8), report="width_rad"),
+    ),
+    identification=Identification(
+        equation="steering", depends_on=("steering history",), starts=((0.015,), (0.04,), (0.1,)),
+        steps=(0.01,),
+        sentence="The steering has {width_rad} of play.",
     ),
 )  # fmt: skip

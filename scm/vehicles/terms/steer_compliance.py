@@ -12,6 +12,7 @@ Holds: side force alone, from Newton and Euler in the plane.   Shows in: circles
 Source: Milliken, Race Car Vehicle Dynamics (1995), chapter 23: lateral force compliance steer.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -56,4 +57,10 @@ TERM = Term(
     ),
     also=(Term(steer_compliance_angle, per=Per.BODY, sets="steer_angle",
                shows_in=("fast_circle",)),),
+    identification=Identification(
+        equation="steering", depends_on=("lateral force",), starts=((0.03,), (0.1,), (0.3,)),
+        steps=(0.01,), needs_m_s2=0.5,
+        sentence="The front wheels give way under side force, {rad_per_weight} for the car's "
+                 "weight.",
+    ),
 )  # fmt: skip

@@ -6,6 +6,7 @@ Holds: constant dead time; the skeleton keeps the commands.   Shows in: steering
 Source: textbook dead time; radio, bus and the servo's 20 ms frame together.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -26,5 +27,10 @@ TERM = Term(
     params=(
         Param("delay", 0.0, "s", "steering.delay_s", (0.0, 0.5),
               "from command to servo", LogNormal(0.05, 0.8), report="delay_s"),
+    ),
+    identification=Identification(
+        equation="steering", depends_on=("steering",), starts=((0.02,), (0.04,), (0.08,), (0.16,)),
+        steps=(0.01,),
+        sentence="The steering answers {delay_s} late.",
     ),
 )  # fmt: skip

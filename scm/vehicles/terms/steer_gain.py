@@ -6,6 +6,7 @@ Holds: another horn or rod length, small angles.   Shows in: slow circles of any
 Source: linkage geometry, first order; at speed `understeer` looks alike, slow circles tell.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -26,5 +27,10 @@ TERM = Term(
     params=(
         Param("gain", 1.0, "1", "steering.gain", (0.2, 2.0),
               "angle over the angle meant", LogNormal(1.0, 0.15)),
+    ),
+    identification=Identification(
+        equation="steering", depends_on=("steering",), starts=((0.9,), (1.1,), (0.75,), (1.3,)),
+        steps=(0.02,),
+        sentence="The wheels turn by {gain} of the commanded angle.",
     ),
 )  # fmt: skip

@@ -6,6 +6,7 @@ Holds: one dominant time constant.   Shows in: steering steps.
 Source: Lorenzo-Lyons/DART, vehicle model (steering time constant).
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -28,5 +29,10 @@ TERM = Term(
     params=(
         Param("time_constant", 0.0, "s", "steering.lag_s", (0.0, 2.0),
               "63 % of a step", LogNormal(0.05, 0.8), report="time_constant_s"),
+    ),
+    identification=Identification(
+        equation="steering", depends_on=("steering",), starts=((0.02,), (0.04,), (0.08,), (0.16,)),
+        steps=(0.01,),
+        sentence="The steering follows sluggishly, with a time constant of {time_constant_s}.",
     ),
 )  # fmt: skip

@@ -6,6 +6,7 @@ Holds: servos that run at one speed.   Shows in: steering steps, fast slaloms.
 Source: servo data sheets give the speed at one voltage; it goes with the supply.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -26,5 +27,10 @@ TERM = Term(
     params=(
         Param("scale", 1.0, "1", "steering.rate_scale", (0.05, 5.0),
               "speed over the nominal one", LogNormal(1.0, 0.4)),
+    ),
+    identification=Identification(
+        equation="steering", depends_on=("steering",), starts=((0.5,), (0.75,), (1.5,)),
+        steps=(0.05,),
+        sentence="The steering servo turns at {scale} of its nominal rate.",
     ),
 )  # fmt: skip

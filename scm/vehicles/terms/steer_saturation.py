@@ -6,6 +6,7 @@ Holds: stops hard against the servo.   Shows in: tightest circles, both ways.
 Source: geometry; both numbers are shares of full command, + both, 1 where nothing is cut.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -28,5 +29,10 @@ TERM = Term(
               "largest left command that still acts", Normal(1.0, 0.2)),
         Param("right", 1.0, "1", "steering.stop_right", (0.1, 1.0),
               "largest right command that still acts", Normal(1.0, 0.2)),
+    ),
+    identification=Identification(
+        equation="steering", depends_on=("steering",), starts=((0.7, 1.0), (1.0, 0.7), (0.7, 0.7)),
+        steps=(0.02, 0.02), bounds={"left": (0.3, 1.0), "right": (0.3, 1.0)},
+        sentence="The steering ends at {left} of full lock on the left and {right} on the right.",
     ),
 )  # fmt: skip

@@ -5,6 +5,7 @@
 Holds: bent or badly set rod.   Shows in: straight drives.   Source: geometry; + turns left.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -25,5 +26,10 @@ TERM = Term(
     params=(
         Param("offset", 0.0, "rad", "steering.trim_rad", (-0.3, 0.3),
               "added to the wheels' angle, + left", Normal(0.0, 0.03), report="offset_rad"),
+    ),
+    identification=Identification(
+        equation="steering", depends_on=("constant",),
+        starts=((0.02,), (-0.02,), (0.08,), (-0.08,)), steps=(0.005,),
+        sentence="The wheels stand {offset_rad} to the left when the command is straight ahead.",
     ),
 )  # fmt: skip

@@ -6,6 +6,7 @@ Holds: Stribeck's falling branch, beside `coulomb_friction` that stays.   Shows 
 throttle ramps from rest.   Source: Armstrong-Helouvry, Control of Machines with Friction (1991).
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.lane_math import exp_neg
 from scm.vehicles.param import LogNormal, Param
@@ -31,5 +32,10 @@ TERM = Term(
               "at rest, per driven wheel", LogNormal(0.03, 0.8), report="torque_nm"),
         Param("fade_speed", 0.6, "rad/s", "drive.stiction_fade_rad_s", (0.01, 50.0),
               "wheel speed where a third is left", fit=False),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("speed",), starts=((0.02,), (0.06,), (0.15,)), steps=(0.01,),
+        sentence="Near standstill the driven wheels stick with {torque_nm} more than the model "
+                 "knows.",
     ),
 )  # fmt: skip

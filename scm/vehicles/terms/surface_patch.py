@@ -10,6 +10,7 @@ Source: ours; carpets, tape and spills in the DART recordings.
 
 import math
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -56,4 +57,10 @@ TERM = Term(
     params=(*_SPOT, _GRIP), shows_in=("laps", "coast_down"),
     also=(Term(surface_patch_rolling, per=Per.WHEEL, sets="rolling",
                neutral={"patch_rolling": 0.0}, params=(*_SPOT, _ROLLING), shows_in=("laps",)),),
+    identification=Identification(
+        equation="surface", depends_on=("position",), starts=(), steps=(0.1, 0.1, 0.05, 0.1, 0.01),
+        shared="floor",
+        sentence="A spot of floor near ({x_m}, {y_m}), {radius_m} in radius, has grip {grip} and "
+                 "rolling resistance {rolling}.",
+    ),
 )  # fmt: skip

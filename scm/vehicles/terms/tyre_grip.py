@@ -7,6 +7,7 @@ Holds: one tyre compound on one floor.   Shows in: fast circles, launch, hard br
 Source: Coulomb friction; Pacejka, Tire and Vehicle Dynamics (scaling of peak friction).
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -27,5 +28,10 @@ TERM = Term(
     params=(
         Param("scale", 1.0, "1", "tyre_grip.scale", (0.05, 3.0),
               "below 1 more slippery", LogNormal(1.0, 0.3)),
+    ),
+    identification=Identification(
+        equation="tyre", depends_on=("slip",), starts=((0.7,), (1.2,)), steps=(0.05,), rare=4.0,
+        needs_m_s2=1.0, bounds={"scale": (0.2, 2.0)},
+        sentence="The tyres hold {scale} of their nominal side force.",
     ),
 )  # fmt: skip

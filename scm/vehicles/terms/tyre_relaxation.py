@@ -14,6 +14,7 @@ Source: Pacejka, Tire and Vehicle Dynamics, single contact point transient model
 
 import math
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -60,4 +61,9 @@ TERM = Term(
     also=(Term(tyre_relaxation_speed, per=Per.WHEEL, sets="side_lag_speed",
                neutral={"length": 0.0}, params=(_LENGTH, _LOW_SPEED),
                shows_in=("steering_step",)),),
+    identification=Identification(
+        equation="tyre", depends_on=("slip history",), starts=((0.05,), (0.15,), (0.4,)),
+        steps=(0.02,), needs_m_s2=0.5, parameters=("length_m",),
+        sentence="The tyres build up side force only after rolling {length_m}.",
+    ),
 )  # fmt: skip

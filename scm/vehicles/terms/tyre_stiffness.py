@@ -8,6 +8,7 @@ Holds: below the curve's peak.   Shows in: fast circles, steering steps.
 Source: Pacejka, Tire and Vehicle Dynamics (similarity method, scaling of slip stiffness).
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -28,5 +29,10 @@ TERM = Term(
     params=(
         Param("scale", 1.0, "1", "tyre_stiffness.scale", (0.1, 5.0),
               "below 1 softer", LogNormal(1.0, 0.4)),
+    ),
+    identification=Identification(
+        equation="tyre", depends_on=("slip",), starts=((0.4,), (0.7,), (1.5,)), steps=(0.05,),
+        needs_m_s2=1.0, bounds={"scale": (0.2, 4.0)},
+        sentence="The tyres answer side slip with {scale} of their nominal stiffness.",
     ),
 )  # fmt: skip

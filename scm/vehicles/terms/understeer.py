@@ -8,6 +8,7 @@ Holds: steady turns below the tyres' peak.   Shows in: circles at two speeds.
 Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 6 (understeer gradient).
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -28,5 +29,10 @@ TERM = Term(
     params=(
         Param("gradient", 0.0, "rad*s^2/m", "understeer.gradient", (-0.1, 0.5),
               "angle lost over lateral acceleration", Normal(0.0, 0.02)),
+    ),
+    identification=Identification(
+        equation="steering", depends_on=("lateral acceleration",), starts=((0.01,), (0.05,)),
+        steps=(0.003,), needs_m_s2=0.5,
+        sentence="The car turns less the faster it corners: {gradient}.",
     ),
 )  # fmt: skip

@@ -5,6 +5,7 @@
 Holds: slow air, cables, grease.   Shows in: coast-down.   Source: AutoDRIVE paper, rigid body drag.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
@@ -38,4 +39,9 @@ TERM = Term(
     neutral={"coefficient": 0.0}, params=_PARAMS, shows_in=("coast_down",),
     also=(Term(viscous_drag_across, per=Per.BODY, adds="force_y", damping=viscous_drag_damping,
                passive=True, neutral={"coefficient": 0.0}, params=_PARAMS, shows_in=("slide",)),),
+    identification=Identification(
+        equation="body", depends_on=("speed",), starts=((0.4,), (1.5,), (4.0,)), steps=(0.1,),
+        adds=True,
+        sentence="Something brakes the car in proportion to its speed, {coefficient}.",
+    ),
 )  # fmt: skip

@@ -8,6 +8,7 @@ as a velocity (`air_x`, `air_y` of the map) is felt through aero_drag instead.
 Shows in: throttle held in several headings, coasting.   Source: Newton's second law.
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import law
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -38,4 +39,10 @@ TERM = Term(
     shows_in=("headings", "coast_down"),
     also=(Term(wind_across, per=Per.BODY, adds="force_y", neutral=_NEUTRAL, params=_PARAMS,
                shows_in=("headings",)),),
+    identification=Identification(
+        equation="body", depends_on=("heading",),
+        starts=((0.2, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.2)), steps=(0.05, 0.05), rare=10.0,
+        bounds={"force_x_n": (-20.0, 20.0)}, like="grade", shared="floor",
+        sentence="A steady push of {force_x_n} and {force_y_n} along the floor's x and y.",
+    ),
 )  # fmt: skip

@@ -1,19 +1,19 @@
-"""Drives of several cars under one camera, and their searches where nothing was found yet."""
+"""Drives of several cars under one camera, and selections of their effects."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from scm.mismatch.diagnose import Searched
 from scm.mismatch.effect_catalogue import by_name, candidates
 from scm.mismatch.fit.data_split import split
-from scm.mismatch.fit.fitter import Fitted
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.select.search import Search, Step
+from scm.mismatch.select.round import Context, Round
+from scm.mismatch.select.search import Selection
+from scm.mismatch.select.selected import Selected
 from scm.replay.drive import Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive, nigel
 
-LISTED = ("camera_tilt", "pose_point", "pose_heading", "pose_latency", "steer_trim", "grade")
+CATALOGUE = ("camera_tilt", "pose_point", "pose_heading", "pose_latency", "steer_trim", "grade")
 
 
 def tilted(recording, tilt_x, tilt_y):
@@ -43,32 +43,27 @@ def drive_of(seed, seconds=13.0):
     return made_drive(seconds=seconds, seed=seed)
 
 
-def searched(recording, **found):
-    """A search that found the effects given, by name with values to begin from."""
+def selected(recording, **found):
+    """A selection that found the effects given, by name with values to begin from."""
     drives = [Drive(recording, big_nigel())]
-    model = Likelihood(drives, big_nigel())
+    model = Likelihood.of(drives, big_nigel())
     parts = split(model)
-    listed = candidates(big_nigel())
-    library = tuple(by_name(listed, name) for name in LISTED)
-    search = Search(model, parts.fit.weight + parts.choose.weight, library, lambda _: None)
-    effects = tuple(by_name(library, name) for name in found)
+    catalogue = tuple(by_name(candidates(big_nigel()), name) for name in CATALOGUE)
+    context = Context(parts.fit.weight + parts.choose.weight, catalogue)
+    effects = tuple(by_name(catalogue, name) for name in found)
     values = np.array([v for some in found.values() for v in some], dtype=float)
-    begun = search.fitter.null()
-    if effects:
-        begun = Fitted(effects, begun.z, values, np.zeros(0), 0.0, np.zeros((0, 0)))
-    (best,) = search.fitter.refine([begun], rounds=3, fresh=True)
-    if not effects:
-        search.retuned = best
-        search.steps = [_tried(search, best)]
-    return Searched(
-        (recording,), drives, nigel(), model, parts, search, best, False, (), None, None
-    )  # fmt: skip
+    fitter = context.fitter(model)
+    begun = replace(fitter.unfitted(), effects=effects, values=values)
+    (best,) = fitter.refine([begun], rounds=3, fresh=True)
+    rounds = () if effects else (_tried(context, best),)
+    return Selected(
+        (recording,), drives, nigel(), context, parts, Selection(best, best, rounds), (), None, None
+    )
 
 
-def _tried(search, base):
-    """The first round of a search, of which only a tilt was refitted."""
-    tilt = by_name(search.listed, "camera_tilt")
-    trials = [((tilt,), np.array(start)) for start in tilt.starts]
-    begun = search.fitter.begin(base, trials, amplified=True)
-    rivals = search.fitter.refine(sorted(begun, key=lambda f: f.q)[:1], rounds=3)
-    return Step(base, tuple(rivals), tuple(search.criterion(f) for f in rivals))
+def _tried(context, base):
+    """The first round of a selection, of which only a tilt was refitted."""
+    tilt, fitter = by_name(context.catalogue, "camera_tilt"), context.fitter(base.model)
+    begun = fitter.begin(base, [((tilt,), np.array(s)) for s in tilt.starts], amplified=True)
+    tried = fitter.refine(sorted(begun, key=lambda f: f.score)[:1], rounds=3)
+    return Round(base, tuple(tried), tuple(context.criterion(f) for f in tried))

@@ -95,4 +95,4 @@ def driven(*args, **kwargs):
 @cache
 def healthy_model():
     """One healthy drive's likelihood."""
-    return Likelihood([driven()], big_nigel())
+    return Likelihood.of([driven()], big_nigel())

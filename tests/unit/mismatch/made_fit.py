@@ -16,9 +16,9 @@ def candidate(name):
 
 def fitted(drive, **effects):
     """Return model, re-tuned car and car with effects fitted from given values."""
-    model = Likelihood([drive], big_nigel())
+    model = Likelihood.of([drive], big_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))
-    (retuned,) = fitter.refine([fitter.null()], rounds=2, fresh=True)
+    (retuned,) = fitter.refine([fitter.unfitted()], rounds=2, fresh=True)
     if not effects:
         return model, retuned, retuned
     chosen = tuple(candidate(name) for name in effects)

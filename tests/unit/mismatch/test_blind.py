@@ -55,13 +55,13 @@ def test_one_channel_of_the_pose_that_is_missing_is_enough():
 
 
 def test_the_right_model_leaves_noise_after_a_car_was_seen_again(drive):
-    model = Likelihood([drive], big_nigel())
+    model = Likelihood.of([drive], big_nigel())
     e, _ = model([{}])
     (whitener,), left = model.whiteners, e[:, 0] ** 2
     poses = np.isin(whitener.stream, [drive.names.index(name) for name in POSES])
     after = poses & (whitener.t >= LAST_S) & (whitener.t < LAST_S + 1.0)
-    assert np.all(model.settled[(whitener.t > FIRST_S + 0.1) & (whitener.t < LAST_S - 0.1)] == 0.0)
-    assert np.all(model.settled[after] == 1.0)
+    assert np.all(model.valid[(whitener.t > FIRST_S + 0.1) & (whitener.t < LAST_S - 0.1)] == 0.0)
+    assert np.all(model.valid[after] == 1.0)
     assert left[after].max() < 16.0
     assert left[after].mean() < 1.5
 

@@ -1,4 +1,4 @@
-"""A budget ends a search in time: what was begun is undone, and what was not asked is told."""
+"""A budget ends a diagnosis in time: unfinished work counts for nothing."""
 
 import math
 from dataclasses import replace
@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 
 from scm.clock import StepClock, nanoseconds
-from scm.mismatch import diagnose
-from scm.mismatch.budget import DEFAULT_S, MOST_KEPT, WORDS, Budget, Question
-from scm.mismatch.diagnose import diagnose_car
-from scm.mismatch.discovery.decide import Lawful, _Best, _Settled
+from scm.mismatch.budget import DEFAULT_S, MAX_RESERVED, WORDS, Budget, Question
+from scm.mismatch.discovery import decide
+from scm.mismatch.discovery.decide import Compared, Discovery
 from scm.mismatch.fit.fitter import Fitter
-from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.fit.likelihood import Likelihood, Simulator
+from scm.mismatch.pipeline import diagnose_car
 from scm.mismatch.report.panels import panels_of
-from scm.mismatch.select.many_effects import ManyEffectsSearch
-from scm.mismatch.select.search import Search
+from scm.mismatch.select import many_effects, selected
+from scm.mismatch.select.round import Context
+from scm.mismatch.select.search import Explanation, Selection, retune, select
 from scm.records.mismatch import BUDGET_S
 from tests.unit.mismatch.discovery import made_effect
 from tests.unit.mismatch.made_drive import big_nigel, driven, made_drive, nigel
@@ -35,16 +36,16 @@ class Batches(Budget):
         super().check()
 
 
-def late(asked_s, at_s):
+def late(limit_s, at_s):
     """A budget at some time of it."""
     clock = StepClock()
-    budget = Budget(asked_s, clock)
+    budget = Budget(limit_s, clock)
     clock.set_ns(nanoseconds(at_s))
     return budget
 
 
-def names(unasked):
-    return [question.name for question in unasked]
+def names(unanswered):
+    return [question.name for question in unanswered]
 
 
 def test_every_question_has_words():
@@ -58,8 +59,8 @@ def test_the_server_allows_a_search_as_much_as_the_command_does():
 @pytest.mark.parametrize(("at_s", "found"), [(59.0, "law"), (60.0, None)])
 def test_an_attempt_goes_on_until_time_is_up(at_s, found):
     budget = late(60.0, at_s)
-    assert budget.attempt(Question.LAWS, lambda: budget.check() or "law") == found
-    assert names(budget.unasked) == ([] if found else ["laws"])
+    assert budget.attempt(Question.DISCOVERY, lambda: budget.check() or "law") == found
+    assert names(budget.unanswered) == ([] if found else ["laws"])
 
 
 def test_what_is_no_attempt_is_done_however_late():
@@ -69,31 +70,31 @@ def test_what_is_no_attempt_is_done_however_late():
 def test_an_attempt_within_another_is_given_up_alone():
     budget = late(60.0, 60.0)
     inner = lambda: budget.attempt(Question.BESIDE, budget.check)  # noqa: E731
-    assert budget.attempt(Question.LAWS, lambda: inner() or "law") == "law"
-    assert names(budget.unasked) == ["beside_law"]
-    assert budget.attempt(Question.LAWS, lambda: [inner(), budget.check()]) is None
-    assert names(budget.unasked) == ["beside_law", "laws"]
+    assert budget.attempt(Question.DISCOVERY, lambda: inner() or "law") == "law"
+    assert names(budget.unanswered) == ["beside_law"]
+    assert budget.attempt(Question.DISCOVERY, lambda: [inner(), budget.check()]) is None
+    assert names(budget.unanswered) == ["beside_law", "laws"]
 
 
 def test_time_is_kept_for_what_follows_but_never_more_than_half():
     budget = late(60.0, 45.0)
     assert not budget.is_over()
-    budget.keep(20.0)
+    budget.reserve(20.0)
     assert budget.is_over()
-    early = late(60.0, 60.0 * MOST_KEPT - 1.0)
-    early.keep(1e3)
+    early = late(60.0, 60.0 * MAX_RESERVED - 1.0)
+    early.reserve(1e3)
     assert not early.is_over()
 
 
 def test_a_question_is_told_once_and_whether_it_was_begun():
     clock = StepClock()
     budget = Budget(60.0, clock)
-    budget.attempt(Question.LAWS, lambda: [clock.set_ns(nanoseconds(61.0)), budget.check()])
-    budget.attempt(Question.LAWS, budget.check)
-    budget.attempt(Question.CALM, budget.check)
-    assert [question.text for question in budget.unasked] == [
-        "Laws outside the library were not sought to the end: the budget of 60 s ended.",
-        "Effects that the noise believed in may hide were not sought: the budget of 60 s ended.",
+    budget.attempt(Question.DISCOVERY, lambda: [clock.set_ns(nanoseconds(61.0)), budget.check()])
+    budget.attempt(Question.DISCOVERY, budget.check)
+    budget.attempt(Question.LOW_NOISE, budget.check)
+    assert [question.text for question in budget.unanswered] == [
+        "Effects outside the catalogue were not searched for to the end: the budget of 60 s ended.",
+        "Effects that the assumed noise may hide were not searched for: the budget of 60 s ended.",
     ]
 
 
@@ -106,142 +107,127 @@ def test_a_budget_knows_how_much_of_a_processor_it_got(got_s, share):
     assert budget.processor_share() == pytest.approx(share)
 
 
+class Spent(Budget):
+    """No time is left, but nothing is given up."""
+
+    spent = True
+
+    def is_spent(self):
+        return self.spent
+
+
 def test_a_fit_ends_with_its_round_when_no_time_is_left():
-    model = Likelihood([driven((("steering.trim_rad", 0.05),), seconds=6.0)], big_nigel())
+    drive, budget = driven((("steering.trim_rad", 0.05),), seconds=6.0), Spent()
+    model = Likelihood.of([drive], big_nigel(), budget=budget)
     fitter = Fitter(model, np.ones(len(model.t)))
     runs = list[int]()
-    for late in (True, False):
-        model.is_late = lambda late=late: late
-        before = model.runs
-        (fitted,) = fitter.refine([fitter.null()], fresh=True)
-        runs.append(model.runs - before)
-        assert np.isfinite(fitted.q)
+    for budget.spent in (True, False):
+        before = model.simulator.runs
+        (fitted,) = fitter.refine([fitter.unfitted()], fresh=True)
+        runs.append(model.simulator.runs - before)
+        assert np.isfinite(fitted.score)
         assert len(fitted.covariance) == len(fitted.z)
     assert runs[0] < runs[1]
 
 
 @pytest.fixture(scope="module")
 def trimmed():
-    """A drive whose steering is off, and what a search finds in it that has all the time."""
+    """A drive whose steering is off, and what a selection finds in it that has all the time."""
     drive = driven((("steering.trim_rad", 0.05),), seconds=6.0)
-    search, budget = a_search(drive)
-    before = replace(search.retuned), search.model.noise
-    budget.left = 10_000
-    best = search.run()
-    assert best.names == ("steer_trim",)
-    return drive, before, (replace(best), search.model.noise), 10_000 - budget.left
+    context, retuned = a_context(drive)
+    context.budget.left = 10_000
+    found = select(context, retuned, nothing_else)
+    assert found.best.names == ("steer_trim",)
+    return drive, retuned, found.best, 10_000 - context.budget.left
 
 
-def a_search(drive):
-    budget, library = Batches(60.0), [candidate("steer_trim"), candidate("battery_sag")]
-    model = Likelihood([drive], big_nigel())
-    return Search(model, np.ones(len(model.t)), library, lambda _: None, budget=budget), budget
+def nothing_else(_):
+    return Explanation(ends=False)
+
+
+def a_context(drive):
+    """What a selection works with, and the re-tuned car."""
+    budget, catalogue = Batches(60.0), (candidate("steer_trim"), candidate("battery_sag"))
+    model = Likelihood.of([drive], big_nigel(), budget=budget)
+    context = Context(np.ones(len(model.t)), catalogue, budget=budget)
+    return context, retune(context, model)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.9])
-def test_a_search_cut_anywhere_ends_with_what_was_whole_before(trimmed, share):
+def test_a_selection_cut_anywhere_ends_with_what_was_whole_before(trimmed, share):
     drive, before, after, batches = trimmed
-    search, budget = a_search(drive)
-    assert search.retuned.q == before[0].q
-    budget.left = int(share * batches)
-    best = search.run()
-    whole, noise = after if best.effects else before
-    assert search.model.noise == noise
+    context, retuned = a_context(drive)
+    assert retuned.score == before.score
+    context.budget.left = int(share * batches)
+    found = select(context, retuned, nothing_else)
+    best, whole = found.best, after if found.best.effects else before
+    assert best.noise == whole.noise
     assert best.names == whole.names
-    assert (best.q, best.z.tolist(), best.values.tolist()) == (
-        whole.q, whole.z.tolist(), whole.values.tolist()
+    assert (best.score, best.z.tolist(), best.values.tolist()) == (
+        whole.score, whole.z.tolist(), whole.values.tolist()
     )  # fmt: skip
-    assert len(search.steps) == len(best.effects)
-    assert names(budget.unasked) == (["further_effects"] if best.effects else ["effects"])
-
-
-def test_what_an_attempt_changed_is_put_back_where_it_is_given_up():
-    search, budget = a_search(driven(seconds=6.0))
-    fitted, noise = search.fitter.null(), search.model.noise
-    kept = replace(fitted)
-
-    def half_done():
-        search.model.believe(replace(noise, speed=2.0 * noise.speed))
-        search.steps.append("half a round")
-        fitted.z, fitted.q = fitted.z + 1.0, 0.0
-        budget.left = 0
-        search.model([{}])
-
-    assert search.within(Question.LAWS, half_done, fitted) is None
-    assert search.model.noise == noise
-    assert search.steps == []
-    assert fitted.q == kept.q
-    assert fitted.z is kept.z
+    assert len(found.rounds) == len(best.effects)
+    assert names(context.budget.unanswered) == (
+        ["further_effects"] if best.effects else ["effects"]
+    )
 
 
 @pytest.fixture
-def lawful(monkeypatch):
-    """A search without a fit yet, and a law that is better than whatever it finds."""
-    search, unseen = made_effect.searched(made_effect.lawful_drive(seconds=6.0))
-    search.budget = budget = Batches(60.0)
-    search.model.asked = budget.check
-    (listed,) = search.fitter.refine([search.fitter.null()], rounds=1, fresh=True)
-    fitted = replace(listed, effects=(made_effect.gust(),))
-    law = _Settled(fitted, search.model.noise, -math.inf, -math.inf)
-    laws = Lawful(search, unseen)
-    monkeypatch.setattr(laws, "_best", lambda _: _Best((), law, "what was sought"))
-    return search, budget, laws, listed
+def discovered(monkeypatch):
+    """A selection without an effect yet, and a discovered one that is better than any it finds."""
+    context, model, unseen = made_effect.context_of(made_effect.lawful_drive(seconds=6.0))
+    budget = Batches(60.0)
+    model = Likelihood(Simulator(model.drives, model.car, model.simulator.tiles, budget))
+    context = replace(context, budget=budget)
+    fitter = context.fitter(model)
+    (known,) = fitter.refine([fitter.unfitted()], rounds=1, fresh=True)
+    gust = replace(known, effects=(made_effect.gust(),))
+    discovery = Discovery(known, Compared(gust, -math.inf, -math.inf), None)
+    monkeypatch.setattr(decide, "discover", lambda *_: discovery)
+    return context, Selection(known, known), unseen, discovery
 
 
-def test_a_listed_model_stays_as_it_is_where_no_law_could_be_held_against_it(lawful):
-    search, budget, laws, listed = lawful
-    kept, noise = replace(listed), search.model.noise
-    budget.left = 3  # time runs out in the midst of settling the listed model
-    assert laws.decide(listed) == (listed, None)
-    assert names(budget.unasked) == ["laws"]
-    assert search.model.noise == noise
-    assert (listed.q, listed.z.tolist()) == (kept.q, kept.z.tolist())
-    assert listed.jacobian is kept.jacobian
+def test_a_known_hypothesis_stays_where_nothing_discovered_could_be_compared_with_it(discovered):
+    context, found, unseen, _ = discovered
+    context.budget.left = 3  # time runs out while the known hypothesis is settled
+    assert decide.decide(context, found, unseen) == (found.best, None)
+    assert names(context.budget.unanswered) == ["laws"]
 
 
-def test_a_law_stays_found_where_there_was_no_time_for_effects_beside_it(lawful, monkeypatch):
-    search, budget, laws, listed = lawful
-    monkeypatch.setattr(search, "settle", lambda fitted: fitted)
+def test_a_discovery_stays_where_there_was_no_time_for_effects_beside_it(discovered, monkeypatch):
+    context, found, unseen, discovery = discovered
+    monkeypatch.setattr(decide, "fit_with_noise", lambda _, fitted: fitted)
 
-    def extend(_):
+    def extend(_, base):
+        context.budget.left = 0
+        base.model([{}])
+
+    monkeypatch.setattr(decide, "extend", extend)
+    best, why = decide.decide(context, found, unseen)
+    assert best.effects == (made_effect.gust(),)
+    assert why is discovery
+    assert names(context.budget.unanswered) == ["beside_law"]
+
+
+def test_a_round_of_several_effects_that_is_cut_leaves_no_trace(monkeypatch):
+    budget = Batches(60.0)
+    model = Likelihood.of([driven(seconds=6.0)], big_nigel(), budget=budget)
+    context = Context(np.ones(len(model.t)), (candidate("steer_trim"),), budget=budget)
+    retuned = context.fitter(model).unfitted()
+
+    def cut(_, base):
         budget.left = 0
-        search.model([{}])
+        base.model([{}])
 
-    monkeypatch.setattr(search, "extend", extend)
-    found, sought = laws.decide(listed)
-    assert found.effects == (made_effect.gust(),)
-    assert sought == "what was sought"
-    assert names(budget.unasked) == ["beside_law"]
-
-
-def test_a_round_of_strides_that_is_cut_leaves_no_trace(monkeypatch):
-    model, budget = Likelihood([driven(seconds=12.0)], big_nigel()), Batches(60.0)
-    rare = replace(candidate("grade"), rare=5.0)
-    listed = (rare, candidate("steer_trim"))
-    search = ManyEffectsSearch(model, np.ones(len(model.t)), listed, lambda _: None, budget)
-    search.retuned = search.fitter.null()
-    search.steps = []
-    fitted = replace(search.retuned, effects=(rare,))
-
-    def usual_only(_):
-        assert search.listed == listed[1:]
-        budget.left = 0
-        search.steps.append("half a round")
-        model([{}])
-
-    monkeypatch.setattr(search, "_without_each", lambda _: [search.retuned])
-    monkeypatch.setattr(search, "_with_noise", lambda _: 0.0)
-    monkeypatch.setattr(search, "extend", usual_only)
-    monkeypatch.setattr(search, "_more", lambda _: search._usually(fitted, ()))
-    assert search.run().names == ()
-    assert search.listed == listed
-    assert search.steps == []
-    assert names(budget.unasked) == ["effects"]
+    monkeypatch.setattr(many_effects, "extend", cut)
+    found = many_effects.select_many(context, retuned)
+    assert found == Selection(retuned, retuned)
+    assert names(budget.unanswered) == ["effects"]
 
 
 @pytest.fixture(scope="module")
 def no_time():
-    return diagnose_car([made_drive(seconds=12.0)], nigel(), budget_s=0.0, clock=StepClock())
+    return diagnose_car([made_drive(seconds=12.0)], nigel(), budget=Budget(0.0, StepClock()))
 
 
 def test_a_diagnosis_without_time_is_fitted_and_judged_and_says_what_it_left(no_time):
@@ -249,58 +235,59 @@ def test_a_diagnosis_without_time_is_fitted_and_judged_and_says_what_it_left(no_
     assert found.fit is not None
     assert no_time.evidence.tried == ()
     assert found.effects == ()
-    assert names(found.unasked) == ["effects", "laws"]
+    assert names(found.unanswered) == ["effects", "laws"]
     (card,) = (c for c in panels_of(found, no_time.evidence) if c.title == "Time ran out")
-    assert "Laws outside the library were not sought: the budget of 0 s ended." in card.rows[0][1]
+    assert (
+        "Effects outside the catalogue were not searched for: the budget of 0 s ended."
+        in card.rows[0][1]
+    )
 
 
-def test_a_car_that_differs_in_many_ways_keeps_its_first_fit_where_strides_come_too_late(
+def far_and_straying(monkeypatch):
+    monkeypatch.setattr(selected, "is_far", lambda _: True)
+    monkeypatch.setattr(selected, "strays", lambda _: True)
+
+
+def test_a_car_that_differs_in_many_ways_keeps_its_first_fit_where_windows_come_too_late(
     monkeypatch, no_time
 ):
-    monkeypatch.setattr(diagnose, "is_far", lambda search: bool(search.retuned))
-    monkeypatch.setattr(diagnose, "strays", lambda _: True)
-    found = diagnose_car([made_drive(seconds=12.0)], nigel(), budget_s=0.0, clock=StepClock())
+    far_and_straying(monkeypatch)
+    found = diagnose_car([made_drive(seconds=12.0)], nigel(), budget=Budget(0.0, StepClock()))
     assert names(found.diagnosis.unanswered) == ["effects", "strides"]
-    assert not found.searched.rough
+    assert not found.selected.context.by_windows
     assert found.best.z.tolist() == no_time.best.z.tolist()
 
 
-def test_where_strides_come_too_late_only_they_are_told_as_left(monkeypatch):
-    clock, runs = StepClock(), []
-    really_run = Search.run
+def test_where_windows_come_too_late_only_they_are_named_as_left(monkeypatch):
+    clock = StepClock()
 
-    def run(search, *is_over):
-        runs.append(search)
-        return search.retuned if len(runs) == 1 else really_run(search, *is_over)
-
-    def too_late(search, *_):
+    def too_late(context, *_):
         clock.set_ns(nanoseconds(61.0))
-        search.budget.check()
+        context.budget.check()
 
-    monkeypatch.setattr(Search, "run", run)
-    monkeypatch.setattr(diagnose, "_by_strides", too_late)
-    monkeypatch.setattr(diagnose, "is_far", lambda search: bool(search.retuned))
-    monkeypatch.setattr(diagnose, "strays", lambda _: True)
-    found = diagnose_car([made_drive(seconds=12.0)], nigel(), budget_s=60.0, clock=clock)
+    monkeypatch.setattr(selected, "select", lambda _, retuned, *__: Selection(retuned, retuned))
+    monkeypatch.setattr(selected, "by_windows", too_late)
+    far_and_straying(monkeypatch)
+    found = diagnose_car([made_drive(seconds=12.0)], nigel(), budget=Budget(60.0, clock))
     assert names(found.diagnosis.unanswered) == ["strides"]
 
 
-def test_as_long_as_the_first_fit_took_is_kept_for_what_follows_a_search(monkeypatch):
-    clock, seen = StepClock(), []
+def test_as_long_as_the_first_fit_took_is_reserved_for_what_follows_a_selection(monkeypatch):
+    clock, seen, really_retune = StepClock(), [], selected.retune
 
-    def fitted(search):
+    def retuned(*given):
         clock.set_ns(nanoseconds(20.0))
-        return bool(search.retuned)
+        return really_retune(*given)
 
-    def run(search, *_):
+    def chosen(context, retuned, *_):
         for at_s in (39.0, 41.0):
             clock.set_ns(nanoseconds(at_s))
-            seen.append(search.budget.is_over())
-        return search.retuned
+            seen.append(context.budget.is_over())
+        return Selection(retuned, retuned)
 
-    monkeypatch.setattr(diagnose, "is_far", fitted)
-    monkeypatch.setattr(diagnose, "strays", lambda _: True)
-    monkeypatch.setattr(diagnose, "_by_strides", lambda search, *_: search.budget.check())
-    monkeypatch.setattr(Search, "run", run)
-    diagnose_car([made_drive(seconds=12.0)], nigel(), budget_s=60.0, clock=clock)
-    assert seen[:2] == [False, True]
+    monkeypatch.setattr(selected, "retune", retuned)
+    monkeypatch.setattr(selected, "select", chosen)
+    far_and_straying(monkeypatch)
+    monkeypatch.setattr(selected, "by_windows", lambda context, *_: context.budget.check())
+    diagnose_car([made_drive(seconds=12.0)], nigel(), budget=Budget(60.0, clock))
+    assert seen == [False, True]

@@ -5,15 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scm.mismatch.diagnose import (
-    Found,
-    as_given,
-    gained_nothing,
-    retuned_error,
-    strays_more,
-    verdict_of,
-    write,
-)
 from scm.mismatch.experiment.changed import drive_alone
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES
 from scm.mismatch.experiment.pace import Floor, pace_of
@@ -22,8 +13,17 @@ from scm.mismatch.experiment.separation import Separation
 from scm.mismatch.experiment.suggest import Suggestion, Weighed
 from scm.mismatch.findings import Undecided, Verdict
 from scm.mismatch.fit.data_split import split
-from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.pipeline import write
+from scm.mismatch.select.round import Context
+from scm.mismatch.validate.conclude import (
+    Result,
+    as_given,
+    gained_nothing,
+    retuned_error,
+    strays_more,
+    verdict_of,
+)
 from scm.mismatch.validate.found_car import patched
 from scm.mismatch.validate.free_runs import judge, nothing_got_worse
 from tests.unit.mismatch import made_fit
@@ -45,12 +45,12 @@ def suggested(name, between):
 
 def test_the_re_tuned_car_strays_by_what_refitting_alone_could_not_take_off():
     drive, true, half = driven((("steering.trim_rad", 0.05),)), 0.05, 0.025
-    parts = split(Likelihood([drive], big_nigel()), 5.0)
-    model = Likelihood([drive], big_nigel())
-    searched = SimpleNamespace(model=model, drives=[drive], parts=parts)
+    parts = split(Likelihood.of([drive], big_nigel()), 5.0)
+    model = Likelihood.of([drive], big_nigel())
+    selected = SimpleNamespace(best=SimpleNamespace(model=model), drives=[drive], parts=parts)
     found, tuned = (car_with({"steering.trim_rad": trim}) for trim in (true, half))
     fit, _ = judge([drive], big_nigel(), found, parts)
-    strays_m = retuned_error(searched, tuned, found)
+    strays_m = retuned_error(selected, tuned, found)
     before, after = (side["position_m"] for side in (fit.confirm.before, fit.confirm.after))
     assert after < 0.9 * strays_m < 0.7 * before
 
@@ -60,31 +60,31 @@ def test_a_car_that_strays_more_than_the_re_tuned_one_is_worse_though_better_tha
     retuned, found, worse
 ):
     drive = driven((("steering.trim_rad", 0.05),))
-    model = Likelihood([drive], big_nigel())
+    model = Likelihood.of([drive], big_nigel())
     parts = split(model, 5.0)
-    searched = SimpleNamespace(model=model, drives=[drive], parts=parts)
+    selected = SimpleNamespace(best=SimpleNamespace(model=model), drives=[drive], parts=parts)
     tuned, car = (car_with({"steering.trim_rad": trim}) for trim in (retuned, found))
     fit, _ = judge([drive], big_nigel(), car, parts)
     assert nothing_got_worse(fit) == ()
-    assert strays_more(searched, fit, tuned, car) == worse
+    assert strays_more(selected, fit, tuned, car) == worse
 
 
 def test_numbers_that_gained_nothing_on_unseen_parts_stay_as_the_file_has_them(tmp_path):
     assert gained_nothing(made_up.fit(before=0.018, after=0.0184))
     assert not gained_nothing(made_up.fit(before=0.018, after=0.0176))
     model, _, best = made_fit.healthy()
-    fitter = Fitter(model, np.ones(len(model.t)))
+    context = Context(np.ones(len(model.t)), ())
     assert np.abs(best.z).max() > 0.0
     keys = [own.key for own in model.nominal if nigel().has(own.key)]
 
     def moved(fitted):
-        car = patched(nigel(), model, fitted, tmp_path)
+        car = patched(nigel(), fitted, tmp_path)
         return [key for key in keys if car.value(key) != nigel().value(key)]
 
     assert moved(best)
-    given = as_given(fitter, best)
+    given = as_given(context, best)
     assert moved(given) == []
-    for key, value in fitter.numbers((), given.z, np.zeros(0)).items():
+    for key, value in given.numbers.items():
         text = 0.0 if key.startswith("clock.") else model.car.value(key)
         assert value == pytest.approx(text), key  # also what no car file says
 
@@ -103,7 +103,7 @@ def test_the_drives_of_two_open_questions_lie_side_by_side(tmp_path):
     found = made_up.diagnosis(
         verdict=Verdict.UNDECIDED, undecided=tuple(s.undecided for s in suggestions)
     )
-    write(Found(found, nigel(), made_up.evidence(), suggestions=suggestions), tmp_path)
+    write(Result(found, nigel(), made_up.evidence(), suggestions=suggestions), tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     for folder, name in (("next_drive", "circles"), ("next_drive_2", "straight_steps")):
         text = (tmp_path / folder / "next_drive.yaml").read_text(encoding="utf-8")

@@ -9,10 +9,11 @@ from scm.mismatch.effect_catalogue import by_name, candidates
 from scm.mismatch.fit.fitter import Fitter, _bounded
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import usual_noise
-from scm.mismatch.fit.noise_fit import learn_noise
+from scm.mismatch.fit.noise_fit import fit_noise
 from scm.mismatch.fit.rollouts import Rollouts, _shares
 from scm.mismatch.fit.whitening import Whitener, _Events
-from scm.mismatch.select.search import Search
+from scm.mismatch.select.round import Context, extend
+from scm.mismatch.select.search import retune
 from scm.replay.drive import Drive
 from scm.replay.numbers import COMMAND_CLOCK, THROTTLE_CLOCK
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
@@ -25,7 +26,7 @@ def healthy():
 
 @pytest.fixture(scope="module")
 def model(healthy):
-    return Likelihood([healthy], big_nigel())
+    return Likelihood.of([healthy], big_nigel())
 
 
 def test_rows_do_not_feel_each_other(healthy):
@@ -78,14 +79,14 @@ def test_a_servo_at_its_rate_is_not_hurried_by_a_command_within_a_step(healthy, 
 def test_a_clock_of_commands_that_is_late_delays_both_commands(model):
     both = {"drive.delay_s": 0.02, "steering.delay_s": 0.02}
     residuals, _ = model.residuals([{}, {COMMAND_CLOCK: 0.02}, both])
-    e = model.weigh(residuals)[model.settled > 0.0]
+    e = model.weigh(residuals)[model.valid > 0.0]
     clock, delayed = e[:, 1] - e[:, 0], e[:, 2] - e[:, 0]
     assert np.linalg.norm(clock - delayed) < 0.1 * np.linalg.norm(delayed)
 
 
 def test_a_clock_of_commands_shows_however_little_it_is_late(model):
     residuals, _ = model.residuals([{}, {COMMAND_CLOCK: 0.002}, {COMMAND_CLOCK: 0.0001}])
-    e = model.weigh(residuals)[model.settled > 0.0]
+    e = model.weigh(residuals)[model.valid > 0.0]
     much, little = e[:, 1] - e[:, 0], e[:, 2] - e[:, 0]
     np.testing.assert_allclose(20.0 * little, much, atol=0.02 * np.abs(much).max())
 
@@ -109,7 +110,7 @@ def test_at_the_truth_innovations_are_no_larger_than_noise(model, healthy):
     e, ok = model([{}])
     assert ok.all()
     for i, stream in enumerate(healthy.streams):
-        power = np.mean(e[(model.whiteners[0].stream == i) & (model.settled > 0.0), 0] ** 2)
+        power = np.mean(e[(model.whiteners[0].stream == i) & (model.valid > 0.0), 0] ** 2)
         assert power < 1.25, stream.name
         if stream.name.startswith("pose."):
             assert power > 0.8, stream.name
@@ -163,22 +164,22 @@ def test_a_step_within_bounds_is_the_best_there():
 )
 def test_a_fit_finds_what_was_concealed(name, key, value):
     drive = Drive(made_drive(((key, value),), seconds=12.0), big_nigel())
-    model = Likelihood([drive], big_nigel())
+    model = Likelihood.of([drive], big_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))
-    (base,) = fitter.refine([fitter.null()], rounds=3, fresh=True)
+    (base,) = fitter.refine([fitter.unfitted()], rounds=3, fresh=True)
     effect = by_name(candidates(big_nigel()), name)
     begun = fitter.begin(base, [((effect,), np.array(start)) for start in effect.starts])
-    best = min(fitter.refine(begun, rounds=5), key=lambda f: f.q)
-    assert best.q < base.q - 30.0
+    best = min(fitter.refine(begun, rounds=5), key=lambda f: f.score)
+    assert best.score < base.score - 30.0
     assert best.values[0] == pytest.approx(value, rel=0.15)
     assert np.all(np.abs(best.z) <= 2.0)
 
 
 def test_the_cars_own_twin_of_an_effect_stays_as_the_file_has_it():
     drive = Drive(made_drive((("steering.rate_scale", 0.6),), seconds=12.0), big_nigel())
-    model = Likelihood([drive], big_nigel())
+    model = Likelihood.of([drive], big_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))
-    (base,) = fitter.refine([fitter.null()], rounds=3, fresh=True)
+    (base,) = fitter.refine([fitter.unfitted()], rounds=3, fresh=True)
     own = [o.key for o in model.nominal].index("steering.rate_rad_s")
     assert base.z[own] < -0.2
     effect = by_name(candidates(big_nigel()), "steer_rate")
@@ -190,37 +191,46 @@ def test_the_cars_own_twin_of_an_effect_stays_as_the_file_has_it():
 
 
 def test_noise_that_a_poor_model_raised_is_taken_back(healthy):
-    model = Likelihood([healthy], big_nigel())
+    model = Likelihood.of([healthy], big_nigel())
     least, (residuals, _) = model.noise, model.residuals([{}])
     raised = replace(least, speed=16 * least.speed, side=16 * least.side, launch=8 * least.launch)
-    model.believe(raised)
-    learnt = learn_noise(model, residuals, rounds=1)
+    learnt = fit_noise(model.under(raised), residuals, rounds=1).noise
     assert learnt.speed <= 2 * least.speed
     assert learnt.launch <= 2 * least.launch
 
 
-def test_no_belief_about_noise_is_weighed_twice(healthy, monkeypatch):
-    model, asked = Likelihood([healthy], big_nigel()), []
-    under = model.under
-    monkeypatch.setattr(model, "under", lambda noise: (asked.append(repr(noise)), under(noise))[1])
+def test_no_noise_model_is_weighed_twice(healthy, monkeypatch):
+    model, weighed = Likelihood.of([healthy], big_nigel()), []
     residuals, _ = model.residuals([{}])
-    model.believe(replace(model.noise, speed=4 * model.noise.speed))
-    asked.clear()
-    learnt = learn_noise(model, residuals, rounds=2)
-    assert asked.pop() == repr(learnt)  # it is believed in the end
-    assert len(asked) == len(set(asked)) > 20
+    model, under = model.under(replace(model.noise, speed=4 * model.noise.speed)), Whitener.under
+    monkeypatch.setattr(
+        Whitener, "under", lambda one, noise: (weighed.append(repr(noise)), under(one, noise))[1]
+    )
+    learnt = fit_noise(model, residuals, rounds=2)
+    assert weighed.pop() == repr(learnt.noise)  # that of the likelihood returned
+    assert len(weighed) == len(set(weighed)) > 20
+
+
+def test_another_noise_model_leaves_a_likelihood_as_it_was(healthy):
+    model = Likelihood.of([healthy], big_nigel())
+    before, noise = model([{}])[0], model.noise
+    louder = model.under(replace(noise, speed=4 * noise.speed))
+    assert np.abs(louder([{}])[0] - before).max() > 0.0
+    np.testing.assert_array_equal(model([{}])[0], before)
+    assert model.noise == noise
 
 
 def test_no_effect_is_tried_beside_its_twin(healthy):
-    model = Likelihood([healthy], big_nigel())
+    model = Likelihood.of([healthy], big_nigel())
     listed = [c for c in candidates(big_nigel()) if c.name in {"grade", "wind", "steer_trim"}]
-    search = Search(model, np.ones(len(model.t)), listed, lambda _: None)
-    (base,) = search.fitter.refine([search.fitter.null()], rounds=1, fresh=True)
+    context = Context(np.ones(len(model.t)), tuple(listed))
+    fitter = context.fitter(model)
+    (base,) = fitter.refine([fitter.unfitted()], rounds=1, fresh=True)
     grade = next(c for c in listed if c.name == "grade")
-    (sloped,) = search.fitter.refine(
-        search.fitter.begin(base, [((grade,), np.array([0.01, 0.0]))]), rounds=1, fresh=True
+    (sloped,) = fitter.refine(
+        fitter.begin(base, [((grade,), np.array([0.01, 0.0]))]), rounds=1, fresh=True
     )
-    tried = {rival.names[-1] for rival in search.extend(sloped).rivals}
+    tried = {one.names[-1] for one in extend(context, sloped).alternatives}
     assert tried == {"steer_trim"}
 
 
@@ -229,23 +239,22 @@ def test_a_delay_is_told_from_a_lag():
     sent = made.channels["command.steering"]
     early = {**made.channels, "command.steering": replace(sent, t=sent.t - 0.03)}
     drive = Drive(replace(made, channels=early), big_nigel())
-    model = Likelihood([drive], big_nigel())
+    model = Likelihood.of([drive], big_nigel())
     listed = [c for c in candidates(big_nigel()) if c.name in {"steer_delay", "steer_lag"}]
-    search = Search(model, np.ones(len(model.t)), listed, lambda _: None)
-    best = search.extend(search.retuned).rivals[0]
+    context = Context(np.ones(len(model.t)), tuple(listed))
+    best = extend(context, retune(context, model)).alternatives[0]
     assert best.names == ("steer_delay",)
     assert best.values[0] == pytest.approx(0.03, abs=0.006)
 
 
 def test_an_effect_smaller_than_its_trials_and_of_the_other_sign_is_begun_where_it_is():
     biased = Drive(made_drive([], sense=_lower_y), big_nigel())
-    fitter = Fitter(Likelihood([biased], big_nigel()), np.ones(1))
-    fitter.part = fitter.model.settled
+    fitter = Fitter(Likelihood.of([biased], big_nigel()), np.ones(1))
     effect = by_name(candidates(big_nigel()), "accel_bias")
-    base = fitter.nominal(fitter.null())
+    base = fitter.with_nominal_car(fitter.unfitted())
     trials = [((effect,), np.array(start)) for start in effect.starts]
-    assert min(f.q for f in fitter.begin(base, trials)) > base.q
-    best = min(fitter.begin(base, trials, amplified=True), key=lambda f: f.q)
+    assert min(f.score for f in fitter.begin(base, trials)) > base.score
+    best = min(fitter.begin(base, trials, amplified=True), key=lambda f: f.score)
     assert best.values[1] == pytest.approx(-0.03, abs=0.01)
 
 

@@ -8,12 +8,13 @@ import pytest
 from scm.mismatch.effect_catalogue import by_name, candidates
 from scm.mismatch.findings import Estimate
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.select.search import Search
+from scm.mismatch.select.round import Context
+from scm.mismatch.select.search import Explanation, Selection, retune, select
+from scm.mismatch.select.selected import Selected, tried_of
 from scm.mismatch.validate.explain import (
     effect_of,
-    ordinary_of,
+    refitted,
     sentence_of,
-    tried_of,
     upright,
     widened_of,
 )
@@ -26,11 +27,12 @@ def test_what_was_taken_is_shown_with_the_gain_for_which_it_was_taken():
     made = made_drive(seconds=8.0)
     sent = made.channels["command.steering"]
     early = {**made.channels, "command.steering": replace(sent, t=sent.t - 0.06)}
-    model = Likelihood([Drive(replace(made, channels=early), big_nigel())], big_nigel())
+    model = Likelihood.of([Drive(replace(made, channels=early), big_nigel())], big_nigel())
     listed = [c for c in candidates(big_nigel()) if c.name in {"steer_delay", "steer_trim"}]
-    search = Search(model, np.ones(len(model.t)), listed, lambda _: None)
-    assert search.run().names == ("steer_delay",)
-    first = tried_of(search)[0]
+    context = Context(np.ones(len(model.t)), tuple(listed))
+    found = select(context, retune(context, model), lambda _: Explanation(ends=False))
+    assert found.best.names == ("steer_delay",)
+    first = tried_of(context, found)[0]
     assert first.name == "steer_delay"
     assert first.gain > first.needed
 
@@ -39,7 +41,7 @@ def test_no_recording_makes_a_number_less_sure_than_its_file_or_unphysical():
     model, _, best = made_fit.healthy()
     unsure = replace(best, z=0.0 * best.z, covariance=25.0 * np.eye(len(best.z)))
     bounds = {own.key: own.bounds for own in model.nominal}
-    for own in ordinary_of(model, unsure, big_nigel()):
+    for own in refitted(unsure, big_nigel()):
         prior = next(o for o in model.nominal if o.key == own.key)
         assert own.found.high - own.found.low <= 2.0 * 1.645 * prior.std + 1e-12
         assert bounds[own.key][0] <= own.found.low <= own.found.high <= bounds[own.key][1]
@@ -57,8 +59,9 @@ def test_the_interval_of_a_direction_does_not_end_where_the_angle_wraps():
     grade, n = made_fit.candidate("grade"), len(best.z)
     covariance = np.eye(n + 2) * np.append(np.ones(n), (0.01, 1.0))
     found = replace(best, effects=(grade,), values=np.array([0.02, np.pi]), covariance=covariance)
-    search = Search(model, np.ones(len(model.t)), (grade,), lambda _: None)
-    uphill = effect_of(search, found, 0).parameters["uphill_rad"]
+    context, selection = Context(np.ones(len(model.t)), (grade,)), Selection(found, best)
+    selected = Selected((), (), big_nigel(), context, None, selection, (), None, None)
+    uphill = effect_of(selected, found, grade).parameters["uphill_rad"]
     assert uphill.high - uphill.value == pytest.approx(uphill.value - uphill.low)
 
 
@@ -100,7 +103,7 @@ def weighed_to(std_kg):
 
 def test_a_std_of_the_car_file_that_was_widened_is_said_with_the_reason():
     car = weighed_to(0.01)
-    model = Likelihood([Drive(made_drive(seconds=6.0), car)], car)
+    model = Likelihood.of([Drive(made_drive(seconds=6.0), car)], car)
     (said,) = [line for line in widened_of(model, car) if "body.mass_kg" in line]
     assert "std of body.mass_kg, 0.01, was taken as 0.192 kg, 8 % of the value: cars are" in said
     assert not any("body.mass_kg" in line for line in widened_of(model, weighed_to(0.5)))
@@ -117,15 +120,16 @@ def test_a_stated_std_of_an_axle_lock_is_used():
     car = big_nigel()
     lock = replace(car.quantity("drive.axle_lock"), value=0.8, std=0.1)
     car = replace(car, values={**car.values, "drive.axle_lock": lock})
-    model = Likelihood([Drive(made_drive(seconds=6.0), car)], car)
+    model = Likelihood.of([Drive(made_drive(seconds=6.0), car)], car)
     (own,) = [own for own in model.nominal if own.key == "drive.axle_lock"]
     assert (own.mean, own.std) == (0.8, 0.1)
 
 
 def test_noise_that_is_larger_than_the_recording_states_is_said():
     made = made_drive(seconds=6.0)
-    model = Likelihood([Drive(made, big_nigel())], big_nigel())
+    model = Likelihood.of([Drive(made, big_nigel())], big_nigel())
     assert not any("recording's std" in line for line in widened_of(model, big_nigel()))
-    model.believe(replace(model.noise, scale={**model.noise.scale, "pose.x": 3.0, "pose.y": 3.0}))
-    (said,) = [line for line in widened_of(model, big_nigel()) if "recording's std" in line]
+    loud = replace(model.noise, scale={**model.noise.scale, "pose.x": 3.0, "pose.y": 3.0})
+    lines = widened_of(model.under(loud), big_nigel())
+    (said,) = [line for line in lines if "recording's std" in line]
     assert "std of pose.x and pose.y, 0.002, was taken as 0.006" in said

@@ -14,7 +14,7 @@ TRIM = {"steering.trim_rad": 0.05}
 
 
 def judged(drive, after, before=(), horizon_s=2.0):
-    parts = split(Likelihood([drive], big_nigel()), 5.0)
+    parts = split(Likelihood.of([drive], big_nigel()), 5.0)
     return judge([drive], car_with(before), car_with(after), parts, horizon_s)
 
 
@@ -112,7 +112,7 @@ def test_what_noise_may_change_is_not_called_worse(trimmed):
 
 def test_two_drives_are_judged_together():
     drives = [driven(seed=seed) for seed in (1, 2)]
-    parts = split(Likelihood(drives, big_nigel()))
+    parts = split(Likelihood.of(drives, big_nigel()))
     fit, runs = judge(drives, big_nigel(), big_nigel(), parts, 2.0)
     alone, _ = judged(drives[0], {})
     assert fit.fit.windows + fit.confirm.windows > alone.fit.windows + alone.confirm.windows

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.budget import OutOfTimeError
+from scm.mismatch.budget import Budget, OutOfTimeError
 from scm.mismatch.fit import likelihood
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import usual_noise
@@ -16,7 +16,18 @@ from scm.mismatch.fit.whitening import Whitener
 from scm.replay.drive import Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
-KEPT = 3
+CACHED = 3
+
+
+class Interrupted(Budget):
+    """Ends at the second check after `armed`."""
+
+    armed, checks = False, 0
+
+    def check(self):
+        self.checks += self.armed
+        if self.checks == 2:  # the first tile was driven
+            raise OutOfTimeError
 
 
 @pytest.fixture(scope="module")
@@ -31,8 +42,8 @@ def tiles():
 
 @pytest.fixture
 def model(drive, tiles, monkeypatch):
-    monkeypatch.setattr(likelihood, "KEPT", KEPT)
-    return Likelihood([drive], big_nigel(), tiles)
+    monkeypatch.setattr(likelihood, "MAX_CACHED", CACHED)
+    return Likelihood.of([drive], big_nigel(), tiles, Interrupted())
 
 
 def trims(*numbers):
@@ -47,7 +58,7 @@ def left(model, *numbers):
 
 def remembered(model):
     every = {n: frozenset(*(s.items() for s in trims(n))) for n in range(9)}
-    return {n for n, key in every.items() if key in model._recent[0]}
+    return {n for n, key in every.items() if key in model.simulator._recent[0]}
 
 
 def test_a_set_has_the_same_residuals_however_often_and_whenever_it_is_asked_for(model):
@@ -85,7 +96,7 @@ def test_two_cars_that_are_physical_and_one_that_is_not_are_remembered_as_such(m
 
 
 def test_many_sets_are_weighed_in_the_room_of_residuals_and_innovations(drive, tiles):
-    model = Likelihood([drive], big_nigel(), tiles)
+    model = Likelihood.of([drive], big_nigel(), tiles)
     model(trims(0))
     sets = [{"steering.trim_rad": 1e-4 * n} for n in range(480)]
     tracemalloc.start()
@@ -104,18 +115,10 @@ def test_a_belief_beyond_what_numbers_can_hold_has_no_size_and_raises_no_warning
 
 def test_sets_whose_driving_is_given_up_leave_nothing_behind(model):
     many = trims(*range(2 * ROWS))
-    asked = []
-
-    def give_up():
-        asked.append(1)
-        if len(asked) == 2:  # the first tile was driven
-            raise OutOfTimeError
-
     expected = left(model, 1, 2)
-    model.asked = give_up
+    model.simulator.budget.armed = True
     with pytest.raises(OutOfTimeError):
         model(many)
-    model.asked = lambda: None
     np.testing.assert_array_equal(left(model, 1, 2), expected)
 
 

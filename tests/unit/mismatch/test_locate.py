@@ -9,7 +9,7 @@ from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.validate.curves import curve
 from scm.mismatch.validate.free_runs import judge
 from scm.mismatch.validate.locate import chance, locate
-from scm.mismatch.validate.residual_forces import honest, leftover, on_one_axis
+from scm.mismatch.validate.residual_forces import honest, on_one_axis, residual_forces
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch.made_drive import big_nigel, driven
 
@@ -23,27 +23,27 @@ def by_channel(residuals):
 
 
 def test_nothing_is_located_where_nothing_was_found():
-    located, residuals = locate(*made_fit.healthy())
+    located, residuals = locate(*made_fit.healthy()[1:])
     assert located == ()
     assert {r.channel for r in residuals} == {"drive force", "wheel angle"}
 
 
 def test_an_effect_that_acts_all_the_time_has_neither_time_nor_place():
-    (found,), _ = locate(*made_fit.trimmed())
+    (found,), _ = locate(*made_fit.trimmed()[1:])
     assert (found.when_s, found.where) == (None, None)
     assert found.equation is Equation.STEERING
     assert found.share_of_error == pytest.approx(1.0)
 
 
 def test_the_sensors_that_show_an_effect_are_named():
-    (found,), _ = locate(*made_fit.trimmed())
+    (found,), _ = locate(*made_fit.trimmed()[1:])
     assert "imu.gyro_z" in found.channels
-    (found,), _ = locate(*made_fit.biased())
+    (found,), _ = locate(*made_fit.biased()[1:])
     assert found.channels == ("imu.gyro_z",)
 
 
 def test_a_spot_of_floor_is_located_where_it_is():
-    (found,), _ = locate(*made_fit.patched())
+    (found,), _ = locate(*made_fit.patched()[1:])
     assert found.equation is Equation.SURFACE
     assert found.where.x_m[0] < 0.0 < found.where.x_m[1]
     assert found.where.y_m[0] < 0.0 < found.where.y_m[1]
@@ -51,7 +51,7 @@ def test_a_spot_of_floor_is_located_where_it_is():
 
 def test_what_lasts_for_a_part_of_the_drive_is_located_in_time():
     model, retuned, best = made_fit.patched()
-    (found,), _ = locate(model, retuned, best)
+    (found,), _ = locate(retuned, best)
     drive = model.drives[0]
     near = [np.hypot(drive.smoothed["pose.x"].at(np.array([t])), drive.smoothed["pose.y"].at(
         np.array([t])))[0] for span in found.when_s for t in span]  # fmt: skip
@@ -60,7 +60,7 @@ def test_what_lasts_for_a_part_of_the_drive_is_located_in_time():
 
 
 def test_two_effects_share_the_error():
-    located, _ = locate(*made_fit.both())
+    located, _ = locate(*made_fit.both()[1:])
     assert {found.equation for found in located} == {Equation.STEERING, Equation.SENSOR}
     assert sum(found.share_of_error for found in located) == pytest.approx(1.0)
     assert located[0].share_of_error >= located[1].share_of_error
@@ -72,7 +72,7 @@ def test_more_places_looked_at_need_more_gain():
 
 def test_the_angle_left_over_is_the_one_that_the_wheels_stand_off_by():
     drive = driven((("steering.trim_rad", 0.05),))
-    residuals = by_channel(leftover([drive], big_nigel(), {}, {"steering.trim_rad": 0.05}))
+    residuals = by_channel(residual_forces([drive], big_nigel(), {}, {"steering.trim_rad": 0.05}))
     assert np.nanmedian(residuals["wheel angle"].before) == pytest.approx(0.05, rel=0.2)
     assert rms(residuals["wheel angle"].after) < 0.01
     assert rms(residuals["drive force"].before) < 3.0 * rms(residuals["drive force"].std)
@@ -82,7 +82,7 @@ def test_the_force_left_over_is_the_one_that_acted():
     (parameter,) = made_fit.candidate("viscous_drag").parameters
     brake = {parameter.key: 4.0}
     drive = driven(tuple(brake.items()))
-    residual = by_channel(leftover([drive], big_nigel(), {}, brake))["drive force"]
+    residual = by_channel(residual_forces([drive], big_nigel(), {}, brake))["drive force"]
     x, y = drive.smoothed["pose.x"], drive.smoothed["pose.y"]
     speed = np.interp(residual.t_s, x.t, np.hypot(x.rate, y.rate))
     acted, sure = -4.0 * speed, np.isfinite(residual.before)
@@ -90,7 +90,7 @@ def test_the_force_left_over_is_the_one_that_acted():
 
 
 def test_a_healthy_car_stays_within_the_band():
-    for residual in leftover([driven()], big_nigel(), {}, {}):
+    for residual in residual_forces([driven()], big_nigel(), {}, {}):
         inside = np.abs(residual.before) < 1.645 * residual.std
         assert np.mean(inside[np.isfinite(residual.before)]) > 0.85
 
@@ -102,7 +102,7 @@ def test_a_band_is_never_narrower_than_what_is_left():
 
 
 def test_a_sensor_s_fault_is_drawn_as_what_the_sensor_reads_too_much():
-    _, residuals = locate(*made_fit.biased())
+    _, residuals = locate(*made_fit.biased()[1:])
     gyro = residuals[0]
     assert (gyro.channel, gyro.unit) == ("yaw rate (gyro)", "rad/s")
     assert np.nanmean(gyro.before) == pytest.approx(0.05, abs=0.01)
@@ -111,15 +111,17 @@ def test_a_sensor_s_fault_is_drawn_as_what_the_sensor_reads_too_much():
 
 def test_a_camera_s_fault_that_was_found_is_no_force():
     spoilt = driven(sense=lambda name, _, v: 1.2 * v if name in ("pose.x", "pose.y") else v)
-    found = leftover([spoilt], big_nigel(), {}, {"measure.pose_scale": 1.2})
-    for residual, healthy in zip(found, leftover([driven()], big_nigel(), {}, {}), strict=True):
+    found = residual_forces([spoilt], big_nigel(), {}, {"measure.pose_scale": 1.2})
+    for residual, healthy in zip(
+        found, residual_forces([driven()], big_nigel(), {}, {}), strict=True
+    ):
         assert rms(residual.before) < 1.5 * rms(healthy.before)
 
 
 def test_no_force_is_made_up_beyond_the_poses_of_a_late_camera():
     late = {"measure.pose_delay_s": 0.3}
     drive = driven(sense=lambda name, t, v: np.interp(t - 0.3, t, v) if "pose" in name else v)
-    for residual in leftover([drive], big_nigel(), late, late):
+    for residual in residual_forces([drive], big_nigel(), late, late):
         assert residual.t_s[-1] < drive.edges[-1] - 0.3
         known = np.isfinite(residual.after)
         assert np.mean(np.abs(residual.after[known]) > 4.0 * residual.std[known]) < 0.02
@@ -129,8 +131,8 @@ def test_drives_follow_one_another_on_one_axis_for_lines_windows_and_places():
     drives = [driven(seconds=12.0), driven(seconds=12.0, seed=2)]
     end = drives[0].edges[-1]
     assert on_one_axis(drives)[0] == 0.0
-    t = leftover(drives, big_nigel(), {}, {})[0].t_s
-    parts = split(Likelihood(drives, big_nigel()), 3.0)
+    t = residual_forces(drives, big_nigel(), {}, {})[0].t_s
+    parts = split(Likelihood.of(drives, big_nigel()), 3.0)
     _, runs = judge(drives, big_nigel(), big_nigel(), parts, 1.0)
     second = [times[times > end] for times in (t, runs.start_s)]
     assert len(second[0]) == pytest.approx(0.5 * len(t), abs=1)
@@ -140,16 +142,16 @@ def test_drives_follow_one_another_on_one_axis_for_lines_windows_and_places():
 
 
 def test_a_trim_is_a_level_curve_at_its_angle():
-    model, _, best = made_fit.trimmed()
-    found = curve(model, best, best.effects[0])
+    _, _, best = made_fit.trimmed()
+    found = curve(best, best.effects[0])
     assert (found.x_name, found.y_name, found.y_unit) == ("speed", "wheel angle", "rad")
     assert np.allclose(found.y, best.values[0], rtol=0.3)
     assert np.all((found.low <= found.y) & (found.y <= found.high))
 
 
 def test_a_gyro_s_bias_is_a_curve_over_the_turning_seen():
-    model, _, best = made_fit.biased()
-    found = curve(model, best, best.effects[0])
+    _, _, best = made_fit.biased()
+    found = curve(best, best.effects[0])
     assert found.x_name == "yaw rate"
     assert np.allclose(found.y, best.values[0])
     assert np.all(found.low < 0.05 + 0.01)
@@ -157,5 +159,5 @@ def test_a_gyro_s_bias_is_a_curve_over_the_turning_seen():
 
 
 def test_an_effect_that_no_curve_would_tell_has_none():
-    model, _, best = made_fit.biased()
-    assert curve(model, best, made_fit.candidate("pose_latency")) is None
+    _, _, best = made_fit.biased()
+    assert curve(best, made_fit.candidate("pose_latency")) is None

@@ -41,14 +41,14 @@ def test_the_order_of_turns_changes_so_that_no_lap_falls_in_step_with_it():
 
 
 def test_even_a_short_drive_has_all_three_parts():
-    model = Likelihood([driven(seconds=4.0)], big_nigel())
+    model = Likelihood.of([driven(seconds=4.0)], big_nigel())
     parts = split(model)
     assert all(getattr(parts, name).weight.any() for name in NAMES)
 
 
 def test_two_drives_are_split_each():
     one = healthy_model().drives[0]
-    parts = split(Likelihood([one, one], big_nigel()), 1.0)
+    parts = split(Likelihood.of([one, one], big_nigel()), 1.0)
     for name in NAMES:
         first, second = getattr(parts, name).spans
         assert abs(lengths(first) - lengths(second)) < 0.1 * lengths(first)
@@ -57,7 +57,7 @@ def test_two_drives_are_split_each():
 
 def test_many_drives_too_short_to_cut_take_turns_as_wholes():
     one = driven(seconds=4.0)
-    parts = split(Likelihood([one] * 4, big_nigel()))
+    parts = split(Likelihood.of([one] * 4, big_nigel()))
     held = [sum(len(getattr(parts, name).spans[i]) for name in NAMES) for i in range(4)]
     assert held == [1, 1, 1, 1]
     counts = {name: sum(map(bool, getattr(parts, name).spans)) for name in NAMES}
@@ -65,12 +65,12 @@ def test_many_drives_too_short_to_cut_take_turns_as_wholes():
 
 
 def test_a_short_stretch_beside_a_long_one_is_not_cut():
-    parts = split(Likelihood([driven(seconds=8.0), driven(seconds=3.0)], big_nigel()), 1.9)
+    parts = split(Likelihood.of([driven(seconds=8.0), driven(seconds=3.0)], big_nigel()), 1.9)
     held = [sum(len(getattr(parts, name).spans[i]) for name in NAMES) for i in range(2)]
     assert held == [4, 1]
 
 
 def test_a_short_stretch_does_not_shorten_the_windows_of_all():
     drives = [driven(seconds=14.0), driven(seconds=2.5)]
-    parts = split(Likelihood(drives, big_nigel()), 3.4)
+    parts = split(Likelihood.of(drives, big_nigel()), 3.4)
     assert horizon_of(drives, parts) > 2.8

@@ -8,11 +8,13 @@ from scm.clock import StepClock
 from scm.mismatch.progress import Progress
 
 STEPS = (
-    "doubting the data", "fitting the car's own numbers", "trying 46 effects from 155 starts",
+    "checking the data", "fitting the car's own numbers", "trying 46 effects from 155 starts",
     "refitting payload, drag ...", "trying 46 effects from 151 starts", "refitting drag ...",
-    "asking what a push at each moment would explain", "laying 52 laws over them",
-    "refitting 17 laws, such as drive force", "judging on what the fit did not see",
-    "designing the drive that would tell", "writing the report",
+    "computing what a push at each moment would explain",
+    "screening 52 effects outside the catalogue",
+    "refitting 17 effects outside the catalogue, such as drive force",
+    "judging on what the fit did not see", "designing the drive that would decide",
+    "writing the report",
 )  # fmt: skip
 
 
@@ -58,9 +60,9 @@ def test_the_bar_shows_what_is_tried_and_for_how_long(clock):
 def test_elsewhere_each_step_is_a_plain_line(clock):
     stream = io.StringIO()
     progress = Progress(stream, clock)
-    progress.notify("doubting the data")
+    progress.notify("checking the data")
     progress.close()
-    assert stream.getvalue() == "    0 s    0 %  doubting the data\n"
+    assert stream.getvalue() == "    0 s    0 %  checking the data\n"
 
 
 def test_of_several_cars_each_takes_its_share_and_is_named(clock):

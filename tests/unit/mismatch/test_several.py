@@ -12,24 +12,26 @@ from scm.__main__ import main
 from scm.commands import mismatch
 from scm.mismatch.findings import Estimate, Undecided, Verdict
 from scm.mismatch.report.cars_page import several_html, several_summary, write_several
-from scm.mismatch.several.diagnose import _is_settled, cars_of
-from scm.mismatch.several.findings import CarSight, Cause, Common, Sight
+from scm.mismatch.several.diagnose import _is_decided, cars_of
+from scm.mismatch.several.findings import Agreement, CarAgreement, Cause, Common
 from scm.mismatch.several.verdict import all_alike, conclusion
 from scm.vehicles.car import load_car
 from tests.reality.several_cars import write_cars
 from tests.unit.mismatch import made_up_findings as made_up
 
 
-def seen(car, sight=Sight.SEES, value=0.03, *, alone=False):
+def seen(car, agreement=Agreement.CONFIRMS, value=0.03, *, alone=False):
     own = {"tilt_x": Estimate(value=value, low=value - 0.01, high=value + 0.01, unit="1/m")}
-    return CarSight(car=car, sight=sight, alone=alone, gain=40.0, needed=8.0, misses=0.4, own=own)
+    return CarAgreement(
+        car=car, agreement=agreement, alone=alone, gain=40.0, needed=8.0, misses=0.4, own=own
+    )
 
 
 def common(*cars, shared=True, cause=Cause.CAMERA):
     told = {"tilt_x": Estimate(value=0.03, low=0.025, high=0.035, unit="1/m")}
     return Common(
         name="camera_tilt", cause=cause, shared=shared, parameters=told, cars=cars,
-        said="The camera looks askew.", conclusion=conclusion(cause, cars, shared=shared),
+        text="The camera looks askew.", conclusion=conclusion(cause, cars, shared=shared),
     )  # fmt: skip
 
 
@@ -107,19 +109,19 @@ def test_the_page_says_each_verdict_and_what_is_common(tmp_path):
     ("cars", "shared", "says"),
     [
         (
-            (seen("a"), seen("b"), seen("c", Sight.CANNOT_TELL)), True,
+            (seen("a"), seen("b"), seen("c", Agreement.UNDECIDED)), True,
             "a and b see it alike: it is the camera, not the cars. The drive of c cannot tell",
         ),
         (
-            (seen("a"), seen("b"), seen("c", Sight.OTHERWISE)), True,
+            (seen("a"), seen("b"), seen("c", Agreement.CONTRADICTS)), True,
             "a and b see it alike, c would have to and does not: it is something that only a and b",
         ),
         (
-            (seen("a", alone=True), seen("b", Sight.CANNOT_TELL)), False,
+            (seen("a", alone=True), seen("b", Agreement.UNDECIDED)), False,
             "Only a sees it; the drive of b cannot tell whether it is the camera",
         ),
         (
-            (seen("a"), seen("b", Sight.ADDS), seen("c", Sight.ADDS)), True,
+            (seen("a"), seen("b", Agreement.SUPPORTS), seen("c", Agreement.SUPPORTS)), True,
             "Too weak for one car alone, all 3 cars together show it: it is the camera",
         ),
     ],
@@ -131,12 +133,12 @@ def test_whose_it_is_in_words(cars, shared, says):
 def asked(**criteria):
     """A car whose search ranked effects so, the lower the better."""
     rivals = tuple(SimpleNamespace(names=(name,)) for name in criteria)
-    step = SimpleNamespace(rivals=rivals, criteria=tuple(criteria.values()))
-    return SimpleNamespace(searched=SimpleNamespace(search=SimpleNamespace(steps=[step])))
+    step = SimpleNamespace(alternatives=rivals, criteria=tuple(criteria.values()))
+    return SimpleNamespace(selected=SimpleNamespace(selection=SimpleNamespace(rounds=[step])))
 
 
 @pytest.mark.parametrize(
-    ("between", "of_b", "settled"),
+    ("between", "of_b", "decided"),
     [
         (("camera_tilt", "steer_trim"), {"camera_tilt": 0.0}, True),
         (("camera_tilt", "pose_scale"), {"camera_tilt": 0.0, "pose_scale": 30.0}, True),
@@ -144,14 +146,14 @@ def asked(**criteria):
         (("grade", "wind"), {"camera_tilt": 0.0}, False),
     ],
 )
-def test_other_cars_settle_what_one_leaves_open(between, of_b, settled):
+def test_other_cars_decide_what_one_leaves_open(between, of_b, decided):
     tilt = common(seen("a"), seen("b"))
     cars = {"a": asked(camera_tilt=0.0, pose_scale=1.0), "b": asked(**of_b)}
     question = Undecided(between=between, drive_this="", expected_separation=0.0)
-    assert _is_settled(question, {"camera_tilt": tilt}, cars) is settled
+    assert _is_decided(question, {"camera_tilt": tilt}, cars) is decided
 
 
 def test_a_car_s_report_says_with_whom_it_shares_an_effect():
-    tilt = common(seen("a", alone=True), seen("b"), seen("c", Sight.CANNOT_TELL))
+    tilt = common(seen("a", alone=True), seen("b"), seen("c", Agreement.UNDECIDED))
     assert all_alike(tilt, "a") == "Estimated together with b, seen by the same camera."
     assert "This car alone would not have shown it" in all_alike(tilt, "b")

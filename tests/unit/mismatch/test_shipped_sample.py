@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from scm.mismatch.diagnose import diagnose, write
+from scm.mismatch.pipeline import diagnose, write
 from scm.mismatch.validate.check_report import check_report
 
 CONCEALED_RAD = 0.0628  # as docs/make/sample.py prints

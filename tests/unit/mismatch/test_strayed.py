@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scm.mismatch.findings import Equation
-from scm.mismatch.validate.strayed import strayed
+from scm.mismatch.validate.locate import strayed
 from tests.unit.mismatch import made_up_findings as made_up
 
 

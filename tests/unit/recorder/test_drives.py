@@ -13,7 +13,7 @@ from scm.__main__ import main
 from scm.errors import RecordingError
 from scm.fleet import LockstepLink
 from scm.maps.load import load_map
-from scm.mismatch.diagnose import diagnose
+from scm.mismatch.pipeline import diagnose
 from scm.recorder.drives import read_drives, recordings_of
 from scm.recorder.mcap_file import RunFile, read_run
 from scm.recorder.part import RecorderPart
@@ -274,7 +274,7 @@ def test_a_drive_told_since_is_of_the_same_car_and_whole(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(
-        "scm.mismatch.diagnose.diagnose_car", lambda recordings, *_, **__: recordings
+        "scm.mismatch.pipeline.diagnose_car", lambda recordings, *_, **__: recordings
     )
     with Lockstep([WorldPart(load_map("parking_school"), hosted=(("n9", "nigel"),))]) as city:
         city.run_for(0.1)
@@ -283,7 +283,7 @@ def test_a_drive_told_since_is_of_the_same_car_and_whole(
         )
     write_recording(played, "nigel", tmp_path / "told")
     told, part = [tmp_path / "told"], (2.0, 3.0)
-    before, since = diagnose([run], vehicle="n1", span_s=part, told=told)
+    before, since = diagnose([run], vehicle="n1", span_s=part, played=told)
     assert np.ptp(before.channel("pose.x").t) <= 1.0
     assert np.ptp(since.channel("pose.x").t) == pytest.approx(1.5, abs=0.1)
     assert main(["mismatch", str(run), "--told", *map(str, told), "--out", str(tmp_path)]) == 2

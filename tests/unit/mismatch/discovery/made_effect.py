@@ -5,16 +5,19 @@ from functools import cache
 
 import numpy as np
 
-from scm.mismatch.discovery.decide import Lawful
+from scm.mismatch.discovery import decide
+from scm.mismatch.discovery.decide import Discovery
 from scm.mismatch.discovery.dictionary import dictionary
 from scm.mismatch.discovery.general_effect import learned_terms
-from scm.mismatch.discovery.seek import Sought, seek, with_general_effect
-from scm.mismatch.discovery.sensor_effects import SensorLikelihood, sensor_effects
+from scm.mismatch.discovery.sensor_effects import sensor_effects, signatures_of
+from scm.mismatch.discovery.try_dictionary import try_dictionary
 from scm.mismatch.effect_catalogue import by_name, candidates
-from scm.mismatch.fit.fitter import Fitted, Fitter
+from scm.mismatch.fit.fitter import Fitter
+from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.select.alternatives import Standing, standing
-from scm.mismatch.select.search import Search
+from scm.mismatch.select.round import Context, extend, fit_with_noise
+from scm.mismatch.select.search import Selection, retune
+from scm.mismatch.select.selected import Selected
 from scm.replay.drive import Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
@@ -45,23 +48,20 @@ def lawful_drive(numbers=(), seconds=12.0, **more):
     return Drive(recording, lawful_nigel())
 
 
-def sought(drive):
-    """What is found in a drive, beside the car with its own numbers refitted."""
-    model = Likelihood([drive], lawful_nigel())
+def tried_in(drive):
+    """What the dictionary offers for a drive, beside the car with its own numbers refitted."""
+    model = Likelihood.of([drive], lawful_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))
-    (base,) = fitter.refine([fitter.null()], rounds=2, fresh=True)
-    return seek(model, base, np.ones(len(model.t)))
+    (base,) = fitter.refine([fitter.unfitted()], rounds=2, fresh=True)
+    return try_dictionary(base, np.ones(len(model.t)))
 
 
-def searched(drive):
-    """A search with two effects through a drive, and the part that it may not see."""
-    return _search(with_general_effect(Likelihood([drive], lawful_nigel())))
-
-
-def _search(model):
+def context_of(drive):
+    """A selection with two effects for a drive, and the part that it may not see."""
+    model = Likelihood.of([drive], lawful_nigel())
     part = np.where(np.arange(len(model.t)) % 1000 < 800, 1.0, 0.0)
-    library = tuple(by_name(candidates(lawful_nigel()), n) for n in ("wind", "steer_trim"))
-    return Search(model, part, library, lambda _: None), 1.0 - part
+    catalogue = tuple(by_name(candidates(lawful_nigel()), n) for n in ("wind", "steer_trim"))
+    return Context(part, catalogue), model, 1.0 - part
 
 
 @cache
@@ -71,63 +71,56 @@ def gusty_drive():
 
 @dataclass(frozen=True)
 class Gusty:
-    """What a search finds under a gust.
+    """What a selection finds under a gust.
 
     Attributes:
-        listed: The listed model, and `held` how it stood before a law took its place.
-        best: What was taken in its place; `sought`: the laws that were tried.
+        known: The best hypothesis of the catalogue, and `offered` how it stood.
+        best: What was found in its place; `discovery`: what the dictionary offered.
     """
 
-    search: Search
-    listed: Fitted
-    held: Standing
-    best: Fitted
-    sought: Sought
+    selected: Selected
+    known: Hypothesis
+    best: Hypothesis
+    discovery: Discovery
 
 
 @cache
 def gusty():
-    """A round of a search under a gust, and a law in place of what it took.
+    """A round of a selection under a gust, and a discovered effect in place of what it found.
 
     It is long, so whoever asks about it stands in one file.
     """
-    search, unseen = searched(gusty_drive())
-    search.steps.append(search.extend(search.retuned))
-    listed = search.settle(search.steps[0].rivals[0])
-    held = standing(search, listed, unseen=True)
-    return Gusty(search, listed, held, *Lawful(search, unseen).decide(listed))
+    context, model, unseen = context_of(gusty_drive())
+    retuned = retune(context, model)
+    one = extend(context, retuned)
+    known = fit_with_noise(context, one.alternatives[0])
+    found = Selection(known, retuned, (one,))
+    offered = decide.offered(context, found, has_unseen=True)
+    best, discovery = decide.decide(context, found, unseen)
+    selection = replace(found, best=best)
+    drives, tried = model.drives, discovery
+    chosen = Selected((), drives, lawful_nigel(), context, None, selection, (), offered, tried)
+    return Gusty(chosen, known, best, discovery)
 
 
 @cache
-def _asked():
-    search, unseen = searched(gusty_drive())
-    listed, noise = search.retuned, search.model.noise
-    return search.model, listed, noise, Lawful(search, unseen)._best(listed)
-
-
-def asked():
-    """A search under a gust with its own numbers fitted, and the laws that were sought beside them.
-
-    Both are made once: everybody gets copies, for later fits renew what was found in place.
-    """
-    model, listed, noise, best = _asked()
-    model.believe(noise)
-    search, unseen = _search(model)
-    search.retuned, laws = replace(listed), Lawful(search, unseen)
-    laws._last = replace(best, law=replace(best.law, fitted=replace(best.law.fitted)))
-    return search, laws
+def discovered():
+    """A selection under a gust without an effect yet, and what the dictionary offers beside it."""
+    context, model, unseen = context_of(gusty_drive())
+    retuned = retune(context, model)
+    found = Selection(retuned, retuned)
+    return context, found, unseen, decide.discover(context, found, unseen)
 
 
 @cache
 def lens():
     """A camera whose scale grows with |x|, as a cheap lens."""
-    drive = lawful_drive(seconds=30.0, sense=_bent())
-    model = SensorLikelihood(Likelihood([drive], lawful_nigel()), lawful_nigel())
+    model = Likelihood.of([lawful_drive(seconds=30.0, sense=_bent())], lawful_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))
-    (base,) = fitter.refine([fitter.null()], rounds=2, fresh=True)
-    model.learn(fitter.numbers((), base.z, base.values))
-    law = sensor_effects()[0]
-    (found,) = fitter.refine(fitter.begin(base, [((law,), np.array([0.01]))]), rounds=3)
+    (base,) = fitter.refine([fitter.unfitted()], rounds=2, fresh=True)
+    fitter = fitter.under(model.with_signatures(signatures_of(base)))
+    effect = sensor_effects()[0]
+    (found,) = fitter.refine(fitter.begin(base, [((effect,), np.array([0.01]))]), rounds=3)
     return model, base, found
 
 
@@ -148,4 +141,4 @@ def _bent(size=0.05):
 
 @cache
 def healthy():
-    return sought(lawful_drive())
+    return tried_in(lawful_drive())

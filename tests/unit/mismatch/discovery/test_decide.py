@@ -1,58 +1,60 @@
-"""Laws outside the library end a search by a margin only, and healthy drives give none."""
-
-from dataclasses import replace
+"""Effects outside the catalogue end a selection by a margin only, and healthy drives give none."""
 
 import numpy as np
 import pytest
 
 from scm.mismatch.discovery import decide
-from scm.mismatch.discovery.decide import Lawful
+from scm.mismatch.select.search import Selection, retune
 from tests.unit.mismatch.discovery import made_effect
 
 
-def test_a_bent_lens_is_a_law_of_the_camera_that_a_fit_takes_off():
+def test_a_bent_lens_is_an_effect_of_the_camera_that_a_fit_takes_off():
     model, before, after = made_effect.lens()
     assert after.effects[0].equation == "sensor"
     np.testing.assert_allclose(after.values, 0.05, atol=0.015)
-    assert after.q < before.q - 30.0
-    assert len(after.e) == len(model.t)
+    assert after.score < before.score - 30.0
+    assert len(after.innovations) == len(model.t)
 
 
-def test_no_law_is_worth_its_price_on_a_healthy_drive():
-    sought = made_effect.healthy()
-    assert [
-        f.names for f, c in zip(sought.found, sought.criteria, strict=True) if c < sought.base.q
-    ] == []
+def test_no_dictionary_effect_is_worth_its_penalty_on_a_healthy_drive():
+    tried = made_effect.healthy()
+    pairs = zip(tried.found, tried.criteria, strict=True)
+    assert [f.names for f, criterion in pairs if criterion < tried.base.score] == []
 
 
 @pytest.mark.parametrize(("by_far", "ends"), [(100.0, True), (1e4, False)])
-def test_only_a_law_that_is_better_by_far_ends_a_search(by_far, ends, monkeypatch):
-    search, laws = made_effect.asked()
-    monkeypatch.setattr(decide, "seek", None)  # what was sought already is not sought again
+def test_only_what_is_better_by_far_ends_a_selection(by_far, ends, monkeypatch):
+    context, found, unseen, discovery = made_effect.discovered()
+    monkeypatch.setattr(decide, "discover", lambda *_: discovery)
     monkeypatch.setattr(decide, "BY_FAR", by_far)
-    listed, noise = search.retuned, search.model.noise
-    assert laws.explains_all(listed) is ends
-    assert search.model.noise == noise
-    found, sought = laws.decide(listed)
-    assert found.names == (made_effect.GUST_NAME,)
-    assert sought is not None
+    why = decide.explain(context, unseen, found)
+    assert why.ends is ends
+    best, tried = decide.decide(context, Selection(found.best, found.retuned, (), why), unseen)
+    assert best.names == (made_effect.GUST_NAME,)
+    assert tried is not None
 
 
-def test_a_law_that_leaves_something_to_a_listed_effect_does_not_end_a_search(monkeypatch):
-    search, laws = made_effect.asked()
+def test_what_leaves_something_to_a_known_effect_does_not_end_a_selection(monkeypatch):
+    context, found, unseen, discovery = made_effect.discovered()
+    monkeypatch.setattr(decide, "discover", lambda *_: discovery)
     monkeypatch.setattr(decide, "BY_FAR", 100.0)
-    price = decide._price
-    worth = lambda search, fitted: price(search, fitted) - 1e4 * (len(fitted.effects) > 1)  # noqa: E731
-    monkeypatch.setattr(decide, "_price", worth)
-    assert not laws.explains_all(search.retuned)
+    really = decide._criterion
+    worth = lambda context, fitted: really(context, fitted) - 1e4 * (len(fitted.effects) > 1)  # noqa: E731
+    monkeypatch.setattr(decide, "_criterion", worth)
+    assert not decide.explain(context, unseen, found).ends
 
 
-def test_laws_that_were_sought_in_vain_are_not_sought_again(monkeypatch):
-    search, unseen = made_effect.searched(made_effect.lawful_drive())
-    laws, listed, seeks = Lawful(search, unseen), search.retuned, []
-    seek = decide.seek
-    monkeypatch.setattr(decide, "seek", lambda *given: (seeks.append(1), seek(*given))[1])
-    assert not laws.explains_all(listed)
-    assert not laws.explains_all(replace(listed, z=listed.z + 0.1))  # it is asked once
-    assert laws.decide(listed) == (listed, None)
-    assert len(seeks) == 1
+def test_a_dictionary_that_was_tried_in_vain_is_not_tried_again(monkeypatch):
+    context, model, unseen = made_effect.context_of(made_effect.lawful_drive())
+    retuned, tries = retune(context, model), []
+    really = decide.try_dictionary
+    monkeypatch.setattr(
+        decide, "try_dictionary", lambda *given: (tries.append(1), really(*given))[1]
+    )
+    found = Selection(retuned, retuned)
+    why = decide.explain(context, unseen, found)
+    assert not why.ends
+    found = Selection(retuned, retuned, (), why)
+    assert not decide.explain(context, unseen, found).ends  # it is asked once
+    assert decide.decide(context, found, unseen) == (retuned, None)
+    assert len(tries) == 1

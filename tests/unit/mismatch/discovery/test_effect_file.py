@@ -35,7 +35,7 @@ def general(law, values):
     defaults = {p.name: p.default for term in TERMS for p in term.params}
     numbers = {k.removeprefix(PREFIX): v for k, v in law.numbers(values).items()}
     given = defaults | HERE | numbers
-    given["law_shape"] = value(SHAPE.law, given)
+    given["learned_shape"] = value(SHAPE.law, given)
     return {term.target: value(term.law, given) for term in TERMS}
 
 

@@ -1,4 +1,4 @@
-"""A gust, which the library does not have: the law found for it, and what its rivals lack."""
+"""A gust, which the catalogue does not have: what is discovered, and what alternatives lack."""
 
 from functools import cache
 
@@ -6,15 +6,15 @@ import numpy as np
 
 from scm.mismatch.discovery.curves import discovered_curves
 from scm.mismatch.discovery.decide import is_discovered
-from scm.mismatch.discovery.seek import criterion
+from scm.mismatch.discovery.try_dictionary import criterion
 from scm.mismatch.validate.explain import effect_of
 from tests.unit.mismatch.discovery import made_effect
 
 
 @cache
-def gust_told():
+def gust_reported():
     gusty = made_effect.gusty()
-    return effect_of(gusty.search, gusty.best, 0, gusty.held, gusty.sought)
+    return effect_of(gusty.selected, gusty.best, gusty.best.effects[0])
 
 
 def test_a_gust_is_a_force_over_the_floor_against_time():
@@ -30,15 +30,15 @@ def test_a_gust_is_a_force_over_the_floor_against_time():
 
 
 def test_laws_come_best_first_by_a_criterion_that_counts_their_numbers():
-    sought = made_effect.gusty().sought
-    assert list(sought.criteria) == sorted(sought.criteria)
-    first = sought.found[0]
-    assert criterion(first, 3000) > first.q + 4 * 8.0
+    tried = made_effect.gusty().discovery.tried
+    assert list(tried.criteria) == sorted(tried.criteria)
+    first = tried.found[0]
+    assert criterion(first, 3000) > first.score + 4 * 8.0
 
 
 def test_bins_of_a_curve_agree_with_the_law():
     gusty = made_effect.gusty()
-    bins, fit = discovered_curves(gusty.best, gusty.sought)
+    bins, fit = discovered_curves(gusty.best, gusty.discovery.tried)
     y = np.interp(bins.x, fit.x, fit.y)
     assert np.mean((bins.low <= y) & (y <= bins.high)) > 0.6
     assert np.ptp(fit.y) > 1.5
@@ -47,25 +47,25 @@ def test_bins_of_a_curve_agree_with_the_law():
 def test_a_law_takes_the_place_of_known_effects_only_by_a_margin():
     gusty = made_effect.gusty()
     assert all(is_discovered(e) for e in gusty.best.effects[:1])
-    assert not any(is_discovered(e) for e in gusty.listed.effects)
-    assert gusty.sought is not None
+    assert not any(is_discovered(e) for e in gusty.known.effects)
+    assert gusty.discovery is not None
 
 
 def test_the_listed_effects_that_a_law_was_held_against_are_its_rivals():
-    effect = gust_told()
+    effect = gust_reported()
     assert not effect.is_known
     assert {"wind", "steer_trim"} <= {rival.name for rival in effect.alternatives}
     assert effect.name not in {rival.name for rival in effect.alternatives}
 
 
 def test_what_rules_a_law_s_rivals_out_is_how_much_worse_they_explain_the_recording():
-    rivals = {rival.name: rival for rival in gust_told().rivals}
+    rivals = {one.name: one for one in gust_reported().alternatives}
     assert "worse by" in rivals["wind"].ruled_out_by
     assert "standard deviations" in rivals["steer_trim"].ruled_out_by
 
 
 def test_probabilities_of_a_law_and_its_rivals_are_of_one_whole():
-    effect = gust_told()
+    effect = gust_reported()
     total = effect.probability + sum(rival.probability for rival in effect.alternatives)
     np.testing.assert_allclose(total, 1.0)
     assert effect.probability > 0.99

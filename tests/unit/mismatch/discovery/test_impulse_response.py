@@ -15,33 +15,33 @@ from tests.unit.mismatch.discovery import made_effect
 
 
 @cache
-def asked():
+def healthy():
     """Model, fitter and base of a healthy drive, and its moments."""
-    model = Likelihood([made_effect.lawful_drive()], made_effect.lawful_nigel())
+    model = Likelihood.of([made_effect.lawful_drive()], made_effect.lawful_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))
-    (base,) = fitter.refine([fitter.null()], rounds=1, fresh=True)
-    return model, fitter, base, cells_of(model, fitter, base)
+    (base,) = fitter.refine([fitter.unfitted()], rounds=1, fresh=True)
+    return model, fitter, base, cells_of(base)
 
 
 def explained(model, fitter, base, change):
     """What a change of the innovations adds to the objective, own numbers refitted linearly."""
-    weights, own = fitter.weights(base.e), base.jacobian
+    weights, own = fitter.weights(base.innovations), base.jacobian
     normal = (own.T * weights) @ own + np.eye(own.shape[1])
     held = np.linalg.solve(normal, (own.T * weights) @ change)
     return float(change @ (weights * change) - held @ normal @ held)
 
 
 def test_hats_together_are_the_rollout_of_the_whole_course():
-    model, fitter, base, cells = asked()
+    model, fitter, base, cells = healthy()
     for channel, size in (("along_n", 0.2), ("turn_rad", 0.01)):
-        response = respond(model, fitter, base, cells, channel)
+        response = respond(fitter, base, cells, channel)
         course = size * np.sin(2.0 * np.pi * cells.driven["time"] / 4.0)
         swing = {
             PREFIX + "by_time": 2.0 * np.pi / 4.0,
             PREFIX + "sine": size,
             PREFIX + channel: 1.0,
         }
-        numbers = fitter.numbers((), base.z, base.values)
+        numbers = base.numbers
         e, _ = model([numbers, numbers | swing])
         true = explained(model, fitter, base, e[:, 1] - e[:, 0])
         np.testing.assert_allclose(course @ response.bend @ course, true, rtol=0.1)
@@ -103,5 +103,5 @@ def test_what_is_remembered_of_the_throttle_fades_and_begins_with_every_drive_an
 def test_a_law_of_the_throttle_s_past_begins_near_how_long_it_is_remembered():
     worked = made_effect.law("throttle against throttle's past", "worked")
     start, _, _ = best_of(worked, (-0.2, 8.0))
-    assert start.law is worked
+    assert start.effect is worked
     np.testing.assert_allclose(start.values, (-0.2, 8.0), rtol=0.1)

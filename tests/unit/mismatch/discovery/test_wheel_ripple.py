@@ -6,7 +6,7 @@ import numpy as np
 
 from scm.mismatch.discovery.curves import discovered_curves
 from scm.mismatch.discovery.general_effect import RIPPLE
-from scm.mismatch.discovery.seek import seek
+from scm.mismatch.discovery.try_dictionary import try_dictionary
 from scm.mismatch.discovery.wheel_ripple import WAVES, by_turn, ripples
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.likelihood import Likelihood
@@ -21,16 +21,16 @@ TRUE = (0.03, 3.0, 0.7)  # N*m, waves in a turn, rad
 @cache
 def rippled():
     drive = made_effect.lawful_drive(by_turn().numbers(TRUE))
-    model = Likelihood([drive], made_effect.lawful_nigel())
+    model = Likelihood.of([drive], made_effect.lawful_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))
-    (base,) = fitter.refine([fitter.null()], rounds=2, fresh=True)
-    return model, fitter, base
+    (base,) = fitter.refine([fitter.unfitted()], rounds=2, fresh=True)
+    return fitter, base
 
 
 @cache
 def found():
-    model, _, base = rippled()
-    return seek(model, base, np.ones(len(model.t)))
+    _, base = rippled()
+    return try_dictionary(base, np.ones(len(base.model.t)))
 
 
 def test_the_right_number_of_waves_in_a_turn_explains_most():

@@ -10,10 +10,11 @@ from scm.mismatch.effect_catalogue import by_name, candidates, terms_needed
 from scm.mismatch.experiment.changed import ramp_and_mass
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES
 from scm.mismatch.experiment.pace import Floor, pace_of
-from scm.mismatch.experiment.plan import Explanation, Leg, Planned, numbers_of, place
+from scm.mismatch.experiment.plan import Explanation, Leg, place, planned
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.separation import linear_separation
 from scm.mismatch.experiment.suggest import MIN_LAMBDA, SURE_LAMBDA, names_of, suggest
+from scm.mismatch.fit.hypothesis import numbers_of
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.recorder.play import read_drive
 from scm.recording.read import Channel, Recording
@@ -41,7 +42,7 @@ def recorded():
         channels[f"command.{name}"] = Channel(slow, values, None, (0.0, 0.0), "ratio")
     car = load_car("nigel")
     big = car.with_terms(terms_needed(car))
-    return Likelihood([Drive(Recording(Path("made-up"), "nigel", channels), big)], big)
+    return Likelihood.of([Drive(Recording(Path("made-up"), "nigel", channels), big)], big)
 
 
 def explanation(name, *values):
@@ -52,7 +53,7 @@ def lambda_of(build, *explanations, change=None):
     model = recorded()
     numbers = [numbers_of(r.effects, r.values) for r in explanations]
     placed = place(Leg(build, change), model.car, pace_of(model.car, model.drives, FLOOR), numbers)
-    return linear_separation(Planned(model, [placed], numbers[0]), explanations).least
+    return linear_separation(planned(model, [placed], numbers[0]), explanations).least
 
 
 @cache

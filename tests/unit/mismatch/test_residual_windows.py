@@ -1,16 +1,16 @@
-"""A car judged by strides, and the search for many effects at once."""
+"""A car judged by residual windows, and the selection of several effects at once."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from scm.mismatch.budget import Budget
 from scm.mismatch.fit.data_split import split
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import usual_noise
-from scm.mismatch.fit.residual_windows import LENGTH_S, WindowedLikelihood, learn_sizes, least_sizes
-from scm.mismatch.select.many_effects import by_windows, doublings
+from scm.mismatch.fit.residual_windows import LENGTH_S, WindowedLikelihood, fit_sizes, least_sizes
+from scm.mismatch.select.many_effects import by_windows, doublings, select_many
+from scm.mismatch.select.round import Context
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 
@@ -22,17 +22,17 @@ def healthy():
 
 @pytest.fixture(scope="module")
 def model(healthy):
-    return WindowedLikelihood([healthy], big_nigel())
+    return WindowedLikelihood.of([healthy], big_nigel())
 
 
-def test_strides_are_linear_in_residuals(model):
+def test_windows_are_linear_in_residuals(model):
     residuals, _ = model.residuals([{}, {"steering.trim_rad": 0.05}])
     e = model.weigh(residuals)
     mixed = [[3.0 * r[:, :1] - 2.0 * r[:, 1:] for r in residuals[0]]]
     np.testing.assert_allclose(model.weigh(mixed)[:, 0], 3.0 * e[:, 0] - 2.0 * e[:, 1], atol=1e-6)
 
 
-def test_a_stride_lies_within_one_part(model):
+def test_a_window_lies_within_one_part(model):
     parts = split(model)
     weights = parts.fit.weight + parts.choose.weight + parts.confirm.weight
     np.testing.assert_array_equal(weights, np.ones(len(model.t)))
@@ -64,20 +64,18 @@ def test_a_wrong_heading_is_missed_across_the_body_too(model):
 def test_sizes_grow_with_what_is_missed_and_never_below_the_least(model, healthy):
     residuals, _ = model.residuals([{}, {"steering.trim_rad": 0.1}])
     right, wrong = ([[r[:, i : i + 1] for r in residuals[0]]] for i in (0, 1))
-    calm = learn_sizes(model, right).own
+    calm = fit_sizes(model, right).noise.own
     least = least_sizes([healthy])
     assert all(calm[name] >= least[name] for name in least)
-    assert learn_sizes(model, wrong).own["pose.yaw"] > 2.0 * calm["pose.yaw"]
-    learn_sizes(model, right)
+    assert fit_sizes(model, wrong).noise.own["pose.yaw"] > 2.0 * calm["pose.yaw"]
 
 
 def test_least_disturbances_are_no_doublings(healthy):
-    model = Likelihood([healthy], big_nigel())
+    model = Likelihood.of([healthy], big_nigel())
     assert doublings(model) == pytest.approx(0.0)
     noise = usual_noise([healthy])
     noise = replace(noise, side=4.0 * noise.side)
-    model.believe(noise)
-    assert doublings(model) == pytest.approx(2.0)
+    assert doublings(model.under(noise)) == pytest.approx(2.0)
 
 
 def test_two_effects_are_found_in_one_round():
@@ -85,10 +83,12 @@ def test_two_effects_are_found_in_one_round():
     drive = driven(tuple(truth.items()), seconds=12.0)
     names = ("steer_trim", "drive_gain", "grade", "gyro_bias", "steer_gain")
     library = [candidate(name) for name in names]
-    _, _, search = by_windows([drive], big_nigel(), library, lambda _: None, Budget())
-    found = search.run()
-    assert set(found.names) == {"steer_trim", "drive_gain"}
-    assert len(search.steps) >= 2
-    values = dict(zip(found.names, found.values, strict=True))
+    context = Context(np.ones(1), tuple(library))
+    many = by_windows(context, [drive], big_nigel())
+    found = select_many(many.context, many.retuned)
+    best = found.best
+    assert set(best.names) == {"steer_trim", "drive_gain"}
+    assert len(found.rounds) >= 2
+    values = dict(zip(best.names, best.values, strict=True))
     assert values["steer_trim"] == pytest.approx(0.06, abs=0.01)
     assert values["drive_gain"] == pytest.approx(0.8, abs=0.08)

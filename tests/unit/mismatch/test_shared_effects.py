@@ -5,10 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from scm.mismatch.several.findings import Cause, Sight
+from scm.mismatch.several.effect_in_car import EffectInCar
+from scm.mismatch.several.findings import Agreement, Cause
 from scm.mismatch.several.shared_effects import compared
-from scm.mismatch.several.witness import Witness
-from tests.unit.mismatch.made_cars import drive_of, searched, tagged, tilted
+from tests.unit.mismatch.made_cars import drive_of, selected, tagged, tilted
 
 CARS = ("a", "b", "c")
 TILT, WEAK, TAG_M = 0.03, 0.009, 0.03
@@ -24,7 +24,7 @@ def under_one_tilted_camera():
     """Only the first car's search found the tilt."""
     found = {"a": {"camera_tilt": (0.02, 0.0)}}
     cars = {
-        name: searched(tilted(drive, TILT, 0.0), **found.get(name, {}))
+        name: selected(tilted(drive, TILT, 0.0), **found.get(name, {}))
         for name, drive in drives().items()
     }
     return cars, *compared(cars, lambda _: None)
@@ -33,7 +33,7 @@ def under_one_tilted_camera():
 def test_what_all_cars_see_is_the_cameras():
     _, (tilt,), _ = under_one_tilted_camera()
     assert (tilt.name, tilt.cause, tilt.shared) == ("camera_tilt", Cause.CAMERA, True)
-    assert [one.sight for one in tilt.cars] == [Sight.SEES] * 3
+    assert [one.agreement for one in tilt.cars] == [Agreement.CONFIRMS] * 3
     assert [one.alone for one in tilt.cars] == [True, False, False]
     assert tilt.conclusion == "All 3 cars see it alike: it is the camera, not the cars."
 
@@ -48,48 +48,52 @@ def test_all_cars_together_know_the_tilt_better_than_each_alone():
 
 
 def test_a_car_that_found_nothing_gets_what_all_share_at_the_shared_value():
-    _, (tilt,), taken = under_one_tilted_camera()
-    for searched_again in taken.values():
+    _, (tilt,), adopted = under_one_tilted_camera()
+    for searched_again in adopted.values():
         assert searched_again.best.names == ("camera_tilt",)
         assert searched_again.best.values[0] == pytest.approx(tilt.parameters["tilt_x"].value)
 
 
 def test_a_wrong_tag_is_the_car_s_own():
-    wrong = searched(tagged(drives()["b"], TAG_M, 0.0), pose_point=(0.02, 0.0))
-    cars = {"a": searched(drives()["a"]), "b": wrong, "c": searched(drives()["c"])}
-    (point,), taken = compared(cars, lambda _: None)
+    wrong = selected(tagged(drives()["b"], TAG_M, 0.0), pose_point=(0.02, 0.0))
+    cars = {"a": selected(drives()["a"]), "b": wrong, "c": selected(drives()["c"])}
+    (point,), adopted = compared(cars, lambda _: None)
     assert not point.shared
-    assert [one.sight for one in point.cars] == [Sight.OTHERWISE, Sight.SEES, Sight.OTHERWISE]
+    assert [one.agreement for one in point.cars] == [
+        Agreement.CONTRADICTS,
+        Agreement.CONFIRMS,
+        Agreement.CONTRADICTS,
+    ]
     assert point.conclusion == (
         "Only b sees it, a and c would have to and do not: it is that car's own tag or its "
         "mounting, not the camera."
     )
     assert point.parameters["x_m"].low < TAG_M < point.parameters["x_m"].high
-    assert [one.best.names for one in taken.values()] == [(), ("pose_point",), ()]
+    assert [one.best.names for one in adopted.values()] == [(), ("pose_point",), ()]
 
 
 def test_a_tilt_too_weak_for_one_car_is_found_by_all_together():
-    cars = {name: searched(tilted(drive, WEAK, 0.0)) for name, drive in drives().items()}
-    (tilt,), taken = compared(cars, lambda _: None)
+    cars = {name: selected(tilted(drive, WEAK, 0.0)) for name, drive in drives().items()}
+    (tilt,), adopted = compared(cars, lambda _: None)
     for name, one in zip(CARS, tilt.cars, strict=True):
-        search = cars[name].search
-        assert one.gain < search.price((search.listed[0],))
+        context = cars[name].context
+        assert one.gain < context.penalty((context.catalogue[0],))
     assert tilt.shared
     assert tilt.parameters["tilt_x"].low < WEAK < tilt.parameters["tilt_x"].high
-    assert all(one.best.names == ("camera_tilt",) for one in taken.values())
+    assert all(one.best.names == ("camera_tilt",) for one in adopted.values())
     assert tilt.conclusion.startswith("Too weak for one car alone, all 3 cars together show it")
 
 
 def test_healthy_cars_have_nothing_in_common():
-    cars = {name: searched(drive) for name, drive in drives().items()}
-    common, taken = compared(cars, lambda _: None)
+    cars = {name: selected(drive) for name, drive in drives().items()}
+    common, adopted = compared(cars, lambda _: None)
     assert not common
-    assert taken == cars
+    assert adopted == cars
 
 
 def test_cars_with_tags_wrong_by_unlike_amounts_share_nothing():
     cars = {
-        name: searched(tagged(drives()[name], ahead, 0.0), pose_point=(ahead, 0.0))
+        name: selected(tagged(drives()[name], ahead, 0.0), pose_point=(ahead, 0.0))
         for name, ahead in (("a", 0.03), ("b", -0.03))
     }
     (point,), _ = compared(cars, lambda _: None)
@@ -100,11 +104,11 @@ def test_cars_with_tags_wrong_by_unlike_amounts_share_nothing():
 def test_a_car_s_slope_and_precision_are_those_of_its_cost():
     cars, _, _ = under_one_tilted_camera()
     effect = cars["a"].best.effects[0]
-    witness = Witness(cars["b"], effect, np.array([TILT, 0.0]))
+    in_car = EffectInCar(cars["b"], effect, np.array([TILT, 0.0]))
     at, step = np.array([TILT - 0.012, 0.0]), effect.parameters[0].step
-    here, (low, high) = witness.at(at), (
-        witness.at(at + np.array([way, 0.0])).cost for way in (-0.5 * step, 0.5 * step)
+    here, (low, high) = in_car.at(at), (
+        in_car.at(at + np.array([way, 0.0])).cost for way in (-0.5 * step, 0.5 * step)
     )  # fmt: skip
     assert high - low == pytest.approx(2.0 * here.slope[0], rel=0.15)
     assert high + low - 2.0 * here.cost == pytest.approx(0.5 * here.precision[0, 0], rel=0.3)
-    assert witness.gain(witness.free) >= witness.gain(here)
+    assert in_car.gain(in_car.free) >= in_car.gain(here)

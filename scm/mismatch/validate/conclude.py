@@ -1,0 +1,215 @@
+"""The validate step: what was selected, judged by free runs, located and put into words."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scm.errors import RecordingError, ScmError
+from scm.mismatch.discovery.curves import discovered_curves
+from scm.mismatch.discovery.decide import is_discovered
+from scm.mismatch.evidence import Curve, Evidence, FreeRuns
+from scm.mismatch.experiment.suggest import Suggestion
+from scm.mismatch.findings import Diagnosis, Effect, Fit, Undecided, Verdict
+from scm.mismatch.fit.hypothesis import Hypothesis
+from scm.mismatch.select.confirm import without_one
+from scm.mismatch.select.round import Context, Notify
+from scm.mismatch.select.selected import Selected
+from scm.mismatch.usable_data import titles_of
+from scm.mismatch.validate.curves import curve
+from scm.mismatch.validate.explain import effect_of, refitted, undecided_of, widened_of
+from scm.mismatch.validate.found_car import CarFiles, as_written, on
+from scm.mismatch.validate.free_runs import judge, nothing_got_worse
+from scm.mismatch.validate.locate import locate, strayed
+from scm.mismatch.validate.residual_forces import on_one_axis
+from scm.vehicles.car import Car
+
+POSE = ("position_m", "yaw_rad")
+MAX_NOISE_RATIO = 3.0  # of a free run's error to what noise makes of it; healthy cars: 2.3 at most
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """A diagnosis with what its report needs.
+
+    Attributes:
+        car: As given.
+        best: What was selected; `retuned`: the car's own numbers refitted alone. None where the
+            recordings cannot be used.
+        suggestions: Drives that would answer what this one cannot.
+        selected: What it concludes from; None where nothing could be selected.
+        found_car, retuned_car: As their written files say; None where none could be written.
+        files: Keeps the folder of those files.
+        account: Which rows were read, a line a recording.
+    """
+
+    diagnosis: Diagnosis
+    car: Car
+    evidence: Evidence
+    best: Hypothesis | None = None
+    retuned: Hypothesis | None = None
+    suggestions: tuple[Suggestion, ...] = ()
+    selected: Selected | None = None
+    found_car: Car | None = None
+    retuned_car: Car | None = None
+    files: CarFiles | None = None
+    account: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Validated:
+    """A hypothesis with its effects, its car, and free runs of the given car and of this one."""
+
+    best: Hypothesis
+    effects: tuple[Effect, ...]
+    car: Car | None
+    fit: Fit | None
+    free_runs: FreeRuns | None
+
+
+def conclude(selected: Selected, notify: Notify) -> Result:
+    """Return the diagnosis of what was selected, validated, located and put into words."""
+    car, retuned = selected.car, selected.retuned
+    titles = titles_of(selected.recordings)
+    files = CarFiles(car, titles)
+    _, retuned_car = _written(selected, files, retuned)
+    valid = _validated(selected, files, retuned_car)
+    best, effects, fit = valid.best, valid.effects, valid.fit
+    retuned_m = retuned_error(selected, retuned_car, valid.car) if best.effects else None
+    located, residuals = locate(retuned, best)
+    suggestions = () if selected.context.by_windows else undecided_of(selected, best, notify)
+    undecided = tuple(suggestion.undecided for suggestion in suggestions)
+    verdict = verdict_of(effects, undecided, fit)
+    if verdict is Verdict.MISMATCH and not effects and fit and valid.free_runs:
+        located = strayed(valid.free_runs, fit)
+    diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
+                          fit=fit, runtime_s=0.0,
+                          unanswered=selected.context.budget.unanswered)  # fmt: skip
+    evidence = Evidence(
+        vehicle=car.name, recordings=titles, residuals=residuals, free_runs=valid.free_runs,
+        refitted=as_written(refitted(best, car), valid.car or car), tried=selected.tried,
+        curves=_curves(selected, best), retuned_m=retuned_m, pauses=_pauses(selected),
+        widened=widened_of(best.model, car),
+    )  # fmt: skip
+    return Result(
+        diagnosis, car, evidence, best, retuned, suggestions, selected, valid.car, retuned_car,
+        files,
+    )  # fmt: skip
+
+
+def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> _Validated:
+    """Return what stays of a hypothesis after free runs on unseen parts.
+
+    By windows, effects go until the car strays no farther than those without; a car without
+    effects keeps the numbers of its file where refitted ones bring it no nearer.
+    """
+    best, context = selected.best, selected.context
+    while True:
+        effects, car = _written(selected, files, best)
+        fit, free_runs = _judged(selected, car)
+        if not context.by_windows or not best.effects or fit is None:
+            break
+        if not strays_more(selected, fit, retuned_car, car):
+            break
+        best = without_one(context, best, selected.retuned)
+    if not best.effects and fit is not None and gained_nothing(fit):
+        best, car = as_given(context, best), selected.car
+        fit, free_runs = _judged(selected, car)
+    return _Validated(best, effects, car, fit, free_runs)
+
+
+def _written(
+    selected: Selected, files: CarFiles, fitted: Hypothesis
+) -> tuple[tuple[Effect, ...], Car | None]:
+    """Return a hypothesis' effects, and its car as the written file says; None if none loads."""
+    effects = tuple(effect_of(selected, fitted, effect) for effect in fitted.effects)
+    try:
+        return effects, files.written(fitted, effects)
+    except ScmError:
+        return effects, None
+
+
+def _judged(selected: Selected, car: Car | None) -> tuple[Fit | None, FreeRuns | None]:
+    """Return free runs before and after; nothing where no part has a whole window, or no file."""
+    if car is None:
+        return None, None
+    before = selected.best.model.car
+    try:
+        return judge(selected.drives, before, on(before, car), selected.parts)
+    except RecordingError:
+        return None, None
+
+
+def retuned_error(selected: Selected, retuned: Car | None, found: Car | None) -> float | None:
+    """Return how far the re-tuned car strays [m] in the windows in which the one found is judged.
+
+    None where no part has a whole window, or a car has no file.
+    """
+    fit = _beside_retuned(selected, retuned, found)
+    return None if fit is None else fit.confirm.before.get(POSE[0])
+
+
+def strays_more(selected: Selected, fit: Fit, retuned: Car | None, found: Car | None) -> bool:
+    """Return whether a car strays farther than the given one, or than the re-tuned one.
+
+    Args:
+        selected: Whose recordings they are driven by.
+        fit: Of the found car and the one given.
+        retuned: With the given car's own numbers refitted, and nothing else.
+        found: With effects.
+    """
+    beside = _beside_retuned(selected, retuned, found)
+    fits = (fit,) if beside is None else (fit, beside)
+    return any(POSE[0] in nothing_got_worse(one) for one in fits)
+
+
+def _beside_retuned(selected: Selected, retuned: Car | None, found: Car | None) -> Fit | None:
+    """Return free runs of the re-tuned car and of the one found, as of `before` and `after`."""
+    if retuned is None or found is None:
+        return None
+    base = selected.best.model.car
+    try:
+        return judge(selected.drives, on(base, retuned), on(base, found), selected.parts)[0]
+    except RecordingError:
+        return None
+
+
+def gained_nothing(fit: Fit) -> bool:
+    """Return whether the car's own numbers, refitted, bring it no nearer on unseen parts."""
+    before, after = fit.confirm.before, fit.confirm.after
+    return POSE[0] in before and after[POSE[0]] >= before[POSE[0]]
+
+
+def as_given(context: Context, best: Hypothesis) -> Hypothesis:
+    """Return the car with its own numbers as its file gives them, as sure as the file is."""
+    given = replace(best, z=best.model.simulator.unfitted())
+    fitter = context.fitter(best.model)
+    return replace(fitter.at(given), covariance=np.eye(len(best.z)))
+
+
+def verdict_of(
+    effects: Sequence[Effect], undecided: Sequence[Undecided], fit: Fit | None
+) -> Verdict:
+    """Return the verdict; a car that strays for no cause that was tried is a mismatch too."""
+    if undecided:
+        return Verdict.UNDECIDED
+    after, floor = (fit.confirm.after, fit.confirm.noise_floor) if fit else ({}, {})
+    strays = any(after[name] > MAX_NOISE_RATIO * floor[name] for name in POSE if name in after)
+    return Verdict.MISMATCH if effects or strays else Verdict.NONE
+
+
+def _curves(selected: Selected, best: Hypothesis) -> tuple[Curve, ...]:
+    """Return the effects found as curves; a discovered one with its bins beside it."""
+    drawn = [curve(best, e) for e in best.effects if not is_discovered(e)]
+    discovery = selected.discovery
+    more = () if discovery is None else discovered_curves(best, discovery.tried)
+    return (*(c for c in drawn if c is not None), *more)
+
+
+def _pauses(selected: Selected) -> tuple[tuple[float, float], ...]:
+    """Return what `Evidence.pauses` holds; nothing of several recordings, or of a whole one."""
+    recordings, drives = selected.recordings, selected.drives
+    if len(drives) == 1 or len({(r.path, r.name) for r in recordings}) > 1:
+        return ()
+    moves = on_one_axis(drives)
+    return tuple((float(d.edges[0]) + move, -move) for d, move in zip(drives, moves, strict=True))
