@@ -18,7 +18,7 @@ STANDARD = {
     "_slots_",  # of ctypes structures
 }
 PENDING = (
-    "scm/maps", "scm/mismatch", "scm/traffic", "scm/vehicles", "scm/world",
+    "scm/maps", "scm/traffic", "scm/vehicles", "scm/world",
 )  # fmt: skip
 """Where old names still stand; this list only gets shorter."""
 PUBLISHED = ("scm/client/nouns",)  # written from the interface: methods carry its operation ids
