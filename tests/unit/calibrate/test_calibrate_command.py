@@ -59,7 +59,7 @@ def test_it_drives_writes_the_drive_and_the_car_and_says_what_it_found(bodies, t
     assert (tmp_path / "drive" / "recording.yaml").is_file()
     said = capsys.readouterr().out
     assert "  drive.deadband" in said
-    assert "the guard held the car up: pose 1" in said
+    assert "the guard limited the car: pose 1" in said
     assert [line for line in said.splitlines() if line.endswith("% driven")] == [
         f"{percent} % driven" for percent in range(0, 101, 10)
     ]
@@ -120,7 +120,7 @@ def test_each_reason_to_wait_is_said_once_and_with_advice(capsys):
         on_progress(doing)
     said = capsys.readouterr().out.splitlines()
     assert said == [
-        "waits (pose): the Eye tells no pose of that name; a car that has not joined is called "
+        "waits (pose): the Eye reports no pose of that name; a car that has not joined is called "
         "tag-ID",
         "0 % driven",
         "10 % driven",

@@ -122,20 +122,20 @@ def test_a_car_of_which_nothing_is_said_gets_nothing():
     wishes, complaints = read(cars=2)
     assert (wishes.cars[1].throttle, wishes.cars[1].steering) == (0.0, 0.0)
     assert complaints == [
-        "V2 Steering: not said, expected a number from -1 to 1",
-        "V2 Throttle: not said, expected a number from -1 to 1",
+        "V2 Steering: missing, expected a number from -1 to 1",
+        "V2 Throttle: missing, expected a number from -1 to 1",
     ]
 
 
 @pytest.mark.parametrize(
     ("key", "words"),
     [
-        ("V2 Throttle", "only V1 to V1"),
+        ("V2 Throttle", "expected V1 to V1"),
         ("V1 Thruttle", "expected one of Throttle"),
-        ("TL1 State", "only V1"),
-        ("Weather", "not carried"),
-        ("Fog", "not carried"),
-        ("", "nothing here"),
+        ("TL1 State", "expected V1"),
+        ("Weather", "not supported"),
+        ("Fog", "not supported"),
+        ("", "unknown"),
     ],
 )
 def test_a_key_that_is_not_known_is_told_and_the_others_count(key, words):
@@ -187,4 +187,4 @@ def test_a_missing_throttle_is_told_after_any_number_of_strange_keys():
     for number in range(300):
         commands.read({**SAID, f"x{number}": "1"})
     commands.read({"V1 Steering": "0"})
-    assert any(what.startswith("V1 Throttle: not said") for what in commands.complaints)
+    assert any(what.startswith("V1 Throttle: missing") for what in commands.complaints)

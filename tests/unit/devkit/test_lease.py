@@ -59,7 +59,7 @@ def test_a_refusal_is_said_once_and_another_one_anew(caplog):
     for why in ("ada drives", "ada drives", "no such car"):
         wheel.replied(call.request, Refused(code="owned", detail=why))
     assert (caplog.text.count("ada drives"), caplog.text.count("no such car")) == (1, 1)
-    assert wheel.detail == "n1 is asked for"
+    assert wheel.detail == "n1 is requested"
     assert told(wheel, 1, 1) == []
 
 
