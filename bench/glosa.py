@@ -90,7 +90,7 @@ def drive(city_map: CityMap, cars: int, span_s: float, policy: str, seed: int) -
         watch, passed = Watch(world.slots.hosted.copy(), world.slots.speed), drivers.passed.sum()
         for _ in range(round(span_s / LOOK_S)):
             city.run_for(LOOK_S)
-            watch.look(world.slots.speed)
+            watch.look(world.timed_stages.speed)
     watch.tally.contacts = len(touched.began)
     watch.tally.lines = float(drivers.passed.sum() - passed) / 2.0 / span_s
     return watch.tally

@@ -182,7 +182,7 @@ def lied(story: Story, attack: str, liars: set[str], ground: Ground, seed: int) 
     air: list[Sent] = []
     for frame in story.frames:
         air += sends[frame.station](frame) if frame.station in sends else [Sent(frame, lies=False)]
-        scene.heard.append(frame)
+        scene.claims_checked.append(frame)
     return sorted(air, key=lambda sent: sent.frame.t_ns)
 
 
@@ -212,13 +212,13 @@ def judge(
         if loss and rng.random() < loss:
             continue
         sender = Sender(CAR) if station in story_cars else UNKNOWN  # a ghost is no car of the city
-        found = detector.hear(station, receiver, t_ns, body, sender=sender)
+        found = detector.receive(station, receiver, t_ns, body, sender=sender)
         if found is None:
             continue
-        outcome.highest[station] = max(outcome.highest[station], found.memory.score)
+        outcome.highest[station] = max(outcome.highest[station], found.history.score)
         if found.is_reported and station not in outcome.reported_ns:
             outcome.reported_ns[station] = t_ns
-            outcome.why[station] = found.memory.worst
+            outcome.why[station] = found.history.worst
     return outcome
 
 

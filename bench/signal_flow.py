@@ -17,9 +17,9 @@ from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
-from scm.traffic.signals.controller import Controller, Heard
-from scm.traffic.signals.detectors import Seen, Watcher, reach_of
-from scm.traffic.signals.part import tables_of
+from scm.traffic.signals.controller import Controller, Observations
+from scm.traffic.signals.detectors import JunctionDetectors, Seen, reach_of
+from scm.traffic.signals.part import timetables_of
 from scm.traffic.signals.program import STEP_NS, program_of
 from scm.traffic.signals.timing import NIGEL
 
@@ -61,7 +61,7 @@ class Flow:
         self.roads = Roads(city_map)
         self.uneven = uneven
         programs = {j.name: program_of(j, self.roads) for j in city_map.junctions}
-        tables = tables_of(city_map, self.roads, programs, NIGEL)
+        tables = timetables_of(city_map, self.roads, programs, NIGEL)
         self.controllers = {
             name: Controller(
                 name, program, plan, policy=policy, tables=tables[name] if waves else None
@@ -69,7 +69,7 @@ class Flow:
             for name, program in programs.items()
         }
         self.watchers = {
-            j.name: Watcher(j, self.roads, reach_of(programs[j.name], self.roads))
+            j.name: JunctionDetectors(j, self.roads, reach_of(programs[j.name], self.roads))
             for j in city_map.junctions
         }
         self.favoured = {
@@ -121,7 +121,7 @@ class Flow:
             seen = car.delayed.pop(0)
             for name, watcher in self.watchers.items():
                 if self.controllers[name].needs_detectors:
-                    watcher.show(seen, self.now_ns)
+                    watcher.add(seen, self.now_ns)
 
     def _next_lane(self, lane: str) -> str:
         ways = self.roads.successors(lane)

@@ -15,7 +15,7 @@ from scm.traffic.signals.kernel import Program
 from scm.traffic.signals.policy import policy_names
 from scm.traffic.signals.program import STEP_NS, program_of
 from scm.traffic.signals.proof.kernel_proof import in_steps, prove
-from scm.traffic.signals.proof.random_requests import flood
+from scm.traffic.signals.proof.random_requests import run_random_requests
 from scm.traffic.signals.proof.ring_proof import prove_service, small_times
 
 STEPS, JUNCTIONS = 100_000_000, 4_000
@@ -53,7 +53,7 @@ def main() -> None:
     each = max(1, steps // JUNCTIONS // len(programs) + 1)
     for seed, (name, program) in enumerate(programs.items()):
         began = time.perf_counter()
-        judged = flood(in_steps(program, STEP_NS), JUNCTIONS, each, seed)
+        judged = run_random_requests(in_steps(program, STEP_NS), JUNCTIONS, each, seed)
         spent = time.perf_counter() - began
         numbers = f"{judged.steps:.3g} | {judged.greens} | {judged.conflicts}"
         print(f"| {name} | {numbers} | {judged.short_clearances} | {spent:.1f} |", flush=True)

@@ -33,7 +33,7 @@ from scm.records.city_map import CityMap
 from scm.runtime.lockstep import Lockstep
 from scm.traffic.demand.part import DemandPart, Ways
 from scm.traffic.demand.table import Flow
-from scm.traffic.signals.map_plan import OWN, adopted, own_table
+from scm.traffic.signals.map_plan import OWN, adopted, map_timetable
 from scm.traffic.signals.part import TrafficPart
 from scm.traffic.signals.plan import load_timetable
 from scm.traffic.signals.program import program_of
@@ -124,7 +124,7 @@ def capacities(city_map: CityMap) -> tuple[dict[str, float], dict[str, tuple[str
     hour = 3600.0
     for junction in city_map.junctions:
         program = program_of(junction, roads)
-        table = (own_table(junction.stages, program) if junction.plan == OWN
+        table = (map_timetable(junction.stages, program) if junction.plan == OWN
                  else load_timetable(junction.plan, program))  # fmt: skip
         for group in junction.groups:
             green = sum(g.end_ns - g.start_ns for g in table.greens_of(group.name))

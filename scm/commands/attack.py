@@ -49,7 +49,7 @@ def _run(arguments: argparse.Namespace) -> int:
     with ZenohBus(arguments.city, name, arguments.connect, credentials=credentials) as bus:
         agent = AgentPart(name, "nigel", arguments.spawn, bus.session, arguments.seed)
         city_map = load_map(arguments.map)
-        part = Attacker(agent, attacks, city_map, arguments.seed, say=report)
+        part = Attacker(agent, attacks, city_map, arguments.seed, print_line=report)
         run(Leaving(part, stop, done), bus, clock, done)
     gc.freeze()  # as in `scm.command.run_part`
     return 0

@@ -37,7 +37,7 @@ def _run(arguments: argparse.Namespace) -> int:
             policy=arguments.policy,
             car=slowest_of(map(facts_of, arguments.car)) if arguments.car else NIGEL,
             learned=load_learned(arguments.learned) if arguments.learned else None,
-            kept={} if state is None else records(state, "plans", "traffic", PlanRecord),
+            restored={} if state is None else records(state, "plans", "traffic", PlanRecord),
         )
         return run_part(part, arguments, state)
 

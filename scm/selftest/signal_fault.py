@@ -13,8 +13,8 @@ import msgspec
 
 from scm.clock import NS_PER_MS
 from scm.records.signals import Colour, SignalGroup
-from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Spat
+from scm.traffic.monitor.conflict_table import ConflictTable
 
 OutputFault = Callable[[Spat], Spat | None]
 
@@ -33,7 +33,7 @@ class SignalFault:
 
     what: str
     expects: tuple[str, ...]
-    output: Callable[[Card], OutputFault] | None = None
+    output: Callable[[ConflictTable], OutputFault] | None = None
     process: Signals | None = None
 
 
@@ -46,10 +46,12 @@ def recolour(spat: Spat, colours: dict[str, Colour]) -> Spat:
     return msgspec.structs.replace(spat, groups=groups)
 
 
-def cut_short(colour: Colour, to: Colour, *, after_ms: int) -> Callable[[Card], OutputFault]:
+def cut_short(
+    colour: Colour, to: Colour, *, after_ms: int
+) -> Callable[[ConflictTable], OutputFault]:
     """Return a fault that ends each colour early, but not one that is already shown."""
 
-    def output(table: Card) -> OutputFault:
+    def output(table: ConflictTable) -> OutputFault:
         del table
         began_ns: list[int] = []
 
@@ -69,7 +71,7 @@ def cut_short(colour: Colour, to: Colour, *, after_ms: int) -> Callable[[Card], 
     return output
 
 
-def conflicting_groups(table: Card, group: str) -> list[str]:
+def conflicting_groups(table: ConflictTable, group: str) -> list[str]:
     """Return the groups that must never be green together with one."""
     return [a if b == group else b for a, b in table.conflicts if group in (a, b)]
 

@@ -21,7 +21,7 @@ from scm.selftest.observer import Observer
 from scm.selftest.signal_fault import OutputFault, SignalFault
 from scm.selftest.stand_in import StandIn
 from scm.selftest.table import in_ms, in_s
-from scm.traffic.monitor.conflict_table import card_of
+from scm.traffic.monitor.conflict_table import conflict_table_of
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Spat
@@ -94,7 +94,7 @@ class SignalTrials:
         if not city_map.junctions:
             msg = f"map {city_map.name}: has no signals to test"
             raise RunError(msg)
-        self._conflict_table = card_of(city_map, city_map.junctions[0])
+        self._conflict_table = conflict_table_of(city_map, city_map.junctions[0])
         self._junction = city_map.junctions[0].name
         self._observer = observer
         self._stand_in = stand_in

@@ -14,7 +14,7 @@ from scm.registry import load
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
 from scm.traffic.monitor.checks import Monitor
-from scm.traffic.monitor.conflict_table import card_of
+from scm.traffic.monitor.conflict_table import conflict_table_of
 from scm.traffic.monitor.part import MonitorPart
 from scm.traffic.signals import kernel
 from scm.traffic.signals.controller import Controller
@@ -49,7 +49,7 @@ def test_the_kernel_is_proven_for_the_junction_at_its_real_times(city_map, junct
 @pytest.mark.parametrize(("city_map", "junction"), CASES)
 def test_both_channels_find_the_same_conflicts_by_different_code(city_map, junction):
     program = program_of(junction, Roads(city_map))
-    card = card_of(city_map, junction)
+    card = conflict_table_of(city_map, junction)
     assert {frozenset(pair) for pair in card.conflicts} == program.conflicts
 
 
@@ -58,7 +58,7 @@ def test_both_channels_find_the_same_conflicts_by_different_code(city_map, junct
 def test_a_plan_fits_the_junction_and_serves_every_group(city_map, junction, plan):
     program = program_of(junction, Roads(city_map))
     table = load_timetable(plan, program)
-    assert set().union(*(slot.groups for slot in table.slots)) == set(program.groups)
+    assert set().union(*(slot.groups for slot in table.timed_stages)) == set(program.groups)
     assert load(PACKAGE, plan, "PLAN", Plan).about
 
 
@@ -122,7 +122,7 @@ WRONG = {
 def test_a_controller_with_a_wrong_program_is_caught_in_its_first_cycle(city_map, junction, fault):
     program = WRONG[fault](program_of(junction, Roads(city_map)))
     controller = Controller(junction.name, program, "brisk")
-    monitor = Monitor(card_of(city_map, junction), 0)
+    monitor = Monitor(conflict_table_of(city_map, junction), 0)
     for k in range(load_timetable("brisk", program).length_ns // STEP_NS + 100):
         controller.step(k * STEP_NS)
         monitor.see(controller.spat(k * STEP_NS), k * STEP_NS)

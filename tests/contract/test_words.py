@@ -16,6 +16,7 @@ STANDARD = {
     "wait_for_calm",  # of `scm.fleet.City`: scripts of users call it by its name of 0.1
     "__slots__",  # Python's own name
     "_slots_",  # of ctypes structures
+    "calm",  # the public name of a signal plan
 }
 PENDING = (
     "scm/maps", "scm/traffic", "scm/vehicles", "scm/world",

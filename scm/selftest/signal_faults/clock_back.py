@@ -4,13 +4,13 @@ import msgspec
 
 from scm.clock import NS_PER_S
 from scm.selftest.signal_fault import OutputFault, SignalFault
-from scm.traffic.monitor.conflict_table import Card
+from scm.traffic.monitor.conflict_table import ConflictTable
 from scm.v2x.messages.spat import Spat
 
 JUMP_NS = -2 * NS_PER_S
 
 
-def _output_fault(table: Card) -> OutputFault:
+def _output_fault(table: ConflictTable) -> OutputFault:
     del table
 
     def output_fault(spat: Spat) -> Spat:

@@ -8,11 +8,11 @@ from scm.selftest.signal_fault import (
     long_green,
     recolour,
 )
-from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Spat
+from scm.traffic.monitor.conflict_table import ConflictTable
 
 
-def _output_fault(table: Card) -> OutputFault:
+def _output_fault(table: ConflictTable) -> OutputFault:
     stuck: dict[str, Colour] = {}
 
     def output_fault(spat: Spat) -> Spat:

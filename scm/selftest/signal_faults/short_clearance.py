@@ -2,11 +2,11 @@
 
 from scm.clock import NS_PER_MS
 from scm.selftest.signal_fault import OutputFault, SignalFault, conflicting_groups, recolour
-from scm.traffic.monitor.conflict_table import Card
+from scm.traffic.monitor.conflict_table import ConflictTable
 from scm.v2x.messages.spat import Spat
 
 
-def _output_fault(table: Card) -> OutputFault:
+def _output_fault(table: ConflictTable) -> OutputFault:
     went: set[str] = set()
     early: list[str] = []
 

@@ -1,11 +1,11 @@
 """The same old sample is sent again and again."""
 
 from scm.selftest.signal_fault import OutputFault, SignalFault
-from scm.traffic.monitor.conflict_table import Card
+from scm.traffic.monitor.conflict_table import ConflictTable
 from scm.v2x.messages.spat import Spat
 
 
-def _output_fault(table: Card) -> OutputFault:
+def _output_fault(table: ConflictTable) -> OutputFault:
     del table
     first: list[Spat] = []
 

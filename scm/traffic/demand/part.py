@@ -29,11 +29,11 @@ PERIOD_NS = 100 * NS_PER_MS
 TRY_AGAIN_NS = 500 * NS_PER_MS
 STATUS_NS = NS_PER_S
 NO_ROOM = ("occupied", "full", "timeout", "unreachable")
-NAME_TAKEN = "owned"
+NAME_IN_USE = "owned"
 
 
 @dataclass(slots=True)
-class _Wish:
+class _Departure:
     """A car that wants to drive."""
 
     due_ns: int
@@ -47,9 +47,9 @@ class _Wish:
 class _Entry:
     """A spawn place, who waits for it, and when to try again."""
 
-    waiting: deque[_Wish] = field(default_factory=deque)
+    waiting: deque[_Departure] = field(default_factory=deque)
     next_ns: int = 0
-    asked: bool = False
+    is_spawning: bool = False
 
 
 class DemandPart(BasePart):
@@ -82,10 +82,10 @@ class DemandPart(BasePart):
             min(flow.begin_s for flow in flows) if time_of_day_s is None else time_of_day_s
         )
         self._start_ns: int | None = None
-        self._due: list[_Wish] = []
+        self._due: list[_Departure] = []
         self._entries: dict[str, _Entry] = defaultdict(_Entry)
-        self._asked: dict[str, _Wish] = {}
-        self._under_way: dict[str, tuple[_Wish, int]] = {}
+        self._spawning: dict[str, _Departure] = {}
+        self._under_way: dict[str, tuple[_Departure, int]] = {}
         self._numbers = 0
         self._next_status_ns = 0
         self._waited_ns = self._travelled_ns = 0
@@ -104,77 +104,81 @@ class DemandPart(BasePart):
             if item.call is not None:
                 outbox += self._answered(item.call, item.message, now_ns)
             elif isinstance(item.message, Trip):
-                outbox += self._heard(item.message, now_ns)
+                outbox += self._receive_trip(item.message, now_ns)
         self._queue_up(now_ns)
         for name, entry in self._entries.items():
             outbox += self._let_in(name, entry, now_ns)
         if now_ns >= self._next_status_ns:
             self._next_status_ns = now_ns + STATUS_NS
-            outbox.append(self._tell(now_ns))
+            outbox.append(self._current_status(now_ns))
         return outbox
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Take its cars along."""
         cars = [*self._under_way]
         self._under_way.clear()
-        return [*(_removal(name, "the demand ends") for name in cars), self._tell(now_ns)]
+        return [*(_removal(name, "the demand ends") for name in cars), self._current_status(now_ns)]
 
     def _open(self, now_ns: int) -> None:
         self._start_ns = now_ns
-        wishes = [
-            _Wish(now_ns + round((at_s - self._begin_s) * NS_PER_S), flow.car, entry, route)
+        found = [
+            _Departure(now_ns + round((at_s - self._begin_s) * NS_PER_S), flow.car, entry, route)
             for number, (flow, entry, route) in enumerate(self._flows)
             for at_s in departures(flow, number, self._begin_s)
         ]
-        self._due = sorted(wishes, key=lambda wish: wish.due_ns, reverse=True)
+        self._due = sorted(found, key=lambda departure: departure.due_ns, reverse=True)
 
     def _queue_up(self, now_ns: int) -> None:
         while self._due and self._due[-1].due_ns <= now_ns:
-            wish = self._due.pop()
+            departure = self._due.pop()
             self._counts["wanted"] += 1
-            self._entries[wish.entry].waiting.append(wish)
+            self._entries[departure.entry].waiting.append(departure)
 
     def _let_in(self, name: str, entry: _Entry, now_ns: int) -> list[Outgoing]:
-        if not entry.waiting or entry.asked or now_ns < entry.next_ns:
+        if not entry.waiting or entry.is_spawning or now_ns < entry.next_ns:
             return []
-        wish = entry.waiting[0]
+        departure = entry.waiting[0]
         self._numbers += 1
-        wish.vehicle = f"d{self._numbers}"
-        entry.asked = True
-        self._asked[wish.vehicle] = wish
-        return [Call(SpawnRequest(vehicle=wish.vehicle, car=wish.car, spawn=name))]
+        departure.vehicle = f"d{self._numbers}"
+        entry.is_spawning = True
+        self._spawning[departure.vehicle] = departure
+        return [Call(SpawnRequest(vehicle=departure.vehicle, car=departure.car, spawn=name))]
 
     def _answered(self, call: Call, reply: Message, now_ns: int) -> list[Outgoing]:
         request = call.request
         if isinstance(request, SpawnRequest):
-            return self._spawned(self._asked.pop(request.vehicle), reply, now_ns)
+            return self._spawned(self._spawning.pop(request.vehicle), reply, now_ns)
         if isinstance(request, RouteRequest) and not isinstance(reply, RouteReply):
             self._under_way.pop(request.vehicle, None)
             self._counts["refused"] += 1
             return [_removal(request.vehicle, "no way"), _warn(request.vehicle, reply, now_ns)]
         return []
 
-    def _spawned(self, wish: _Wish, reply: Message, now_ns: int) -> list[Outgoing]:
-        entry = self._entries[wish.entry]
-        entry.asked = False
+    def _spawned(self, departure: _Departure, reply: Message, now_ns: int) -> list[Outgoing]:
+        entry = self._entries[departure.entry]
+        entry.is_spawning = False
         if isinstance(reply, SpawnReply):
             entry.waiting.popleft()
             self._counts["entered"] += 1
-            self._waited_ns += now_ns - wish.due_ns
-            self._under_way[wish.vehicle] = (wish, now_ns)
-            trip_id = f"demand-{wish.vehicle}-{now_ns}"
-            return [Call(RouteRequest(request_id=trip_id, vehicle=wish.vehicle, via=wish.route))]
+            self._waited_ns += now_ns - departure.due_ns
+            self._under_way[departure.vehicle] = (departure, now_ns)
+            trip_id = f"demand-{departure.vehicle}-{now_ns}"
+            return [
+                Call(
+                    RouteRequest(request_id=trip_id, vehicle=departure.vehicle, via=departure.route)
+                )
+            ]
         code = reply.code if isinstance(reply, Refused) else ""
-        if code == NAME_TAKEN:
+        if code == NAME_IN_USE:
             return []
         if code in NO_ROOM:
             entry.next_ns = now_ns + TRY_AGAIN_NS
             return []
         entry.waiting.popleft()
         self._counts["refused"] += 1
-        return [_warn(wish.vehicle, reply, now_ns)]
+        return [_warn(departure.vehicle, reply, now_ns)]
 
-    def _heard(self, trip: Trip, now_ns: int) -> list[Outgoing]:
+    def _receive_trip(self, trip: Trip, now_ns: int) -> list[Outgoing]:
         """Take a car off the map whose trip has ended."""
         if trip.arrived_ns is None or trip.vehicle not in self._under_way:
             return []
@@ -185,7 +189,7 @@ class DemandPart(BasePart):
         self._travelled_ns += trip.arrived_ns - began_ns
         return [_removal(trip.vehicle, "arrived")]
 
-    def _tell(self, now_ns: int) -> DemandStatus:
+    def _current_status(self, now_ns: int) -> DemandStatus:
         queued = sum(len(entry.waiting) for entry in self._entries.values())
         began_ns = now_ns if self._start_ns is None else self._start_ns
         counts = self._counts
@@ -269,7 +273,7 @@ class Ways:
         done: set[tuple[int, str]] = set()
         heapq.heapify(queue)
         while queue:
-            taken_s, reached, lanes = heapq.heappop(queue)
+            elapsed_s, reached, lanes = heapq.heappop(queue)
             reached += lanes[-1] in goals[reached]
             if reached == len(goals):
                 return lanes
@@ -278,7 +282,7 @@ class Ways:
             done.add((reached, lanes[-1]))
             for following in self._roads.successors(lanes[-1]):
                 if (reached, following) not in done:
-                    way = (taken_s + self._time_s(following), reached, (*lanes, following))
+                    way = (elapsed_s + self._time_s(following), reached, (*lanes, following))
                     heapq.heappush(queue, way)
         return None
 

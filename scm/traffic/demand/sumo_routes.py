@@ -85,12 +85,12 @@ class Departures(NamedTuple):
     at_s: tuple[float, ...]
 
 
-def read_routes(path: Path, say: Callable[[str], None]) -> list[Departures]:
+def read_routes(path: Path, warn: Callable[[str], None]) -> list[Departures]:
     """Return who sets out by a SUMO route file.
 
     Args:
         path: Of the file.
-        say: Called with what the file says and has no effect here.
+        warn: Called with what the file says and has no effect here.
 
     Raises:
         DemandError: naming element and attribute of what is wrong, or cannot be followed.
@@ -102,8 +102,8 @@ def read_routes(path: Path, say: Callable[[str], None]) -> list[Departures]:
     idle: Counter[str] = Counter()
     _check(root, path, idle)
     if idle:
-        listed = ", ".join(f"{key} ({count})" for key, count in sorted(idle.items()))
-        say(f"{path}: no effect here, where cars drive as their car files say: {listed}")
+        known = ", ".join(f"{key} ({count})" for key, count in sorted(idle.items()))
+        warn(f"{path}: no effect here, where cars drive as their car files say: {known}")
     _check_ids(root, path)
     file = _RouteFile(root, path)
     return [row for entry, interval in _entries(root) for row in file.departures(entry, interval)]
@@ -148,16 +148,16 @@ def _check_keys(element: Element, where: str, idle: Counter[str]) -> None:
     read = _READ[element.tag]
     for key in element.attrib.keys() - read:
         if key not in NO_EFFECT:
-            listed = ", ".join(sorted(read))
-            raise DemandError(f"{where}: {key} is not read{nearest(key, [*read])}, only {listed}")
+            known = ", ".join(sorted(read))
+            raise DemandError(f"{where}: {key} is not read{nearest(key, [*read])}, only {known}")
         idle[key] += 1
 
 
 def _check_type(element: Element, where: str, idle: Counter[str]) -> None:
     """Refuse types of what is no car, or of other numbers of them; their driving has no effect."""
     if (kind := element.get("vClass", "passenger")) not in CAR_CLASSES:
-        listed = ", ".join(CAR_CLASSES)
-        raise DemandError(f"{where}: vClass: only cars drive here: expected {listed}, got {kind!r}")
+        known = ", ".join(CAR_CLASSES)
+        raise DemandError(f"{where}: vClass: only cars drive here: expected {known}, got {kind!r}")
     if number_of(element.get("scale", "1"), f"{where}: scale") != 1.0:
         raise DemandError(f"{where}: scale: expected 1; give its flows other numbers instead")
     for key in element.attrib.keys() - {"id", "vClass", "scale", "probability"}:

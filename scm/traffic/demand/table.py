@@ -74,18 +74,18 @@ def departures(flow: Flow, number: int, from_s: float) -> tuple[float, ...]:
     return tuple(found)
 
 
-def load_demand(path: Path, say: Callable[[str], None] = lambda _: None) -> tuple[Flow, ...]:
+def load_demand(path: Path, warn: Callable[[str], None] = lambda _: None) -> tuple[Flow, ...]:
     """Return the rows of a demand file: `.toml`, `.csv`, or SUMO's `.rou.xml`.
 
     Args:
         path: Of the file.
-        say: Called with what a SUMO file says and has no effect here.
+        warn: Called with what a SUMO file says and has no effect here.
 
     Raises:
         DemandError: naming file, row and key that are wrong.
     """
     if path.suffix == ".xml":
-        return _nonempty([_flow_of(row) for row in read_routes(path, say)], path)
+        return _nonempty([_flow_of(row) for row in read_routes(path, warn)], path)
     with reading(path, "a demand file", DemandError):
         text = path.read_text(encoding="utf-8")
     if path.suffix == ".toml":
@@ -129,22 +129,22 @@ def _toml(text: str, path: Path) -> list[Mapping[str, Any]]:
 
 
 def _flow(row: Mapping[str, Any], where: str) -> Flow:
-    told = {key: value for key, value in row.items() if value not in (None, "")}
-    for key in told:
+    given = {key: value for key, value in row.items() if value not in (None, "")}
+    for key in given:
         if key not in COLUMNS:
             hint = nearest(str(key), COLUMNS)
             raise DemandError(f"{where}: no key {key!r}{hint}, only {', '.join(COLUMNS)}")
     for key in COLUMNS[:3]:
-        if key not in told:
+        if key not in given:
             raise DemandError(f"{where}: key {key!r} is missing")
     flow = Flow(
-        start=str(told["from"]),
-        end=str(told["to"]),
-        per_hour=number_of(told["vehicles_per_hour"], f"{where}: vehicles_per_hour"),
-        begin_s=seconds_of_day(told.get("begin", 0.0), f"{where}: begin"),
-        end_s=seconds_of_day(told.get("end", DAY_S), f"{where}: end"),
-        car=str(told.get("car", DEFAULT_CAR)),
-        seed=int(number_of(told.get("seed", 0), f"{where}: seed")),
+        start=str(given["from"]),
+        end=str(given["to"]),
+        per_hour=number_of(given["vehicles_per_hour"], f"{where}: vehicles_per_hour"),
+        begin_s=seconds_of_day(given.get("begin", 0.0), f"{where}: begin"),
+        end_s=seconds_of_day(given.get("end", DAY_S), f"{where}: end"),
+        car=str(given.get("car", DEFAULT_CAR)),
+        seed=int(number_of(given.get("seed", 0), f"{where}: seed")),
     )
     return _checked(flow, where)
 

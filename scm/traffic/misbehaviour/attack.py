@@ -19,7 +19,7 @@ from scm.v2x.etsi.cam_spatem import SCALE, CamBody
 ATTACKS = "scm.traffic.misbehaviour.attacks"
 SLOW_MPS = 1.0 / SCALE
 STEP_M = 1.0 / SCALE
-HEARD = 200
+MAX_FRAMES = 200
 
 
 class Frame(NamedTuple):
@@ -43,11 +43,11 @@ class Scene:
 
     Attributes:
         ground: The map.
-        heard: The last CAMs of others, oldest first; whoever runs the attack adds to it.
+        received: The last CAMs of others, oldest first; whoever runs the attack adds to it.
     """
 
     ground: Ground
-    heard: deque[Frame] = field(default_factory=lambda: deque(maxlen=HEARD))
+    received: deque[Frame] = field(default_factory=lambda: deque(maxlen=MAX_FRAMES))
 
 
 Transform = Callable[[Frame], list[Sent]]

@@ -64,7 +64,7 @@ class Attacker:
         seed: int = 0,
         *,
         own_names: bool = False,
-        say: Callable[[str], None] | None = None,
+        print_line: Callable[[str], None] | None = None,
     ) -> None:
         self._part = part
         self.name, self.role, self.period_ns = part.name, part.role, part.period_ns
@@ -74,8 +74,8 @@ class Attacker:
             for station, name in attacks.items()
         }
         self._own_names = own_names
-        self._say = say or _nobody
-        self._is_told = say is not None
+        self._print = print_line or _nobody
+        self._prints = print_line is not None
         self._records = {name: _Record(load_attack(a).about) for name, a in attacks.items()}
         self._later: list[tuple[int, int, list[Cam]]] = []
         self._count = itertools.count()
@@ -84,7 +84,7 @@ class Attacker:
     def subscriptions(self) -> Sequence[Subscription]:
         """What the part hears, and reports on its liars where somebody is told."""
         reports = (Subscription(MisbehaviourReport, {"suspect": name}) for name in self._send)
-        return (*self._part.subscriptions, *reports) if self._is_told else self._part.subscriptions
+        return (*self._part.subscriptions, *reports) if self._prints else self._part.subscriptions
 
     @property
     def services(self) -> Sequence[Service]:
@@ -103,15 +103,15 @@ class Attacker:
             elif isinstance(item.message, MisbehaviourReport):
                 self._is_reported(item.message)
         outbox: list[Outgoing] = []
-        heard: dict[tuple[str, int], list[Cam]] = {}
-        for said in self._part.step(now_ns, inbox):
-            if isinstance(said, CamTx | CamRx) and said.station in self._send:
-                heard.setdefault((said.station, said.t_ns), []).append(said)
+        copies_of: dict[tuple[str, int], list[Cam]] = {}
+        for sent in self._part.step(now_ns, inbox):
+            if isinstance(sent, CamTx | CamRx) and sent.station in self._send:
+                copies_of.setdefault((sent.station, sent.t_ns), []).append(sent)
                 continue
-            if isinstance(said, CamTx):
-                self._overhear(said)
-            outbox.append(said)
-        for copies in heard.values():
+            if isinstance(sent, CamTx):
+                self._overhear(sent)
+            outbox.append(sent)
+        for copies in copies_of.values():
             self._lie(copies)
         while self._later and self._later[0][0] <= now_ns:
             outbox += heapq.heappop(self._later)[2]
@@ -122,11 +122,11 @@ class Attacker:
         for name, record in self._records.items():
             found = "never reported" if record.since_ns is None else "reported"
             sums = f"{record.cams} CAMs, {record.lies} of them lies, {found}"
-            self._say(f"{name} leaves: {sums if record.cams else 'it was never in the city'}")
+            self._print(f"{name} leaves: {sums if record.cams else 'it was never in the city'}")
         return self._part.finish(now_ns)
 
     def _overhear(self, cam: Cam) -> None:
-        self._scene.heard.append(Frame(cam.station, cam.t_ns, cam.body))
+        self._scene.received.append(Frame(cam.station, cam.t_ns, cam.body))
 
     def _lie(self, copies: list[Cam]) -> None:
         """Replace one frame, as sent and as each receiver heard it."""
@@ -138,10 +138,10 @@ class Attacker:
             record.lies += sent.lies
             if sent.lies and record.lies == 1:
                 record.first_ns = frame.t_ns
-                self._say(f"{first.station} lies from now on: {record.about}")
+                self._print(f"{first.station} lies from now on: {record.about}")
             name = frame.station if self._own_names else first.station
-            told = [_as(copy, name, frame) for copy in copies]
-            heapq.heappush(self._later, (frame.t_ns, next(self._count), told))
+            changed = [_as(copy, name, frame) for copy in copies]
+            heapq.heappush(self._later, (frame.t_ns, next(self._count), changed))
 
     def _is_reported(self, report: MisbehaviourReport) -> None:
         """Say it once for each suspicion, not at every repetition."""
@@ -153,7 +153,7 @@ class Attacker:
         checks = ", ".join(
             f"{one.check} ({one.claims} CAMs doubted)" for one in report.observations[:MOST_CHECKS]
         )
-        self._say(
+        self._print(
             f"{report.suspect} is reported {after_s:.1f} s after its first lie, "
             f"score {report.score:.1f}: {checks}"
         )

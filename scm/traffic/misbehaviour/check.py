@@ -18,7 +18,7 @@ from scm.traffic.misbehaviour.limits import Limits
 from scm.v2x.messages.eye_track import EyeTrack
 
 CHECKS = "scm.traffic.misbehaviour.checks"
-LOOKED_S, SETTLES_S = 0.2, 1.0
+LOOKED_S, TRACK_LAG_S = 0.2, 1.0
 GRACE_S = 3.0
 """For how long a car is new that has come into the city: the Eye still looks for its tag."""
 HARD_S = 3.0
@@ -141,7 +141,7 @@ class Case:
 
         The Eye carries a track on from its last look, and needs some more to see that a car stood.
         """
-        return self.unseen_s <= LOOKED_S and self.since_lost_s >= SETTLES_S
+        return self.unseen_s <= LOOKED_S and self.since_lost_s >= TRACK_LAG_S
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,8 +95,8 @@ def claim_of(
     station: str, receiver: str, sent_ns: int, body: CamBody, limits: Limits, lost_ns: int = 0
 ) -> Claim | None:
     """Return what a CAM claims; None: it does not say where its car is, so it claims nothing."""
-    told = read_cam(body)
-    if told.place is None:
+    reported = read_cam(body)
+    if reported.place is None:
         return None
     motion = body.motion
     accel_mps2, beyond_mps2 = accel_of(body)
@@ -110,13 +110,13 @@ def claim_of(
         sent_ns,
         generated_ns(body, sent_ns),
         lost_ns,
-        *told.place,
-        told.yaw_rad,
-        told.speed_mps,
+        *reported.place,
+        reported.yaw_rad,
+        reported.speed_mps,
         accel_mps2,
-        told.yaw_rate_radps,
-        told.length_m,
-        told.width_m,
+        reported.yaw_rate_radps,
+        reported.length_m,
+        reported.width_m,
         is_out_of_range(motion.speed, "value"),
         beyond_mps2,
         _deviation(ellipse, "semi_major", 0.01 / SCALE, own[0], most[0]),
@@ -128,10 +128,10 @@ def claim_of(
 
 def accel_of(body: CamBody) -> tuple[float | None, float | None]:
     """Return the acceleration that a CAM tells, and what it says to exceed; see `Claim` [m/s^2]."""
-    told = body.motion.longitudinal_acceleration
-    if is_out_of_range(told, "value"):
-        return None, told.value * ACCEL_UNIT_MPS2
-    return scaled(told, "value", ACCEL_UNIT_MPS2), None
+    reported = body.motion.longitudinal_acceleration
+    if is_out_of_range(reported, "value"):
+        return None, reported.value * ACCEL_UNIT_MPS2
+    return scaled(reported, "value", ACCEL_UNIT_MPS2), None
 
 
 def _deviation(
@@ -140,5 +140,5 @@ def _deviation(
     """Return the standard deviation that a confidence field tells, never more than `most`."""
     if is_out_of_range(record, field):
         return most
-    told = scaled(record, field, unit)
-    return unknown if told is None else min(max(told / SURELY, LEAST_OWN), most)
+    reported = scaled(record, field, unit)
+    return unknown if reported is None else min(max(reported / SURELY, LEAST_OWN), most)

@@ -20,7 +20,7 @@ from scm.traffic.misbehaviour.check import (
     load_checks,
 )
 from scm.traffic.misbehaviour.claim import Claim, claim_of
-from scm.traffic.misbehaviour.fusion import FREE, Memory
+from scm.traffic.misbehaviour.fusion import FREE, StationHistory
 from scm.traffic.misbehaviour.ground import Ground
 from scm.traffic.misbehaviour.kalman import ACCEL_PSD, HARD_PSD
 from scm.traffic.misbehaviour.likely import LEAST, Box, overlap_m
@@ -40,7 +40,7 @@ TOUCH_M = 0.03
 BAD_FLAGS = frozenset({"tentative", "duplicate", "disagree", "wrong_id", "jumped"})
 MOST_STATIONS = 10_000
 """More station numbers than any city has: a flood of new ones must not fill the memory."""
-ORDINARY = 10.0**-FREE
+UNSUSPICIOUS = 10.0**-FREE
 IDLE_S, UNMOVED = 0.9, 0.5
 OLDEST_S = 60.0
 LEAST_S = 0.001
@@ -48,12 +48,12 @@ UNKNOWN = Sender()
 MOVED_M, MOVED_MPS, MOVED_RAD = 4.0 / 14.0, 0.5 / 14.0, math.radians(4.0)
 
 
-class Judged(NamedTuple):
+class CheckedClaim(NamedTuple):
     """One claim, what each check found doubtful in it, and whether a report is due."""
 
     claim: Claim
-    memory: Memory
-    doubts: list[tuple[Check, float]]
+    history: StationHistory
+    findings: list[tuple[Check, float]]
     is_reported: bool
 
 
@@ -61,8 +61,8 @@ class Detector:
     """Judges all stations of a city.
 
     Attributes:
-        memories: By station number.
-        heard: Claims judged so far.
+        histories: By station number.
+        claims_checked: How many, so far.
         eye_ns: When a camera last saw any car; None: no Eye was ever heard.
     """
 
@@ -85,8 +85,8 @@ class Detector:
         # Those that a witness settles come after those by which it speaks.
         self._checks = sorted(chosen, key=lambda check: check.witnessed)
         self._ground = ground
-        self.memories: dict[int, Memory] = {}
-        self.heard = 0
+        self.histories: dict[int, StationHistory] = {}
+        self.claims_checked = 0
         self._numbers: dict[str, int] = {}
         self._cells: dict[tuple[int, int], dict[int, Claim]] = {}
         self._tracks: dict[int, EyeTrack] = {}
@@ -95,7 +95,7 @@ class Detector:
         self._eye_began_ns = 0
         self._standings: dict[int, Standing] = {}
         self._began_ns: int | None = None
-        self._heard_ns = 0
+        self._received_ns = 0
 
     def see(self, track: EyeTrack) -> None:
         """Take a track of the Eye."""
@@ -109,34 +109,34 @@ class Detector:
         # Nobody saw anything after this was told: what came from the future is forgotten again.
         self.eye_ns = seen if before is None or before > track.t_ns else max(seen, before)
 
-    def hear(
+    def receive(
         self, station: str, receiver: str, sent_ns: int, body: CamBody, lost_ns: int = 0,
         sender: Sender = UNKNOWN,
-    ) -> Judged | None:  # fmt: skip
+    ) -> CheckedClaim | None:  # fmt: skip
         """Judge a CAM; None: it was heard before, through another receiver, or tells no place.
 
         `lost_ns` is that of `CamRx`: time in which the car was not moved; `sender` what the city
         knows of it.
         """
-        memory = self._memory(body.station_id, station, sent_ns)
-        newest = memory.newest
+        history = self._history(body.station_id, station, sent_ns)
+        newest = history.newest
         if newest is not None and sent_ns <= newest.sent_ns:
             return None
         limits = self._limits_of(sender.car)
         claim = claim_of(station, receiver, sent_ns, body, limits, lost_ns)
         if claim is None:
             return None
-        if self._began_ns is None or sent_ns - self._heard_ns > SILENT_NS:
+        if self._began_ns is None or sent_ns - self._received_ns > SILENT_NS:
             self._began_ns = sent_ns
-        self._heard_ns = sent_ns
-        case = self._case(claim, memory, sender, limits)
-        doubts = self._ask(case)
-        due = memory.add(claim, case.gap_s, doubts)
+        self._received_ns = sent_ns
+        case = self._case(claim, history, sender, limits)
+        findings = self._run_checks(case)
+        due = history.add(claim, case.gap_s, findings)
         self._place(claim, newest)
-        memory.newest = claim
-        self._standings[claim.who] = Standing(memory.score, memory.first_ns)
-        self.heard += 1
-        return Judged(claim, memory, doubts, due)
+        history.newest = claim
+        self._standings[claim.who] = Standing(history.score, history.first_ns)
+        self.claims_checked += 1
+        return CheckedClaim(claim, history, findings, due)
 
     def track_of(self, who: int) -> EyeTrack | None:
         """Return the newest track of a station's own tag, however old."""
@@ -144,22 +144,22 @@ class Detector:
 
     def forget(self, now_ns: int) -> None:
         """Drop stations and tracks that were not heard or seen for a minute."""
-        for who, memory in list(self.memories.items()):
-            newest = memory.newest
+        for who, history in list(self.histories.items()):
+            newest = history.newest
             if newest is not None and now_ns - newest.sent_ns > FORGET_NS:
                 self._cells.get(_cell(*newest.middle), {}).pop(who, None)
-                del self.memories[who]
+                del self.histories[who]
                 self._standings.pop(who, None)
                 self._seen.discard(who)
         self._tracks = {w: t for w, t in self._tracks.items() if now_ns - t.t_ns < FORGET_NS}
 
-    def _memory(self, who: int, station: str, sent_ns: int) -> Memory:
-        memory = self.memories.get(who)
-        if memory is None:
-            if len(self.memories) >= MOST_STATIONS:
-                self.memories.pop(next(iter(self.memories)))
-            memory = self.memories[who] = Memory(station, sent_ns)
-        return memory
+    def _history(self, who: int, station: str, sent_ns: int) -> StationHistory:
+        history = self.histories.get(who)
+        if history is None:
+            if len(self.histories) >= MOST_STATIONS:
+                self.histories.pop(next(iter(self.histories)))
+            history = self.histories[who] = StationHistory(station, sent_ns)
+        return history
 
     def _number(self, name: str) -> int:
         number = self._numbers.get(name)
@@ -169,8 +169,8 @@ class Detector:
             number = self._numbers[name] = station_id(name)
         return number
 
-    def _ask(self, case: Case) -> list[tuple[Check, float]]:
-        doubts: list[tuple[Check, float]] = []
+    def _run_checks(self, case: Case) -> list[tuple[Check, float]]:
+        findings: list[tuple[Check, float]] = []
         confirmed = False
         for check in self._checks:
             if (confirmed and check.witnessed) or (case.is_new and _may_wait(check)):
@@ -178,14 +178,14 @@ class Detector:
             plausibility = check.judge(case)
             if plausibility is None:
                 continue
-            if plausibility < ORDINARY:
-                doubts.append((check, max(plausibility, check.floor)))
+            if plausibility < UNSUSPICIOUS:
+                findings.append((check, max(plausibility, check.floor)))
             if check.name == "eye_position":
                 confirmed = plausibility >= CONFIRMED
-        return doubts
+        return findings
 
-    def _case(self, claim: Claim, memory: Memory, sender: Sender, limits: Limits) -> Case:
-        before = memory.newest
+    def _case(self, claim: Claim, history: StationHistory, sender: Sender, limits: Limits) -> Case:
+        before = history.newest
         gap_s = 0.0 if before is None else (claim.sent_ns - before.sent_ns) * 1e-9
         if gap_s > REAPPEARS_S:
             before = None
@@ -193,21 +193,21 @@ class Detector:
         driven_s = dt_s
         if before is not None and claim.lost_ns > before.lost_ns:
             driven_s = _driven_s(claim, before, limits.front_share)
-            memory.late_ns = claim.t_ns
-        memory.idle = _idle(claim, before, gap_s, memory.idle)
+            history.late_ns = claim.t_ns
+        history.idle = _idle(claim, before, gap_s, history.idle)
         if sender.by_hand or sender.stopped or sender.touches:
-            memory.hard_ns = claim.sent_ns
-        is_hard = _since_s(claim.sent_ns, memory.hard_ns) <= HARD_S
+            history.hard_ns = claim.sent_ns
+        is_hard = _since_s(claim.sent_ns, history.hard_ns) <= HARD_S
         limits = limits.hard if is_hard else limits
-        self._filter(claim, memory, before, driven_s, limits, HARD_PSD if is_hard else ACCEL_PSD)
+        self._filter(claim, history, before, driven_s, limits, HARD_PSD if is_hard else ACCEL_PSD)
         if sender.touches:  # what holds or pushes it does so between two claims
-            memory.strayed.begin()
+            history.strayed.begin()
         track = self._fresh(claim)
         eye_sees = self._eye_sees(claim)
-        is_new = bool(sender.car) and claim.sent_ns - memory.first_ns <= GRACE_S * NS_PER_S
+        is_new = bool(sender.car) and claim.sent_ns - history.first_ns <= GRACE_S * NS_PER_S
         unseen = bool(sender.car) and (claim.who not in self._seen or not limits.has_tag)
         has_looked = _since_s(claim.sent_ns, self._eye_began_ns) > GRACE_S and not is_new
-        memory.is_tag_unseen = unseen and has_looked and (eye_sees or memory.is_tag_unseen)
+        history.is_tag_unseen = unseen and has_looked and (eye_sees or history.is_tag_unseen)
         neighbours = self._around(claim)
         return Case(
             now=claim,
@@ -216,11 +216,11 @@ class Detector:
             before=before,
             dt_s=dt_s,
             driven_s=driven_s,
-            since_lost_s=_since_s(claim.t_ns, memory.late_ns),
+            since_lost_s=_since_s(claim.t_ns, history.late_ns),
             gap_s=gap_s,
-            kalman=memory.kalman,
+            kalman=history.kalman,
             neighbours=neighbours,
-            strayed=memory.strayed,
+            strayed=history.strayed,
             standings=self._standings,
             track=track,
             is_tag_unseen=unseen,
@@ -232,29 +232,29 @@ class Detector:
             else math.inf,
             eye_sees=eye_sees,
             since_start_s=(claim.sent_ns - (self._began_ns or claim.sent_ns)) * 1e-9,
-            idle=memory.idle,
+            idle=history.idle,
             is_own_number=self._number(claim.station) == claim.who,
             touches=lambda: sender.touches or self._touches(claim, neighbours, limits),
         )
 
     def _filter(
-        self, claim: Claim, memory: Memory, before: Claim | None, driven_s: float,
+        self, claim: Claim, history: StationHistory, before: Claim | None, driven_s: float,
         limits: Limits, psd: float,
     ) -> None:  # fmt: skip
         x, y = claim.rear(limits.front_share)
-        kalman = memory.kalman
+        kalman = history.kalman
         if claim.yaw_rad is None or claim.speed_mps is None:
             kalman.stop()
-            memory.strayed.begin()
+            history.strayed.begin()
             return
         yaw, speed = claim.yaw_rad, claim.speed_mps
         vx, vy = speed * math.cos(yaw), speed * math.sin(yaw)
         if before is None or driven_s <= 0.0 or not kalman.has_begun:
             kalman.begin(x, y, vx, vy)
-            memory.strayed.begin()
+            history.strayed.begin()
         else:
-            kalman.take(driven_s, x, y, vx, vy, claim.own_m, claim.own_mps, psd)
-            memory.strayed.add(claim, before, driven_s, limits.front_share)
+            kalman.update(driven_s, x, y, vx, vy, claim.own_m, claim.own_mps, psd)
+            history.strayed.add(claim, before, driven_s, limits.front_share)
 
     def _fresh(self, claim: Claim) -> EyeTrack | None:
         track = self._tracks.get(claim.who)

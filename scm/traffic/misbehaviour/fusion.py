@@ -39,7 +39,7 @@ class Noted:
         self.check, self.least, self.claims = check, 1.0, 0
 
 
-class Memory:
+class StationHistory:
     """What is known of one station.
 
     Attributes:
@@ -52,16 +52,29 @@ class Memory:
         idle: Its claims in a row that came fast though nothing had changed.
         score: What is held against it.
         since_ns: Since when it is suspected; None: it is not.
-        told_ns: When that was last reported.
+        reported_ns: When that was last reported.
         is_news: Whether that report was the first of this suspicion.
         noted: By check what led to it.
         evidence: The last claims that gave points, each with the one before it.
     """
 
     __slots__ = (
-        "evidence", "first_ns", "hard_ns", "idle", "is_news", "is_tag_unseen",
-        "kalman", "late_ns", "newest", "noted", "score",
-        "since_ns", "station", "strayed", "told_ns", "worst",
+        "evidence",
+        "first_ns",
+        "hard_ns",
+        "idle",
+        "is_news",
+        "is_tag_unseen",
+        "kalman",
+        "late_ns",
+        "newest",
+        "noted",
+        "reported_ns",
+        "score",
+        "since_ns",
+        "station",
+        "strayed",
+        "worst",
     )  # fmt: skip
 
     def __init__(self, station: str, first_ns: int) -> None:
@@ -77,21 +90,21 @@ class Memory:
         self.score = 0.0
         self.worst = ""
         self.since_ns: int | None = None
-        self.told_ns: int | None = None
+        self.reported_ns: int | None = None
         self.is_news = False
         self.noted: dict[str, Noted] = {}
         self.evidence: deque[Claim] = deque(maxlen=EVIDENCE)
 
-    def add(self, claim: Claim, gap_s: float, doubts: list[tuple[Check, float]]) -> bool:
-        """Take the checks' doubts of a claim; return whether a report is due.
+    def add(self, claim: Claim, gap_s: float, findings: list[tuple[Check, float]]) -> bool:
+        """Add the findings of the checks on a claim; return whether a report is due.
 
         Args:
             claim: The claim.
             gap_s: Since the station's last one.
-            doubts: Checks that found it less than ordinary, and its plausibility.
+            findings: Checks that found it suspicious, and its plausibility.
         """
         points = soft = 0.0
-        for check, plausibility in doubts:
+        for check, plausibility in findings:
             found = min(MOST, -math.log10(plausibility)) - FREE
             if found <= 0.0:
                 continue
@@ -127,10 +140,10 @@ class Memory:
                 return False
             self.since_ns = now_ns
         elif self.score < OFF:
-            self.since_ns = self.told_ns = None
+            self.since_ns = self.reported_ns = None
             self.noted.clear()
             return False
-        if self.told_ns is not None and now_ns - self.told_ns < REPEAT_NS:
+        if self.reported_ns is not None and now_ns - self.reported_ns < REPEAT_NS:
             return False
-        self.is_news, self.told_ns = self.told_ns is None, now_ns
+        self.is_news, self.reported_ns = self.reported_ns is None, now_ns
         return True

@@ -81,10 +81,10 @@ class Ground:
         known = self._known.get(cell)
         if known is None:
             middle = (cell[0] + 0.5) * CELL_M, (cell[1] + 0.5) * CELL_M
-            known = self._known[cell] = self._ask(*middle)
+            known = self._known[cell] = self._compute(*middle)
         return known
 
-    def _ask(self, x: float, y: float) -> tuple[float, tuple[float, ...]]:
+    def _compute(self, x: float, y: float) -> tuple[float, tuple[float, ...]]:
         for (x0, y0, x1, y1), area in self._areas:
             if x0 <= x <= x1 and y0 <= y <= y1 and inside(x, y, area):
                 return 0.0, ()

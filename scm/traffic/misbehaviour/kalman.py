@@ -44,7 +44,7 @@ class Kalman:
         """Forget the car: a claim without heading or speed leaves nothing to go on from."""
         self.is_warm = self.has_begun = False
 
-    def take(
+    def update(
         self, dt: float, x: float, y: float, vx: float, vy: float, own_m: float, own_mps: float,
         psd: float = ACCEL_PSD,
     ) -> None:  # fmt: skip

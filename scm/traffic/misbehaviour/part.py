@@ -15,7 +15,7 @@ from scm.records.misbehaviour import StationScore
 from scm.runtime.part import BasePart, Subscription
 from scm.traffic.car_facts import facts_of, outline_of
 from scm.traffic.misbehaviour.check import Sender
-from scm.traffic.misbehaviour.detector import EYE_WORKS_NS, Detector, Judged
+from scm.traffic.misbehaviour.detector import EYE_WORKS_NS, CheckedClaim, Detector
 from scm.traffic.misbehaviour.ground import Ground, Sees
 from scm.traffic.misbehaviour.limits import Limits, limits_of
 from scm.v2x.etsi.convert import roadside_station
@@ -38,8 +38,8 @@ _log = logging.getLogger(__name__)
 NAME = "misbehaviour"
 PERIOD_NS = 50 * NS_PER_MS
 CAR = "nigel"
-MOST_MPS = 7.0
-MOST_TOLD = 200
+FASTEST_CAR_MPS = 7.0
+MAX_SCORES = 200
 """Stations in a list of scores: those that most is held against."""
 
 
@@ -68,7 +68,7 @@ class MisbehaviourPart(BasePart):
             if isinstance(message, EyeTrack):
                 detector.see(message)
             elif isinstance(message, CamRx):
-                found = detector.hear(
+                found = detector.receive(
                     message.station,
                     message.receiver,
                     message.t_ns,
@@ -77,19 +77,19 @@ class MisbehaviourPart(BasePart):
                     Sender(message.car, message.by_hand, message.stopped, message.touches),
                 )
                 if found is not None and found.is_reported:
-                    outbox += self._tell(found, now_ns)
+                    outbox += self._reports(found, now_ns)
         if now_ns >= self._due_ns:
             self._due_ns = now_ns + NS_PER_S
             detector.forget(now_ns)
             outbox += self._each_second(now_ns)
         return outbox
 
-    def _tell(self, found: Judged, now_ns: int) -> list[Message]:
+    def _reports(self, found: CheckedClaim, now_ns: int) -> list[Message]:
         report = report_of(found, self.detector, now_ns)
-        if not found.memory.is_news:
+        if not found.history.is_news:
             return [report]
         checks = [one.check for one in report.observations[:3]]
-        said = ", ".join(check.replace("_", " ") for check in checks)
+        described = ", ".join(check.replace("_", " ") for check in checks)
         facts = {"station": report.suspect, "score": report.score, "checks": ",".join(checks)}
         event(_log, "station_suspected", level=logging.WARNING, **facts)
         news = CityEvent(
@@ -97,37 +97,37 @@ class MisbehaviourPart(BasePart):
             source=NAME,
             t_ns=now_ns,
             name="misbehaviour",
-            text=f"{report.suspect} is suspected of lying on the air: {said}",
+            text=f"{report.suspect} is suspected of lying on the air: {described}",
             vehicle=report.suspect,
         )
         return [report, news]
 
     def _each_second(self, now_ns: int) -> list[Message]:
-        memories = sorted(self.detector.memories.items(), key=lambda one: -one[1].score)
-        suspected = sum(memory.since_ns is not None for _, memory in memories)
+        histories = sorted(self.detector.histories.items(), key=lambda one: -one[1].score)
+        suspected = sum(history.since_ns is not None for _, history in histories)
         rows = tuple(
             StationScore(
-                station=memory.station,
+                station=history.station,
                 station_id=who,
-                score=round(memory.score, 3),
-                worst=memory.worst,
-                suspected=memory.since_ns is not None,
-                tag_unseen=memory.is_tag_unseen,
+                score=round(history.score, 3),
+                worst=history.worst,
+                suspected=history.since_ns is not None,
+                tag_unseen=history.is_tag_unseen,
             )
-            for who, memory in memories[:MOST_TOLD]
+            for who, history in histories[:MAX_SCORES]
         )
         eye_ns = self.detector.eye_ns
         witness = eye_ns is not None and now_ns - eye_ns <= EYE_WORKS_NS
-        detail = f"{len(memories)} stations, {suspected} suspected"
+        detail = f"{len(histories)} stations, {suspected} suspected"
         return [
-            *self._tell_unseen(now_ns),
+            *self._report_unseen(now_ns),
             MisbehaviourScores(t_ns=now_ns, witness=witness, stations=rows),
             PartStatus(station=NAME, t_ns=now_ns, detail=detail),
         ]
 
-    def _tell_unseen(self, now_ns: int) -> list[Message]:
+    def _report_unseen(self, now_ns: int) -> list[Message]:
         """Say once of each car that the Eye cannot see its tag; that is no accusation."""
-        unseen = {one.station for one in self.detector.memories.values() if one.is_tag_unseen}
+        unseen = {one.station for one in self.detector.histories.values() if one.is_tag_unseen}
         news = [
             CityEvent(
                 severity="info",
@@ -146,26 +146,26 @@ class MisbehaviourPart(BasePart):
 def limits_by_car(car: str) -> Limits:
     """Return the limits of a car file by its name; of one that is not here, a Nigel's.
 
-    A file that tells no top speed is given `MOST_MPS`, that of a 1:10 racing car.
+    A file that tells no top speed is given `FASTEST_CAR_MPS`, that of a 1:10 racing car.
     """
     try:
         facts, (front_share, has_tag) = facts_of(car), outline_of(car)
     except CarError:
         facts, (front_share, has_tag) = facts_of(CAR), outline_of(CAR)
-    return limits_of(min(facts.speed_mps, MOST_MPS), front_share, has_tag=has_tag)
+    return limits_of(min(facts.speed_mps, FASTEST_CAR_MPS), front_share, has_tag=has_tag)
 
 
-def report_of(found: Judged, detector: Detector, now_ns: int) -> MisbehaviourReport:
+def report_of(found: CheckedClaim, detector: Detector, now_ns: int) -> MisbehaviourReport:
     """Return the report on a station that has just been judged."""
-    memory, claim = found.memory, found.claim
-    worst_first = sorted(memory.noted.values(), key=lambda noted: noted.least)
+    history, claim = found.history, found.claim
+    worst_first = sorted(history.noted.values(), key=lambda noted: noted.least)
     track = detector.track_of(claim.who)
     return MisbehaviourReport(
-        suspect=memory.station,
+        suspect=history.station,
         suspect_id=claim.who,
         t_ns=now_ns,
-        since_ns=memory.since_ns or now_ns,
-        score=round(memory.score, 3),
+        since_ns=history.since_ns or now_ns,
+        score=round(history.score, 3),
         observations=tuple(
             Observation(
                 kind=noted.check.kind,
@@ -175,7 +175,7 @@ def report_of(found: Judged, detector: Detector, now_ns: int) -> MisbehaviourRep
             )
             for noted in worst_first
         ),
-        evidence=tuple(EvidenceCam(t_ns=one.sent_ns, body=one.body) for one in memory.evidence),
+        evidence=tuple(EvidenceCam(t_ns=one.sent_ns, body=one.body) for one in history.evidence),
         seen=None
         if track is None or track.stale
         else EvidencePose(

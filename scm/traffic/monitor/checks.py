@@ -7,7 +7,7 @@
     overload                     the same, while the monitor itself waited for a processor
     clock_jump                   time stamps that go back, or run ahead by more than 500 ms
 
-`dual` is two colours for one group, `dark` none or dark, `card` a group that is not on the card. A
+`dual` is two colours for one group, `dark` none or dark, `table` a group that is not on the card. A
 span is judged by the longest it can have been: from the sample before it began to the sample that
 ended it. So lost samples excuse, they never accuse. A fault stays until `reset`, whatever follows.
 Two end by themselves: the first silence, of a controller that was never seen; and an overload,
@@ -23,8 +23,8 @@ from dataclasses import dataclass
 
 from scm.clock import NS_PER_MS
 from scm.records.signals import Colour
-from scm.traffic.monitor.conflict_table import Card
 from scm.v2x.messages.spat import Spat
+from scm.traffic.monitor.conflict_table import ConflictTable
 
 STALE_NS = 500 * NS_PER_MS
 GRACE_NS = 5_000 * NS_PER_MS
@@ -73,10 +73,12 @@ class Monitor:
         since_ns: Of the fault, or of the start or last reset.
     """
 
-    def __init__(self, card: Card, now_ns: int, waited_ns: Callable[[], int] = lambda: 0) -> None:
-        self.card = card
+    def __init__(
+        self, table: ConflictTable, now_ns: int, waited_ns: Callable[[], int] = lambda: 0
+    ) -> None:
+        self.table = table
         self._waited_ns = waited_ns
-        self._card = {group.name: group for group in card.groups}
+        self._limits = {group.name: group for group in table.groups}
         self._is_new = True
         self.reset(now_ns)
 
@@ -89,7 +91,7 @@ class Monitor:
         self._suspects: dict[str, int] = {}
         self._stamp_ns: int | None = None
         self._ahead_ns: deque[int] = deque(maxlen=20)
-        self._heard_ns = now_ns
+        self._received_ns = now_ns
         self._ticked_ns = now_ns
         self._waited_before_ns = self._waited_ns()
         self._regular_ns = now_ns  # since when no sample was missed
@@ -103,9 +105,9 @@ class Monitor:
         """Look at the time: has the controller fallen silent?"""
         if now_ns - self._ticked_ns > ASLEEP_NS:
             # Who slept cannot call others silent: its own link may just be coming back.
-            self._heard_ns = max(self._heard_ns, now_ns)
+            self._received_ns = max(self._received_ns, now_ns)
         self._ticked_ns = now_ns
-        silent_ns = now_ns - self._heard_ns
+        silent_ns = now_ns - self._received_ns
         if silent_ns > (GRACE_NS if self._is_new else STALE_NS):
             self._regular_ns = now_ns
             self._judge_silence(silent_ns, now_ns)
@@ -125,7 +127,7 @@ class Monitor:
         """Judge one sample that arrived at `arrived_ns` on the monitor's own clock."""
         if spat.t_ns == self._stamp_ns:
             return  # nothing new: an output that hangs says the same for ever
-        self._heard_ns = max(self._heard_ns, arrived_ns)
+        self._received_ns = max(self._received_ns, arrived_ns)
         self._waited_before_ns = self._waited_ns()
         is_over = self.fault == OVERLOAD and arrived_ns - self._regular_ns >= REGULAR_NS
         if is_over or (self._is_new and self.fault == "stale"):
@@ -160,7 +162,7 @@ class Monitor:
             self._suspects[fault] = arrived_ns
 
     def _wrong_in(self, spat: Spat) -> dict[str, str]:
-        shown: dict[str, list[Colour]] = {name: [] for name in self._card}
+        shown: dict[str, list[Colour]] = {name: [] for name in self._limits}
         wrong: dict[str, str] = {}
         for group in spat.groups:
             if group.group in shown:
@@ -172,7 +174,7 @@ class Monitor:
                 wrong["dual"] = f"group {name} shows {' and '.join(colours)}"
             if not colours or "dark" in colours:
                 wrong["dark"] = f"group {name} shows nothing"
-        for one, other in self.card.conflicts:
+        for one, other in self.table.conflicts:
             if any(c in _GOING for c in shown[one]) and any(c in _GOING for c in shown[other]):
                 both = f"{one} {shown[one][0]} against {other} {shown[other][0]}"
                 wrong["conflict"] = both
@@ -184,7 +186,7 @@ class Monitor:
         shown = {
             group.group: group.colour
             for group in spat.groups
-            if group.group in self._card
+            if group.group in self._limits
             and names.count(group.group) == 1
             and group.colour != "dark"
         }
@@ -208,13 +210,13 @@ class Monitor:
         self, name: str, before: _Group, shown: Mapping[str, Colour], stamp_ns: int
     ) -> list[tuple[str, str]]:
         """Return the faults of a group's change to what it shows now."""
-        colour, card = shown[name], self._card[name]
+        colour, table = shown[name], self._limits[name]
         longest_ns = None if before.other_ns is None else stamp_ns - before.other_ns
         match before.colour, colour:
             case "green", "yellow":
-                return _short("short_green", "green", longest_ns, card.green_ns)
+                return _short("short_green", "green", longest_ns, table.green_ns)
             case "yellow", "red":
-                return _short("short_yellow", "yellow", longest_ns, card.yellow_ns)
+                return _short("short_yellow", "yellow", longest_ns, table.yellow_ns)
             case "red", "green":
                 return self._short_clearances(name, shown, stamp_ns)
             case "green", "red":
@@ -227,14 +229,14 @@ class Monitor:
         self, name: str, shown: Mapping[str, Colour], stamp_ns: int
     ) -> list[tuple[str, str]]:
         wrong = []
-        for pair in self.card.conflicts:
-            rival = pair[0] if pair[1] == name else pair[1]
-            seen = self._groups.get(rival)
-            if name not in pair or seen is None or shown.get(rival) in _GOING:
+        for pair in self.table.conflicts:
+            conflicting = pair[0] if pair[1] == name else pair[1]
+            seen = self._groups.get(conflicting)
+            if name not in pair or seen is None or shown.get(conflicting) in _GOING:
                 continue  # two that go at once are a conflict, not a short clearance
             cleared_ns = None if seen.going_ns is None else stamp_ns - seen.going_ns
-            least_ns = self._card[rival].clearance_ns
-            wrong += _short("short_clearance", f"red after {rival}", cleared_ns, least_ns)
+            least_ns = self._limits[conflicting].clearance_ns
+            wrong += _short("short_clearance", f"red after {conflicting}", cleared_ns, least_ns)
         return wrong
 
 

@@ -28,13 +28,13 @@ NIGEL_STARTS_MPS2 = 0.5
 NIGEL_LENGTH_M = 0.30
 REACTS_IN_S = 0.3
 
-_STRIDE_M = 0.005
+_STEP_M = 0.005
 
 # Where a movement heads at first, the pieces of its lane, and from where to where it counts on it.
 _Way = tuple[float, tuple[Segment, ...], float, float]
 
 
-class CardGroup(msgspec.Struct, kw_only=True, frozen=True):
+class GroupLimits(msgspec.Struct, kw_only=True, frozen=True):
     """The least times of one group [ns]; clearance counts from the end of its yellow."""
 
     name: str
@@ -43,24 +43,24 @@ class CardGroup(msgspec.Struct, kw_only=True, frozen=True):
     clearance_ns: int
 
 
-class Card(msgspec.Struct, kw_only=True, frozen=True):
+class ConflictTable(msgspec.Struct, kw_only=True, frozen=True):
     """Everything the monitor of one junction knows beforehand; pairs are sorted names."""
 
     junction: str
-    groups: tuple[CardGroup, ...]
+    groups: tuple[GroupLimits, ...]
     conflicts: tuple[tuple[str, str], ...]
 
 
-def card_hash(card: Card) -> str:
+def table_hash(table: ConflictTable) -> str:
     """Return twelve hexadecimal digits that change with anything on the card."""
-    return hashlib.sha256(msgspec.json.encode(card)).hexdigest()[:12]
+    return hashlib.sha256(msgspec.json.encode(table)).hexdigest()[:12]
 
 
-def card_of(city_map: CityMap, junction: Junction) -> Card:
+def conflict_table_of(city_map: CityMap, junction: Junction) -> ConflictTable:
     """Return the card of a junction."""
     lanes = {lane.name: lane for lane in city_map.lanes}
     lines = [line for line in city_map.stop_lines if line.junction == junction.name]
-    return Card(
+    return ConflictTable(
         junction=junction.name,
         groups=tuple(_group(group, lanes, lines) for group in junction.groups),
         conflicts=tuple(
@@ -71,7 +71,7 @@ def card_of(city_map: CityMap, junction: Junction) -> Card:
     )
 
 
-def _group(group: Group, lanes: dict[str, Lane], lines: list[StopLine]) -> CardGroup:
+def _group(group: Group, lanes: dict[str, Lane], lines: list[StopLine]) -> GroupLimits:
     moves = group.movements
     slow_mps = min(NIGEL_SLOW_MPS, *(lanes[move.lane].speed_limit_mps for move in moves))
     own_lines = [line for line in lines if line.group == group.name]
@@ -81,7 +81,7 @@ def _group(group: Group, lanes: dict[str, Lane], lines: list[StopLine]) -> CardG
     )
     braking_s = NIGEL_TOP_MPS / NIGEL_BRAKES_MPS2
     starting_s = slow_mps / (2.0 * NIGEL_STARTS_MPS2) + NIGEL_LENGTH_M / slow_mps
-    return CardGroup(
+    return GroupLimits(
         name=group.name,
         green_ns=int((REACTS_IN_S + starting_s) * 1e9),
         yellow_ns=int((REACTS_IN_S + braking_s / 2.0) * 1e9),
@@ -137,13 +137,13 @@ def _walk(start: tuple[float, float], way: _Way) -> list[tuple[float, float]]:
         if segment.radius_m is not None and segment.angle_rad is not None:
             turn_per_m = math.copysign(1.0 / segment.radius_m, segment.angle_rad)
             length_m = segment.radius_m * abs(segment.angle_rad)
-        strides = max(1, round(length_m / _STRIDE_M))
-        stride_m = length_m / strides
-        for _ in range(strides):
-            yaw += turn_per_m * stride_m / 2.0
-            x, y = x + stride_m * math.cos(yaw), y + stride_m * math.sin(yaw)
-            yaw += turn_per_m * stride_m / 2.0
-            gone_m += stride_m
+        steps = max(1, round(length_m / _STEP_M))
+        step_m = length_m / steps
+        for _ in range(steps):
+            yaw += turn_per_m * step_m / 2.0
+            x, y = x + step_m * math.cos(yaw), y + step_m * math.sin(yaw)
+            yaw += turn_per_m * step_m / 2.0
+            gone_m += step_m
             if from_m <= gone_m <= to_m:
                 places.append((x, y))
     return places

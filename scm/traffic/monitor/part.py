@@ -15,7 +15,7 @@ from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.store.records import FaultRecord
 from scm.traffic.monitor.checks import OVERLOAD, Monitor
-from scm.traffic.monitor.conflict_table import card_hash, card_of
+from scm.traffic.monitor.conflict_table import conflict_table_of, table_hash
 from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
@@ -50,7 +50,7 @@ class MonitorPart(BasePart):
         self.period_ns = PERIOD_NS
         self.subscriptions = (Subscription(Spat),)
         self.services = (Service(MonitorReset),)
-        self._cards = [card_of(city_map, junction) for junction in city_map.junctions]
+        self._tables = [conflict_table_of(city_map, junction) for junction in city_map.junctions]
         self._watches: dict[str, _Watch] = {}
         self._faults = dict(faults or {})
         self._waited_ns = waited_ns
@@ -59,10 +59,12 @@ class MonitorPart(BasePart):
         """Judge what arrived and what did not, answer resets, tell verdicts."""
         if not self._watches:
             self._watches = {
-                card.junction: _Watch(
-                    Monitor(card, now_ns, self._waited_ns), self._faults.get(card.junction), now_ns
+                table.junction: _Watch(
+                    Monitor(table, now_ns, self._waited_ns),
+                    self._faults.get(table.junction),
+                    now_ns,
                 )
-                for card in self._cards
+                for table in self._tables
             }
         outbox: list[Outgoing] = []
         for item in inbox:
@@ -71,7 +73,7 @@ class MonitorPart(BasePart):
             elif isinstance(item.message, MonitorReset):
                 outbox += self._reset(item, item.message, now_ns)
         for watch in self._watches.values():
-            outbox += watch.tell(now_ns)
+            outbox += watch.due(now_ns)
         return outbox
 
     def finish(self, now_ns: int) -> list[Outgoing]:
@@ -101,18 +103,18 @@ class _Watch:
     """One junction's monitor and what was last told of it."""
 
     def __init__(self, monitor: Monitor, fault: str | None, now_ns: int) -> None:
-        card, self.monitor = monitor.card, monitor
+        table, self.monitor = monitor.table, monitor
         if fault is not None:
             self.monitor.keep(fault, now_ns)
-        self._hash = card_hash(card)
-        self._told: str | None = None
-        self._told_ns: int | None = None
-        event(_log, "monitor_watches", junction=card.junction, card=self._hash)
+        self._hash = table_hash(table)
+        self._published: str | None = None
+        self._published_ns: int | None = None
+        event(_log, "monitor_watches", junction=table.junction, table=self._hash)
 
     def status(self, now_ns: int) -> MonitorStatus:
         monitor = self.monitor
         return MonitorStatus(
-            junction=monitor.card.junction,
+            junction=monitor.table.junction,
             t_ns=now_ns,
             fault=monitor.fault,
             detail=monitor.detail or f"card {self._hash}",
@@ -127,23 +129,26 @@ class _Watch:
         text = f"{request.by} reset the monitor of {request.junction} ({was}): {request.reason}"
         return [_event("warning", "monitor_reset", text, now_ns)]
 
-    def tell(self, now_ns: int) -> list[Outgoing]:
+    def due(self, now_ns: int) -> list[Outgoing]:
         self.monitor.tick(now_ns)
         news: list[Outgoing] = []
         fault = self.monitor.fault
-        if fault != self._told:
+        if fault != self._published:
             ends_by_itself = fault in (None, OVERLOAD)
             record = None if ends_by_itself else FaultRecord(fault=str(fault))
-            news.append(Keep("latches", self.monitor.card.junction, record))
+            news.append(Keep("latches", self.monitor.table.junction, record))
             news += self._event_of(fault, now_ns)
-        due = self._told_ns is None or now_ns - self._told_ns >= STATUS_EVERY_NS - PERIOD_NS // 2
-        if not due and fault == self._told:
+        due = (
+            self._published_ns is None
+            or now_ns - self._published_ns >= STATUS_EVERY_NS - PERIOD_NS // 2
+        )
+        if not due and fault == self._published:
             return news
-        self._told, self._told_ns = fault, now_ns
+        self._published, self._published_ns = fault, now_ns
         return [self.status(now_ns), *news]
 
     def _event_of(self, fault: str | None, now_ns: int) -> list[Message]:
-        where = f"junction {self.monitor.card.junction}"
+        where = f"junction {self.monitor.table.junction}"
         if fault is None:
             return [_event("info", "monitor_clear", f"{where}: signals are believed", now_ns)]
         text = f"{where}: {fault}, {self.monitor.detail}"

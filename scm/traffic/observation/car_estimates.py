@@ -22,7 +22,7 @@ FARTHEST_M, FASTEST_MPS, MOST_RAD = 10_000.0, 100.0, 1_000.0
 SAME_M = 0.2
 
 
-class Belief(NamedTuple):
+class CarEstimate(NamedTuple):
     """A car's rear axle, map frame; speed along the body, + = forward; doubts are 1 sigma."""
 
     vehicle: str
@@ -36,53 +36,53 @@ class Belief(NamedTuple):
     source: str
 
 
-class Beliefs:
+class CarEstimates:
     """The newest of every car, by who told it."""
 
     def __init__(self) -> None:
-        self._eye: dict[str, tuple[Belief, int]] = {}
-        self._self: dict[str, tuple[Belief, int]] = {}
+        self._eye: dict[str, tuple[CarEstimate, int]] = {}
+        self._self: dict[str, tuple[CarEstimate, int]] = {}
 
-    def take(self, message: EyeTrack | VehicleState, arrived_ns: int) -> None:
+    def add(self, message: EyeTrack | VehicleState, arrived_ns: int) -> None:
         """Take a message in, unless no car can be where it says, or move so."""
         if isinstance(message, EyeTrack):
-            belief, table = _of_track(message), self._eye
+            estimate, table = _of_track(message), self._eye
             if message.stale:
                 return
         else:
-            belief, table = _of_state(message), self._self
-        if _can_be(belief):
-            table[message.vehicle] = (belief, arrived_ns)
+            estimate, table = _of_state(message), self._self
+        if _can_be(estimate):
+            table[message.vehicle] = (estimate, arrived_ns)
 
-    def now(self, now_ns: int) -> list[Belief]:
+    def now(self, now_ns: int) -> list[CarEstimate]:
         """Return what is believed of each car that was told of within the last second."""
         for table in (self._eye, self._self):
             for name in [n for n, (_, at_ns) in table.items() if now_ns - at_ns > FRESH_NS]:
                 del table[name]
         newest = {**self._self, **self._eye}
-        found = [belief for belief, _ in newest.values()]
-        named = [belief for belief in found if not belief.vehicle.startswith(NOBODY)]
+        found = [estimate for estimate, _ in newest.values()]
+        named = [estimate for estimate in found if not estimate.vehicle.startswith(NOBODY)]
         return named + [
-            belief
-            for belief in found
-            if belief.vehicle.startswith(NOBODY)
-            and all(math.dist((belief.x, belief.y), (one.x, one.y)) > SAME_M for one in named)
+            estimate
+            for estimate in found
+            if estimate.vehicle.startswith(NOBODY)
+            and all(math.dist((estimate.x, estimate.y), (one.x, one.y)) > SAME_M for one in named)
         ]
 
 
-def _can_be(belief: Belief) -> bool:
+def _can_be(estimate: CarEstimate) -> bool:
     return (
-        abs(belief.x) <= FARTHEST_M
-        and abs(belief.y) <= FARTHEST_M
-        and belief.std_m <= FARTHEST_M
-        and max(abs(belief.speed), belief.std_mps) <= FASTEST_MPS
-        and abs(belief.yaw) <= MOST_RAD
+        abs(estimate.x) <= FARTHEST_M
+        and abs(estimate.y) <= FARTHEST_M
+        and estimate.std_m <= FARTHEST_M
+        and max(abs(estimate.speed), estimate.std_mps) <= FASTEST_MPS
+        and abs(estimate.yaw) <= MOST_RAD
     )
 
 
-def _of_track(track: EyeTrack) -> Belief:
+def _of_track(track: EyeTrack) -> CarEstimate:
     covariance = track.covariance
-    return Belief(
+    return CarEstimate(
         track.vehicle,
         track.t_ns,
         track.x_m,
@@ -95,8 +95,8 @@ def _of_track(track: EyeTrack) -> Belief:
     )
 
 
-def _of_state(state: VehicleState) -> Belief:
-    return Belief(
+def _of_state(state: VehicleState) -> CarEstimate:
+    return CarEstimate(
         state.vehicle,
         state.t_ns,
         state.x_m,

@@ -21,7 +21,7 @@ from statistics import fmean
 from scm.clock import NS_PER_S, seconds
 from scm.maps.route import OnLane, Roads
 from scm.records.traffic import ApproachCount, LaneCount
-from scm.traffic.observation.car_estimates import Belief
+from scm.traffic.observation.car_estimates import CarEstimate
 from scm.traffic.observation.lane_tracking import Followed, Lines
 from scm.traffic.observation.service_level import level_of, share_below
 from scm.traffic.signals.sightings import NIGEL_FRONT_M
@@ -84,17 +84,17 @@ class Counters:
         self._began_ns: int | None = None
         self._next_sample_ns = 0
 
-    def see(self, belief: Belief, followed: Followed | None) -> None:
+    def see(self, estimate: CarEstimate, followed: Followed | None) -> None:
         """Take where a car is now."""
         if followed is None:
-            self.forget(belief.vehicle)
+            self.forget(estimate.vehicle)
             return
-        place, vehicle = followed.place, belief.vehicle
+        place, vehicle = followed.place, estimate.vehicle
         visit = self._visits.get(vehicle)
         if visit is None or visit.lane != place.lane:
-            visit = self._change(belief, place, visit)
-        self._stops(visit, belief.speed)
-        self._pass(visit, belief, place)
+            visit = self._change(estimate, place, visit)
+        self._stops(visit, estimate.speed)
+        self._pass(visit, estimate, place)
 
     def forget(self, vehicle: str) -> None:
         """Forget a car that is gone, or beside all lanes."""
@@ -137,9 +137,9 @@ class Counters:
     def _log(self, lane: str) -> _Log:
         return self._logs.setdefault(lane, _Log())
 
-    def _change(self, belief: Belief, place: OnLane, old: _Visit | None) -> _Visit:
+    def _change(self, estimate: CarEstimate, place: OnLane, old: _Visit | None) -> _Visit:
         """Begin a visit; the one before goes on until the junction is behind the car."""
-        vehicle, earlier = belief.vehicle, self._before.get(belief.vehicle)
+        vehicle, earlier = estimate.vehicle, self._before.get(estimate.vehicle)
         if earlier is not None and old is not None and place.lane == earlier.lane:
             self._visits[vehicle] = earlier  # it was not gone: noise at the joint
             del self._before[vehicle]
@@ -147,7 +147,7 @@ class Counters:
         if earlier is not None and old is not None:
             successors = self._roads.successors(old.lane)
             if place.lane in successors:
-                self._leave(earlier, old.lane, belief.t_ns)
+                self._leave(earlier, old.lane, estimate.t_ns)
                 del self._before[vehicle]
             elif place.lane not in self._roads.successors(earlier.lane):
                 del self._before[vehicle]
@@ -155,9 +155,9 @@ class Counters:
         if old is not None and follows and old.lane in self._lines:
             self._before[vehicle] = old
         front = self._front(place)
-        visit = _Visit(place.lane, belief.t_ns, place.s, follows, front, belief.t_ns)
+        visit = _Visit(place.lane, estimate.t_ns, place.s, follows, front, estimate.t_ns)
         if old is None:  # a car that stands where it is first seen has not stopped there
-            visit.moved = abs(belief.speed) > MOVES_MPS
+            visit.moved = abs(estimate.speed) > MOVES_MPS
         else:
             visit.stands, visit.moved = old.stands, old.moved
         self._visits[vehicle] = visit
@@ -177,21 +177,23 @@ class Counters:
         elif abs(speed) > MOVES_MPS:
             visit.stands, visit.moved = False, True
 
-    def _pass(self, visit: _Visit, belief: Belief, place: OnLane) -> None:
+    def _pass(self, visit: _Visit, estimate: CarEstimate, place: OnLane) -> None:
         front = self._front(place)
         before_m, before_ns = visit.front_m, visit.t_ns
-        visit.front_m, visit.t_ns = front, belief.t_ns
+        visit.front_m, visit.t_ns = front, estimate.t_ns
         if front < -ARMED_M:
             visit.armed = True
         if front < 0.0 or not visit.armed or visit.passed_ns is not None:
             return
-        key = (belief.vehicle, visit.lane)
-        if belief.t_ns - self._last.get(key, -AGAIN_NS) < AGAIN_NS:
+        key = (estimate.vehicle, visit.lane)
+        if estimate.t_ns - self._last.get(key, -AGAIN_NS) < AGAIN_NS:
             return
         share = -before_m / (front - before_m) if before_m < 0.0 <= front else 1.0
-        visit.passed_ns = before_ns + round(share * (belief.t_ns - before_ns))
-        self._last[key] = belief.t_ns
-        self._log(visit.lane).passages.append((visit.passed_ns, abs(belief.speed), visit.stops > 0))
+        visit.passed_ns = before_ns + round(share * (estimate.t_ns - before_ns))
+        self._last[key] = estimate.t_ns
+        self._log(visit.lane).passages.append(
+            (visit.passed_ns, abs(estimate.speed), visit.stops > 0)
+        )
 
     def _leave(self, visit: _Visit, way: str, now_ns: int) -> None:
         """Note the delay of a car that has left the junction."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.route import OnLane, Roads
 from scm.maps.signs import precedence_at
-from scm.traffic.observation.car_estimates import Belief
+from scm.traffic.observation.car_estimates import CarEstimate
 
 SAME_WAY_RAD = math.radians(60.0)
 NEAR_M = 0.06
@@ -43,44 +43,44 @@ class Follower:
         self._roads = roads
         self._cars: dict[str, Followed] = {}
 
-    def see(self, belief: Belief) -> Followed | None:
+    def see(self, estimate: CarEstimate) -> Followed | None:
         """Return where a car is; None when it is beside all lanes of its direction."""
-        known = self._cars.get(belief.vehicle)
-        found = self._stays(known, belief) if known is not None else None
+        known = self._cars.get(estimate.vehicle)
+        found = self._stays(known, estimate) if known is not None else None
         if found is None:
-            found = self._moves(known, belief)
+            found = self._moves(known, estimate)
         if found is None:
-            self._cars.pop(belief.vehicle, None)
+            self._cars.pop(estimate.vehicle, None)
             return None
-        self._cars[belief.vehicle] = found
+        self._cars[estimate.vehicle] = found
         return found
 
     def forget(self, vehicle: str) -> None:
         """Forget a car that is gone."""
         self._cars.pop(vehicle, None)
 
-    def _stays(self, known: Followed, belief: Belief) -> Followed | None:
+    def _stays(self, known: Followed, estimate: CarEstimate) -> Followed | None:
         """Return the place on the same lane if it is plainly still there."""
         lane = self._roads.lanes[known.place.lane]
-        s, lateral = lane.project(belief.x, belief.y, known.place.s)
+        s, lateral = lane.project(estimate.x, estimate.y, known.place.s)
         # beyond an end `project` answers the end itself, give or take the last digit
         if not END_M < s < lane.length_m - END_M or abs(lateral) > NEAR_M:
             return None
-        if abs(wrap_angle(lane.yaw_at(s) - belief.yaw)) > SAME_WAY_RAD:
+        if abs(wrap_angle(lane.yaw_at(s) - estimate.yaw)) > SAME_WAY_RAD:
             return None
         return Followed(OnLane(known.place.lane, s, lateral), known.before)
 
-    def _moves(self, known: Followed | None, belief: Belief) -> Followed | None:
+    def _moves(self, known: Followed | None, estimate: CarEstimate) -> Followed | None:
         """Return the nearest place on a lane that it can have come to, else on any."""
         best: tuple[float, OnLane] | None = None
         if known is not None:
             for name in self._reached(known):
-                away, place = self._measure(name, belief)
+                away, place = self._measure(name, estimate)
                 away -= STAYS_M if name == known.place.lane else 0.0
                 if place is not None and (best is None or away < best[0]):
                     best = away, place
         if best is None:
-            place = self._roads.nearest(Pose2(belief.x, belief.y, belief.yaw))
+            place = self._roads.nearest(Pose2(estimate.x, estimate.y, estimate.yaw))
             if place is None or abs(place.lateral) > self._room(place.lane):
                 return None
             best = 0.0, place
@@ -99,12 +99,12 @@ class Follower:
             names += roads.successors(name)
         return list(dict.fromkeys(names))
 
-    def _measure(self, name: str, belief: Belief) -> tuple[float, OnLane | None]:
+    def _measure(self, name: str, estimate: CarEstimate) -> tuple[float, OnLane | None]:
         lane = self._roads.lanes[name]
-        s, lateral = lane.project(belief.x, belief.y)
+        s, lateral = lane.project(estimate.x, estimate.y)
         foot = lane.at(s)
-        away = math.hypot(belief.x - foot.x, belief.y - foot.y)
-        same_way = abs(wrap_angle(foot.yaw - belief.yaw)) <= SAME_WAY_RAD
+        away = math.hypot(estimate.x - foot.x, estimate.y - foot.y)
+        same_way = abs(wrap_angle(foot.yaw - estimate.yaw)) <= SAME_WAY_RAD
         is_there = same_way and away <= self._room(name)
         return away, OnLane(name, s, lateral) if is_there else None
 

@@ -10,7 +10,7 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, Subscription
-from scm.traffic.observation.car_estimates import Beliefs
+from scm.traffic.observation.car_estimates import CarEstimates
 from scm.traffic.observation.counters import Counters
 from scm.traffic.observation.lane_tracking import Follower, rules_of
 from scm.traffic.observation.violations import Judge
@@ -23,7 +23,7 @@ from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.violation import Violation
 
 PERIOD_NS = 100 * NS_PER_MS
-TELL_NS = 5 * NS_PER_S
+COUNTS_EVERY_NS = 5 * NS_PER_S
 
 
 class ObserverPart(BasePart):
@@ -41,7 +41,7 @@ class ObserverPart(BasePart):
         )
         roads = Roads(city_map)
         lines = rules_of(roads)
-        self._beliefs = Beliefs()
+        self._estimates = CarEstimates()
         self._follower = Follower(roads)
         self._spats: dict[str, Spat] = {}
         self._seen: set[str] = set()
@@ -55,10 +55,10 @@ class ObserverPart(BasePart):
         for item in inbox:
             message = item.message
             if isinstance(message, EyeTrack | VehicleState):
-                self._beliefs.take(message, item.t_ns)
+                self._estimates.add(message, item.t_ns)
             elif isinstance(message, Spat):
                 self._spats[message.junction] = message
-                self._judge.signals.hear(message)
+                self._judge.signals.receive(message)
             elif isinstance(message, Contact):
                 violations += self._judge.hit(message)
         violations += self._look(now_ns)
@@ -67,7 +67,7 @@ class ObserverPart(BasePart):
         for violation in violations:
             outbox += [violation, _event(violation)]
         if now_ns >= self._next_ns:
-            self._next_ns = now_ns + TELL_NS
+            self._next_ns = now_ns + COUNTS_EVERY_NS
             outbox.append(self.counters.counts(now_ns))
         return outbox
 
@@ -77,11 +77,11 @@ class ObserverPart(BasePart):
 
     def _look(self, now_ns: int) -> list[Violation]:
         found, seen = [], set()
-        for belief in self._beliefs.now(now_ns):
-            seen.add(belief.vehicle)
-            followed = self._follower.see(belief)
-            self.counters.see(belief, followed)
-            found += self._judge.see(belief, followed)
+        for estimate in self._estimates.now(now_ns):
+            seen.add(estimate.vehicle)
+            followed = self._follower.see(estimate)
+            self.counters.see(estimate, followed)
+            found += self._judge.see(estimate, followed)
         for vehicle in self._seen - seen:
             for table in (self._follower, self.counters, self._judge):
                 table.forget(vehicle)

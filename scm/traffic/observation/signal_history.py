@@ -19,13 +19,13 @@ class Shown(NamedTuple):
     since_ns: int
 
 
-class SignalMemory:
+class SignalHistory:
     """The last seconds of every group."""
 
     def __init__(self) -> None:
         self._rows: dict[tuple[str, str], deque[tuple[int, SignalGroup]]] = {}
 
-    def hear(self, spat: Spat) -> None:
+    def receive(self, spat: Spat) -> None:
         """Take what a junction shows."""
         for group in spat.groups:
             row = self._rows.setdefault((spat.junction, group.group), deque(maxlen=DEPTH))

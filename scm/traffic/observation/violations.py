@@ -23,9 +23,9 @@ from scm.geometry import Pose2
 from scm.maps.route import Roads
 from scm.records.signals import SignalGroup
 from scm.records.traffic import Kind, TrackPoint
-from scm.traffic.observation.car_estimates import Belief
+from scm.traffic.observation.car_estimates import CarEstimate
 from scm.traffic.observation.lane_tracking import Followed, Lines
-from scm.traffic.observation.signal_history import Shown, SignalMemory
+from scm.traffic.observation.signal_history import Shown, SignalHistory
 from scm.traffic.signals.sightings import NIGEL_FRONT_M
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.violation import Violation
@@ -57,7 +57,7 @@ class _Lasting:
 
     since_ns: int | None = None
     way_m: float = 0.0
-    told: bool = False
+    reported: bool = False
     good_ns: int | None = None
 
     def bad(self, now_ns: int, way_m: float) -> None:
@@ -74,7 +74,7 @@ class _Lasting:
         if self.good_ns is None:
             self.good_ns = now_ns
         if now_ns - self.good_ns >= GOOD_NS:
-            self.told = False
+            self.reported = False
 
 
 @dataclass(slots=True)
@@ -86,7 +86,7 @@ class _Car:
     front_m: float = 0.0
     t_ns: int = 0
     past: _Past | None = None
-    line_told: bool = False
+    line_reported: bool = False
     stands_ns: int | None = None
     came_m: float = 0.0
     slowest_mps: float = math.inf
@@ -102,8 +102,8 @@ class Judge:
         self._cars: dict[str, _Car] = {}
         self._limits: dict[str, list[tuple[float, float]]] = {}
         self._contacts: dict[frozenset[str], int] = {}
-        self._told = 0
-        self.signals = SignalMemory()
+        self._number = 0
+        self.signals = SignalHistory()
 
     def forget(self, vehicle: str) -> None:
         """Forget a car that is gone."""
@@ -115,17 +115,17 @@ class Judge:
             car = self._cars[vehicle] = _Car()
         return car
 
-    def see(self, belief: Belief, followed: Followed | None) -> list[Violation]:
+    def see(self, estimate: CarEstimate, followed: Followed | None) -> list[Violation]:
         """Judge where a car is now."""
-        car = self._car(belief.vehicle)
-        if car.track and belief.t_ns <= car.track[-1].t_ns:
+        car = self._car(estimate.vehicle)
+        if car.track and estimate.t_ns <= car.track[-1].t_ns:
             return []
-        span_s = seconds(belief.t_ns - car.track[-1].t_ns) if car.track else 0.0
-        car.track.append(_point(belief))
+        span_s = seconds(estimate.t_ns - car.track[-1].t_ns) if car.track else 0.0
+        car.track.append(_point(estimate))
         found = [
-            self._line(car, belief, followed),
-            self._speed(car, belief, followed),
-            self._direction(car, belief, followed, abs(belief.speed) * span_s),
+            self._line(car, estimate, followed),
+            self._speed(car, estimate, followed),
+            self._direction(car, estimate, followed, abs(estimate.speed) * span_s),
         ]
         return [violation for violation in found if violation is not None]
 
@@ -142,25 +142,27 @@ class Judge:
 
     def _collision(self, contact: Contact, other: str) -> Violation:
         car = self._car(contact.vehicle)
-        blow_mps = math.hypot(contact.dvx_mps, contact.dvy_mps)
+        dv_mps = math.hypot(contact.dvx_mps, contact.dvy_mps)
         last = car.track[-1] if car.track else None
-        self._told += 1
+        self._number += 1
         return Violation(
             vehicle=contact.vehicle,
-            number=self._told,
+            number=self._number,
             kind="collision",
             t_ns=contact.t_ns,
             x_m=last.x_m if last is not None else 0.0,
             y_m=last.y_m if last is not None else 0.0,
             lane=car.lane,
-            text=f"{contact.vehicle} hit {other}: {blow_mps:.2f} m/s in one blow",
+            text=f"{contact.vehicle} hit {other}: {dv_mps:.2f} m/s in one blow",
             certainty=1.0,
             sources=("contact", *_sources(car)),
             against=(other,),
             track=tuple(car.track),
         )
 
-    def _line(self, car: _Car, belief: Belief, followed: Followed | None) -> Violation | None:
+    def _line(
+        self, car: _Car, estimate: CarEstimate, followed: Followed | None
+    ) -> Violation | None:
         """Judge the line of the lane that it is on, or has just left over the junction."""
         if followed is None:
             car.lane, car.past = "", None
@@ -175,14 +177,14 @@ class Judge:
             lane = car.lane
         front = s + NIGEL_FRONT_M - line.at_m
         if lane != car.lane:
-            car.lane, car.front_m, car.t_ns = lane, front, belief.t_ns
-            car.past, car.line_told, car.stands_ns = None, False, None
+            car.lane, car.front_m, car.t_ns = lane, front, estimate.t_ns
+            car.past, car.line_reported, car.stands_ns = None, False, None
             car.came_m, car.slowest_mps = front, math.inf
         if front > -REST_M - NIGEL_FRONT_M:
-            car.slowest_mps = min(car.slowest_mps, abs(belief.speed))
+            car.slowest_mps = min(car.slowest_mps, abs(estimate.speed))
         if line.group:
-            return self._at_signal(car, belief, line, front)
-        return self._at_sign(car, belief, line, front)
+            return self._at_signal(car, estimate, line, front)
+        return self._at_sign(car, estimate, line, front)
 
     def _behind(self, car: _Car, lane: str, s: float) -> tuple[Lines | None, float]:
         """Return the line that lies behind a car on the way over a junction, and its place."""
@@ -190,82 +192,94 @@ class Judge:
             return None, s
         return self._lines[car.lane], s + self._roads.length_of(car.lane)
 
-    def _at_signal(self, car: _Car, belief: Belief, line: Lines, front: float) -> Violation | None:
+    def _at_signal(
+        self, car: _Car, estimate: CarEstimate, line: Lines, front: float
+    ) -> Violation | None:
         before_m, before_ns = car.front_m, car.t_ns
-        car.front_m, car.t_ns = front, belief.t_ns
+        car.front_m, car.t_ns = front, estimate.t_ns
         if before_m <= 0.0 < front:
             share = -before_m / (front - before_m)
-            at_ns = before_ns + round(share * (belief.t_ns - before_ns))
-            grace_s = GRACE_S + SIGMAS * belief.std_m / max(abs(belief.speed), STANDS_MPS)
+            at_ns = before_ns + round(share * (estimate.t_ns - before_ns))
+            grace_s = GRACE_S + SIGMAS * estimate.std_m / max(abs(estimate.speed), STANDS_MPS)
             shown = self.signals.red_at(line.junction, line.group, at_ns, grace_s)
             car.past = None if shown is None else _Past(at_ns, shown)
-        if front <= 0.0 or car.line_told:
+        if front <= 0.0 or car.line_reported:
             car.past = None if front <= 0.0 else car.past
             return None
-        return self._past_red(car, belief, line, front) if car.past is not None else None
+        return self._past_red(car, estimate, line, front) if car.past is not None else None
 
-    def _past_red(self, car: _Car, belief: Belief, line: Lines, front: float) -> Violation | None:
+    def _past_red(
+        self, car: _Car, estimate: CarEstimate, line: Lines, front: float
+    ) -> Violation | None:
         """Judge a car whose front has passed its line at red."""
         assert car.past is not None  # noqa: S101 asked before
-        sure = SIGMAS * belief.std_m
+        sure = SIGMAS * estimate.std_m
         if front >= INTO_M + sure:
-            car.line_told = True
+            car.line_reported = True
             age_s = seconds(car.past.t_ns - car.past.shown.since_ns)
             text = (
-                f"{belief.vehicle} passed the line of {line.junction} at {_where(line)} at red, "
+                f"{estimate.vehicle} passed the line of {line.junction} at {_where(line)} at red, "
                 f"{age_s:.1f} s after it began, and drove on"
             )
-            return self._tell("red_light", car, belief, text, front / _doubt(belief), car.past)
+            return self._violation(
+                "red_light", car, estimate, text, front / _std_m(estimate), car.past
+            )
         if self.signals.is_not_red(line.junction, line.group):
             car.past = None
             return None
-        if abs(belief.speed) > STANDS_MPS + SIGMAS * belief.std_mps:
+        if abs(estimate.speed) > STANDS_MPS + SIGMAS * estimate.std_mps:
             car.stands_ns = None
             return None
         if car.stands_ns is None:
-            car.stands_ns = belief.t_ns
-        if front < OVER_M + sure or belief.t_ns - car.stands_ns < STANDS_NS:
+            car.stands_ns = estimate.t_ns
+        if front < OVER_M + sure or estimate.t_ns - car.stands_ns < STANDS_NS:
             return None
-        car.line_told = True
+        car.line_reported = True
         text = (
-            f"{belief.vehicle} stands {front:.2f} m beyond the line of {line.junction} at "
+            f"{estimate.vehicle} stands {front:.2f} m beyond the line of {line.junction} at "
             f"{_where(line)}, which it passed at red"
         )
-        return self._tell("stop_line", car, belief, text, front / _doubt(belief), car.past)
+        return self._violation("stop_line", car, estimate, text, front / _std_m(estimate), car.past)
 
-    def _at_sign(self, car: _Car, belief: Belief, line: Lines, front: float) -> Violation | None:
-        car.front_m, car.t_ns = front, belief.t_ns
-        if line.sign != "stop" or car.line_told or front < INTO_M + SIGMAS * belief.std_m:
+    def _at_sign(
+        self, car: _Car, estimate: CarEstimate, line: Lines, front: float
+    ) -> Violation | None:
+        car.front_m, car.t_ns = front, estimate.t_ns
+        if line.sign != "stop" or car.line_reported or front < INTO_M + SIGMAS * estimate.std_m:
             return None
-        car.line_told = True
+        car.line_reported = True
         beyond = car.slowest_mps - RESTS_MPS
         came_from_afar = car.came_m < -REST_M
-        if not came_from_afar or beyond <= SIGMAS * belief.std_mps:
+        if not came_from_afar or beyond <= SIGMAS * estimate.std_mps:
             return None
         text = (
-            f"{belief.vehicle} passed the stop sign of {line.junction} without a stop: never "
+            f"{estimate.vehicle} passed the stop sign of {line.junction} without a stop: never "
             f"slower than {car.slowest_mps:.2f} m/s before the line"
         )
-        return self._tell("stop_line", car, belief, text, beyond / max(belief.std_mps, 1e-6))
+        return self._violation(
+            "stop_line", car, estimate, text, beyond / max(estimate.std_mps, 1e-6)
+        )
 
-    def _speed(self, car: _Car, belief: Belief, followed: Followed | None) -> Violation | None:
+    def _speed(
+        self, car: _Car, estimate: CarEstimate, followed: Followed | None
+    ) -> Violation | None:
         if followed is None:
-            car.speed.good(belief.t_ns)
+            car.speed.good(estimate.t_ns)
             return None
         limit = self._limit(followed)
-        over = abs(belief.speed) - limit * OVER_SHARE - OVER_MPS
-        if over <= SIGMAS * belief.std_mps:
-            car.speed.good(belief.t_ns)
+        over = abs(estimate.speed) - limit * OVER_SHARE - OVER_MPS
+        if over <= SIGMAS * estimate.std_mps:
+            car.speed.good(estimate.t_ns)
             return None
-        car.speed.bad(belief.t_ns, 0.0)
-        if car.speed.told or car.speed.lasts_ns(belief.t_ns) < LONG_NS:
+        car.speed.bad(estimate.t_ns, 0.0)
+        if car.speed.reported or car.speed.lasts_ns(estimate.t_ns) < LONG_NS:
             return None
-        car.speed.told = True
+        car.speed.reported = True
         text = (
-            f"{belief.vehicle} drives {abs(belief.speed):.2f} m/s on {followed.place.lane}, "
+            f"{estimate.vehicle} drives {abs(estimate.speed):.2f} m/s on {followed.place.lane}, "
             f"where {limit:.2f} m/s are allowed"
         )
-        return self._tell("speed", car, belief, text, over / max(belief.std_mps, 1e-6))
+        return self._violation("speed", car, estimate, text, over / max(estimate.std_mps, 1e-6))
 
     def _limit(self, followed: Followed) -> float:
         lane = followed.place.lane
@@ -275,53 +289,53 @@ class Judge:
         return next(limit for at, limit in reversed(limits) if at <= max(followed.place.s, 0.0))
 
     def _direction(
-        self, car: _Car, belief: Belief, followed: Followed | None, way_m: float
+        self, car: _Car, estimate: CarEstimate, followed: Followed | None, way_m: float
     ) -> Violation | None:
         lane, needed, how = "", BACK_M, "drives backwards on"
-        if followed is not None and belief.speed < -SLOW_MPS - SIGMAS * belief.std_mps:
+        if followed is not None and estimate.speed < -SLOW_MPS - SIGMAS * estimate.std_mps:
             lane = followed.place.lane
-        elif followed is None and belief.speed > SLOW_MPS + SIGMAS * belief.std_mps:
-            lane, needed, how = self._against(belief), WRONG_M, "drives against the direction of"
+        elif followed is None and estimate.speed > SLOW_MPS + SIGMAS * estimate.std_mps:
+            lane, needed, how = self._against(estimate), WRONG_M, "drives against the direction of"
         if not lane:
-            car.way.good(belief.t_ns)
+            car.way.good(estimate.t_ns)
             return None
-        car.way.bad(belief.t_ns, way_m)
-        is_sure = car.way.way_m - needed >= SIGMAS * belief.std_m
-        if car.way.told or not is_sure or car.way.lasts_ns(belief.t_ns) < LONG_NS:
+        car.way.bad(estimate.t_ns, way_m)
+        is_sure = car.way.way_m - needed >= SIGMAS * estimate.std_m
+        if car.way.reported or not is_sure or car.way.lasts_ns(estimate.t_ns) < LONG_NS:
             return None
-        car.way.told = True
-        text = f"{belief.vehicle} {how} {lane}, for {car.way.way_m:.2f} m so far"
-        return self._tell("wrong_way", car, belief, text, car.way.way_m / _doubt(belief))
+        car.way.reported = True
+        text = f"{estimate.vehicle} {how} {lane}, for {car.way.way_m:.2f} m so far"
+        return self._violation("wrong_way", car, estimate, text, car.way.way_m / _std_m(estimate))
 
-    def _against(self, belief: Belief) -> str:
+    def _against(self, estimate: CarEstimate) -> str:
         """Return the lane of the other direction on which a car is; empty: on none."""
-        turned = Pose2(belief.x, belief.y, belief.yaw + math.pi)
+        turned = Pose2(estimate.x, estimate.y, estimate.yaw + math.pi)
         place = self._roads.nearest(turned)
         if place is None:
             return ""
-        room = self._roads.definition(place.lane).width_m / 2.0 - SIGMAS * belief.std_m
+        room = self._roads.definition(place.lane).width_m / 2.0 - SIGMAS * estimate.std_m
         return place.lane if abs(place.lateral) < room else ""
 
-    def _tell(
+    def _violation(
         self,
         kind: Kind,
         car: _Car,
-        belief: Belief,
+        estimate: CarEstimate,
         text: str,
         sigmas: float,
         past: _Past | None = None,
     ) -> Violation:
-        self._told += 1
+        self._number += 1
         place = car.lane if kind in ("red_light", "stop_line") else ""
         signal: SignalGroup | None = past.shown.group if past is not None else None
         at_m = car.front_m + self._lines[place].at_m - NIGEL_FRONT_M if place else 0.0
         return Violation(
-            vehicle=belief.vehicle,
-            number=self._told,
+            vehicle=estimate.vehicle,
+            number=self._number,
             kind=kind,
-            t_ns=past.t_ns if past is not None else belief.t_ns,
-            x_m=belief.x,
-            y_m=belief.y,
+            t_ns=past.t_ns if past is not None else estimate.t_ns,
+            x_m=estimate.x,
+            y_m=estimate.y,
             lane=place,
             at_m=at_m,
             text=text,
@@ -333,14 +347,14 @@ class Judge:
         )
 
 
-def _point(belief: Belief) -> TrackPoint:
+def _point(estimate: CarEstimate) -> TrackPoint:
     return TrackPoint(
-        t_ns=belief.t_ns,
-        x_m=belief.x,
-        y_m=belief.y,
-        yaw_rad=belief.yaw,
-        speed_mps=belief.speed,
-        source=belief.source,
+        t_ns=estimate.t_ns,
+        x_m=estimate.x,
+        y_m=estimate.y,
+        yaw_rad=estimate.yaw,
+        speed_mps=estimate.speed,
+        source=estimate.source,
     )
 
 
@@ -348,8 +362,8 @@ def _sources(car: _Car) -> tuple[str, ...]:
     return tuple(sorted({point.source for point in car.track}))
 
 
-def _doubt(belief: Belief) -> float:
-    return max(belief.std_m, 1e-6)
+def _std_m(estimate: CarEstimate) -> float:
+    return max(estimate.std_m, 1e-6)
 
 
 def _where(line: Lines) -> str:

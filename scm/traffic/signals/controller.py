@@ -15,19 +15,19 @@ from scm.errors import PlanError, nearest
 from scm.records.signals import Colour, SignalGroup
 from scm.traffic.signals import kernel, operator_overrides
 from scm.traffic.signals.detectors import Detector
-from scm.traffic.signals.forecast import Coming, forecasts, laid_out, within
+from scm.traffic.signals.forecast import Coming, forecasts, schedule, within
 from scm.traffic.signals.green_wave import Wave
 from scm.traffic.signals.guaranteed_time import (
     SLACK_NS,
-    Promise,
+    GuaranteedTime,
     earliest_green,
     end_after,
     red_end,
+    requested_green,
     still_ns,
-    wished_green,
 )
 from scm.traffic.signals.kernel import Phase, Program
-from scm.traffic.signals.operator_overrides import NEED_RINGS, Asked
+from scm.traffic.signals.operator_overrides import NEED_RINGS, Override
 from scm.traffic.signals.plan import FLASH, Timetable, load_timetable, plan_names
 from scm.traffic.signals.policy import (
     FIXED,
@@ -47,7 +47,7 @@ from scm.v2x.messages.spat import Spat
 
 LATE_NS = 3 * STEP_NS
 FORESEE_EVERY_NS = 5 * STEP_NS
-BY_HAND = "actuated"
+POLICY_FOR_OVERRIDES = "actuated"
 
 _COLOUR: dict[Phase, Colour] = {
     Phase.RED: "red",
@@ -70,11 +70,11 @@ class _Shown:
 
     colour: Colour
     since_ns: int
-    promise: Promise
+    guaranteed: GuaranteedTime
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Observations:
     """What detectors and vehicles tell a policy at one step; see `JunctionView`."""
 
     detectors: Mapping[str, Detector]
@@ -82,7 +82,7 @@ class Heard:
     priority: tuple[PriorityCall, ...] = ()
 
 
-UNHEARD = Heard({})
+NO_OBSERVATIONS = Observations({})
 
 
 class Controller:
@@ -91,7 +91,7 @@ class Controller:
     Attributes:
         mode: `start`, `plan`, `flash`, or what a policy says: `adaptive`, `priority`, `preempt`.
         policy: In force, also while flashing.
-        asked: Wishes of operators and scripts in force.
+        overrides: Of operators and scripts, in force.
         priority: What became of each vehicle's request, by its key.
         failure: Why a policy was given up for fixed time; empty: none was.
         changed: Whether the last step changed a colour.
@@ -129,13 +129,13 @@ class Controller:
         self._program = program
         self._revision = revision
         tables = tables or {name: (load_timetable(name, program), None) for name in plan_names()}
-        self._timetables = Timetables(tables, _known(junction, plan, tables))
+        self._timetables = Timetables(tables, _checked_plan(junction, plan, tables))
         self._site = site_of(junction, program, learned, car)
         self._policies = {name: load_policy(name) for name in policy_names()}
-        self._usual = self._known_policy(policy)
+        self._default_policy = self._checked_policy(policy)
         self.policy = FIXED
         self._memory: Any = None
-        self.asked: tuple[Asked, ...] = ()
+        self.overrides: tuple[Override, ...] = ()
         self.priority: Mapping[tuple[int, int], Status] = {}
         self.failure = self._failed = ""
         self.mode = "start"
@@ -144,7 +144,7 @@ class Controller:
         self._flash_reasons: set[str] = set()
         self._state = kernel.start(program)
         self._shown: dict[str, _Shown] = {}
-        self._wished: frozenset[str] = frozenset()
+        self._requested: frozenset[str] = frozenset()
         self._last_ns: int | None = None
         self._shown_ns: int | None = None
         self._is_late = False
@@ -160,9 +160,9 @@ class Controller:
         return self._timetables.plan
 
     @property
-    def guest(self) -> tuple[Timetable, Wave | None] | None:
+    def custom_plan(self) -> tuple[Timetable, Wave | None] | None:
         """The plan in force, where somebody made it; None: it is one of the junction's own."""
-        return self._timetables.guest
+        return self._timetables.custom_plan
 
     @property
     def running(self) -> str:
@@ -172,23 +172,23 @@ class Controller:
     @property
     def pending(self) -> str:
         """What was asked for and is to come at the next safe moment; empty: nothing."""
-        wanted = self._wanted()
-        if wanted == self.policy:
-            return self._timetables.pending if wanted == FIXED else ""
-        return (self._timetables.pending or self.plan) if wanted == FIXED else wanted
+        target = self._target_policy()
+        if target == self.policy:
+            return self._timetables.pending if target == FIXED else ""
+        return (self._timetables.pending or self.plan) if target == FIXED else target
 
     @property
     def is_flashing(self) -> bool:
         """Whether there is a reason to flash, from the next step on."""
-        return bool(self._flash_reasons) or self._policies[self._wanted()].is_flash
+        return bool(self._flash_reasons) or self._policies[self._target_policy()].is_flash
 
     @property
     def needs_detectors(self) -> bool:
         """Whether cars must be listened to, for what runs or for what is to come."""
-        names = (self.policy, self._wanted())
+        names = (self.policy, self._target_policy())
         return any(self._policies[name].needs_detectors for name in names)
 
-    def ask(self, plan: str) -> None:
+    def request_plan(self, plan: str) -> None:
         """Wish for a plan, and thereby for fixed time, or for a policy, until further notice.
 
         Raises:
@@ -196,23 +196,23 @@ class Controller:
         """
         plans = self._timetables.names
         if plan not in plans and plan in self._policies:
-            self._usual = plan
+            self._default_policy = plan
         else:
-            self._timetables.ask(_known(self.junction, plan, plans))
-            self._usual = FIXED
+            self._timetables.request(_checked_plan(self.junction, plan, plans))
+            self._default_policy = FIXED
         self.failure = self._failed = ""
 
     def end_flash(self) -> bool:
         """Return whether to flash was usual; a timetable is then, for flash has to end."""
-        was_usual = self._policies[self._usual].is_flash
-        if was_usual:
-            self._usual = FIXED
-        return was_usual
+        was_default = self._policies[self._default_policy].is_flash
+        if was_default:
+            self._default_policy = FIXED
+        return was_default
 
-    def ask_for_guest(self, table: Timetable, wave: Wave | None = None) -> None:
+    def request_custom_plan(self, table: Timetable, wave: Wave | None = None) -> None:
         """Wish for a plan that somebody made; it comes once every promise reckons with it."""
-        self._timetables.offer(table, wave)
-        self._usual = FIXED
+        self._timetables.offer_custom_plan(table, wave)
+        self._default_policy = FIXED
         self.failure = self._failed = ""
 
     def outlook(self, now_ns: int) -> tuple[Coming, ...]:
@@ -221,14 +221,14 @@ class Controller:
             return ()
         return self._timetables.outlook(now_ns) if self.policy == FIXED else self._coming
 
-    def take(self, request: SignalRequest, now_ns: int) -> None:
+    def apply_override(self, request: SignalRequest, now_ns: int) -> None:
         """Take a wish of an operator or a script.
 
         Raises:
             PlanError: saying in words why it cannot be taken.
         """
-        self.asked = operator_overrides.take(
-            self.asked, request, self._program, self._policies, now_ns
+        self.overrides = operator_overrides.apply(
+            self.overrides, request, self._program, self._policies, now_ns
         )
         if request.verb == "policy":
             self.failure = self._failed = ""
@@ -240,23 +240,23 @@ class Controller:
         else:
             self._flash_reasons.discard(reason)
 
-    def step(self, now_ns: int, heard: Heard = UNHEARD) -> None:
+    def step(self, now_ns: int, observations: Observations = NO_OBSERVATIONS) -> None:
         """Go on to `now_ns`."""
-        dt_ns = self._take_time(now_ns)
-        self.asked = operator_overrides.lapse(self.asked, now_ns, *self._just_changed())
+        dt_ns = self._elapsed_ns(now_ns)
+        self.overrides = operator_overrides.expire(self.overrides, now_ns, *self._just_changed())
         if self.is_flashing:
             self.mode = FLASH
-            self.priority = {one.key: "rejected" for one in heard.priority}
-            wishes: frozenset[str] = frozenset()
+            self.priority = {one.key: "rejected" for one in observations.priority}
+            requested: frozenset[str] = frozenset()
         else:
-            self._wished = self._wishes(now_ns, dt_ns, heard)
-            wishes = self._gate(self._wished, now_ns)
+            self._requested = self._next_requests(now_ns, dt_ns, observations)
+            requested = self._gate(self._requested, now_ns)
         self._state = kernel.step(
-            self._program, self._state, wishes, dt_ns, flash=self.mode == FLASH
+            self._program, self._state, requested, dt_ns, flash=self.mode == FLASH
         )
         self._show(now_ns)
         if self.changed or now_ns - self._foreseen_ns >= FORESEE_EVERY_NS:
-            self._foresee(now_ns, heard)
+            self._foresee(now_ns, observations)
 
     def spat(self, now_ns: int) -> Spat:
         """Return what is shown, for the step that was just made."""
@@ -267,11 +267,13 @@ class Controller:
             seq=self._seq,
             mode=self.mode,
             plan=self.running,
-            groups=tuple(self._tell(name, shown, now_ns) for name, shown in self._shown.items()),
+            groups=tuple(
+                self._signal_group(name, shown, now_ns) for name, shown in self._shown.items()
+            ),
             revision=self._revision,
         )
 
-    def _known_policy(self, policy: str) -> str:
+    def _checked_policy(self, policy: str) -> str:
         if policy not in self._policies:
             names = list(self._policies)
             hint = nearest(policy, names)
@@ -279,19 +281,23 @@ class Controller:
             raise PlanError(msg)
         return policy
 
-    def _wanted(self) -> str:
+    def _target_policy(self) -> str:
         """Return the policy that should run: wished, or usual; rings, where wishes need them."""
-        wished = next((one.policy for one in self.asked if one.verb == "policy"), self._usual)
-        policy = FIXED if wished == self._failed else wished
-        needs_rings = any(one.verb in NEED_RINGS for one in self.asked)
-        by_hand = needs_rings and self._policies[policy].is_timed and self._failed != BY_HAND
-        return BY_HAND if by_hand else policy
+        target = next(
+            (one.policy for one in self.overrides if one.verb == "policy"), self._default_policy
+        )
+        policy = FIXED if target == self._failed else target
+        needs_rings = any(one.verb in NEED_RINGS for one in self.overrides)
+        needs_override_policy = (
+            needs_rings and self._policies[policy].is_timed and self._failed != POLICY_FOR_OVERRIDES
+        )
+        return POLICY_FOR_OVERRIDES if needs_override_policy else policy
 
-    def _take_time(self, now_ns: int) -> int:
+    def _elapsed_ns(self, now_ns: int) -> int:
         """Return the time since the last step; what is far too much of it puts the cycle off."""
         if self._last_ns is None:
             self._last_ns = now_ns
-            self._begin_again(now_ns)
+            self._restart_cycle(now_ns)
         dt_ns = now_ns - self._last_ns
         self._last_ns = now_ns
         self._is_late = dt_ns > LATE_NS
@@ -300,37 +306,37 @@ class Controller:
             self._timetables.put_off(dt_ns - STEP_NS)
         return dt_ns
 
-    def _begin_again(self, now_ns: int) -> None:
+    def _restart_cycle(self, now_ns: int) -> None:
         self.mode = "start"
         self.policy = FIXED
         self._timetables.clear(now_ns, now_ns + self._restart_ns)
 
-    def _wishes(self, now_ns: int, dt_ns: int, heard: Heard) -> frozenset[str]:
+    def _next_requests(self, now_ns: int, dt_ns: int, observations: Observations) -> frozenset[str]:
         """Return what timetable or policy wishes now, after a change between them if it is time."""
         if self.mode == FLASH:
-            self._begin_again(now_ns)
-        wanted = self._wanted()
+            self._restart_cycle(now_ns)
+        target = self._target_policy()
         if self.policy != FIXED:
-            if wanted == FIXED:
+            if target == FIXED:
                 self._return_to_timetable(now_ns)
-            elif wanted != self.policy:
-                self._begin_policy(wanted)
+            elif target != self.policy:
+                self._begin_policy(target)
         elif now_ns >= self._timetables.cycle.ends_ns:
-            if wanted != FIXED and not self._has_promised_greens():
-                self._begin_policy(wanted)
+            if target != FIXED and not self._has_guaranteed_red_ends():
+                self._begin_policy(target)
             else:
                 self._timetables.next_cycle()
                 self.mode = "plan"
         if self.policy == FIXED:
-            self.priority = {one.key: "rejected" for one in heard.priority}
-            self._timetables.settle(now_ns, goes_on=wanted == FIXED)
-            return self._timetables.wishes(now_ns)
-        return self._ask_policy(now_ns, dt_ns, heard)
+            self.priority = {one.key: "rejected" for one in observations.priority}
+            self._timetables.commit_next(now_ns, goes_on=target == FIXED)
+            return self._timetables.requested(now_ns)
+        return self._step_policy(now_ns, dt_ns, observations)
 
-    def _has_promised_greens(self) -> bool:
+    def _has_guaranteed_red_ends(self) -> bool:
         """Return whether a red's end has been promised: only the timetable can keep that."""
         return any(
-            shown.colour == "red" and shown.promise.max_end_ns is not None
+            shown.colour == "red" and shown.guaranteed.max_end_ns is not None
             for shown in self._shown.values()
         )
 
@@ -341,15 +347,15 @@ class Controller:
     def _return_to_timetable(self, now_ns: int) -> None:
         """Clear the junction, then begin a cycle."""
         self.mode, self.policy = "start", FIXED
-        ends = self._promises()
+        ends = self._guarantees()
         left = [
             still_ns(self._state, i, times, ends[i], now_ns)
             for i, times in enumerate(self._program.times)
         ]
         self._timetables.clear(now_ns, now_ns + max(left) + 3 * STEP_NS)
 
-    def _ask_policy(self, now_ns: int, dt_ns: int, heard: Heard) -> frozenset[str]:
-        view = self._view(now_ns, dt_ns, heard)
+    def _step_policy(self, now_ns: int, dt_ns: int, observations: Observations) -> frozenset[str]:
+        view = self._view(now_ns, dt_ns, observations)
         try:
             self._memory, answer = self._policies[self.policy].step(self._site, self._memory, view)
             self._check(answer)
@@ -358,52 +364,54 @@ class Controller:
             self._return_to_timetable(now_ns)
             return frozenset()
         self.mode, self.priority = answer.mode, answer.priority
-        return self._as_asked(answer.groups)
+        return self._with_overrides(answer.groups)
 
     def _fail(self, cause: Exception) -> None:
         self._failed = self.policy
         self.failure = f"policy {self.policy}: {type(cause).__name__}: {cause}"
 
-    def _view(self, now_ns: int, dt_ns: int, heard: Heard) -> JunctionView:
+    def _view(self, now_ns: int, dt_ns: int, observations: Observations) -> JunctionView:
         return JunctionView(
             now_ns,
             dt_ns,
             self._state,
-            heard.detectors,
-            heard.sees,
-            self.asked,
-            heard.priority,
-            self._timetables.wishes(now_ns),
+            observations.detectors,
+            observations.sees,
+            self.overrides,
+            observations.priority,
+            self._timetables.requested(now_ns),
         )
 
-    def _foresee(self, now_ns: int, heard: Heard) -> None:
+    def _foresee(self, now_ns: int, observations: Observations) -> None:
         """Ask timetable or policy when the present colours will likely end."""
         self._foreseen_ns = now_ns
         self._forecasts, self._coming = {}, ()
         if self.mode == FLASH:
             return
         if self.policy == FIXED:
-            if self._wanted() == FIXED:
+            if self._target_policy() == FIXED:
                 self._forecasts = {
                     name: self._timetables.likely_end_ns(name, now_ns, red=shown.colour == "red")
                     for name, shown in self._shown.items()
-                    if not shown.promise.is_exact
+                    if not shown.guaranteed.is_exact
                 }
             return
-        view, promises = self._view(now_ns, 0, heard), self._promises()
+        view, guarantees = self._view(now_ns, 0, observations), self._guarantees()
         try:
             turns = self._policies[self.policy].foresee(self._site, self._memory, view)
-            self._coming = tuple(laid_out(self._program, self._state, promises, turns, now_ns))
+            self._coming = tuple(schedule(self._program, self._state, guarantees, turns, now_ns))
             self._forecasts = forecasts(self._program, self._state, self._coming)
         except Exception as cause:  # noqa: BLE001 as above; the next step gives it up
             self._fail(cause)
 
-    def _as_asked(self, wishes: frozenset[str]) -> frozenset[str]:
+    def _with_overrides(self, requested: frozenset[str]) -> frozenset[str]:
         """Return a policy's wishes with those of people in them, which it may have overlooked."""
         green = {name for name, shown in self._shown.items() if shown.colour == "green"}
         may_hold = self.mode != "preempt"  # pre-emption goes before a hold
-        held = operator_overrides.groups_of(self.asked, "hold") & green if may_hold else set[str]()
-        return (wishes - (operator_overrides.groups_of(self.asked, "omit") - green)) | held
+        held = (
+            operator_overrides.groups_of(self.overrides, "hold") & green if may_hold else set[str]()
+        )
+        return (requested - (operator_overrides.groups_of(self.overrides, "omit") - green)) | held
 
     def _check(self, answer: Answer) -> None:
         unknown = [group for group in answer.groups if group not in self._program.groups]
@@ -411,13 +419,13 @@ class Controller:
             msg = f"wishes {unknown}, expected groups of {list(self._program.groups)}"
             raise PlanError(msg)
 
-    def _gate(self, wishes: frozenset[str], now_ns: int) -> frozenset[str]:
+    def _gate(self, requested: frozenset[str], now_ns: int) -> frozenset[str]:
         """Return the wishes as far as they keep what was promised."""
-        passed = set(wishes)
+        passed = set(requested)
         for name, shown in self._shown.items():
             is_green = shown.colour == "green"
-            latest_ns = shown.promise.max_end_ns
-            if now_ns < shown.promise.min_end_ns:
+            latest_ns = shown.guaranteed.max_end_ns
+            if now_ns < shown.guaranteed.min_end_ns:
                 (passed.add if is_green else passed.discard)(name)
             elif is_green and latest_ns is not None and now_ns >= latest_ns - SLACK_NS:
                 passed.discard(name)
@@ -428,74 +436,78 @@ class Controller:
         new = {n: s.colour for n, s in self._shown.items() if s.since_ns == self._shown_ns}
         return [n for n in new if new[n] == "green"], [n for n in new if new[n] == "yellow"]
 
-    def _promises(self) -> list[Promise | None]:
+    def _guarantees(self) -> list[GuaranteedTime | None]:
         shown = [self._shown.get(name) for name in self._program.groups]
-        return [one.promise if one is not None else None for one in shown]
+        return [one.guaranteed if one is not None else None for one in shown]
 
     def _show(self, now_ns: int) -> None:
         self.changed = False
         self._shown_ns = now_ns
-        before = self._promises()
+        before = self._guarantees()
         for index, name in enumerate(self._program.groups):
             colour = _COLOUR[self._state[index].phase]
             shown = self._shown.get(name)
             if shown is None or shown.colour != colour:
                 self.changed = True
-                promise = self._promise(index, colour, now_ns, before)
-                self._shown[name] = _Shown(colour, now_ns, promise)
+                guaranteed = self._guarantee_of(index, colour, now_ns, before)
+                self._shown[name] = _Shown(colour, now_ns, guaranteed)
             elif colour == "red":
-                promise = self._promise(index, colour, now_ns, before)
-                shown.promise = promise if self._is_late else shown.promise.narrowed(promise)
-            elif colour == "green" and not shown.promise.is_exact:
-                shown.promise = self._of_green(index, shown, now_ns)
+                guaranteed = self._guarantee_of(index, colour, now_ns, before)
+                shown.guaranteed = (
+                    guaranteed if self._is_late else shown.guaranteed.narrowed(guaranteed)
+                )
+            elif colour == "green" and not shown.guaranteed.is_exact:
+                shown.guaranteed = self._of_green(index, shown, now_ns)
 
-    def _of_green(self, index: int, shown: _Shown, now_ns: int) -> Promise:
+    def _of_green(self, index: int, shown: _Shown, now_ns: int) -> GuaranteedTime:
         """Return what can be promised by now of a green whose end was not known."""
         name, least_ns = self._program.groups[index], self._program.times[index].min_green
         if self.policy != FIXED or self._timetables.cycle.timetable is None:
-            return wished_green(shown.promise, now_ns, least_ns, wished=name in self._wished)
-        promise = self._timetables.green_end(name, now_ns, shown.since_ns + least_ns)
-        return promise if self._is_late else shown.promise.narrowed(promise)
+            return requested_green(
+                shown.guaranteed, now_ns, least_ns, requested=name in self._requested
+            )
+        guaranteed = self._timetables.green_end(name, now_ns, shown.since_ns + least_ns)
+        return guaranteed if self._is_late else shown.guaranteed.narrowed(guaranteed)
 
-    def _promise(
-        self, index: int, colour: Colour, now_ns: int, before: list[Promise | None]
-    ) -> Promise:
+    def _guarantee_of(
+        self, index: int, colour: Colour, now_ns: int, before: list[GuaranteedTime | None]
+    ) -> GuaranteedTime:
         name, times = self._program.groups[index], self._program.times[index]
         is_timed = self.policy == FIXED
         match colour:
             case "red" if is_timed:
-                plans = self._timetables.coming if self._wanted() == FIXED else ()
+                plans = self._timetables.coming if self._target_policy() == FIXED else ()
                 return red_end(name, self._timetables.cycle, now_ns, plans)
             case "red":
                 return earliest_green(self._program, self._state, index, before, now_ns)
             case "green" if is_timed:
                 return self._timetables.green_end(name, now_ns, now_ns + times.min_green)
             case "green":
-                return wished_green(None, now_ns, times.min_green, wished=True)
+                return requested_green(None, now_ns, times.min_green, requested=True)
             case "yellow":
                 return end_after(now_ns + times.yellow)
             case _:
-                return Promise(now_ns, None)
+                return GuaranteedTime(now_ns, None)
 
-    def _tell(self, name: str, shown: _Shown, now_ns: int) -> SignalGroup:
+    def _signal_group(self, name: str, shown: _Shown, now_ns: int) -> SignalGroup:
         likely = None
         if self.mode != FLASH:
             forecast_ns, is_red = self._forecasts.get(name), shown.colour == "red"
             planned = self.policy == FIXED
-            likely = within(shown.promise, forecast_ns, now_ns, red=is_red, planned=planned)
+            likely = within(shown.guaranteed, forecast_ns, now_ns, red=is_red, planned=planned)
         return SignalGroup(
             group=name,
             colour=shown.colour,
             since_ns=shown.since_ns,
-            min_end_ns=shown.promise.min_end_ns,
-            max_end_ns=shown.promise.max_end_ns,
+            min_end_ns=shown.guaranteed.min_end_ns,
+            max_end_ns=shown.guaranteed.max_end_ns,
             next_colour=_NEXT[shown.colour],
             likely_end_ns=likely and likely.end_ns,
             likely_confidence=likely and likely.confidence,
         )
 
 
-def _known(junction: str, plan: str, plans: Collection[str]) -> str:
+def _checked_plan(junction: str, plan: str, plans: Collection[str]) -> str:
     if plan not in plans:
         names = [*plans, *policy_names(), FLASH]
         msg = f"junction {junction}: no plan {plan!r}{nearest(plan, names)}, only {names}"

@@ -14,7 +14,14 @@ from scm.store.records import StageRecord
 from scm.traffic.signals import kernel
 from scm.traffic.signals.green_wave import Wave
 from scm.traffic.signals.kernel import GroupTimes, Program
-from scm.traffic.signals.plan import FLASH, Slot, Stage, Timetable, least_between_ns, timetable
+from scm.traffic.signals.plan import (
+    FLASH,
+    Stage,
+    TimedStage,
+    Timetable,
+    least_between_ns,
+    timetable,
+)
 from scm.traffic.signals.program import whole_steps_ns
 from scm.traffic.signals.proof.load_checks import check_table
 from scm.traffic.signals.proof.plan_proof import prove_plan
@@ -71,29 +78,29 @@ def wave_of(table: Timetable, offset_s: float | None) -> Wave | None:
     return Wave(table.length_ns, round(offset_s * 1e9))
 
 
-def check_name(plan: str, taken: Collection[str]) -> None:
+def check_plan_name(plan: str, in_use: Collection[str]) -> None:
     """Refuse a name that means something else.
 
     Raises:
         PlanError: naming it.
     """
-    if plan == FLASH or plan in taken:
+    if plan == FLASH or plan in in_use:
         msg = f"plan {plan!r}: the junction has one of that name, expected another"
         raise PlanError(msg)
 
 
 def stages_of(table: Timetable, program: Program) -> tuple[SignalStage, ...]:
     """Return the stages that make a timetable."""
-    following = [*table.slots[1:], Slot(frozenset(), table.length_ns, table.length_ns)]
+    following = [*table.timed_stages[1:], TimedStage(frozenset(), table.length_ns, table.length_ns)]
     made = []
-    for slot, after in zip(table.slots, following, strict=True):
-        groups = tuple(name for name in program.groups if name in slot.groups)
-        between_ns = least_between_ns(slot.groups, after.groups, program)
-        extra_ns = after.start_ns - slot.end_ns - between_ns
+    for timed, after in zip(table.timed_stages, following, strict=True):
+        groups = tuple(name for name in program.groups if name in timed.groups)
+        between_ns = least_between_ns(timed.groups, after.groups, program)
+        extra_ns = after.start_ns - timed.end_ns - between_ns
         made.append(
             SignalStage(
                 groups=groups,
-                green_s=(slot.end_ns - slot.start_ns) / 1e9,
+                green_s=(timed.end_ns - timed.start_ns) / 1e9,
                 extra_red_s=extra_ns / 1e9,
             )
         )
@@ -107,7 +114,7 @@ def records_of(stages: Sequence[SignalStage]) -> tuple[StageRecord, ...]:
     )
 
 
-def recalled(records: Sequence[StageRecord]) -> tuple[SignalStage, ...]:
+def stages_from_records(records: Sequence[StageRecord]) -> tuple[SignalStage, ...]:
     """Return stages that were stored."""
     return tuple(
         SignalStage(groups=r.groups, green_s=r.green_s, extra_red_s=r.extra_red_s) for r in records

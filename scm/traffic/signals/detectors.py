@@ -155,7 +155,7 @@ class _Car(NamedTuple):
     at_m: float
 
 
-class Watcher:
+class JunctionDetectors:
     """The detectors of one junction: show it cars, then read it.
 
     Attributes:
@@ -164,16 +164,16 @@ class Watcher:
 
     def __init__(self, junction: Junction, roads: Roads, reach_m: float = REACH_M) -> None:
         self.approaches = approaches_of(junction, roads, reach_m)
-        self.heard_ns: int | None = None
+        self.received_ns: int | None = None
         self._roads = roads
         self._cars: dict[int, _Car] = {}
         self._coming: dict[str, dict[int, float]] = {a.line.name: {} for a in self.approaches}
         self._counts = dict.fromkeys(self._coming, 0)
-        self._kept_ns: dict[str, int | None] = dict.fromkeys(self._coming)
+        self._extended_ns: dict[str, int | None] = dict.fromkeys(self._coming)
 
-    def show(self, seen: Seen, arrived_ns: int) -> None:
+    def add(self, seen: Seen, arrived_ns: int) -> None:
         """Take a car as heard or seen; what is older than what is known of it is ignored."""
-        self.heard_ns = arrived_ns
+        self.received_ns = arrived_ns
         known = self._cars.get(seen.who)
         if known is not None and seen.t_ns <= known.seen.t_ns:
             return
@@ -185,7 +185,7 @@ class Watcher:
 
     def sees(self, now_ns: int) -> bool:
         """Return whether anything was heard or seen lately."""
-        return self.heard_ns is not None and now_ns - self.heard_ns <= BLIND_NS
+        return self.received_ns is not None and now_ns - self.received_ns <= BLIND_NS
 
     def read(self, now_ns: int) -> dict[str, Detector]:
         """Return the detectors now, by the stop lines' names; ask once a step."""
@@ -219,8 +219,8 @@ class Watcher:
         queue, queue_m = _queue(near)
         extend = any(_keeps_green(left, seen) for left, _, seen in near)
         if extend:
-            self._kept_ns[name] = now_ns
-        kept_ns = self._kept_ns[name]
+            self._extended_ns[name] = now_ns
+        extended_ns = self._extended_ns[name]
         return Detector(
             call=bool(near),
             extend=extend,
@@ -230,7 +230,7 @@ class Watcher:
             queue=queue,
             queue_m=queue_m,
             ahead=_standing(approach.ahead, by_lane),
-            gap_s=None if kept_ns is None else (now_ns - kept_ns) / NS_PER_S,
+            gap_s=None if extended_ns is None else (now_ns - extended_ns) / NS_PER_S,
             arrivals_s=tuple(
                 left / seen.speed_mps for left, _, seen in near if seen.speed_mps > STANDS_MPS
             ),

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from scm.clock import NS_PER_S
-from scm.traffic.signals.guaranteed_time import Promise, still_ns
+from scm.traffic.signals.guaranteed_time import GuaranteedTime, still_ns
 from scm.traffic.signals.kernel import Phase, Program, State
 from scm.traffic.signals.policy import Turn
 
@@ -38,23 +38,23 @@ class Likely(NamedTuple):
 
 
 def within(
-    promise: Promise, forecast_ns: int | None, now_ns: int, *, red: bool, planned: bool
+    guaranteed: GuaranteedTime, forecast_ns: int | None, now_ns: int, *, red: bool, planned: bool
 ) -> Likely | None:
     """Return a forecast as far as the promise lets it be; what is promised exactly needs none.
 
     Args:
-        promise: Of the colour that is shown.
+        guaranteed: Of the colour that is shown.
         forecast_ns: Its likely end; None: nobody knows.
         now_ns: The present time.
         red: Whether it is red.
         planned: Whether a timetable says so.
     """
-    latest_ns = promise.max_end_ns
-    if promise.is_exact:
-        return Likely(promise.min_end_ns, CERTAIN)
+    latest_ns = guaranteed.max_end_ns
+    if guaranteed.is_exact:
+        return Likely(guaranteed.min_end_ns, CERTAIN)
     if forecast_ns is None:
         return None
-    earliest_ns = max(promise.min_end_ns, now_ns)
+    earliest_ns = max(guaranteed.min_end_ns, now_ns)
     end_ns = max(forecast_ns, earliest_ns)
     if latest_ns is not None:
         end_ns = min(end_ns, latest_ns)
@@ -77,10 +77,10 @@ class Coming(NamedTuple):
     end_ns: int | None
 
 
-def laid_out(
+def schedule(
     program: Program,
     state: State,
-    promises: Sequence[Promise | None],
+    guarantees: Sequence[GuaranteedTime | None],
     turns: Sequence[Turn],
     now_ns: int,
 ) -> list[Coming]:
@@ -89,23 +89,23 @@ def laid_out(
     Args:
         program: Of the junction.
         state: Of its kernel.
-        promises: What every group's colour was promised; None: not yet.
+        guarantees: What every group's colour was promised; None: not yet.
         turns: That the policy foresees, what is green now first.
         now_ns: The present time.
     """
     green = _green(program, state)
     at_ns, before = now_ns, frozenset[str]()
-    laid: list[Coming] = []
+    scheduled: list[Coming] = []
     for turn in turns:
         entering = turn.groups - before - green
         at_ns += _change_ns(program, before - turn.groups, entering)
-        if not laid:
-            at_ns += _cleared_ns(program, state, promises, entering, now_ns)
+        if not scheduled:
+            at_ns += _cleared_ns(program, state, guarantees, entering, now_ns)
         if turn.green_s is None:
-            return [*laid, Coming(turn.groups, at_ns, None)]
-        laid.append(Coming(turn.groups, at_ns, at_ns + round(turn.green_s * NS_PER_S)))
+            return [*scheduled, Coming(turn.groups, at_ns, None)]
+        scheduled.append(Coming(turn.groups, at_ns, at_ns + round(turn.green_s * NS_PER_S)))
         at_ns, before = at_ns + round(turn.green_s * NS_PER_S), turn.groups
-    return laid
+    return scheduled
 
 
 def forecasts(program: Program, state: State, coming: Sequence[Coming]) -> dict[str, int]:
@@ -114,7 +114,7 @@ def forecasts(program: Program, state: State, coming: Sequence[Coming]) -> dict[
     Args:
         program: Of the junction.
         state: Of its kernel.
-        coming: From `laid_out`.
+        coming: From `schedule`.
     """
     ends: dict[str, int] = {}
     green, before = _green(program, state), frozenset[str]()
@@ -150,14 +150,14 @@ def _change_ns(program: Program, leaving: frozenset[str], entering: frozenset[st
 def _cleared_ns(
     program: Program,
     state: State,
-    promises: Sequence[Promise | None],
+    guarantees: Sequence[GuaranteedTime | None],
     entering: frozenset[str],
     now_ns: int,
 ) -> int:
     """Return for how long those who went before still are in the way of some [ns]."""
     return max(
         (
-            still_ns(state, number, program.times[number], promises[number], now_ns)
+            still_ns(state, number, program.times[number], guarantees[number], now_ns)
             for number, name in enumerate(program.groups)
             if any(frozenset((name, e)) in program.conflicts for e in entering)
         ),

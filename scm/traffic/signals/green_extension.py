@@ -18,13 +18,13 @@ from scm.traffic.signals.guaranteed_time import AHEAD_NS
 from scm.traffic.signals.policy import JunctionView, Site
 
 START_S = 1.0
-PROMISED_S = AHEAD_NS / NS_PER_S
+GUARANTEED_S = AHEAD_NS / NS_PER_S
 
 
 def is_worth_waiting(site: Site, number: int, view: JunctionView) -> bool:
     """Return whether the green of a group should go on, by its number."""
     comes = coming(view.detectors[site.program.groups[number]], site.headway_s)
-    return bool(comes) and _is_worth(comes, *_rivalry(site, number, view))
+    return bool(comes) and _is_worth(comes, *_conflicting_demand(site, number, view))
 
 
 def worth_until_s(site: Site, number: int, view: JunctionView, from_s: float) -> float:
@@ -33,27 +33,29 @@ def worth_until_s(site: Site, number: int, view: JunctionView, from_s: float) ->
     It is decided again whenever one of the cars that are known by now needs no more of it.
     """
     comes = coming(view.detectors[site.program.groups[number]], site.headway_s)
-    red_s, change_s, waiting = _rivalry(site, number, view)
+    red_s, change_s, waiting = _conflicting_demand(site, number, view)
     until_s = from_s
     for place, at_s in enumerate(comes):
-        if at_s - until_s <= PROMISED_S:
+        if at_s - until_s <= GUARANTEED_S:
             continue
         left = [one - until_s for one in comes[place:]]
         there = [max(0.0, one - until_s) for one in waiting]
         if not _is_worth(left, red_s, change_s, there):
             break
-        until_s = at_s - PROMISED_S
+        until_s = at_s - GUARANTEED_S
     return until_s
 
 
-def _rivalry(
+def _conflicting_demand(
     site: Site, number: int, view: JunctionView
 ) -> tuple[float, float, list[float]]:  # fmt: skip
     """Return the red that follows a green, the change before it, and when the others' cars come."""
     change_s = _change_s(site, number)
-    rivals = rivals_of(site, number, view)
-    red_s = change_s + sum(_served_s(site, i, view) for i in rivals)
-    waiting = [at_s for i in rivals for at_s in _arrivals(view.detectors[site.program.groups[i]])]
+    conflicting = conflicting_groups(site, number, view)
+    red_s = change_s + sum(_served_s(site, i, view) for i in conflicting)
+    waiting = [
+        at_s for i in conflicting for at_s in _arrivals(view.detectors[site.program.groups[i]])
+    ]
     return red_s, change_s, waiting
 
 
@@ -75,10 +77,10 @@ def coming(detector: Detector, headway_s: float) -> list[float]:
     """Return when those cars will pass the line that need more green than is promised [s]."""
     standing = max(0, detector.near - len(detector.arrivals_s))
     leaves = [(k + 1) * headway_s for k in range(standing)]
-    return sorted(at_s for at_s in (*leaves, *detector.arrivals_s) if at_s > PROMISED_S)
+    return sorted(at_s for at_s in (*leaves, *detector.arrivals_s) if at_s > GUARANTEED_S)
 
 
-def rivals_of(site: Site, number: int, view: JunctionView) -> list[int]:
+def conflicting_groups(site: Site, number: int, view: JunctionView) -> list[int]:
     """Return the groups in conflict with one of which detectors tell."""
     names = site.program.groups
     return [

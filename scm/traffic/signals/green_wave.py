@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap, StopLine
-from scm.traffic.signals.plan import Slot, Timetable
+from scm.traffic.signals.plan import TimedStage, Timetable
 from scm.traffic.signals.program import STEP_NS
 from scm.traffic.signals.timing import CarFacts
 
@@ -33,7 +33,7 @@ class Link(NamedTuple):
 
     start: StopLine
     end: StopLine
-    takes_s: float
+    travel_s: float
 
 
 def links_of(city_map: CityMap, roads: Roads, car: CarFacts) -> list[Link]:
@@ -51,8 +51,8 @@ def _links_from(line: StopLine, roads: Roads, car: CarFacts) -> list[Link]:
         speed_mps = min(car.slow_mps, roads.definition(lane).speed_limit_mps)
         following = next((n for n in roads.stop_lines_on(lane) if n.at_m > from_m), None)
         if following is not None:
-            takes_s = gone_s + (following.at_m - from_m) / speed_mps
-            found.setdefault(following.name, Link(line, following, takes_s))
+            travel_s = gone_s + (following.at_m - from_m) / speed_mps
+            found.setdefault(following.name, Link(line, following, travel_s))
             continue
         gone_s += (roads.length_of(lane) - from_m) / speed_mps
         onward = [name for name in roads.successors(lane) if name not in passed]
@@ -71,7 +71,7 @@ def waves_of(
         tables: Of one plan, by junction.
     """
     length_ns = max(table.length_ns for table in tables.values())
-    common = {name: stretched(table, length_ns) for name, table in tables.items()}
+    common = {name: stretch(table, length_ns) for name, table in tables.items()}
     offsets: dict[str, int] = {}
     for first in tables:
         offsets.setdefault(first, 0)
@@ -82,24 +82,24 @@ def waves_of(
                 start, end = link.start.junction, link.end.junction
                 if start == here and end in common and end not in offsets:
                     leaves_ns = offsets[here] + common[here].first_start_ns(link.start.group)
-                    there_ns = leaves_ns + round(link.takes_s * 1e9)
+                    there_ns = leaves_ns + round(link.travel_s * 1e9)
                     offsets[end] = there_ns - common[end].first_start_ns(link.end.group)
                     todo.append(end)
     return {name: (common[name], Wave(length_ns, offsets[name] % length_ns)) for name in tables}
 
 
-def stretched(table: Timetable, length_ns: int) -> Timetable:
+def stretch(table: Timetable, length_ns: int) -> Timetable:
     """Return a timetable of another length, no shorter: every green gets an equal share more."""
     extra_ns = length_ns - table.length_ns
-    share_ns = extra_ns // len(table.slots) // STEP_NS * STEP_NS
-    shares = [share_ns] * len(table.slots)
+    share_ns = extra_ns // len(table.timed_stages) // STEP_NS * STEP_NS
+    shares = [share_ns] * len(table.timed_stages)
     shares[0] += extra_ns - sum(shares)
     return _longer(table, shares)
 
 
 def dwelling(table: Timetable, dwell_ns: int) -> Timetable:
     """Return a timetable whose first green is longer by `dwell_ns`, to come into step."""
-    return _longer(table, [dwell_ns] + [0] * (len(table.slots) - 1)) if dwell_ns else table
+    return _longer(table, [dwell_ns] + [0] * (len(table.timed_stages) - 1)) if dwell_ns else table
 
 
 def dwell_ns(wave: Wave | None, began_ns: int) -> int:
@@ -114,9 +114,9 @@ def dwell_ns(wave: Wave | None, began_ns: int) -> int:
 
 
 def _longer(table: Timetable, shares: Sequence[int]) -> Timetable:
-    slots, moved_ns = [], 0
-    for slot, share_ns in zip(table.slots, shares, strict=True):
-        start_ns = slot.start_ns + moved_ns
+    timed_stages, moved_ns = [], 0
+    for timed, share_ns in zip(table.timed_stages, shares, strict=True):
+        start_ns = timed.start_ns + moved_ns
         moved_ns += share_ns
-        slots.append(Slot(slot.groups, start_ns, slot.end_ns + moved_ns))
-    return Timetable(table.plan, tuple(slots), table.length_ns + moved_ns)
+        timed_stages.append(TimedStage(timed.groups, start_ns, timed.end_ns + moved_ns))
+    return Timetable(table.plan, tuple(timed_stages), table.length_ns + moved_ns)

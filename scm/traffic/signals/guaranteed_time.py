@@ -25,7 +25,7 @@ AHEAD_NS = 10 * STEP_NS
 
 
 @dataclass(frozen=True, slots=True)
-class Promise:
+class GuaranteedTime:
     """A colour ends not before `min_end_ns` and not after `max_end_ns` (None: not known)."""
 
     min_end_ns: int
@@ -36,10 +36,10 @@ class Promise:
         """Whether the end is known but for late steps."""
         return self.max_end_ns is not None and self.max_end_ns - self.min_end_ns <= SLACK_NS
 
-    def narrowed(self, by: "Promise") -> "Promise":
+    def narrowed(self, by: "GuaranteedTime") -> "GuaranteedTime":
         """Return what is left when both hold."""
         known = [end for end in (self.max_end_ns, by.max_end_ns) if end is not None]
-        return Promise(max(self.min_end_ns, by.min_end_ns), min(known, default=None))
+        return GuaranteedTime(max(self.min_end_ns, by.min_end_ns), min(known, default=None))
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +56,14 @@ class Cycle:
     ends_ns: int
 
 
-def end_after(end_ns: int) -> Promise:
+def end_after(end_ns: int) -> GuaranteedTime:
     """Return the promise of an end that is due at a known time."""
-    return Promise(end_ns, end_ns + SLACK_NS)
+    return GuaranteedTime(end_ns, end_ns + SLACK_NS)
 
 
 def green_end(
     group: str, cycle: Cycle, now_ns: int, least_ns: int, onward: Iterable[Timetable | None]
-) -> Promise:
+) -> GuaranteedTime:
     """Return when a green that is on will end.
 
     Args:
@@ -76,22 +76,24 @@ def green_end(
     if cycle.timetable is None:
         return end_after(least_ns)
     green = cycle.timetable.green_of(group, now_ns - cycle.began_ns)
-    last_ns = cycle.began_ns + cycle.timetable.slots[-1].end_ns
+    last_ns = cycle.began_ns + cycle.timetable.timed_stages[-1].end_ns
     if green is not None and cycle.began_ns + green.end_ns < last_ns:
         return end_after(max(cycle.began_ns + green.end_ns, least_ns))
     ends_ns, is_open = [], False
     for table in onward:
-        if table is None or group not in table.slots[0].groups:
+        if table is None or group not in table.timed_stages[0].groups:
             ends_ns.append(last_ns)
             continue
         first = table.greens_of(group)[0]
         ends_ns.append(cycle.ends_ns + first.end_ns)
-        is_open |= first.end_ns == table.slots[-1].end_ns  # perhaps beyond that cycle as well
+        is_open |= (
+            first.end_ns == table.timed_stages[-1].end_ns
+        )  # perhaps beyond that cycle as well
     latest_ns = None if is_open else max(*ends_ns, least_ns) + SLACK_NS
-    return Promise(max(min(ends_ns), least_ns), latest_ns)
+    return GuaranteedTime(max(min(ends_ns), least_ns), latest_ns)
 
 
-def red_end(group: str, cycle: Cycle, now_ns: int, plans: Iterable[Timetable]) -> Promise:
+def red_end(group: str, cycle: Cycle, now_ns: int, plans: Iterable[Timetable]) -> GuaranteedTime:
     """Return when a red will end.
 
     Args:
@@ -105,24 +107,26 @@ def red_end(group: str, cycle: Cycle, now_ns: int, plans: Iterable[Timetable]) -
         return end_after(cycle.began_ns + green.start_ns)
     starts = [plan.first_start_ns(group) for plan in plans]
     if not starts:
-        return Promise(cycle.ends_ns, None)
-    return Promise(cycle.ends_ns + min(starts), cycle.ends_ns + max(starts) + SLACK_NS)
+        return GuaranteedTime(cycle.ends_ns, None)
+    return GuaranteedTime(cycle.ends_ns + min(starts), cycle.ends_ns + max(starts) + SLACK_NS)
 
 
-def wished_green(before: Promise | None, now_ns: int, least_ns: int, *, wished: bool) -> Promise:
+def requested_green(
+    before: GuaranteedTime | None, now_ns: int, least_ns: int, *, requested: bool
+) -> GuaranteedTime:
     """Return the promise of a green whose end no timetable knows; None: it begins now."""
     if before is None:
-        return Promise(now_ns + max(least_ns, AHEAD_NS), None)
+        return GuaranteedTime(now_ns + max(least_ns, AHEAD_NS), None)
     if before.max_end_ns is not None:
         return before
-    if wished:
-        return Promise(max(before.min_end_ns, now_ns + AHEAD_NS), None)
+    if requested:
+        return GuaranteedTime(max(before.min_end_ns, now_ns + AHEAD_NS), None)
     return end_after(max(before.min_end_ns, now_ns))
 
 
 def earliest_green(
-    program: Program, state: State, number: int, ends: Sequence[Promise | None], now_ns: int
-) -> Promise:
+    program: Program, state: State, number: int, ends: Sequence[GuaranteedTime | None], now_ns: int
+) -> GuaranteedTime:
     """Return the promise of a red that nothing but the kernel keeps red for certain.
 
     Args:
@@ -136,19 +140,19 @@ def earliest_green(
     for other, name in enumerate(program.groups):
         if frozenset((program.groups[number], name)) in program.conflicts:
             left.append(still_ns(state, other, program.times[other], ends[other], now_ns))
-    return Promise(now_ns + max(left), None)
+    return GuaranteedTime(now_ns + max(left), None)
 
 
 def still_ns(
-    state: State, number: int, times: GroupTimes, promised: Promise | None, now_ns: int
+    state: State, number: int, times: GroupTimes, guaranteed: GuaranteedTime | None, now_ns: int
 ) -> int:
     """Return for how long a group still is in others' way, or in its own, at the least [ns]."""
     phase, elapsed_ns = state[number]
     match phase:
         case Phase.GREEN:
             least_ns = times.min_green - elapsed_ns
-            told_ns = 0 if promised is None else promised.min_end_ns - now_ns
-            return max(least_ns, told_ns, 0) + times.yellow + times.clearance
+            guaranteed_ns = 0 if guaranteed is None else guaranteed.min_end_ns - now_ns
+            return max(least_ns, guaranteed_ns, 0) + times.yellow + times.clearance
         case Phase.YELLOW:
             return times.yellow - elapsed_ns + times.clearance
         case Phase.CLEARANCE:

@@ -8,15 +8,21 @@ from msgspec.structs import replace
 from scm.clock import NS_PER_MS
 from scm.records.city_map import Junction
 from scm.store.records import PlanRecord
-from scm.traffic.signals.controller import Controller, Heard
-from scm.traffic.signals.custom_plans import check_name, recalled, records_of, table_of, wave_of
-from scm.traffic.signals.detectors import Detector, Watcher
-from scm.traffic.signals.operator_overrides import NEED_RINGS, Asked
+from scm.traffic.signals.controller import Controller, Observations
+from scm.traffic.signals.custom_plans import (
+    check_plan_name,
+    records_of,
+    stages_from_records,
+    table_of,
+    wave_of,
+)
+from scm.traffic.signals.detectors import Detector, JunctionDetectors
+from scm.traffic.signals.operator_overrides import NEED_RINGS, Override
 from scm.traffic.signals.plan import FLASH
 from scm.traffic.signals.policy import FIXED, policy_names
-from scm.traffic.signals.priority_requests import PriorityDesk
+from scm.traffic.signals.priority_requests import PriorityRequests
 from scm.traffic.signals.program import STEP_NS
-from scm.traffic.signals.status_reports import JunctionFacts, wishes_of
+from scm.traffic.signals.status_reports import StatusReports, override_records
 from scm.v2x.etsi.convert import roadside_station, spatem_of
 from scm.v2x.etsi.mapem import MapemBody
 from scm.v2x.etsi.topology import mapem_at
@@ -49,32 +55,32 @@ class JunctionSignals:
         self,
         junction: Junction,
         controller: Controller,
-        watcher: Watcher,
-        desk: PriorityDesk,
+        detectors: JunctionDetectors,
+        priority_requests: PriorityRequests,
         mapem: MapemBody,
-        facts: JunctionFacts,
+        facts: StatusReports,
     ) -> None:
         self.junction = junction
-        self._facts = facts
+        self._reports = facts
         self._names = {*(plan.plan for plan in facts.site.plans), *policy_names()}
         self._mapem = mapem
         self._mapem_ns: int | None = None
         self.record = PlanRecord(plan="")
-        self.desk = desk
+        self.priority_requests = priority_requests
         self.controller = controller
-        self.watcher = watcher
-        self._told = (controller.mode, controller.running, "")
-        self._asked = "as the map says"
-        self._taken = ""
+        self.detectors = detectors
+        self._reported = (controller.mode, controller.running, "")
+        self._plan_reason = "as the map says"
+        self._accepted = ""
         self._why_flash = ""
         self._why_restart = ""
         self._monitor_ns: int | None = None
         self._sent_ns: int | None = None
-        self._wishes = controller.asked
-        self._news: list[Outgoing] = []
-        self._detectors: Mapping[str, Detector] = {}
+        self._known_overrides = controller.overrides
+        self._events: list[Outgoing] = []
+        self._by_group: Mapping[str, Detector] = {}
 
-    def hear_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
+    def receive_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
         """Flash while the monitor reports a fault."""
         self._monitor_ns = arrived_ns
         self._flash(
@@ -83,18 +89,18 @@ class JunctionSignals:
             on=status.fault is not None,
         )
 
-    def go_on(self, record: PlanRecord) -> None:
+    def restore(self, record: PlanRecord) -> None:
         """Take what was asked for in an earlier run, as if it were asked now.
 
         Raises:
             PlanError: when there is no such plan any more.
         """
-        asked = PlanRequest(junction=self.junction.name, plan=record.plan, by=record.by)
+        request = PlanRequest(junction=self.junction.name, plan=record.plan, by=record.by)
         if record.plan:
-            stages = recalled(record.stages)
-            self.serve_plan(replace(asked, stages=stages, offset_s=record.offset_s))
+            stages = stages_from_records(record.stages)
+            self.serve_plan(replace(request, stages=stages, offset_s=record.offset_s))
         if record.flash:
-            self.serve_plan(replace(asked, plan=FLASH))
+            self.serve_plan(replace(request, plan=FLASH))
 
     def serve_plan(self, request: PlanRequest) -> PlanReply:
         """Take a wish for a plan, or for flash; `record` is what should outlive the process.
@@ -111,41 +117,43 @@ class JunctionSignals:
         if not request.plan:
             return self._end_flash(who)
         if request.stages:
-            check_name(request.plan, self._names)
-            table = table_of(request.plan, request.stages, self._facts.program)
-            controller.ask_for_guest(table, wave_of(table, request.offset_s))
-            self._taken = f"takes plan {request.plan} ({who})"
+            check_plan_name(request.plan, self._names)
+            table = table_of(request.plan, request.stages, self._reports.program)
+            controller.request_custom_plan(table, wave_of(table, request.offset_s))
+            self._accepted = f"takes plan {request.plan} ({who})"
         else:
-            controller.ask(request.plan)
+            controller.request_plan(request.plan)
         stages = records_of(request.stages)
         self.record = PlanRecord(
             plan=request.plan, by=request.by, stages=stages, offset_s=request.offset_s
         )
-        self._asked = self._why_restart = who
+        self._plan_reason = self._why_restart = who
         self._flash("person", who, on=False)
         return self._runs()
 
-    def serve_wish(self, request: SignalRequest, now_ns: int) -> SignalReply:
+    def serve_override(self, request: SignalRequest, now_ns: int) -> SignalReply:
         """Take a wish for groups, or for a policy.
 
         Raises:
             PlanError: saying why it cannot be taken.
         """
         controller = self.controller
-        controller.take(request, now_ns)
-        self._wishes = controller.asked
+        controller.apply_override(request, now_ns)
+        self._known_overrides = controller.overrides
         why = f": {request.reason}" if request.reason else ""
         text = f"{request.by} asked{why}"
         if request.verb in ("policy", "clear"):
-            self._asked = text
+            self._plan_reason = text
         if controller.is_flashing and not self._why_flash:
             self._why_flash = text
-        self._tell("info", "signal_wish", f"{_what(request)} ({text}){_how_long(request)}", now_ns)
+        self._log_event(
+            "info", "signal_wish", f"{_what(request)} ({text}){_how_long(request)}", now_ns
+        )
         return SignalReply(
             junction=request.junction,
             policy=controller.policy,
             pending=controller.pending,
-            wishes=wishes_of(controller.asked),
+            wishes=override_records(controller.overrides),
         )
 
     def step(self, now_ns: int) -> list[Outgoing]:
@@ -154,23 +162,23 @@ class JunctionSignals:
         if self._monitor_ns is not None:
             silent = now_ns - self._monitor_ns > MONITOR_SILENT_NS
             self._flash("silence", "the monitor fell silent", on=silent)
-        controller.step(now_ns, self._heard(now_ns))
+        controller.step(now_ns, self._observations(now_ns))
         spat = controller.spat(now_ns)
-        self._lapses(now_ns)
-        self._changes(now_ns)
-        news, self._news = self._news, []
-        told = self._facts.tell(controller, self._detectors, now_ns)
-        answers = self.desk.tell(controller.priority, now_ns)
-        return [spat, *self._on_air(spat), *answers, *told, *news]
+        self._report_expired(now_ns)
+        self._report_changes(now_ns)
+        events, self._events = self._events, []
+        messages = self._reports.due(controller, self._by_group, now_ns)
+        answers = self.priority_requests.due_ssem(controller.priority, now_ns)
+        return [spat, *self._on_air(spat), *answers, *messages, *events]
 
-    def _heard(self, now_ns: int) -> Heard:
-        calls = self.desk.calls(now_ns)
+    def _observations(self, now_ns: int) -> Observations:
+        calls = self.priority_requests.calls(now_ns)
         if not self.controller.needs_detectors:
-            self._detectors = {}
-            return Heard({}, priority=calls)
-        watcher = self.watcher
-        self._detectors = watcher.by_group(watcher.read(now_ns))
-        return Heard(self._detectors, watcher.sees(now_ns), calls)
+            self._by_group = {}
+            return Observations({}, priority=calls)
+        detectors = self.detectors
+        self._by_group = detectors.by_group(detectors.read(now_ns))
+        return Observations(self._by_group, detectors.sees(now_ns), calls)
 
     def _end_flash(self, who: str) -> PlanReply:
         """Go on with what is wanted, which a flash has not changed."""
@@ -206,65 +214,65 @@ class JunctionSignals:
             sent.append(MapemTx(station=station, t_ns=now_ns, body=lanes))
         return sent
 
-    def _lapses(self, now_ns: int) -> None:
+    def _report_expired(self, now_ns: int) -> None:
         """Tell wishes that ended by themselves."""
-        held = self.controller.asked
-        if held == self._wishes:
+        active = self.controller.overrides
+        if active == self._known_overrides:
             return
-        for one in self._wishes:
-            if one.until_ns <= now_ns and one not in held:
+        for one in self._known_overrides:
+            if one.until_ns <= now_ns and one not in active:
                 text = f"{_what(one)} of {one.by} lapsed"
-                self._tell("info", "signal_wish_lapsed", text, now_ns)
-        self._wishes = held
+                self._log_event("info", "signal_wish_lapsed", text, now_ns)
+        self._known_overrides = active
 
-    def _changes(self, now_ns: int) -> None:
+    def _report_changes(self, now_ns: int) -> None:
         """Tell what changed since this was last asked."""
         controller = self.controller
-        (mode, running, failure), now = self._told, (
+        (mode, running, failure), now = self._reported, (
             controller.mode,
             controller.running,
             controller.failure,
         )  # fmt: skip
-        self._told = now
-        if self._taken:
-            self._tell("info", "plan_taken", self._taken, now_ns)
-            self._taken = ""
+        self._reported = now
+        if self._accepted:
+            self._log_event("info", "plan_taken", self._accepted, now_ns)
+            self._accepted = ""
         if running != now[1]:
             what = "plan" if controller.policy == FIXED else "policy"
             text = f"runs {what} {now[1]}, before {running} ({self._why_runs()})"
-            self._tell("info", "plan_changed", text, now_ns)
+            self._log_event("info", "plan_changed", text, now_ns)
         if now[2] and failure != now[2]:
             text = f"falls back to fixed time: {now[2]}"
-            self._tell("warning", "policy_failed", text, now_ns)
+            self._log_event("warning", "policy_failed", text, now_ns)
         if mode != FLASH and now[0] == FLASH:
-            self._tell("warning", "signals_flash", f"flashes red: {self._why_flash}", now_ns)
+            self._log_event("warning", "signals_flash", f"flashes red: {self._why_flash}", now_ns)
         if mode == FLASH and now[0] != FLASH:
             why = f" ({self._why_restart})" if self._why_restart else ""
             self._why_flash = self._why_restart = ""
-            self._tell("info", "signals_restart", f"restarts all red{why}", now_ns)
+            self._log_event("info", "signals_restart", f"restarts all red{why}", now_ns)
         if mode != "preempt" and now[0] == "preempt":
-            self._tell("info", "signals_preempted", "is pre-empted", now_ns)
+            self._log_event("info", "signals_preempted", "is pre-empted", now_ns)
 
     def _why_runs(self) -> str:
         """Say who wants what runs now: whoever asked for it, or a wish that a plan cannot grant."""
         if self.controller.policy == FIXED:
-            return self._asked
-        wishes = [one for one in self.controller.asked if one.verb in NEED_RINGS]
-        return ", ".join(f"{one.verb} of {one.by}" for one in wishes) or self._asked
+            return self._plan_reason
+        overrides = [one for one in self.controller.overrides if one.verb in NEED_RINGS]
+        return ", ".join(f"{one.verb} of {one.by}" for one in overrides) or self._plan_reason
 
-    def _tell(self, severity: Severity, name: str, what: str, now_ns: int) -> None:
+    def _log_event(self, severity: Severity, name: str, what: str, now_ns: int) -> None:
         text = f"junction {self.junction.name} {what}"
-        self._news.append(
+        self._events.append(
             CityEvent(severity=severity, source="traffic", t_ns=now_ns, name=name, text=text)
         )
 
 
-def _what(wish: SignalRequest | Asked) -> str:
+def _what(override: SignalRequest | Override) -> str:
     """Return what is wished, in the log's words."""
-    if isinstance(wish, SignalRequest) and wish.verb == "clear":
-        of = " ".join(filter(None, (wish.clears, *wish.groups)))
+    if isinstance(override, SignalRequest) and override.verb == "clear":
+        of = " ".join(filter(None, (override.clears, *override.groups)))
         return f"takes back {of or 'all wishes'}"
-    return " ".join(filter(None, (wish.verb, wish.policy, *wish.groups)))
+    return " ".join(filter(None, (override.verb, override.policy, *override.groups)))
 
 
 def _how_long(request: SignalRequest) -> str:

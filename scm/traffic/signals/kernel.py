@@ -63,27 +63,31 @@ def start(program: Program) -> State:
 
 
 def step(
-    program: Program, state: State, wishes: Collection[str], dt: int, *, flash: bool = False
+    program: Program, state: State, requested: Collection[str], dt: int, *, flash: bool = False
 ) -> State:
-    """Return the state `dt` later, with `wishes` the names of groups that would like green."""
+    """Return the state `dt` later, with `requested` the names of groups that would like green."""
     if flash:
         return tuple(GroupState(Phase.FLASH) for _ in program.groups)
     after = [
-        _advance(group, times, wished=name in wishes, dt=max(dt, 0))
+        _advance(group, times, is_requested=name in requested, dt=max(dt, 0))
         for name, times, group in zip(program.groups, program.times, state, strict=True)
     ]
     for index, name in enumerate(program.groups):
-        if after[index].phase is Phase.RED and name in wishes and _is_free(program, after, name):
+        if after[index].phase is Phase.RED and name in requested and _is_free(program, after, name):
             after[index] = GroupState(Phase.GREEN)
     return tuple(after)
 
 
-def _advance(group: GroupState, times: GroupTimes, *, wished: bool, dt: int) -> GroupState:
+def _advance(group: GroupState, times: GroupTimes, *, is_requested: bool, dt: int) -> GroupState:
     """Return a group's state `dt` later as far as it depends on nobody else."""
     elapsed = group.elapsed + dt
     match group.phase:
         case Phase.GREEN if elapsed >= times.min_green:
-            return GroupState(Phase.GREEN, times.min_green) if wished else GroupState(Phase.YELLOW)
+            return (
+                GroupState(Phase.GREEN, times.min_green)
+                if is_requested
+                else GroupState(Phase.YELLOW)
+            )
         case Phase.YELLOW if elapsed >= times.yellow:
             return GroupState(Phase.CLEARANCE)
         case Phase.CLEARANCE if elapsed >= times.clearance:

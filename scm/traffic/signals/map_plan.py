@@ -23,7 +23,7 @@ from scm.traffic.signals.timing import NIGEL, CarFacts
 OWN = "own"
 
 
-def own_table(stages: Sequence[PlanStage], program: Program) -> Timetable:
+def map_timetable(stages: Sequence[PlanStage], program: Program) -> Timetable:
     """Return the timetable of a junction's own stages.
 
     Raises:
@@ -55,5 +55,5 @@ def _adopted(junction: Junction, roads: Roads, car: CarFacts) -> Junction:
     if not junction.stages:
         return junction
     program = program_of(junction, roads, car)
-    check_junction(junction.name, program, [own_table(junction.stages, program)])
+    check_junction(junction.name, program, [map_timetable(junction.stages, program)])
     return msgspec.structs.replace(junction, plan=OWN)

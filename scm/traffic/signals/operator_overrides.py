@@ -17,7 +17,7 @@ from scm.v2x.messages.signal_request import SignalRequest
 NEED_RINGS = ("hold", "force_off", "omit", "preempt")
 
 
-class Asked(NamedTuple):
+class Override(NamedTuple):
     """One wish in force, until `until_ns` at the latest."""
 
     verb: Verb
@@ -28,13 +28,13 @@ class Asked(NamedTuple):
     policy: str = ""
 
 
-def take(
-    held: Sequence[Asked],
+def apply(
+    active: Sequence[Override],
     request: SignalRequest,
     program: Program,
     policies: Collection[str],
     now_ns: int,
-) -> tuple[Asked, ...]:
+) -> tuple[Override, ...]:
     """Return the wishes in force once a request is taken; a newer one replaces its like.
 
     Raises:
@@ -42,8 +42,8 @@ def take(
     """
     _check(request, program, policies)
     if request.verb == "clear":
-        return tuple(one for one in held if not _is_cleared(one, request))
-    new = Asked(
+        return tuple(one for one in active if not _is_cleared(one, request))
+    new = Override(
         request.verb,
         tuple(dict.fromkeys(request.groups)),
         request.by,
@@ -54,20 +54,20 @@ def take(
     is_single = new.verb in ("policy", "preempt")
     like = [
         one
-        for one in held
+        for one in active
         if one.verb == new.verb and (is_single or set(one.groups) == set(new.groups))
     ]
-    all_held = (*(one for one in held if one not in like), new)
-    _check_together(all_held, program)
-    return all_held
+    all_active = (*(one for one in active if one not in like), new)
+    _check_together(all_active, program)
+    return all_active
 
 
-def lapse(
-    held: Sequence[Asked], now_ns: int, began: Collection[str], ended: Collection[str]
-) -> tuple[Asked, ...]:
+def expire(
+    active: Sequence[Override], now_ns: int, began: Collection[str], ended: Collection[str]
+) -> tuple[Override, ...]:
     """Return the wishes that are left, given whose green began and whose ended just now."""
     left = []
-    for one in held:
+    for one in active:
         done = began if one.verb == "call" else ended if one.verb == "force_off" else ()
         groups = tuple(group for group in one.groups if group not in done)
         if now_ns < one.until_ns and (groups or not one.groups):
@@ -75,14 +75,14 @@ def lapse(
     return tuple(left)
 
 
-def _is_cleared(one: Asked, request: SignalRequest) -> bool:
+def _is_cleared(one: Override, request: SignalRequest) -> bool:
     wanted = set(request.groups)
     return request.clears in ("", one.verb) and (not wanted or bool(wanted & set(one.groups)))
 
 
-def groups_of(held: Sequence[Asked], verb: Verb) -> frozenset[str]:
+def groups_of(active: Sequence[Override], verb: Verb) -> frozenset[str]:
     """Return all groups that a verb is wished for."""
-    return frozenset(group for one in held if one.verb == verb for group in one.groups)
+    return frozenset(group for one in active if one.verb == verb for group in one.groups)
 
 
 def _check(request: SignalRequest, program: Program, policies: Collection[str]) -> None:
@@ -108,15 +108,15 @@ def _check(request: SignalRequest, program: Program, policies: Collection[str]) 
         raise PlanError(f"{where}: groups: got none, expected some of {list(program.groups)}")
 
 
-def _check_together(held: Sequence[Asked], program: Program) -> None:
-    omitted = groups_of(held, "omit")
+def _check_together(active: Sequence[Override], program: Program) -> None:
+    omitted = groups_of(active, "omit")
     if omitted >= set(program.groups):
         raise PlanError("omit: all groups would be left out, expected one to be served at least")
-    for one, other in combinations(sorted(groups_of(held, "hold")), 2):
+    for one, other in combinations(sorted(groups_of(active, "hold")), 2):
         if frozenset((one, other)) in program.conflicts:
             msg = f"hold: {one!r} and {other!r} conflict: they can never be held together"
             raise PlanError(msg)
-    both = omitted & (groups_of(held, "hold") | groups_of(held, "preempt"))
+    both = omitted & (groups_of(active, "hold") | groups_of(active, "preempt"))
     if both:
         msg = f"{', '.join(sorted(both))}: wished green and left out at once; clear one of the two"
         raise PlanError(msg)

@@ -19,18 +19,18 @@ from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.store.records import PlanRecord
 from scm.traffic.signals.controller import Controller
-from scm.traffic.signals.detectors import Seen, Watcher, reach_of
+from scm.traffic.signals.detectors import JunctionDetectors, Seen, reach_of
 from scm.traffic.signals.green_wave import links_of, waves_of
 from scm.traffic.signals.junction import JunctionSignals
 from scm.traffic.signals.kernel import Program
-from scm.traffic.signals.map_plan import OWN, own_table
+from scm.traffic.signals.map_plan import OWN, map_timetable
 from scm.traffic.signals.plan import load_timetable, plan_names
 from scm.traffic.signals.policy import FIXED
-from scm.traffic.signals.priority_requests import PriorityDesk
+from scm.traffic.signals.priority_requests import PriorityRequests
 from scm.traffic.signals.program import STEP_NS, program_of
 from scm.traffic.signals.proof.load_checks import check_junction
 from scm.traffic.signals.sightings import Sightings
-from scm.traffic.signals.status_reports import JunctionFacts
+from scm.traffic.signals.status_reports import StatusReports
 from scm.traffic.signals.timetables import Tables
 from scm.traffic.signals.timing import NIGEL, CarFacts
 from scm.v2x.etsi.convert import roadside_station
@@ -58,7 +58,7 @@ class TrafficPart(BasePart):
         policy: str = FIXED,
         car: CarFacts = NIGEL,
         learned: Callable[[Any], Any] | None = None,
-        kept: Mapping[str, PlanRecord] | None = None,
+        restored: Mapping[str, PlanRecord] | None = None,
     ) -> None:
         """Take the map.
 
@@ -68,7 +68,7 @@ class TrafficPart(BasePart):
             policy: Of all junctions while nobody wishes another one.
             car: As bad as the worst of the fleet; all least times follow from it.
             learned: For the policy `learned`.
-            kept: What junctions were asked for in an earlier run, by name.
+            restored: What operators requested in an earlier run, by junction.
 
         Raises:
             PlanError: when a plan or policy is unknown, or not safe for a junction.
@@ -79,7 +79,7 @@ class TrafficPart(BasePart):
         self.services = (Service(PlanRequest), Service(SignalRequest))
         roads = Roads(city_map)
         programs = {j.name: program_of(j, roads, car) for j in city_map.junctions}
-        tables = tables_of(city_map, roads, programs, car)
+        tables = timetables_of(city_map, roads, programs, car)
         for name, program in programs.items():
             check_junction(name, program, (table for table, _ in tables[name].values()))
         self._sightings = Sightings()
@@ -96,16 +96,16 @@ class TrafficPart(BasePart):
                     learned=learned,
                     car=car,
                 ),
-                Watcher(junction, roads, reach_of(programs[junction.name], roads)),
-                PriorityDesk(junction, roads),
+                JunctionDetectors(junction, roads, reach_of(programs[junction.name], roads)),
+                PriorityRequests(junction, roads),
                 mapem_of(roads, junction),
-                JunctionFacts(junction.name, programs[junction.name], tables[junction.name]),
+                StatusReports(junction.name, programs[junction.name], tables[junction.name]),
             )
             for junction in city_map.junctions
         }
-        for name, record in (kept or {}).items():
+        for name, record in (restored or {}).items():
             if name in self._junctions:
-                self._junctions[name].go_on(record)
+                self._junctions[name].restore(record)
         self._by_station = {roadside_station(name): s for name, s in self._junctions.items()}
 
     @property
@@ -125,13 +125,13 @@ class TrafficPart(BasePart):
         for item in inbox:
             message = item.message
             if isinstance(message, MonitorStatus):
-                self._hear_monitor(message, item.t_ns)
+                self._receive_monitor(message, item.t_ns)
             elif isinstance(message, SremRx):
-                self._hear_srem(message, now_ns)
+                self._receive_srem(message, now_ns)
             elif isinstance(message, CamRx):
-                self._show([message.receiver], self._sightings.of_cam(message), item.t_ns)
+                self._add_sighting([message.receiver], self._sightings.of_cam(message), item.t_ns)
             elif isinstance(message, EyeTrack):
-                self._show(self._by_station, self._sightings.of_track(message), item.t_ns)
+                self._add_sighting(self._by_station, self._sightings.of_track(message), item.t_ns)
             elif isinstance(message, PlanRequest | SignalRequest):
                 outbox += self._serve(item, message, now_ns)
         for signals in self._junctions.values():
@@ -143,21 +143,21 @@ class TrafficPart(BasePart):
         event(_log, "traffic_finished", t_ns=now_ns, junctions=len(self._junctions))
         return []
 
-    def _hear_srem(self, heard: SremRx, now_ns: int) -> None:
-        signals = self._by_station.get(heard.receiver)
+    def _receive_srem(self, message: SremRx, now_ns: int) -> None:
+        signals = self._by_station.get(message.receiver)
         if signals is not None:
-            signals.desk.hear(heard, now_ns)
+            signals.priority_requests.receive(message, now_ns)
 
-    def _show(self, stations: Iterable[str], seen: Seen | None, arrived_ns: int) -> None:
+    def _add_sighting(self, stations: Iterable[str], seen: Seen | None, arrived_ns: int) -> None:
         for station in stations if seen is not None else ():
             signals = self._by_station.get(station)
             if signals is not None and seen is not None and signals.controller.needs_detectors:
-                signals.watcher.show(seen, arrived_ns)
+                signals.detectors.add(seen, arrived_ns)
 
-    def _hear_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
+    def _receive_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
         signals = self._junctions.get(status.junction)
         if signals:
-            signals.hear_monitor(status, arrived_ns)
+            signals.receive_monitor(status, arrived_ns)
 
     def _serve(
         self, item: Incoming, request: PlanRequest | SignalRequest, now_ns: int
@@ -173,16 +173,16 @@ class TrafficPart(BasePart):
             return [Answer(item, Refused(code="invalid", detail=detail))]
         try:
             if isinstance(request, SignalRequest):
-                return [Answer(item, signals.serve_wish(request, now_ns))]
+                return [Answer(item, signals.serve_override(request, now_ns))]
             reply = signals.serve_plan(request)
             return [Keep("plans", request.junction, signals.record), Answer(item, reply)]
         except PlanError as refusal:
-            is_wish = isinstance(request, SignalRequest) or request.stages
-            code = "invalid" if is_wish else "not_found"
+            is_override = isinstance(request, SignalRequest) or request.stages
+            code = "invalid" if is_override else "not_found"
             return [Answer(item, Refused(code=code, detail=str(refusal)))]
 
 
-def tables_of(
+def timetables_of(
     city_map: CityMap, roads: Roads, programs: dict[str, Program], car: CarFacts
 ) -> dict[str, Tables]:
     """Return the timetables of all plans by junction; of several junctions they make green waves.
@@ -201,6 +201,6 @@ def tables_of(
             tables[name] = {**tables[name], plan: pair}
     for junction in city_map.junctions:
         if junction.stages:
-            table = own_table(junction.stages, programs[junction.name])
+            table = map_timetable(junction.stages, programs[junction.name])
             tables[junction.name] = {**tables[junction.name], OWN: (table, None)}
     return tables

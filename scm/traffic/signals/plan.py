@@ -42,7 +42,7 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True)
-class Slot:
+class TimedStage:
     """A stage with its place in the cycle: green is wished from `start_ns` to `end_ns`."""
 
     groups: frozenset[str]
@@ -62,10 +62,10 @@ class Timetable:
     """One cycle of a plan at one junction; positions count from its start [ns]."""
 
     plan: str
-    slots: tuple[Slot, ...]
+    timed_stages: tuple[TimedStage, ...]
     length_ns: int
 
-    def wishes(self, position_ns: int, going_on: frozenset[str] = frozenset()) -> frozenset[str]:
+    def requested(self, position_ns: int, going_on: frozenset[str] = frozenset()) -> frozenset[str]:
         """Return the groups wished green at a position of the cycle.
 
         Args:
@@ -73,28 +73,28 @@ class Timetable:
             going_on: Who stays green from the last stage into the next cycle.
         """
         before = frozenset[str]()
-        for slot in self.slots:
-            if position_ns < slot.start_ns:
-                return before & slot.groups
-            if position_ns < slot.end_ns:
-                return slot.groups
-            before = slot.groups
+        for timed in self.timed_stages:
+            if position_ns < timed.start_ns:
+                return before & timed.groups
+            if position_ns < timed.end_ns:
+                return timed.groups
+            before = timed.groups
         return going_on if position_ns < self.length_ns else frozenset()
 
     def into(self, following: "Timetable") -> frozenset[str]:
         """Return who stays green when a cycle of `following` comes next."""
-        return self.slots[-1].groups & following.slots[0].groups
+        return self.timed_stages[-1].groups & following.timed_stages[0].groups
 
     def greens_of(self, group: str) -> list[Green]:
         """Return the group's greens in their order; stages that follow each other make one."""
         greens: list[Green] = []
         before = frozenset[str]()
-        for slot in self.slots:
-            if group in before & slot.groups:
-                greens[-1] = Green(greens[-1].start_ns, slot.end_ns)
-            elif group in slot.groups:
-                greens.append(Green(slot.start_ns, slot.end_ns))
-            before = slot.groups
+        for timed in self.timed_stages:
+            if group in before & timed.groups:
+                greens[-1] = Green(greens[-1].start_ns, timed.end_ns)
+            elif group in timed.groups:
+                greens.append(Green(timed.start_ns, timed.end_ns))
+            before = timed.groups
         return greens
 
     def green_of(self, group: str, position_ns: int) -> Green | None:
@@ -103,7 +103,7 @@ class Timetable:
 
     def first_start_ns(self, group: str) -> int:
         """Return when the group's first green of a cycle begins."""
-        return min(slot.start_ns for slot in self.slots if group in slot.groups)
+        return min(timed.start_ns for timed in self.timed_stages if group in timed.groups)
 
 
 def plan_names() -> list[str]:
@@ -161,15 +161,15 @@ def timetable(name: str, cycle: tuple[Stage, ...], program: Program) -> Timetabl
     ]
     if problems:
         raise PlanError(f"plan {name!r}: " + "; ".join(problems))
-    slots: list[Slot] = []
+    timed_stages: list[TimedStage] = []
     position_ns = 0
     for number, stage in enumerate(cycle, 1):
         end_ns = position_ns + stage.green_ns
-        slots.append(Slot(frozenset(stage.groups), position_ns, end_ns))
+        timed_stages.append(TimedStage(frozenset(stage.groups), position_ns, end_ns))
         following = cycle[number].groups if number < len(cycle) else ()
         between_ns = least_between_ns(stage.groups, following, program)
         position_ns = end_ns + between_ns + stage.extra_red_ns
-    return Timetable(name, tuple(slots), position_ns)
+    return Timetable(name, tuple(timed_stages), position_ns)
 
 
 def least_between_ns(groups: Collection[str], following: Collection[str], program: Program) -> int:

@@ -14,7 +14,7 @@ from scm.errors import PlanError
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.guaranteed_time import AHEAD_NS
 from scm.traffic.signals.kernel import GroupTimes, Program, State
-from scm.traffic.signals.operator_overrides import Asked
+from scm.traffic.signals.operator_overrides import Override
 from scm.traffic.signals.rings import Layout, PhaseTimes, layout_of
 from scm.traffic.signals.timing import NIGEL, CarFacts, headway_s
 
@@ -71,7 +71,7 @@ class JunctionView:
         state: Of the kernel, in the order of the program's groups.
         detectors: By group.
         sees: Whether detectors heard or saw anything lately; if not, they must not be relied on.
-        asked: Wishes of operators and scripts in force.
+        overrides: Of operators and scripts, in force.
         priority: Requests of vehicles in force.
         timetabled: What the timetable of the plan in force wishes now.
     """
@@ -81,7 +81,7 @@ class JunctionView:
     state: State
     detectors: Mapping[str, Detector] = field(default_factory=dict)
     sees: bool = False
-    asked: tuple[Asked, ...] = ()
+    overrides: tuple[Override, ...] = ()
     priority: tuple[PriorityCall, ...] = ()
     timetabled: frozenset[str] = frozenset()
 

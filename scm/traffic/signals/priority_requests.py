@@ -23,8 +23,8 @@ from scm.v2x.messages.ssem import SsemTx
 AFTER_NS = 10 * NS_PER_S
 QUIET_NS = 5 * NS_PER_S
 LONGEST_NS = 120 * NS_PER_S
-TELL_EVERY_NS = NS_PER_S
-MOST = 32
+SSEM_EVERY_NS = NS_PER_S
+MAX_REQUESTS = 32
 
 EMERGENCY = ("roadRescue", "emergency", "police", "fire", "ambulance")
 TRANSIT = ("publicTransport", "specialTransport", "transit", "tram")
@@ -32,71 +32,73 @@ TRANSIT = ("publicTransport", "specialTransport", "transit", "tram")
 Key = tuple[int, int]
 
 
-class PriorityDesk:
+class PriorityRequests:
     """Keeps the requests of one junction.
 
     Attributes:
-        ignored: SREMs in another's name, and requests beyond the `MOST` that are kept.
+        ignored: SREMs in another's name, and requests beyond the `MAX_REQUESTS` that are kept.
     """
 
     def __init__(self, junction: Junction, roads: Roads) -> None:
         self._junction = junction
         self._groups = topology_of(roads, junction).group_in
-        self._wishes: dict[Key, tuple[PriorityRequest, int]] = {}
-        self._told: dict[Key, Status] = {}
-        self._told_ns = 0
+        self._requests: dict[Key, tuple[PriorityRequest, int]] = {}
+        self._published: dict[Key, Status] = {}
+        self._published_ns = 0
         self._sequence = 0
         self.ignored = 0
 
-    def hear(self, heard: SremRx, now_ns: int) -> None:
+    def receive(self, message: SremRx, now_ns: int) -> None:
         """Take the requests of an SREM that are for this junction."""
-        for wish in requests_of(heard.body, now_ns):
-            if wish.junction != self._junction.number:
+        for request in requests_of(message.body, now_ns):
+            if request.junction != self._junction.number:
                 continue
-            key = (wish.station_id, wish.number)
-            if wish.station_id != station_id(heard.station):
+            key = (request.station_id, request.number)
+            if request.station_id != station_id(message.station):
                 self.ignored += 1
-            elif wish.verb == "cancel":
-                self._wishes.pop(key, None)
-            elif key in self._wishes or len(self._wishes) < MOST:
-                self._wishes[key] = (wish, _until_ns(wish, now_ns))
+            elif request.verb == "cancel":
+                self._requests.pop(key, None)
+            elif key in self._requests or len(self._requests) < MAX_REQUESTS:
+                self._requests[key] = (request, _until_ns(request, now_ns))
             else:
                 self.ignored += 1
 
     def calls(self, now_ns: int) -> tuple[PriorityCall, ...]:
         """Return the requests in force, in the order in which they came."""
-        self._wishes = {k: held for k, held in self._wishes.items() if now_ns < held[1]}
+        self._requests = {k: held for k, held in self._requests.items() if now_ns < held[1]}
         return tuple(
-            PriorityCall(key, self._group_of(wish), wish.arrives_ns, _role_of(wish), until_ns)
-            for key, (wish, until_ns) in self._wishes.items()
+            PriorityCall(
+                key, self._group_of(request), request.arrives_ns, _role_of(request), until_ns
+            )
+            for key, (request, until_ns) in self._requests.items()
         )
 
-    def tell(self, status: Mapping[Key, Status], now_ns: int) -> list[SsemTx]:
+    def due_ssem(self, status: Mapping[Key, Status], now_ns: int) -> list[SsemTx]:
         """Return the SSEM that is due: at once when a status changes, and once a second."""
-        now = {key: status.get(key, "requested") for key in self._wishes}
-        is_new = now != self._told
-        if not now or not (is_new or now_ns - self._told_ns >= TELL_EVERY_NS):
-            self._told = now
+        now = {key: status.get(key, "requested") for key in self._requests}
+        is_new = now != self._published
+        if not now or not (is_new or now_ns - self._published_ns >= SSEM_EVERY_NS):
+            self._published = now
             return []
-        self._told, self._told_ns = now, now_ns
+        self._published, self._published_ns = now, now_ns
         self._sequence += is_new
-        answers = [PriorityAnswer(self._wishes[key][0], what) for key, what in now.items()]
+        answers = [PriorityAnswer(self._requests[key][0], what) for key, what in now.items()]
         body = ssem_of(self._junction, answers, self._sequence, now_ns)
         return [SsemTx(station=roadside_station(self._junction.name), t_ns=now_ns, body=body)]
 
-    def _group_of(self, wish: PriorityRequest) -> str:
-        known = wish.lane_in is not None and wish.lane_in <= len(self._groups)
-        return self._groups[wish.lane_in - 1] if known and wish.lane_in else ""
+    def _group_of(self, request: PriorityRequest) -> str:
+        known = request.lane_in is not None and request.lane_in <= len(self._groups)
+        return self._groups[request.lane_in - 1] if known and request.lane_in else ""
 
 
-def _role_of(wish: PriorityRequest) -> str:
-    if wish.role in EMERGENCY:
+def _role_of(request: PriorityRequest) -> str:
+    if request.role in EMERGENCY:
         return "emergency"
-    return "transit" if wish.role in TRANSIT else wish.role
+    return "transit" if request.role in TRANSIT else request.role
 
 
-def _until_ns(wish: PriorityRequest, now_ns: int) -> int:
-    if wish.arrives_ns is None:
+def _until_ns(request: PriorityRequest, now_ns: int) -> int:
+    if request.arrives_ns is None:
         return now_ns + QUIET_NS
-    lasts_ns = round((wish.lasts_s or 0.0) * NS_PER_S)
-    return min(now_ns + LONGEST_NS, max(now_ns, wish.arrives_ns) + lasts_ns + AFTER_NS)
+    lasts_ns = round((request.lasts_s or 0.0) * NS_PER_S)
+    return min(now_ns + LONGEST_NS, max(now_ns, request.arrives_ns) + lasts_ns + AFTER_NS)

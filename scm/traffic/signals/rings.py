@@ -103,24 +103,24 @@ def layout_of(program: Program, phases: tuple[PhaseTimes, ...]) -> Layout:
     fall into rings, it is cut into stages, with a barrier between each two.
     """
     numbers = range(len(program.groups))
-    rivals = {
+    conflicting = {
         i: {
             j for j in numbers if frozenset((program.groups[i], program.groups[j]))
             in program.conflicts and i != j
         }
         for i in numbers
     }  # fmt: skip
-    friends = {i: {j for j in numbers if j not in rivals[i] and j != i} for i in numbers}
+    friends = {i: {j for j in numbers if j not in conflicting[i] and j != i} for i in numbers}
     sections: list[tuple[tuple[int, ...], ...]] = []
     alone = tuple(i for i in numbers if not friends[i])
     if alone:
         sections.append((alone,))
     for members in _components([i for i in numbers if i not in alone], friends):
-        rings = _components(members, rivals)
-        if all(j in rivals[i] for ring in rings for i in ring for j in ring if i != j):
+        rings = _components(members, conflicting)
+        if all(j in conflicting[i] for ring in rings for i in ring for j in ring if i != j):
             sections.append(rings)
         else:
-            sections += [tuple((i,) for i in stage) for stage in _stages(members, rivals)]
+            sections += [tuple((i,) for i in stage) for stage in _stages(members, conflicting)]
     return Layout(phases, tuple(sections))
 
 
@@ -138,10 +138,10 @@ def _components(numbers: Iterable[int], edges: dict[int, set[int]]) -> tuple[tup
     return tuple(found)
 
 
-def _stages(numbers: Iterable[int], rivals: dict[int, set[int]]) -> list[list[int]]:
+def _stages(numbers: Iterable[int], conflicting: dict[int, set[int]]) -> list[list[int]]:
     stages: list[list[int]] = []
     for number in numbers:
-        fitting = (stage for stage in stages if not rivals[number] & set(stage))
+        fitting = (stage for stage in stages if not conflicting[number] & set(stage))
         stage = next(fitting, None)
         if stage is None:
             stages.append([number])
@@ -155,7 +155,7 @@ def start(layout: Layout) -> Rings:
     return Rings(0, tuple(Ring() for _ in layout.sections[0]))
 
 
-def wishes(state: Rings) -> frozenset[int]:
+def requested(state: Rings) -> frozenset[int]:
     """Return the phases that would like green now."""
     return frozenset(ring.phase for ring in state.rings if ring.phase is not None)
 
@@ -165,18 +165,18 @@ def green_in(state: State) -> frozenset[int]:
     return frozenset(i for i, group in enumerate(state) if group.phase is Phase.GREEN)
 
 
-def step(layout: Layout, state: Rings, told: Inputs, green: frozenset[int], dt: int) -> Rings:
+def step(layout: Layout, state: Rings, inputs: Inputs, green: frozenset[int], dt: int) -> Rings:
     """Return the state `dt` later, with `green` the phases that the kernel shows green."""
-    called = _called(layout, state, told)
-    locked = {i for i in told.calls if layout.phases[i].locking}
+    called = _called(layout, state, inputs)
+    locked = {i for i in inputs.calls if layout.phases[i].locking}
     calls = frozenset((state.calls | locked) - green)
     rings = tuple(
-        _count(layout, state, ring, told, called, green, dt) for ring in state.rings
+        _count(layout, state, ring, inputs, called, green, dt) for ring in state.rings
     )  # fmt: skip
     state = Rings(state.section, rings, calls)
-    if told.preempt is not None:
-        return _preempt(layout, state, told.preempt)
-    return _go_on(layout, state, told, called)
+    if inputs.preempt is not None:
+        return _preempt(layout, state, inputs.preempt)
+    return _go_on(layout, state, inputs, called)
 
 
 def order_of(layout: Layout, state: Rings, called: frozenset[int]) -> list[frozenset[int]]:
@@ -184,7 +184,7 @@ def order_of(layout: Layout, state: Rings, called: frozenset[int]) -> list[froze
 
     It is the order of `step` while these stay called, each until it has been served once.
     """
-    order = [wishes(state)]
+    order = [requested(state)]
     left = called - order[0]
     while left:
         sequences = layout.sections[state.section]
@@ -195,18 +195,18 @@ def order_of(layout: Layout, state: Rings, called: frozenset[int]) -> list[froze
         )
         is_last = after == state.rings
         state = _cross(layout, state, left) if is_last else state._replace(rings=after)
-        order.append(wishes(state))
+        order.append(requested(state))
         left -= order[-1]
     return [phases for phases in order if phases]
 
 
-def _called(layout: Layout, state: Rings, told: Inputs) -> frozenset[int]:
+def _called(layout: Layout, state: Rings, inputs: Inputs) -> frozenset[int]:
     """Return who is called: by vehicles, by memory, by recall; not who is left out."""
     always = {i for i, p in enumerate(layout.phases) if p.recall in (Recall.MIN, Recall.MAX)}
-    called = (told.calls | state.calls | always) - told.omit
+    called = (inputs.calls | state.calls | always) - inputs.omit
     if not called:
         soft = {i for i, p in enumerate(layout.phases) if p.recall is Recall.SOFT}
-        called |= soft - told.omit
+        called |= soft - inputs.omit
     return frozenset(called)
 
 
@@ -214,7 +214,7 @@ def _count(
     layout: Layout,
     state: Rings,
     ring: Ring,
-    told: Inputs,
+    inputs: Inputs,
     called: frozenset[int],
     green: frozenset[int],
     dt: int,
@@ -223,53 +223,53 @@ def _count(
     if ring.phase is None:
         return ring
     if ring.phase not in green:
-        is_left_out = ring.phase in told.omit
+        is_left_out = ring.phase in inputs.omit
         return Ring(None, passed=ring.phase) if is_left_out else Ring(ring.phase)
     times = layout.phases[ring.phase]
-    is_there = ring.phase in told.calls or times.recall is Recall.MAX
+    is_there = ring.phase in inputs.calls or times.recall is Recall.MAX
     return Ring(
         ring.phase,
         green=min(ring.green + dt, times.min_green),
         gap=0 if is_there else min(ring.gap + dt, times.passage),
-        waited=min(ring.waited + dt, _most(times, ring.phase, told))
+        waited=min(ring.waited + dt, _most(times, ring.phase, inputs))
         if _is_wanted_by_others(layout, state, ring.phase, called)
         else 0,
     )
 
 
-def _most(times: PhaseTimes, phase: int, told: Inputs) -> int:
-    return times.max2 if phase in told.max2 else times.max1
+def _most(times: PhaseTimes, phase: int, inputs: Inputs) -> int:
+    return times.max2 if phase in inputs.max2 else times.max1
 
 
 def _is_wanted_by_others(
     layout: Layout, state: Rings, phase: int, called: frozenset[int]
 ) -> bool:  # fmt: skip
     """Return whether a phase in conflict with this one is called: of its ring, or elsewhere."""
-    rivals = set(called)
+    conflicting = set(called)
     for ring in layout.sections[state.section]:
         if phase not in ring:
-            rivals -= set(ring)
-    return bool(rivals - {phase})
+            conflicting -= set(ring)
+    return bool(conflicting - {phase})
 
 
-def _is_ready(layout: Layout, ring: Ring, told: Inputs) -> bool:
+def _is_ready(layout: Layout, ring: Ring, inputs: Inputs) -> bool:
     """Return whether a ring may leave its phase."""
     if ring.phase is None:
         return True
     times = layout.phases[ring.phase]
     is_over = (
         ring.gap >= times.passage
-        or ring.waited >= _most(times, ring.phase, told)
-        or ring.phase in told.force_off
+        or ring.waited >= _most(times, ring.phase, inputs)
+        or ring.phase in inputs.force_off
     )
-    return ring.green >= times.min_green and is_over and ring.phase not in told.hold
+    return ring.green >= times.min_green and is_over and ring.phase not in inputs.hold
 
 
-def _go_on(layout: Layout, state: Rings, told: Inputs, called: frozenset[int]) -> Rings:
+def _go_on(layout: Layout, state: Rings, inputs: Inputs, called: frozenset[int]) -> Rings:
     """Let rings advance, or all of them cross the barrier."""
     here = {i for ring in layout.sections[state.section] for i in ring}
     others = called - here
-    ready = [_is_ready(layout, ring, told) for ring in state.rings]
+    ready = [_is_ready(layout, ring, inputs) for ring in state.rings]
     if others:
         after = [
             _next_in(sequence, ring, called)
@@ -282,7 +282,7 @@ def _go_on(layout: Layout, state: Rings, told: Inputs, called: frozenset[int]) -
         is_begun = any(_place(ring) is not None for ring in state.rings)
         if all(ready) and all(is_last) and (is_begun or not any(i in called for i in here)):
             return _cross(layout, state, called)
-    is_shut = any(ring.phase in told.hold for ring in state.rings)
+    is_shut = any(ring.phase in inputs.hold for ring in state.rings)
     rings = tuple(
         _advance(sequence, ring, called, wraps=is_shut or not others) if may else ring
         for sequence, ring, may in zip(
@@ -335,9 +335,9 @@ def _preempt(layout: Layout, state: Rings, phase: int) -> Rings:
         s for s, rings in enumerate(layout.sections) if any(phase in ring for ring in rings)
     )
     sequences = layout.sections[section]
-    kept = state.rings if section == state.section else tuple(Ring() for _ in sequences)
+    current = state.rings if section == state.section else tuple(Ring() for _ in sequences)
     rings = tuple(
         (ring if ring.phase == phase else Ring(phase)) if phase in sequence else ring
-        for sequence, ring in zip(sequences, kept, strict=True)
+        for sequence, ring in zip(sequences, current, strict=True)
     )
     return Rings(section, rings, state.calls)

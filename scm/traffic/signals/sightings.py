@@ -24,18 +24,18 @@ class Sightings:
     def __init__(self) -> None:
         self._spoke: dict[int, Seen] = {}
 
-    def of_cam(self, heard: CamRx) -> Seen | None:
+    def of_cam(self, message: CamRx) -> Seen | None:
         """Return the car that a CAM tells of; None when it lacks a place, heading or speed."""
-        told = read_cam(heard.body)
-        if told.place is None or told.yaw_rad is None or told.speed_mps is None:
+        claimed = read_cam(message.body)
+        if claimed.place is None or claimed.yaw_rad is None or claimed.speed_mps is None:
             return None
         seen = Seen(
-            told.station_id,
-            generated_ns(heard.body, heard.t_ns),
-            *told.place,
-            told.yaw_rad,
-            told.speed_mps,
-            told.length_m or ASSUMED_LENGTH_M,
+            claimed.station_id,
+            generated_ns(message.body, message.t_ns),
+            *claimed.place,
+            claimed.yaw_rad,
+            claimed.speed_mps,
+            claimed.length_m or ASSUMED_LENGTH_M,
         )
         self._spoke[seen.who] = seen
         return seen

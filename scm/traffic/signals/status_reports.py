@@ -15,7 +15,7 @@ from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.green_wave import Wave
 from scm.traffic.signals.kernel import Program
 from scm.traffic.signals.map_plan import OWN
-from scm.traffic.signals.operator_overrides import Asked
+from scm.traffic.signals.operator_overrides import Override
 from scm.traffic.signals.plan import PACKAGE, Plan, Timetable
 from scm.traffic.signals.policy import load_policy, policy_names, site_of
 from scm.traffic.signals.program import STEP_NS
@@ -29,7 +29,7 @@ STATUS_EVERY_NS = NS_PER_S
 EARLY_NS = STEP_NS // 2
 
 
-class JunctionFacts:
+class StatusReports:
     """Tells one junction's `SignalSite` and `SignalStatus` when they are due.
 
     Attributes:
@@ -44,31 +44,31 @@ class JunctionFacts:
         self._status_ns: int | None = None
         self._before: tuple[object, ...] = ()
 
-    def tell(
+    def due(
         self, controller: Controller, detectors: Mapping[str, Detector], now_ns: int
     ) -> list[Outgoing]:
         """Return what is due at a step that was just made."""
-        told: list[Outgoing] = []
+        messages: list[Outgoing] = []
         if _is_due(self._site_ns, now_ns, SITE_EVERY_NS):
             self._site_ns = now_ns
-            told.append(replace(self.site, t_ns=now_ns))
-        what = (controller.policy, controller.plan, controller.pending, controller.asked)
+            messages.append(replace(self.site, t_ns=now_ns))
+        what = (controller.policy, controller.plan, controller.pending, controller.overrides)
         if what != self._before or _is_due(self._status_ns, now_ns, STATUS_EVERY_NS):
             self._before, self._status_ns = what, now_ns
-            told.append(self._status(controller, detectors, now_ns))
-        return told
+            messages.append(self._status(controller, detectors, now_ns))
+        return messages
 
     def _status(
         self, controller: Controller, detectors: Mapping[str, Detector], now_ns: int
     ) -> SignalStatus:
-        table, wave = controller.guest or (None, None)
+        table, wave = controller.custom_plan or (None, None)
         return SignalStatus(
             junction=self.site.junction,
             t_ns=now_ns,
             policy=controller.policy,
             plan=controller.plan,
             pending=controller.pending,
-            wishes=wishes_of(controller.asked),
+            wishes=override_records(controller.overrides),
             detectors=tuple(
                 SignalDetector(group=name, call=one.call, queue=one.queue)
                 for name, one in detectors.items()
@@ -88,7 +88,7 @@ class JunctionFacts:
         return tuple(name for name in self.program.groups if name in groups)
 
 
-def wishes_of(asked: Iterable[Asked]) -> tuple[SignalOverride, ...]:
+def override_records(overrides: Iterable[Override]) -> tuple[SignalOverride, ...]:
     """Return wishes in force as they are told."""
     return tuple(
         SignalOverride(
@@ -99,12 +99,12 @@ def wishes_of(asked: Iterable[Asked]) -> tuple[SignalOverride, ...]:
             ends_ns=one.until_ns,
             policy=one.policy,
         )
-        for one in asked
+        for one in overrides
     )
 
 
-def _is_due(told_ns: int | None, now_ns: int, every_ns: int) -> bool:
-    return told_ns is None or now_ns - told_ns >= every_ns - EARLY_NS
+def _is_due(sent_ns: int | None, now_ns: int, every_ns: int) -> bool:
+    return sent_ns is None or now_ns - sent_ns >= every_ns - EARLY_NS
 
 
 def _site(junction: str, program: Program, tables: Tables) -> SignalSite:
@@ -157,11 +157,11 @@ def _plan(table: Timetable, program: Program, wave: Wave | None) -> SignalPlan:
         stages=stages_of(table, program),
         slots=tuple(
             StageInterval(
-                groups=tuple(name for name in program.groups if name in slot.groups),
-                start_s=slot.start_ns / NS_PER_S,
-                end_s=slot.end_ns / NS_PER_S,
+                groups=tuple(name for name in program.groups if name in timed.groups),
+                start_s=timed.start_ns / NS_PER_S,
+                end_s=timed.end_ns / NS_PER_S,
             )
-            for slot in table.slots
+            for timed in table.timed_stages
         ),
         in_step=wave is not None,
         offset_s=None if wave is None else wave.offset_ns / NS_PER_S,

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from scm.traffic.signals.forecast import Coming
 from scm.traffic.signals.green_wave import Wave, dwell_ns, dwelling
-from scm.traffic.signals.guaranteed_time import Cycle, Promise, green_end
+from scm.traffic.signals.guaranteed_time import Cycle, GuaranteedTime, green_end
 from scm.traffic.signals.plan import Timetable
 
 Tables = Mapping[str, tuple[Timetable, Wave | None]]
@@ -26,39 +26,39 @@ class Timetables:
     """
 
     def __init__(self, tables: Tables, plan: str) -> None:
-        self._own = dict(tables)
+        self._own_tables = dict(tables)
         self._tables = dict(tables)
-        self._entering: dict[str, tuple[Timetable, Wave | None]] = {}
+        self._entering_plans: dict[str, tuple[Timetable, Wave | None]] = {}
         self.plan = plan
         self.pending = ""
-        self._going_on: frozenset[str] | None = None
-        self._settled = ""
+        self._staying_green: frozenset[str] | None = None
+        self._committed_plan = ""
         self.clear(0, 0)
 
     @property
     def names(self) -> list[str]:
         """The names of all plans that may be asked for, guests included."""
-        return list({**self._tables, **self._entering})
+        return list({**self._tables, **self._entering_plans})
 
     @property
-    def guest(self) -> tuple[Timetable, Wave | None] | None:
+    def custom_plan(self) -> tuple[Timetable, Wave | None] | None:
         """The plan in force, where somebody made it; None: it is one of the junction's own."""
-        return None if self.plan in self._own else self._tables[self.plan]
+        return None if self.plan in self._own_tables else self._tables[self.plan]
 
-    def ask(self, plan: str) -> None:
+    def request(self, plan: str) -> None:
         """Let a plan come with the next cycle, or stay."""
-        self.pending = "" if plan == self.plan and self._settled in ("", plan) else plan
+        self.pending = "" if plan == self.plan and self._committed_plan in ("", plan) else plan
         if plan == self.plan:
-            self._entering.pop(plan, None)
+            self._entering_plans.pop(plan, None)
 
-    def offer(self, guest: Timetable, wave: Wave | None) -> None:
+    def offer_custom_plan(self, custom_plan: Timetable, wave: Wave | None) -> None:
         """Take a plan that somebody made, and let it come; one of its name makes room for it."""
-        self._entering = {guest.plan: (guest, wave)}
-        self.pending = guest.plan
+        self._entering_plans = {custom_plan.plan: (custom_plan, wave)}
+        self.pending = custom_plan.plan
 
     def clear(self, now_ns: int, until_ns: int) -> None:
         """Wish nothing until a time, then begin the first cycle."""
-        self._change_guests()
+        self._change_custom_plans()
         self._begin(Cycle(None, now_ns, until_ns))
 
     def put_off(self, by_ns: int) -> None:
@@ -71,28 +71,32 @@ class Timetables:
         self.plan = self._next_plan()
         began_ns = self.cycle.ends_ns
         table = self._beginning(self.plan, began_ns)
-        self._change_guests()
+        self._change_custom_plans()
         self._begin(Cycle(table, began_ns, began_ns + table.length_ns))
 
-    def settle(self, now_ns: int, *, goes_on: bool) -> None:
+    def commit_next(self, now_ns: int, *, goes_on: bool) -> None:
         """Once the last stage has begun, settle who stays green into the next cycle."""
         cycle = self.cycle
-        if self._going_on is not None or cycle.timetable is None:
+        if self._staying_green is not None or cycle.timetable is None:
             return
-        if now_ns >= cycle.began_ns + cycle.timetable.slots[-1].start_ns:
-            self._going_on = cycle.timetable.into(self._next()) if goes_on else frozenset()
-            self._settled = self._next_plan() if self._going_on else ""
+        if now_ns >= cycle.began_ns + cycle.timetable.timed_stages[-1].start_ns:
+            self._staying_green = cycle.timetable.into(self._next()) if goes_on else frozenset()
+            self._committed_plan = self._next_plan() if self._staying_green else ""
 
-    def wishes(self, now_ns: int) -> frozenset[str]:
+    def requested(self, now_ns: int) -> frozenset[str]:
         """Return what the timetable wishes."""
         table, position_ns = self.cycle.timetable, now_ns - self.cycle.began_ns
-        return table.wishes(position_ns, self._going_on or frozenset()) if table else frozenset()
+        return (
+            table.requested(position_ns, self._staying_green or frozenset())
+            if table
+            else frozenset()
+        )
 
-    def green_end(self, group: str, now_ns: int, least_ns: int) -> Promise:
+    def green_end(self, group: str, now_ns: int, least_ns: int) -> GuaranteedTime:
         """Return when a green that is on will end, `least_ns` at the earliest."""
         onward: list[Timetable | None] = [*self.coming, None]
-        if self._going_on is not None:
-            onward = [self._next() if group in self._going_on else None]
+        if self._staying_green is not None:
+            onward = [self._next() if group in self._staying_green else None]
         return green_end(group, self.cycle, now_ns, least_ns, onward)
 
     def likely_end_ns(self, group: str, now_ns: int, *, red: bool) -> int | None:
@@ -105,20 +109,20 @@ class Timetables:
         """
         if red:
             return self.cycle.ends_ns + self._next().first_start_ns(group)
-        told = green_end(group, self.cycle, now_ns, now_ns, [self._next()])
-        return told.min_end_ns if told.is_exact else None
+        end = green_end(group, self.cycle, now_ns, now_ns, [self._next()])
+        return end.min_end_ns if end.is_exact else None
 
     def outlook(self, now_ns: int) -> tuple[Coming, ...]:
         """Return the greens that are on or still to come in this cycle, and those of the next."""
         cycle, following = self.cycle, self._next()
-        this = cycle.timetable.slots if cycle.timetable is not None else ()
+        this = cycle.timetable.timed_stages if cycle.timetable is not None else ()
         greens = [
-            *((slot, cycle.began_ns) for slot in this if cycle.began_ns + slot.end_ns > now_ns),
-            *((slot, cycle.ends_ns) for slot in following.slots),
+            *((timed, cycle.began_ns) for timed in this if cycle.began_ns + timed.end_ns > now_ns),
+            *((timed, cycle.ends_ns) for timed in following.timed_stages),
         ]
         return tuple(
-            Coming(slot.groups, began_ns + slot.start_ns, began_ns + slot.end_ns)
-            for slot, began_ns in greens
+            Coming(timed.groups, began_ns + timed.start_ns, began_ns + timed.end_ns)
+            for timed, began_ns in greens
         )
 
     def _next(self) -> Timetable:
@@ -126,18 +130,18 @@ class Timetables:
         return dict(zip(self._tables, self.coming, strict=True))[self._next_plan()]
 
     def _next_plan(self) -> str:
-        is_ready = self.pending and self.pending not in self._entering
-        return self._settled or (self.pending if is_ready else self.plan)
+        is_ready = self.pending and self.pending not in self._entering_plans
+        return self._committed_plan or (self.pending if is_ready else self.plan)
 
-    def _change_guests(self) -> None:
+    def _change_custom_plans(self) -> None:
         """Let guests in, and those go that nobody wants; call it where nothing is promised."""
-        if self.pending == self.plan and self.pending not in self._entering:
+        if self.pending == self.plan and self.pending not in self._entering_plans:
             self.pending = ""
-        entering, self._entering = self._entering, {}
+        entering, self._entering_plans = self._entering_plans, {}
         stay = {
             name: pair
             for name, pair in self._tables.items()
-            if name in self._own or name in (self.plan, self.pending)
+            if name in self._own_tables or name in (self.plan, self.pending)
         }
         self._tables = {**stay, **entering}
 
@@ -147,7 +151,7 @@ class Timetables:
         return dwelling(table, dwell_ns(wave, began_ns))
 
     def _begin(self, cycle: Cycle) -> None:
-        self._going_on, self._settled = None, ""
+        self._staying_green, self._committed_plan = None, ""
         self._set(cycle)
 
     def _set(self, cycle: Cycle) -> None:

@@ -10,14 +10,14 @@ from scm.selftest.signals import FAULTS, Outcome
 from scm.selftest.stand_in import FaultyTraffic
 from scm.selftest.table import markdown_table, text_table
 from scm.traffic.monitor.checks import Monitor
-from scm.traffic.monitor.conflict_table import card_of
+from scm.traffic.monitor.conflict_table import conflict_table_of
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spat import Spat
 
 CITY = load_map("driving_school")
 (JUNCTION,) = CITY.junctions
-CARD = card_of(CITY, JUNCTION)
+CARD = conflict_table_of(CITY, JUNCTION)
 STEP_NS = 100 * NS_PER_MS
 WARM_NS, LONG_NS = 10 * NS_PER_S, 40 * NS_PER_S
 

@@ -36,17 +36,17 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     ]
 
     def send(frame: Frame) -> list[Sent]:
-        told = read_cam(frame.body)
+        reported = read_cam(frame.body)
         sent = [Sent(frame, lies=False)]
-        if told.place is None or told.yaw_rad is None or told.speed_mps is None:
+        if reported.place is None or reported.yaw_rad is None or reported.speed_mps is None:
             return sent
-        x, y = told.place
-        c, s = math.cos(told.yaw_rad), math.sin(told.yaw_rad)
+        x, y = reported.place
+        c, s = math.cos(reported.yaw_rad), math.sin(reported.yaw_rad)
         for number, (ahead, left, factor) in enumerate(ghosts, 1):
             name = ghost_name(frame.station, number)
             t_ns = frame.t_ns + number * NS_PER_MS
             body = moved(frame.body, x + c * ahead - s * left, y + s * ahead + c * left)
-            body = driven(body, speed_mps=factor * told.speed_mps)
+            body = driven(body, speed_mps=factor * reported.speed_mps)
             body = stamped(body, t_ns, station_id(name))
             sent.append(Sent(Frame(name, t_ns, body), lies=True))
         return sent

@@ -23,9 +23,9 @@ def faster(frame: Frame, by_mps: float) -> Sent:
     speed = read_cam(frame.body).speed_mps
     if speed is None:
         return Sent(frame, lies=False)
-    told = max(0.0, speed + by_mps)
-    body = driven(frame.body, speed_mps=told)
-    return Sent(frame._replace(body=body), lies=abs(told - speed) > LEAST_MPS / 2.0)
+    reported = max(0.0, speed + by_mps)
+    body = driven(frame.body, speed_mps=reported)
+    return Sent(frame._replace(body=body), lies=abs(reported - speed) > LEAST_MPS / 2.0)
 
 
 def _start(rng: random.Random, scene: Scene) -> Transform:

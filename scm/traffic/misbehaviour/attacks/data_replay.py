@@ -24,11 +24,11 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     def victims(frame: Frame) -> dict[str, list[Frame]]:
         here = read_cam(frame.body).place
         found: dict[str, list[Frame]] = {}
-        for heard in scene.heard:
-            there = read_cam(heard.body).place
+        for seen in scene.received:
+            there = read_cam(seen.body).place
             near = here is not None and there is not None and math.dist(here, there) <= NEAR_M
-            if near and frame.t_ns - heard.t_ns <= WITHIN_NS and heard.station != frame.station:
-                found.setdefault(heard.station, []).append(heard)
+            if near and frame.t_ns - seen.t_ns <= WITHIN_NS and seen.station != frame.station:
+                found.setdefault(seen.station, []).append(seen)
         return found
 
     def send(frame: Frame) -> list[Sent]:

@@ -19,12 +19,12 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
 
     def send(frame: Frame) -> list[Sent]:
         nonlocal before
-        told, last = read_cam(frame.body), before
-        before = told
-        if told.yaw_rad is None:
+        reported, last = read_cam(frame.body), before
+        before = reported
+        if reported.yaw_rad is None:
             return [Sent(frame, lies=False)]
-        body = driven(frame.body, yaw_rad=wrap_angle(told.yaw_rad + math.pi))
-        return [Sent(frame._replace(body=body), lies=drives(told, last))]
+        body = driven(frame.body, yaw_rad=wrap_angle(reported.yaw_rad + math.pi))
+        return [Sent(frame._replace(body=body), lies=drives(reported, last))]
 
     return send
 

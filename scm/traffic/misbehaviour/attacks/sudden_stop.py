@@ -22,15 +22,15 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
 
     def send(frame: Frame) -> list[Sent]:
         nonlocal stop
-        told = read_cam(frame.body)
-        is_driving = abs(told.speed_mps or 0.0) > SLOW_MPS
-        if stop is None and is_driving and told.place is not None and rng.random() < CHANCE:
-            stop = told
-        if stop is None or stop.place is None or told.place is None:
+        reported = read_cam(frame.body)
+        is_driving = abs(reported.speed_mps or 0.0) > SLOW_MPS
+        if stop is None and is_driving and reported.place is not None and rng.random() < CHANCE:
+            stop = reported
+        if stop is None or stop.place is None or reported.place is None:
             return [Sent(frame, lies=False)]
         body = moved(frame.body, *stop.place)
         body = driven(body, speed_mps=0.0, yaw_rad=stop.yaw_rad, accel_mps2=0.0)
-        away = math.dist(told.place, stop.place) >= AWAY_M
+        away = math.dist(reported.place, stop.place) >= AWAY_M
         return [Sent(frame._replace(body=body), lies=is_driving or away)]
 
     return send

@@ -19,12 +19,12 @@ from scm.traffic.misbehaviour.forge import driven
 from scm.v2x.etsi.convert import CamView, read_cam
 
 
-def drives(told: CamView, before: CamView | None) -> bool:
+def drives(reported: CamView, before: CamView | None) -> bool:
     """Return whether a car truly moves, by its speed and its way since the CAM before."""
     was = None if before is None else before.place
-    if was is None or told.place is None or abs(told.speed_mps or 0.0) <= SLOW_MPS:
+    if was is None or reported.place is None or abs(reported.speed_mps or 0.0) <= SLOW_MPS:
         return False
-    return math.dist(told.place, was) > STEP_M / 5.0
+    return math.dist(reported.place, was) > STEP_M / 5.0
 
 
 def _start(rng: random.Random, scene: Scene) -> Transform:
@@ -33,10 +33,10 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
 
     def send(frame: Frame) -> list[Sent]:
         nonlocal before
-        told, last = read_cam(frame.body), before
-        before = told
+        reported, last = read_cam(frame.body), before
+        before = reported
         body = driven(frame.body, speed_mps=0.0)
-        return [Sent(frame._replace(body=body), lies=drives(told, last))]
+        return [Sent(frame._replace(body=body), lies=drives(reported, last))]
 
     return send
 

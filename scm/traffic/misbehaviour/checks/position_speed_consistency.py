@@ -38,8 +38,8 @@ def _judge(case: Case) -> float | None:
         return p
     mean = strayed.sum_m / strayed.over_s
     unsure_m = math.hypot(2.0 * now.own_m, math.sqrt(strayed.variance_m2))
-    doubt = math.hypot(SIGMA_MPS, unsure_m / strayed.over_s)
-    return min(p, of_number(mean, MEAN_MPS * faster, doubt))
+    std_mps = math.hypot(SIGMA_MPS, unsure_m / strayed.over_s)
+    return min(p, of_number(mean, MEAN_MPS * faster, std_mps))
 
 
 CHECK = Check(_judge, "speed")

@@ -13,7 +13,12 @@ from typing import NamedTuple
 
 from scm.clock import NS_PER_S
 from scm.traffic.signals import rings
-from scm.traffic.signals.green_extension import PROMISED_S, green_s, is_worth_waiting, worth_until_s
+from scm.traffic.signals.green_extension import (
+    GUARANTEED_S,
+    green_s,
+    is_worth_waiting,
+    worth_until_s,
+)
 from scm.traffic.signals.guaranteed_time import AHEAD_NS
 from scm.traffic.signals.kernel import Phase
 from scm.traffic.signals.operator_overrides import NEED_RINGS, groups_of
@@ -32,7 +37,7 @@ class Memory(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class RingInputs:
     """What the rings are to be told, and whether the detectors can be relied on."""
 
     inputs: Inputs
@@ -46,26 +51,26 @@ def start(site: Site) -> Memory:
 
 def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer]:
     """Let the rings go on."""
-    memory = ride(site, memory, view, told_of(site, memory, view))
-    mode: Mode = "preempt" if groups_of(view.asked, "preempt") else "adaptive"
-    return memory, Answer(named(site, rings.wishes(memory.rings)), mode=mode)
+    memory = ride(site, memory, view, inputs_of(site, memory, view))
+    mode: Mode = "preempt" if groups_of(view.overrides, "preempt") else "adaptive"
+    return memory, Answer(named(site, rings.requested(memory.rings)), mode=mode)
 
 
-def ride(site: Site, memory: Memory, view: JunctionView, told: Told) -> Memory:
+def ride(site: Site, memory: Memory, view: JunctionView, ring_inputs: RingInputs) -> Memory:
     """Return the memory a step later."""
     green = rings.green_in(view.state)
     layout = site.layout
-    if not told.sees:
+    if not ring_inputs.sees:
         blind = tuple(phase._replace(recall=Recall.MAX) for phase in layout.phases)
         layout = layout._replace(phases=blind)
-    after = rings.step(layout, memory.rings, told.inputs, green, view.dt_ns)
+    after = rings.step(layout, memory.rings, ring_inputs.inputs, green, view.dt_ns)
     waits = tuple(
         0 if i in green else wait + view.dt_ns for i, wait in enumerate(memory.not_green_ns)
     )
     return Memory(after, waits)
 
 
-def told_of(site: Site, memory: Memory, view: JunctionView) -> Told:
+def inputs_of(site: Site, memory: Memory, view: JunctionView) -> RingInputs:
     """Return what detectors and operators tell the rings."""
     groups = site.program.groups
     calls = {i for i, wait in enumerate(memory.not_green_ns) if wait >= UNSEEN_NS}
@@ -79,16 +84,16 @@ def told_of(site: Site, memory: Memory, view: JunctionView) -> Told:
             calls.add(i)
         if detector.queue > LONG_QUEUE:
             long.add(i)
-    preempt = sorted(numbers(site, groups_of(view.asked, "preempt")))
+    preempt = sorted(numbers(site, groups_of(view.overrides, "preempt")))
     inputs = Inputs(
-        calls=frozenset(calls) | numbers(site, groups_of(view.asked, "call")),
-        hold=numbers(site, groups_of(view.asked, "hold")),
-        force_off=numbers(site, groups_of(view.asked, "force_off")),
-        omit=numbers(site, groups_of(view.asked, "omit")),
+        calls=frozenset(calls) | numbers(site, groups_of(view.overrides, "call")),
+        hold=numbers(site, groups_of(view.overrides, "hold")),
+        force_off=numbers(site, groups_of(view.overrides, "force_off")),
+        omit=numbers(site, groups_of(view.overrides, "omit")),
         preempt=preempt[0] if preempt else None,
         max2=frozenset(long),
     )
-    return Told(inputs, view.sees)
+    return RingInputs(inputs, view.sees)
 
 
 def numbers(site: Site, groups: frozenset[str]) -> frozenset[int]:
@@ -98,9 +103,9 @@ def numbers(site: Site, groups: frozenset[str]) -> frozenset[int]:
 
 def foresee(site: Site, memory: Memory, view: JunctionView) -> tuple[Turn, ...]:
     """Return the turns of the rings as they are called now; wishes of people end it."""
-    if any(one.verb in NEED_RINGS for one in view.asked):
+    if any(one.verb in NEED_RINGS for one in view.overrides):
         return ()
-    inputs = told_of(site, memory, view).inputs
+    inputs = inputs_of(site, memory, view).inputs
     layout, state = site.layout, memory.rings
     called = inputs.calls if view.sees else frozenset(range(len(layout.phases)))
     left_s = {
@@ -130,12 +135,12 @@ def _left_s(site: Site, ring: Ring, inputs: Inputs, view: JunctionView) -> float
     over_s = (most_ns - ring.waited) / NS_PER_S
     least_s = (times.min_green - ring.green) / NS_PER_S
     if not view.sees:
-        return max(least_s, over_s) + PROMISED_S
+        return max(least_s, over_s) + GUARANTEED_S
     from_s, passage_s = max(0.0, least_s), times.passage / NS_PER_S
     until_s = worth_until_s(site, ring.phase, view, from_s)
     is_alone = until_s == from_s  # the gap runs already
     gap_s = (times.passage - ring.gap) / NS_PER_S if is_alone else until_s + passage_s
-    return max(from_s, min(gap_s, over_s)) + PROMISED_S
+    return max(from_s, min(gap_s, over_s)) + GUARANTEED_S
 
 
 def _green_s(site: Site, phase: int, view: JunctionView) -> float:
@@ -144,8 +149,8 @@ def _green_s(site: Site, phase: int, view: JunctionView) -> float:
     detector = view.detectors.get(site.program.groups[phase])
     if not view.sees or detector is None:
         return (times.max1 + AHEAD_NS) / NS_PER_S
-    wished_s = min(green_s(site, phase, detector), times.max1 / NS_PER_S)
-    return max(wished_s, times.min_green / NS_PER_S + PROMISED_S)
+    needed_s = min(green_s(site, phase, detector), times.max1 / NS_PER_S)
+    return max(needed_s, times.min_green / NS_PER_S + GUARANTEED_S)
 
 
 def named(site: Site, phases: frozenset[int]) -> frozenset[str]:

@@ -63,7 +63,7 @@ def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer
     """
     if site.learned is None:
         raise PlanError("no callable was named: start with --learned module:function")
-    wished = _checked(site, site.learned(LearnedView(site, view)))
+    requested = _checked(site, site.learned(LearnedView(site, view)))
     waits = tuple(
         wait + view.dt_ns if _waits(view, i, name) else 0
         for i, (name, wait) in enumerate(zip(site.program.groups, memory, strict=True))
@@ -71,7 +71,7 @@ def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer
     if max(waits) > STARVED_NS:
         late = site.program.groups[waits.index(max(waits))]
         raise PlanError(f"group {late!r} is called and got no green for {STARVED_NS / 1e9:g} s")
-    return waits, Answer(wished)
+    return waits, Answer(requested)
 
 
 def _waits(view: JunctionView, number: int, name: str) -> bool:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 from scm.clock import NS_PER_S
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.green_extension import (
-    PROMISED_S,
+    GUARANTEED_S,
     coming,
     green_s,
     is_worth_waiting,
@@ -71,13 +71,17 @@ def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer
         stage = _choose(site, stage, view, called, waits)
     if stage != memory.stage:
         green_ns = 0
-    mode: Mode = "preempt" if groups_of(view.asked, "preempt") else "adaptive"
+    mode: Mode = "preempt" if groups_of(view.overrides, "preempt") else "adaptive"
     return Memory(stage, green_ns, waits), Answer(stage, mode=mode)
 
 
 def _goes_on(site: Site, memory: Memory, view: JunctionView, green_ns: int) -> bool:
     """Return whether ending the stage costs its cars more than the others gain, up to max 1."""
-    if not view.sees or groups_of(view.asked, "preempt") or groups_of(view.asked, "force_off"):
+    if (
+        not view.sees
+        or groups_of(view.overrides, "preempt")
+        or groups_of(view.overrides, "force_off")
+    ):
         return False
     numbers = [site.program.groups.index(name) for name in memory.stage if name in view.detectors]
     most_ns = max((site.layout.phases[i].max1 for i in numbers), default=0)
@@ -86,7 +90,7 @@ def _goes_on(site: Site, memory: Memory, view: JunctionView, green_ns: int) -> b
 
 def foresee(site: Site, memory: Memory, view: JunctionView) -> tuple[Turn, ...]:
     """Return what is left of the present stage, and which one follows by the pressure then."""
-    if any(one.verb in NEED_RINGS for one in view.asked) or not view.sees or not memory.stage:
+    if any(one.verb in NEED_RINGS for one in view.overrides) or not view.sees or not memory.stage:
         return ()
     numbers = [site.program.groups.index(name) for name in memory.stage]
     is_green = all(view.state[i].phase is Phase.GREEN for i in numbers)
@@ -96,10 +100,10 @@ def foresee(site: Site, memory: Memory, view: JunctionView) -> tuple[Turn, ...]:
         spent_s = memory.green_ns / NS_PER_S
         from_s = max(0.0, least_s - spent_s)
         until_s = max(worth_until_s(site, i, view, from_s) for i in numbers)
-        left_s = max(from_s, min(until_s, most_s - spent_s)) + PROMISED_S
+        left_s = max(from_s, min(until_s, most_s - spent_s)) + GUARANTEED_S
     else:
-        takes_s = max(green_s(site, i, view.detectors[site.program.groups[i]]) for i in numbers)
-        left_s = max(least_s + PROMISED_S, min(takes_s, most_s))
+        clearing_s = max(green_s(site, i, view.detectors[site.program.groups[i]]) for i in numbers)
+        left_s = max(least_s + GUARANTEED_S, min(clearing_s, most_s))
     gone = {name: _later(site, view.detectors[name], left_s) for name in memory.stage}
     then = replace(view, detectors={**view.detectors, **gone})
     following = _choose(site, memory.stage, then, _called(site, memory, then), memory.waits_ns)
@@ -128,8 +132,8 @@ def stages_of(program: Program) -> list[frozenset[str]]:
 
 
 def _called(site: Site, memory: Memory, view: JunctionView) -> frozenset[str]:
-    omitted = groups_of(view.asked, "omit")
-    called = set(groups_of(view.asked, "call") | groups_of(view.asked, "preempt"))
+    omitted = groups_of(view.overrides, "omit")
+    called = set(groups_of(view.overrides, "call") | groups_of(view.overrides, "preempt"))
     for name in site.program.groups:
         detector = view.detectors.get(name)
         if not view.sees or (detector is not None and detector.call):
@@ -145,21 +149,21 @@ def _choose(
     waits: tuple[int, ...],
 ) -> frozenset[str]:
     """Return the stage to be green now."""
-    preempt = groups_of(view.asked, "preempt")
-    if groups_of(view.asked, "hold") & now and not preempt:
+    preempt = groups_of(view.overrides, "preempt")
+    if groups_of(view.overrides, "hold") & now and not preempt:
         return now
     candidates = [s for s in stages_of(site.program) if s & called]
     must = preempt or _starved(site, waits)
     candidates = [s for s in candidates if s & must] or candidates
     if not candidates:
         return now
-    forced = groups_of(view.asked, "force_off") & now
+    forced = groups_of(view.overrides, "force_off") & now
     best = max(candidates, key=lambda stage: _pressure(stage, view, called))
     better = _pressure(best, view, called) - _pressure(now, view, called)
     is_idle = not now & called
     if not (must or forced or is_idle) and better < SWITCH_AT:
         return now
-    return best - groups_of(view.asked, "omit")
+    return best - groups_of(view.overrides, "omit")
 
 
 def _starved(site: Site, waits: tuple[int, ...]) -> frozenset[str]:

@@ -20,7 +20,7 @@ from scm.traffic.signals import rings
 from scm.traffic.signals.kernel import Phase
 from scm.traffic.signals.operator_overrides import groups_of
 from scm.traffic.signals.policies import actuated
-from scm.traffic.signals.policies.actuated import Told, named, numbers, told_of
+from scm.traffic.signals.policies.actuated import RingInputs, inputs_of, named, numbers
 from scm.traffic.signals.policy import (
     Answer,
     JunctionView,
@@ -51,21 +51,21 @@ def start(site: Site) -> Memory:
 
 def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer]:
     """Let the rings go on, told of those who ask."""
-    told = told_of(site, memory.actuated, view)
+    ring_inputs = inputs_of(site, memory.actuated, view)
     near = [one for one in view.priority if _is_due(one, view.now_ns)]
     urgent = _of_role(near, "emergency", site)
     preempt = urgent[0].group if urgent else None
-    if preempt and not groups_of(view.asked, "preempt"):
+    if preempt and not groups_of(view.overrides, "preempt"):
         (phase,) = numbers(site, frozenset((preempt,)))
-        told = Told(told.inputs._replace(preempt=phase), told.sees)
+        ring_inputs = RingInputs(ring_inputs.inputs._replace(preempt=phase), ring_inputs.sees)
     elif not urgent:
-        told = _helped(site, memory, view, told, _of_role(near, "transit", site))
-    after = actuated.ride(site, memory.actuated, view, told)
-    wished = named(site, rings.wishes(after.rings))
-    status = {one.key: _status(one, site, view, wished, preempt) for one in view.priority}
-    is_preempted = told.inputs.preempt is not None
+        ring_inputs = _helped(site, memory, view, ring_inputs, _of_role(near, "transit", site))
+    after = actuated.ride(site, memory.actuated, view, ring_inputs)
+    requested = named(site, rings.requested(after.rings))
+    status = {one.key: _status(one, site, view, requested, preempt) for one in view.priority}
+    is_preempted = ring_inputs.inputs.preempt is not None
     mode: Mode = "preempt" if is_preempted else "priority" if near else "adaptive"
-    return Memory(after, _count(site, memory, view, near)), Answer(wished, status, mode)
+    return Memory(after, _count(site, memory, view, near)), Answer(requested, status, mode)
 
 
 def foresee(site: Site, memory: Memory, view: JunctionView) -> tuple[Turn, ...]:
@@ -84,24 +84,28 @@ def _of_role(near: Iterable[PriorityCall], role: str, site: Site) -> list[Priori
 
 
 def _helped(
-    site: Site, memory: Memory, view: JunctionView, told: Told, transit: list[PriorityCall]
-) -> Told:
+    site: Site,
+    memory: Memory,
+    view: JunctionView,
+    ring_inputs: RingInputs,
+    transit: list[PriorityCall],
+) -> RingInputs:
     """Return what the rings are told with green extensions and early greens in it."""
     wanted = numbers(site, frozenset(one.group for one in transit))
     green = rings.green_in(view.state)
     extended = {i for i in wanted & green if memory.helped_ns[i] < EXTEND_NS}
-    rivals = {
+    conflicting = {
         i
         for i in green - wanted
         for red in wanted - green
         if frozenset((site.program.groups[i], site.program.groups[red])) in site.program.conflicts
     }
-    inputs = told.inputs._replace(
-        calls=told.inputs.calls | wanted,
-        hold=told.inputs.hold | extended,
-        force_off=(told.inputs.force_off | rivals) - extended,
+    inputs = ring_inputs.inputs._replace(
+        calls=ring_inputs.inputs.calls | wanted,
+        hold=ring_inputs.inputs.hold | extended,
+        force_off=(ring_inputs.inputs.force_off | conflicting) - extended,
     )
-    return Told(inputs, told.sees)
+    return RingInputs(inputs, ring_inputs.sees)
 
 
 def _count(
@@ -118,7 +122,11 @@ def _count(
 
 
 def _status(
-    one: PriorityCall, site: Site, view: JunctionView, wished: frozenset[str], preempt: str | None
+    one: PriorityCall,
+    site: Site,
+    view: JunctionView,
+    requested: frozenset[str],
+    preempt: str | None,
 ) -> Status:
     if one.group not in site.program.groups or one.role not in ("emergency", "transit"):
         return "rejected"
@@ -126,7 +134,7 @@ def _status(
         return "requested"
     is_green = view.state[site.program.groups.index(one.group)].phase is Phase.GREEN
     is_first = preempt is None or one.group == preempt
-    return "granted" if is_green and one.group in wished and is_first else "processing"
+    return "granted" if is_green and one.group in requested and is_first else "processing"
 
 
 POLICY = Policy(

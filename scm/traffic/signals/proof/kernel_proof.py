@@ -28,7 +28,7 @@ class Kernel(Protocol):
         self,
         program: Program,
         state: State,
-        wishes: Collection[str],
+        requested: Collection[str],
         dt: int,
         *,
         flash: bool = False,
@@ -93,14 +93,14 @@ def _walk(kernel: Kernel, program: Program, dts: Sequence[int]) -> Walked:
     todo: list[tuple[State, Memory]] = [(first, first_memory(first))]
     seen, transitions = set(todo), 0
     sizes = range(len(program.groups) + 1)
-    wishes = [frozenset(w) for w in chain(*(combinations(program.groups, n) for n in sizes))]
-    moves = [(wish, dt, False) for wish in wishes for dt in dts]
+    subsets = [frozenset(w) for w in chain(*(combinations(program.groups, n) for n in sizes))]
+    moves = [(requested, dt, False) for requested in subsets for dt in dts]
     moves.append((frozenset(), dts[0], True))
     while todo:
         state, memory = todo.pop()
-        for wish, dt, flash in moves:
-            after = kernel.step(program, state, wish, dt, flash=flash)
-            node = after, watch(program, memory, after, wish, dt)
+        for requested, dt, flash in moves:
+            after = kernel.step(program, state, requested, dt, flash=flash)
+            node = after, watch(program, memory, after, requested, dt)
             if flash and any(seen.colour != "flash" for seen in node[1]):
                 raise PlanError("unsafe: flash is asked for and not shown")
             transitions += 1
@@ -125,13 +125,13 @@ def _shown(phase: Phase) -> str:
 
 
 def watch(
-    program: Program, memory: Memory, state: State, wishes: Collection[str], dt: int
+    program: Program, memory: Memory, state: State, requested: Collection[str], dt: int
 ) -> Memory:
     """Return the observer's memory after a step that it finds no fault with."""
     after = [_look(before, _of(group), dt) for before, group in zip(memory, state, strict=True)]
     for index, before in enumerate(memory):
         if after[index].colour != before.colour:
-            _judge(program, index, before, after, wishes, before.age + dt)
+            _judge(program, index, before, after, requested, before.age + dt)
     return tuple(map(_forget, after, program.times))
 
 
@@ -157,7 +157,7 @@ def _judge(
     index: int,
     before: _Seen,
     after: Sequence[_Seen],
-    wishes: Collection[str],
+    requested: Collection[str],
     shown: int,
 ) -> None:
     name, times, colour = program.groups[index], program.times[index], after[index].colour
@@ -168,7 +168,7 @@ def _judge(
         case ("yellow", "red") if shown < times.yellow:
             wrong = f"yellow for {shown}"
         case ("red", "green"):
-            wrong = _wrong_start(program, name, after) if name in wishes else "green unwished"
+            wrong = _wrong_start(program, name, after) if name in requested else "green unwished"
         case _ if colour not in _MAY_FOLLOW[before.colour]:
             wrong = f"{colour} after {before.colour}"
     if wrong:
@@ -187,7 +187,7 @@ def _wrong_start(program: Program, name: str, after: Sequence[_Seen]) -> str:
 
 def _must_serve(kernel: Kernel, program: Program, states: Collection[State], index: int) -> None:
     """Go on from each state under one wish until its green, or where that is known to come."""
-    wish = {program.groups[index]}
+    requested = {program.groups[index]}
     longest = 2 * sum(map(sum, program.times)) + 10
     served = {state for state in states if _of(state[index]) == "green"}
     for begun in states:
@@ -196,5 +196,5 @@ def _must_serve(kernel: Kernel, program: Program, states: Collection[State], ind
             if state in way or len(way) > longest:
                 raise PlanError(f"unsafe: group {program.groups[index]!r} is never served")
             way.add(state)
-            state = kernel.step(program, state, wish, 1)
+            state = kernel.step(program, state, requested, 1)
         served |= way

@@ -50,8 +50,8 @@ def check_table(table: Timetable, program: Program) -> None:
     for cycle in range(2):
         shown = set[str]()
         for at_ns in range(0, table.length_ns, STEP_NS):
-            wishes = table.wishes(at_ns, table.into(table))
-            state = kernel.step(program, state, wishes, STEP_NS)
+            requested = table.requested(at_ns, table.into(table))
+            state = kernel.step(program, state, requested, STEP_NS)
             shown |= _green(program, state)
         if cycle and shown != set(program.groups):
             late = sorted(set(program.groups) - shown)
@@ -64,10 +64,12 @@ def _check_policy(name: str, program: Program) -> None:
     if policy.is_timed or policy.is_flash or name == "learned":
         return
     for called in (frozenset(program.groups), *(frozenset((one,)) for one in program.groups)):
-        check_serves(name, policy, program, called)
+        check_called_groups_are_served(name, policy, program, called)
 
 
-def check_serves(name: str, policy: Policy, program: Program, called: frozenset[str]) -> None:
+def check_called_groups_are_served(
+    name: str, policy: Policy, program: Program, called: frozenset[str]
+) -> None:
     """Run a policy over the kernel while these groups are called all the time.
 
     Raises:

@@ -33,7 +33,7 @@ MANY_GROUPS = 5
 Numbers = frozenset[int]
 
 
-def prove_told(
+def prove_overrides(
     logic: RingLogic, program: Program, phases: tuple[PhaseTimes, ...], *, most: int = 99
 ) -> Served:
     """Walk through everything.
@@ -51,22 +51,22 @@ def prove_told(
     letters = _letters(program, most)
 
     @cache
-    def show(state: State, wished: Numbers) -> State:
-        return kernel.step(program, state, {program.groups[i] for i in wished}, 1)
+    def show(state: State, requested: Numbers) -> State:
+        return kernel.step(program, state, {program.groups[i] for i in requested}, 1)
 
-    def follow(node: Node, told: Inputs) -> Node:
+    def follow(node: Node, inputs: Inputs) -> Node:
         state, before = node
-        then = logic.step(layout, before, told, green_in(state), 1)
-        wished = logic.wishes(then)
-        _check_meaning(program, node, told, wished)
-        return show(state, wished), then
+        then = logic.step(layout, before, inputs, green_in(state), 1)
+        requested = logic.requested(then)
+        _check_meaning(program, node, inputs, requested)
+        return show(state, requested), then
 
     explored = explore((logic, program, layout), letters, follow)
     return _all_served(explored, letters, program, layout)
 
 
 @cache
-def check_shape(groups: int, conflicts: frozenset[tuple[int, int]]) -> Served | None:
+def check_ring_shape(groups: int, conflicts: frozenset[tuple[int, int]]) -> Served | None:
     """Prove the rings of a junction, told by its conflicts alone, with short times.
 
     Each wish names one group, and nobody, one, or all call. None: so many groups take too long.
@@ -78,7 +78,7 @@ def check_shape(groups: int, conflicts: frozenset[tuple[int, int]]) -> Served | 
         return None
     names = tuple(str(number) for number in range(groups))
     named = frozenset(frozenset((names[i], names[j])) for i, j in conflicts)
-    return prove_told(rings, *small_times(Program(names, (), named)), most=1)
+    return prove_overrides(rings, *small_times(Program(names, (), named)), most=1)
 
 
 def check_rings(junction: str, program: Program) -> None:
@@ -90,7 +90,7 @@ def check_rings(junction: str, program: Program) -> None:
     number = {name: at for at, name in enumerate(program.groups)}
     pairs = (sorted(number[name] for name in pair) for pair in program.conflicts)
     try:
-        check_shape(len(number), frozenset((pair[0], pair[1]) for pair in pairs))
+        check_ring_shape(len(number), frozenset((pair[0], pair[1]) for pair in pairs))
     except PlanError as wrong:
         raise PlanError(f"junction {junction}: rings of {program.groups}: {wrong}") from wrong
 
@@ -107,7 +107,7 @@ def _letters(program: Program, most: int) -> list[Inputs]:
     some = _sets(everyone, 1, most)
     holds = [held for held in some if not any(_clash(program, i, j) for i in held for j in held)]
     omits = [left for left in some if len(left) < len(everyone)]
-    wishes = [
+    requested = [
         Inputs(),
         Inputs(max2=frozenset(everyone)),
         *(Inputs(hold=held) for held in holds),
@@ -116,37 +116,39 @@ def _letters(program: Program, most: int) -> list[Inputs]:
         *(Inputs(preempt=phase) for phase in everyone),
     ]
     calls = dict.fromkeys([*_sets(everyone, 0, most), frozenset(everyone)])
-    return [wish._replace(calls=called) for called in calls for wish in wishes]
+    return [each._replace(calls=called) for called in calls for each in requested]
 
 
 def _clash(program: Program, one: int, other: int) -> bool:
     return frozenset((program.groups[one], program.groups[other])) in program.conflicts
 
 
-def _check_meaning(program: Program, before: Node, told: Inputs, wished: Numbers) -> None:
+def _check_meaning(program: Program, before: Node, inputs: Inputs, requested: Numbers) -> None:
     """Refuse wishes that lost their meaning.
 
     Raises:
         PlanError: saying which.
     """
     green = green_in(before[0])
-    was_wished = rings.wishes(before[1])
-    clash = next(((i, j) for i, j in combinations(sorted(wished), 2) if _clash(program, i, j)), ())
+    was_requested = rings.requested(before[1])
+    clash = next(
+        ((i, j) for i, j in combinations(sorted(requested), 2) if _clash(program, i, j)), ()
+    )
     if clash:
-        wrong, said = set(clash), "and another in conflict are wished for at once"
-    elif told.preempt is not None and told.preempt not in wished:
-        wrong, said = {told.preempt}, "pre-empts and is not wished for"
-    elif told.calls - told.omit and not wished:
-        wrong, said = set(told.calls - told.omit), "is called, and nobody is wished for"
-    elif told.preempt is None and told.hold & green & was_wished - wished:
-        wrong, said = set(told.hold - wished), "is held and no longer wished for"
-    elif told.preempt is None and told.omit & wished - green:
-        wrong, said = set(told.omit & wished - green), "is omitted and wished for"
+        wrong, problem = set(clash), "and another in conflict are wished for at once"
+    elif inputs.preempt is not None and inputs.preempt not in requested:
+        wrong, problem = {inputs.preempt}, "pre-empts and is not wished for"
+    elif inputs.calls - inputs.omit and not requested:
+        wrong, problem = set(inputs.calls - inputs.omit), "is called, and nobody is wished for"
+    elif inputs.preempt is None and inputs.hold & green & was_requested - requested:
+        wrong, problem = set(inputs.hold - requested), "is held and no longer wished for"
+    elif inputs.preempt is None and inputs.omit & requested - green:
+        wrong, problem = set(inputs.omit & requested - green), "is omitted and wished for"
     else:
-        called = told.calls | was_wished | {told.preempt}
-        wrong, said = set(wished - called), "is wished for, and nobody called it"
+        called = inputs.calls | was_requested | {inputs.preempt}
+        wrong, problem = set(requested - called), "is wished for, and nobody called it"
     if wrong:
-        raise PlanError(f"unsafe: group {program.groups[min(wrong)]!r} {said}")
+        raise PlanError(f"unsafe: group {program.groups[min(wrong)]!r} {problem}")
 
 
 def _all_served(
@@ -156,11 +158,11 @@ def _all_served(
     for phase in range(len(program.groups)):
         waiting = [
             number
-            for number, told in enumerate(letters)
-            if phase in told.calls
-            and phase not in told.omit
-            and told.preempt in (None, phase)
-            and not told.hold & _in_the_way(program, layout, phase)
+            for number, inputs in enumerate(letters)
+            if phase in inputs.calls
+            and phase not in inputs.omit
+            and inputs.preempt in (None, phase)
+            and not inputs.hold & _in_the_way(program, layout, phase)
         ]
         worst.append(longest_wait(explored, phase, waiting, program))
     return Served(len(explored.nodes), len(explored.nodes) * len(letters), tuple(worst))

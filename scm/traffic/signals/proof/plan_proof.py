@@ -78,9 +78,9 @@ def prove_plan(kernel: Kernel, program: Program, table: Timetable) -> Proven:
     small = in_steps(program, STEP_NS)
     walked = prove(kernel, small)
     cleared = _all_come_to_rest(kernel, small, walked.states)
-    for slot in table.slots:
-        if slot.end_ns - slot.start_ns < LATEST * STEP_NS:
-            where = f"plan {table.plan!r}: stage {sorted(slot.groups)}"
+    for stage in table.timed_stages:
+        if stage.end_ns - stage.start_ns < LATEST * STEP_NS:
+            where = f"plan {table.plan!r}: stage {sorted(stage.groups)}"
             least_s = LATEST * STEP_NS / 1e9
             raise PlanError(f"{where}: too short for late steps, expected {least_s:g} s at least")
     nodes, transitions = _walk(kernel, small, table, cleared)
@@ -105,7 +105,7 @@ def _all_come_to_rest(kernel: Kernel, program: Program, states: frozenset[State]
 
 
 def _walk(kernel: Kernel, program: Program, table: Timetable, cleared: State) -> tuple[int, int]:
-    first, last = table.slots[0].groups, table.slots[-1].groups
+    first, last = table.timed_stages[0].groups, table.timed_stages[-1].groups
     rests = {
         green: _resting(kernel, program, cleared, green)
         for green in {*_some_of(first), *_some_of(last)}
@@ -120,10 +120,10 @@ def _walk(kernel: Kernel, program: Program, table: Timetable, cleared: State) ->
                 _check_end(kernel, program, table, node, dt, rests[node.going_on])
                 if not node.going_on <= first:
                     continue  # a cycle of another plan follows
-            wishes = table.wishes(at * STEP_NS, going_on)
-            state = kernel.step(program, node.state, wishes, dt)
-            after = _Node(at, state, watch(program, node.memory, state, wishes, dt), going_on)
-            _check_green(program, table, after, wishes)
+            requested = table.requested(at * STEP_NS, going_on)
+            state = kernel.step(program, node.state, requested, dt)
+            after = _Node(at, state, watch(program, node.memory, state, requested, dt), going_on)
+            _check_green(program, table, after, requested)
             transitions += 1
             if after not in seen:
                 seen.add(after)
@@ -147,16 +147,16 @@ def _resting(
     """Return what a cycle begins with, and what was seen of it: some green, all others clear."""
     longest = max(max(times) for times in program.times) + 1
     state, memory = cleared, first_memory(cleared)
-    for wishes in (frozenset[str](), green):
+    for requested in (frozenset[str](), green):
         for _ in range(longest):
-            state = kernel.step(program, state, wishes, 1)
-            memory = watch(program, memory, state, wishes, 1)
+            state = kernel.step(program, state, requested, 1)
+            memory = watch(program, memory, state, requested, 1)
     return state, memory
 
 
 def _onward(table: Timetable, node: _Node) -> Iterator[tuple[int, int, frozenset[str]]]:
     """Yield each next step: how long it takes, where it leads to, and who goes on from there."""
-    length, last = table.length_ns // STEP_NS, table.slots[-1]
+    length, last = table.length_ns // STEP_NS, table.timed_stages[-1]
     for dt in range(1, LATEST + 1):
         at = node.at + dt
         if at >= length:
@@ -183,10 +183,12 @@ def _check_end(
         raise PlanError(msg)
 
 
-def _check_green(program: Program, table: Timetable, node: _Node, wishes: frozenset[str]) -> None:
+def _check_green(
+    program: Program, table: Timetable, node: _Node, requested: frozenset[str]
+) -> None:
     """Refuse a wished group that is not green."""
     for name, group in zip(program.groups, node.state, strict=True):
-        if name in wishes and group.phase is not Phase.GREEN:
+        if name in requested and group.phase is not Phase.GREEN:
             at_s = node.at * STEP_NS / 1e9
             msg = f"group {name!r} is {group.phase.value} at {at_s:g} s, where its green should be"
             raise PlanError(f"plan {table.plan!r}: {msg}")

@@ -1,8 +1,8 @@
-"""Random wishes for thousands of junctions at once: the kernel as arrays, and a judge that counts.
+"""Random requests for thousands of junctions at once: the kernel as arrays, and an observer.
 
-`Flood` is a transcription of the kernel's step; `differences` proves it equal to the kernel state
-by state, so what holds in a hundred million steps of the one holds for the other. The judge sees
-colours alone: two groups in conflict that go at once, or a start before the others' clearance.
+`KernelArrays` transcribes the kernel's step; `differences` proves it equal to the kernel state by
+state, so a hundred million steps of the one count for the other. The observer sees colours alone:
+two conflicting groups that go at once, or a start before the others' clearance.
 """
 
 from collections.abc import Iterable
@@ -31,7 +31,7 @@ class Judged(NamedTuple):
     short_clearances: int
 
 
-class Flood:
+class KernelArrays:
     """So many junctions of one program; times in steps.
 
     Attributes:
@@ -45,7 +45,7 @@ class Flood:
         self.elapsed = np.zeros(shape, np.int16)
         self._times = program.times
         numbers = range(len(program.groups))
-        self.rivals = [
+        self.conflicting = [
             [
                 j
                 for j in numbers
@@ -54,13 +54,13 @@ class Flood:
             for i in numbers
         ]
 
-    def step(self, wished: Flags, flash: Flags, dt: int = 1) -> None:
-        """Go on; `wished` is (groups, junctions), `flash` is (junctions,)."""
+    def step(self, requested: Flags, flash: Flags, dt: int = 1) -> None:
+        """Go on; `requested` is (groups, junctions), `flash` is (junctions,)."""
         for i, times in enumerate(self._times):
-            self._advance(self.phase[i], self.elapsed[i], times, wished[i], dt)
+            self._advance(self.phase[i], self.elapsed[i], times, requested[i], dt)
         for i in range(len(self._times)):
-            free = (self.phase[i] == RED) & wished[i]
-            for j in self.rivals[i]:
+            free = (self.phase[i] == RED) & requested[i]
+            for j in self.conflicting[i]:
                 free &= (self.phase[j] == RED) | (self.phase[j] == FLASH)
             self.phase[i][free] = GREEN
         self.phase[:, flash] = FLASH
@@ -68,15 +68,15 @@ class Flood:
 
     @staticmethod
     def _advance(
-        phase: Array, elapsed: Array, times: kernel.GroupTimes, wished: Flags, dt: int
+        phase: Array, elapsed: Array, times: kernel.GroupTimes, requested: Flags, dt: int
     ) -> None:
         """Advance one group of all junctions in place."""
         elapsed += np.int16(dt)
         green, yellow = phase == GREEN, phase == YELLOW
         clearance, flash = phase == CLEARANCE, phase == FLASH
         is_over = green & (elapsed >= times.min_green)
-        stays = is_over & wished
-        to_yellow = is_over & ~wished
+        stays = is_over & requested
+        to_yellow = is_over & ~requested
         to_clearance = (yellow & (elapsed >= times.yellow)) | flash
         to_red = clearance & (elapsed >= times.clearance)
         phase[to_yellow] = YELLOW
@@ -87,57 +87,57 @@ class Flood:
 
 
 def differences(program: Program, states: Iterable[State], dts: Iterable[int] = (1,)) -> int:
-    """Return in how many of (states x wishes x step lengths) arrays and kernel differ."""
+    """Return in how many of (states x requests x step lengths) arrays and kernel differ."""
     found = list(states)
     sizes = range(len(program.groups) + 1)
     sets = list(chain(*(combinations(program.groups, n) for n in sizes)))
     wrong = 0
     for dt in dts:
-        for wishes in sets:
+        for requested in sets:
             for flash in (False, True):
-                wrong += _differ(program, found, wishes, dt, flash=flash)
+                wrong += _differ(program, found, requested, dt, flash=flash)
     return wrong
 
 
 def _differ(
-    program: Program, states: list[State], wishes: tuple[str, ...], dt: int, *, flash: bool
+    program: Program, states: list[State], requested: tuple[str, ...], dt: int, *, flash: bool
 ) -> int:
-    flood = Flood(program, len(states))
-    flood.phase[:] = np.array([[PHASES.index(g.phase) for g in state] for state in states]).T
-    flood.elapsed[:] = np.array([[g.elapsed for g in state] for state in states]).T
-    wished = np.array([[name in wishes] * len(states) for name in program.groups])
-    flood.step(wished, np.full(len(states), flash), dt)
+    arrays = KernelArrays(program, len(states))
+    arrays.phase[:] = np.array([[PHASES.index(g.phase) for g in state] for state in states]).T
+    arrays.elapsed[:] = np.array([[g.elapsed for g in state] for state in states]).T
+    flags = np.array([[name in requested] * len(states) for name in program.groups])
+    arrays.step(flags, np.full(len(states), flash), dt)
     wrong = 0
     for k, state in enumerate(states):
         got = tuple(
             GroupState(PHASES[int(p)], int(e))
-            for p, e in zip(flood.phase[:, k], flood.elapsed[:, k], strict=True)
+            for p, e in zip(arrays.phase[:, k], arrays.elapsed[:, k], strict=True)
         )
-        wrong += got != kernel.step(program, state, wishes, dt, flash=flash)
+        wrong += got != kernel.step(program, state, requested, dt, flash=flash)
     return wrong
 
 
-def flood(program: Program, junctions: int, steps: int, seed: int) -> Judged:
-    """Wish at random, in bursts of random length, and judge every step.
+def run_random_requests(program: Program, junctions: int, steps: int, seed: int) -> Judged:
+    """Request at random, in bursts of random length, and check every step.
 
     Args:
         program: Of the junction, times in steps.
         junctions: Beside each other.
         steps: Of each.
-        seed: Of the wishes.
+        seed: Of the requests.
     """
     dice = np.random.default_rng(seed)
-    city = Flood(program, junctions)
+    city = KernelArrays(program, junctions)
     shape = city.phase.shape
-    wished = np.zeros(shape, np.bool_)
+    requested = np.zeros(shape, np.bool_)
     quiet = np.zeros(shape, np.int16)
     was_green = np.zeros(shape, np.bool_)
     greens = conflicts = short = 0
     for _ in range(steps):
         changes = dice.integers(0, 256, shape, np.uint8) < 16
-        wished ^= changes
+        requested ^= changes
         flash = dice.integers(0, 4096, junctions, np.uint16) == 0
-        city.step(wished, flash)
+        city.step(requested, flash)
         going = (city.phase == GREEN) | (city.phase == YELLOW)
         quiet += 1
         quiet[going | (city.phase == FLASH)] = 0
@@ -145,8 +145,8 @@ def flood(program: Program, junctions: int, steps: int, seed: int) -> Judged:
         green = city.phase == GREEN
         begins = green & ~was_green
         greens += int(begins.sum())
-        for i, rivals in enumerate(city.rivals):
-            for j in rivals:
+        for i, conflicting in enumerate(city.conflicting):
+            for j in conflicting:
                 conflicts += int((going[i] & going[j]).sum()) if i < j else 0
                 least = program.times[j].clearance
                 short += int((begins[i] & (quiet[j] < least) & ~going[j]).sum())

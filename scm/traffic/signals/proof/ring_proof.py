@@ -30,12 +30,12 @@ class RingLogic(Protocol):
         """See `scm.traffic.signals.rings.start`."""
         ...
 
-    def wishes(self, state: Rings) -> frozenset[int]:
-        """See `scm.traffic.signals.rings.wishes`."""
+    def requested(self, state: Rings) -> frozenset[int]:
+        """See `scm.traffic.signals.rings.requested`."""
         ...
 
     def step(
-        self, layout: Layout, state: Rings, told: Inputs, green: frozenset[int], dt: int
+        self, layout: Layout, state: Rings, inputs: Inputs, green: frozenset[int], dt: int
     ) -> Rings:
         """See `scm.traffic.signals.rings.step`."""
         ...
@@ -86,13 +86,13 @@ def prove_service(
     everyone = frozenset(range(len(program.groups)))
     sets = [frozenset(c) for c in chain(*(combinations(everyone, n) for n in range(9)))]
 
-    def follow(node: Node, told: Inputs) -> Node:
-        return after(logic, program, layout, node, told)
+    def follow(node: Node, inputs: Inputs) -> Node:
+        return after(logic, program, layout, node, inputs)
 
     explored = explore((logic, program, layout), [Inputs(calls=calls) for calls in sets], follow)
     worst = []
     for phase in sorted(everyone):
-        waiting = [number for number, told in enumerate(sets) if phase in told]
+        waiting = [number for number, inputs in enumerate(sets) if phase in inputs]
         worst.append(longest_wait(explored, phase, waiting, program))
     if bound is not None and max(worst) > bound:
         late = program.groups[worst.index(max(worst))]
@@ -102,7 +102,7 @@ def prove_service(
 
 
 def after(
-    logic: RingLogic, program: Program, layout: Layout, node: Node, told: Inputs, dt: int = 1
+    logic: RingLogic, program: Program, layout: Layout, node: Node, inputs: Inputs, dt: int = 1
 ) -> Node:
     """Return kernel and rings a step later.
 
@@ -110,13 +110,13 @@ def after(
         PlanError: when the rings wish for two groups that conflict.
     """
     state, rings = node
-    rings = logic.step(layout, rings, told, green_in(state), dt)
-    wished = [program.groups[i] for i in logic.wishes(rings)]
-    clash = next((p for p in combinations(wished, 2) if frozenset(p) in program.conflicts), None)
+    rings = logic.step(layout, rings, inputs, green_in(state), dt)
+    requested = [program.groups[i] for i in logic.requested(rings)]
+    clash = next((p for p in combinations(requested, 2) if frozenset(p) in program.conflicts), None)
     if clash:
         msg = f"unsafe: the rings wish for {clash[0]!r} and {clash[1]!r} at once"
         raise PlanError(msg)
-    return kernel.step(program, state, wished, dt), rings
+    return kernel.step(program, state, requested, dt), rings
 
 
 def explore(
@@ -135,8 +135,8 @@ def explore(
     ways: list[tuple[int, ...]] = []
     for node in nodes:  # grows while it is walked through
         following = []
-        for told in letters:
-            then = follow(node, told)
+        for inputs in letters:
+            then = follow(node, inputs)
             if then not in number:
                 number[then] = len(nodes)
                 nodes.append(then)

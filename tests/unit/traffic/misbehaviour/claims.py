@@ -55,11 +55,11 @@ def body(told, length_m=0.3):
     return cam_of(told, length_m=length_m, width_m=0.175, front_m=FRONT_M)
 
 
-def hear(judge, told, station=None, receiver=RSU, sent_ns=None, lost_s=0.0, **options):
+def receive(judge, told, station=None, receiver=RSU, sent_ns=None, lost_s=0.0, **options):
     """Let a detector hear the CAM of a state."""
     sent = told.t_ns if sent_ns is None else sent_ns
     lost_ns = nanoseconds(lost_s)
-    return judge.hear(station or told.vehicle, receiver, sent, body(told, **options), lost_ns)
+    return judge.receive(station or told.vehicle, receiver, sent, body(told, **options), lost_ns)
 
 
 def track(told, vehicle=None, stale=False, std=0.003, age_s=0.0):

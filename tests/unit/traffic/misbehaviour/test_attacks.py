@@ -69,7 +69,7 @@ def lied(name, seed=1):
             air += send(frame)
         else:
             air.append((frame, False))
-        scene.heard.append(frame)
+        scene.received.append(frame)
     return sorted(air, key=lambda sent: sent[0].t_ns)
 
 
@@ -80,7 +80,7 @@ def reported(air, with_eye=True):
     for frame, _ in air:
         while tracks and tracks[-1].t_ns <= frame.t_ns:
             judge.see(tracks.pop())
-        judged = judge.hear(frame.station, RSU, frame.t_ns, frame.body)
+        judged = judge.receive(frame.station, RSU, frame.t_ns, frame.body)
         if judged is not None and judged.is_reported:
             found.add(frame.station)
     return found

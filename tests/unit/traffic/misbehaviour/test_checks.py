@@ -7,7 +7,15 @@ import pytest
 
 from scm.clock import NS_PER_S
 from scm.traffic.misbehaviour.check import load_checks
-from tests.unit.traffic.misbehaviour.claims import RSU, START_NS, body, detector, hear, state, track
+from tests.unit.traffic.misbehaviour.claims import (
+    RSU,
+    START_NS,
+    body,
+    detector,
+    receive,
+    state,
+    track,
+)
 
 CHECKS = {check.name: check for check in load_checks()}
 PERIOD_S = 0.5
@@ -28,8 +36,8 @@ def least(name, told, **options):
     judge = detector(CHECKS[name])
     found = [1.0]
     for one in told:
-        judged = hear(judge, one, **options)
-        found += [plausibility for _, plausibility in judged.doubts]
+        judged = receive(judge, one, **options)
+        found += [plausibility for _, plausibility in judged.findings]
     return min(found)
 
 
@@ -61,7 +69,7 @@ def test_no_check_doubts_a_car_that_drives_along_its_lane(name):
     judge = detector(CHECKS[name])
     for told in drive():
         judge.see(track(told))
-        assert hear(judge, told).doubts == []
+        assert receive(judge, told).findings == []
 
 
 def test_acceleration_must_be_that_of_the_speeds():
@@ -86,17 +94,17 @@ def test_who_brakes_while_nobody_hears_it_has_not_lied_about_the_way():
 @pytest.mark.parametrize("name", ["acceleration_plausibility", "acceleration_speed"])
 @pytest.mark.parametrize("witness", ["its claim", "the Eye", "a stale track"])
 def test_who_is_pushed_has_not_lied_about_his_acceleration(name, witness):
-    judge, doubts = detector(CHECKS[name]), []
+    judge, findings = detector(CHECKS[name]), []
     for k in range(8):
         beside = state(0.2 * k, 0.1 + 0.29, v=0.0, name="n2")
         if k >= 4:  # until then it stands alone, and presses against nothing
             if witness == "its claim":
-                hear(judge, beside)
+                receive(judge, beside)
             else:
                 judge.see(track(beside, stale=witness == "a stale track"))
-        doubts.append(hear(judge, state(0.2 * k, 0.1, v=0.0, a=1.14)).doubts)
-    assert any(doubts[:4])
-    assert not any(doubts[4:])
+        findings.append(receive(judge, state(0.2 * k, 0.1, v=0.0, a=1.14)).findings)
+    assert any(findings[:4])
+    assert not any(findings[4:])
 
 
 def test_cams_come_at_most_every_tenth_of_a_second():
@@ -111,59 +119,59 @@ def test_cams_of_a_car_that_stands_come_once_a_second():
 
 def test_a_cam_told_again_is_not_a_new_one():
     judge, told = detector(CHECKS["beacon_frequency"]), state(0.0, 0.1)
-    hear(judge, told)
-    again = hear(judge, told, sent_ns=told.t_ns + NS_PER_S // 2)
-    assert [plausibility for _, plausibility in again.doubts] == [pytest.approx(1e-9)]
+    receive(judge, told)
+    again = receive(judge, told, sent_ns=told.t_ns + NS_PER_S // 2)
+    assert [plausibility for _, plausibility in again.findings] == [pytest.approx(1e-9)]
 
 
 def test_two_cars_cannot_stand_in_each_other_and_the_newcomer_is_to_blame():
     judge = detector(CHECKS["intersection"])
-    hear(judge, state(0.0, 0.3, v=0.0))
-    hear(judge, state(2.0, 0.3, v=0.0))
-    ghost = hear(judge, state(2.1, 0.35, v=0.0, name="n2"))
-    honest = hear(judge, state(2.9, 0.3, v=0.0))
-    assert ghost.doubts
-    assert not honest.doubts
+    receive(judge, state(0.0, 0.3, v=0.0))
+    receive(judge, state(2.0, 0.3, v=0.0))
+    ghost = receive(judge, state(2.1, 0.35, v=0.0, name="n2"))
+    honest = receive(judge, state(2.9, 0.3, v=0.0))
+    assert ghost.findings
+    assert not honest.findings
 
 
 def test_two_cars_behind_each_other_do_not_overlap():
     judge = detector(CHECKS["intersection"])
-    hear(judge, state(0.0, 0.3, v=0.0))
-    assert hear(judge, state(0.1, 0.66, v=0.0, name="n2")).doubts == []
+    receive(judge, state(0.0, 0.3, v=0.0))
+    assert receive(judge, state(0.1, 0.66, v=0.0, name="n2")).findings == []
 
 
 def test_a_car_that_appears_amid_the_roads_is_odd_unless_cars_come_in_there():
     check = CHECKS["sudden_appearance"]
     judge = detector(check)
     for k in range(6):
-        hear(judge, state(1.0 * k, 0.3, v=0.0))
+        receive(judge, state(1.0 * k, 0.3, v=0.0))
     x, y = judge._ground.spawns[0]
     pose = state(5.0, 0.0, name="n2")
     there = msgspec.structs.replace(pose, x_m=x, y_m=y)
-    assert hear(judge, there).doubts == []
+    assert receive(judge, there).findings == []
     far = msgspec.structs.replace(pose, vehicle="n3", x_m=40.0, y_m=40.0)
-    assert hear(judge, far).doubts
+    assert receive(judge, far).findings
 
 
 def test_who_heard_nobody_for_seconds_cannot_say_who_has_suddenly_appeared():
     judge = detector(CHECKS["sudden_appearance"])
     for k in range(6):
-        hear(judge, state(1.0 * k, 0.3, v=0.0))
+        receive(judge, state(1.0 * k, 0.3, v=0.0))
     far = msgspec.structs.replace(state(8.0, 0.0, name="n3"), x_m=40.0, y_m=40.0)
-    assert hear(judge, far).doubts == []
+    assert receive(judge, far).findings == []
 
 
 def test_who_uses_another_number_than_its_own_is_found_by_its_key():
     judge = detector(CHECKS["identity"])
-    assert hear(judge, state(0.0, 0.3), station="n9").doubts
-    assert hear(judge, state(1.0, 0.3, name="n2")).doubts == []
+    assert receive(judge, state(0.0, 0.3), station="n9").findings
+    assert receive(judge, state(1.0, 0.3, name="n2")).findings == []
 
 
 def test_a_car_does_not_grow():
     judge = detector(CHECKS["static"])
-    hear(judge, state(0.0, 0.3))
-    assert hear(judge, state(0.5, 0.4), length_m=0.3).doubts == []
-    assert hear(judge, state(1.0, 0.5), length_m=0.5).doubts
+    receive(judge, state(0.0, 0.3))
+    assert receive(judge, state(0.5, 0.4), length_m=0.3).findings == []
+    assert receive(judge, state(1.0, 0.5), length_m=0.5).findings
 
 
 @pytest.mark.parametrize(
@@ -177,34 +185,34 @@ def test_a_car_does_not_grow():
 def test_the_eye_contradicts_what_it_sees_otherwise(name, lie):
     judge = detector(CHECKS[name])
     judge.see(track(state(1.0, 0.3)))
-    assert hear(judge, state(1.0, 0.3)).doubts == []
+    assert receive(judge, state(1.0, 0.3)).findings == []
     judge.see(track(state(2.0, 0.5)))
-    assert hear(judge, state(2.0, 0.5, **lie)).doubts
+    assert receive(judge, state(2.0, 0.5, **lie)).findings
 
 
 def test_an_unsure_eye_contradicts_nobody():
     judge = detector(CHECKS["eye_position"])
     judge.see(track(state(1.0, 0.3), std=0.5))
-    assert hear(judge, state(1.0, 0.3, shift=(0.2, 0.0))).doubts == []
+    assert receive(judge, state(1.0, 0.3, shift=(0.2, 0.0))).findings == []
 
 
 def test_a_stale_track_is_no_witness():
     judge = detector(CHECKS["eye_position"])
     judge.see(track(state(1.0, 0.3), stale=True))
-    assert hear(judge, state(1.0, 0.3, shift=(0.2, 0.0))).doubts == []
+    assert receive(judge, state(1.0, 0.3, shift=(0.2, 0.0))).findings == []
 
 
 def test_a_ghost_is_where_the_eye_sees_nobody():
     judge = detector(CHECKS["eye_missing"])
     judge.see(track(state(1.0, 0.9, name="n2")))
-    assert hear(judge, state(1.0, 0.1)).doubts
-    assert hear(judge, state(1.0, 0.9, name="n3")).doubts == []  # there somebody is
+    assert receive(judge, state(1.0, 0.1)).findings
+    assert receive(judge, state(1.0, 0.9, name="n3")).findings == []  # there somebody is
 
 
 def test_without_an_eye_that_works_nobody_is_missed():
     judge = detector(CHECKS["eye_missing"])
     judge.see(track(state(1.0, 0.9, name="n2")))
-    assert hear(judge, state(3.0, 0.1)).doubts == []
+    assert receive(judge, state(3.0, 0.1)).findings == []
 
 
 def test_a_lie_about_how_sure_one_is_does_not_help():
@@ -216,5 +224,5 @@ def test_a_lie_about_how_sure_one_is_does_not_help():
         place = msgspec.structs.replace(place, position_confidence_ellipse=ellipse)
         basic = msgspec.structs.replace(one.basic_container, reference_position=place)
         unsure = msgspec.structs.replace(one, basic_container=basic)
-        found += judge.hear("n1", RSU, START_NS + round(t_s * NS_PER_S), unsure).doubts
+        found += judge.receive("n1", RSU, START_NS + round(t_s * NS_PER_S), unsure).findings
     assert found

@@ -21,8 +21,8 @@ def detector():
     return Detector(ground(), lambda car: BARE if car == "bare" else Limits(), CHECKS)
 
 
-def hear(judge, told, sender):
-    return judge.hear(told.vehicle, RSU, told.t_ns, body(told), 0, sender)
+def receive(judge, told, sender):
+    return judge.receive(told.vehicle, RSU, told.t_ns, body(told), 0, sender)
 
 
 def drive(judge, sender, seconds=20, name="n1", shift=(0.0, 0.0), tag=None, v=0.0):
@@ -32,8 +32,8 @@ def drive(judge, sender, seconds=20, name="n1", shift=(0.0, 0.0), tag=None, v=0.
         told = state(0.1 * k, 0.1 + 0.002 * (k % 2), v=v, name=name, shift=shift)
         if tag is not None and tag(0.1 * k):
             judge.see(track(told))
-        found = hear(judge, told, sender)
-    return found.memory
+        found = receive(judge, told, sender)
+    return found.history
 
 
 def harder(judge, sender, hard_until_s=9.0, from_s=4.0):
@@ -46,27 +46,27 @@ def harder(judge, sender, hard_until_s=9.0, from_s=4.0):
         place += 0.05 * (speed + before)
         known = sender if t_s < hard_until_s else NIGEL
         told = state(t_s, place, v=speed, a=accel)
-        points = max(points, hear(judge, told, known).memory.score)
+        points = max(points, receive(judge, told, known).history.score)
     return points
 
 
 @pytest.mark.parametrize("car", ["nigel", "bare"])
 def test_a_car_of_the_city_whose_tag_the_eye_never_saw_is_not_suspected_but_said_to_be_unseen(car):
-    memory = drive(detector(), Sender(car), v=0.02)
-    assert "eye_missing" not in memory.noted
-    assert memory.is_tag_unseen
+    history = drive(detector(), Sender(car), v=0.02)
+    assert "eye_missing" not in history.noted
+    assert history.is_tag_unseen
 
 
 def test_a_ghost_is_still_one_where_the_city_knows_no_such_car():
-    memory = drive(detector(), Sender(), v=0.02)
-    assert "eye_missing" in memory.noted
-    assert not memory.is_tag_unseen
+    history = drive(detector(), Sender(), v=0.02)
+    assert "eye_missing" in history.noted
+    assert not history.is_tag_unseen
 
 
 def test_who_hides_his_tag_after_it_was_seen_is_missed():
-    memory = drive(detector(), NIGEL, tag=lambda t_s: t_s < 5.0, v=0.02)
-    assert "eye_missing" in memory.noted
-    assert not memory.is_tag_unseen
+    history = drive(detector(), NIGEL, tag=lambda t_s: t_s < 5.0, v=0.02)
+    assert "eye_missing" in history.noted
+    assert not history.is_tag_unseen
 
 
 def test_the_eye_that_sees_a_tag_says_nothing():
@@ -78,7 +78,7 @@ def test_a_newcomer_beside_the_road_has_seconds_of_grace_and_no_more():
         judge = detector()
         for k in range(100):
             told = state(0.1 * k, 0.1, v=0.0, shift=(-0.3, -0.6))
-            if hear(judge, told, sender).memory.since_ns is not None:
+            if receive(judge, told, sender).history.since_ns is not None:
                 return 0.1 * k
         return None
 
@@ -93,16 +93,16 @@ def against_its_lane(judge, sender, jumps=False):
         told = state(0.1 * k, 0.6 - 0.003 * k, v=0.03, turn=math.pi)
         if jumps and k == 99:
             told = state(0.1 * k, 0.1, v=0.03, turn=math.pi)
-        memory = hear(judge, told, sender).memory
-    return memory
+        history = receive(judge, told, sender).history
+    return history
 
 
 def test_who_cannot_be_seen_is_not_suspected_for_driving_badly_alone():
     """No Eye could speak for it, as it would for a car with a tag; a contradiction still counts."""
     assert against_its_lane(detector(), Sender()).since_ns is not None
-    memory = against_its_lane(detector(), NIGEL)
-    assert (memory.since_ns, memory.is_tag_unseen) == (None, True)
-    assert 2.0 < memory.score <= UNSEEN_MOST
+    history = against_its_lane(detector(), NIGEL)
+    assert (history.since_ns, history.is_tag_unseen) == (None, True)
+    assert 2.0 < history.score <= UNSEEN_MOST
     assert against_its_lane(detector(), NIGEL, jumps=True).since_ns is not None
 
 
@@ -113,8 +113,8 @@ def test_grace_hides_no_contradiction(name):
     for k in range(6):
         told = state(0.15 * k, 0.1, shift=(0.9 * (k % 2), 0.0))
         sent = body(told)
-        found = judge.hear(name, RSU, told.t_ns, sent, 0, NIGEL)
-    assert found.memory.since_ns is not None
+        found = judge.receive(name, RSU, told.t_ns, sent, 0, NIGEL)
+    assert found.history.since_ns is not None
 
 
 def test_hands_and_stops_move_a_car_as_no_driver_does():
@@ -136,9 +136,9 @@ def test_who_lies_by_hand_or_in_a_stop_is_found_all_the_same(sender, lie):
         told = state(0.1 * k, 0.1 + 0.02 * k)
         judge.see(track(told))
         said = told if k < 30 else state(0.1 * k, 0.1 + 0.02 * k, **lie)
-        memory = hear(judge, said, sender).memory
-    assert memory.since_ns is not None
-    assert memory.since_ns - told.t_ns > -3 * NS_PER_S
+        history = receive(judge, said, sender).history
+    assert history.since_ns is not None
+    assert history.since_ns - told.t_ns > -3 * NS_PER_S
 
 
 @pytest.mark.parametrize("touches", [True, False])
@@ -147,8 +147,8 @@ def test_who_scrapes_along_a_wall_tells_a_speed_that_is_no_way(touches):
     judge = detector()
     for k in range(80):
         told = state(0.1 * k, 0.1 + 0.003 * k, v=0.08)
-        memory = hear(judge, told, Sender("nigel", touches=touches)).memory
-    assert (memory.since_ns is None) == touches
+        history = receive(judge, told, Sender("nigel", touches=touches)).history
+    assert (history.since_ns is None) == touches
 
 
 def test_a_faster_car_is_judged_by_what_it_can_do():
@@ -156,8 +156,8 @@ def test_a_faster_car_is_judged_by_what_it_can_do():
     judge = Detector(ground(), lambda _car: fast, CHECKS)
     for k in range(9):
         told = state(0.1 * k, 0.05 + 0.1 * k, v=1.0)
-        found = hear(judge, told, Sender("fast"))
-    assert found.memory.score < 1.0
+        found = receive(judge, told, Sender("fast"))
+    assert found.history.score < 1.0
     assert fast.accel_mps2 == pytest.approx(9.0)
 
 
@@ -165,6 +165,6 @@ def test_a_faster_car_file_buys_no_leniency_at_the_speed_of_others():
     """What is excused goes by the speed that is driven, so a Nigel's lie is found in any car."""
     judge = Detector(ground(), lambda _car: limits_of(7.0, 0.767, has_tag=False), CHECKS)
     for k in range(60):
-        memory = hear(judge, state(0.1 * k, 0.05 + 0.01 * k, v=0.2), Sender("dart")).memory
-    assert memory.since_ns is not None
-    assert "position_speed_consistency" in memory.noted
+        history = receive(judge, state(0.1 * k, 0.05 + 0.01 * k, v=0.2), Sender("dart")).history
+    assert history.since_ns is not None
+    assert "position_speed_consistency" in history.noted

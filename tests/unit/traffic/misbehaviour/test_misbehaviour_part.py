@@ -72,7 +72,7 @@ def run_starved(attacks):
         reports = city.subscribe(Subscription(MisbehaviourReport))
         city.run_for(25.0)
         suspects = {item.message.suspect for item in reports.drain()}
-    return suspects, seconds(hosted.world.pace.lost_ns), parts[-1].detector.memories.values()
+    return suspects, seconds(hosted.world.pace.lost_ns), parts[-1].detector.histories.values()
 
 
 class Log(logging.Handler):
@@ -103,7 +103,7 @@ def lying():
     log, lines = Log(), []
     logging.getLogger().addHandler(log)
     try:
-        found = run({"n2": "zero_speed"}, say=lines.append)
+        found = run({"n2": "zero_speed"}, print_line=lines.append)
     finally:
         logging.getLogger().removeHandler(log)
     return Lying(*found, lines, log.texts)
@@ -166,16 +166,16 @@ def test_an_honest_city_is_left_in_peace():
 
 
 def test_in_a_city_that_is_too_slow_nobody_honest_is_suspected():
-    suspects, lost_s, memories = run_starved({})
+    suspects, lost_s, histories = run_starved({})
     assert lost_s > 5.0
     assert suspects == set()
-    assert {memory.station for memory in memories} == {"n1", "n2", "n3", "n4"}
+    assert {history.station for history in histories} == {"n1", "n2", "n3", "n4"}
 
 
 def test_in_a_city_that_is_too_slow_a_liar_is_still_found():
-    suspects, _, memories = run_starved({"n2": "zero_speed"})
+    suspects, _, histories = run_starved({"n2": "zero_speed"})
     assert suspects == {"n2"}
-    assert all(memory.newest.lost_ns > 0 for memory in memories), "also of who lies"
+    assert all(history.newest.lost_ns > 0 for history in histories), "also of who lies"
 
 
 def test_ghosts_under_the_attackers_key_are_known_by_their_numbers():
@@ -209,7 +209,8 @@ def test_a_car_that_joins_and_lies_is_a_station_of_its_own():
 
 def test_an_attack_that_nobody_finds_ends_without_a_report():
     lines = []
-    world = Attacker(WorldPart(MAP, 1, hosted=CARS), {"n2": "zero_speed"}, MAP, say=lines.append)
+    attacks = {"n2": "zero_speed"}
+    world = Attacker(WorldPart(MAP, 1, hosted=CARS), attacks, MAP, print_line=lines.append)
     with Lockstep([world, TrafficPart(MAP)], start_ns=START_NS) as city:
         city.subscribe(Subscription(CamTx))  # somebody listens, and judges nothing
         city.run_for(10.0)
@@ -218,7 +219,7 @@ def test_an_attack_that_nobody_finds_ends_without_a_report():
 
 def test_a_liar_that_was_never_let_in_said_nothing():
     lines = []
-    Attacker(AgentPart("n9"), {"n9": "zero_speed"}, MAP, say=lines.append).finish(START_NS)
+    Attacker(AgentPart("n9"), {"n9": "zero_speed"}, MAP, print_line=lines.append).finish(START_NS)
     assert lines == ["n9 leaves: it was never in the city"]
 
 

@@ -6,11 +6,11 @@ import pytest
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.records.city_map import Lane, Segment
-from scm.traffic.monitor.conflict_table import card_hash, card_of
+from scm.traffic.monitor.conflict_table import conflict_table_of, table_hash
 from scm.traffic.signals.program import program_of
 
 MAP = load_map("driving_school")
-CARD = card_of(MAP, MAP.junctions[0])
+CARD = conflict_table_of(MAP, MAP.junctions[0])
 
 
 def test_the_card_asks_for_no_more_than_the_controller_gives_and_for_most_of_it():
@@ -40,13 +40,13 @@ def test_movements_conflict_when_they_come_closer_than_a_lane_is_wide(apart_m, c
         for name, y_m in (("crossing_south_east", 0.0), ("crossing_south_west", apart_m))
     ]
     city_map = msgspec.structs.replace(MAP, lanes=tuple(lanes))
-    assert card_of(city_map, MAP.junctions[0]).conflicts == conflicts
+    assert conflict_table_of(city_map, MAP.junctions[0]).conflicts == conflicts
 
 
 def test_a_stop_line_on_another_lane_or_none_still_gives_a_clearance():
     line = msgspec.structs.replace(MAP.stop_lines[0], lane="west_loop", at_m=2.0)
     city_map = msgspec.structs.replace(MAP, stop_lines=(line,))
-    first, second = card_of(city_map, MAP.junctions[0]).groups
+    first, second = conflict_table_of(city_map, MAP.junctions[0]).groups
     movement = MAP.junctions[0].groups[0].movement
     loop_m = 0.5145 * 4.014257
     assert first.clearance_ns == pytest.approx((loop_m - 2.0 + movement.to_m + 0.3) / 0.217e-9)
@@ -55,6 +55,6 @@ def test_a_stop_line_on_another_lane_or_none_still_gives_a_clearance():
 
 def test_the_hash_changes_with_anything_on_the_card():
     other = msgspec.structs.replace(CARD, conflicts=())
-    assert card_hash(CARD) == card_hash(card_of(MAP, MAP.junctions[0]))
-    assert card_hash(other) != card_hash(CARD)
-    assert len(card_hash(CARD)) == 12
+    assert table_hash(CARD) == table_hash(conflict_table_of(MAP, MAP.junctions[0]))
+    assert table_hash(other) != table_hash(CARD)
+    assert len(table_hash(CARD)) == 12

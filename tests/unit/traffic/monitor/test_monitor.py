@@ -6,14 +6,14 @@ import pytest
 from scm.clock import NS_PER_MS
 from scm.records.signals import SignalGroup
 from scm.traffic.monitor.checks import Monitor
-from scm.traffic.monitor.conflict_table import Card, CardGroup
 from scm.v2x.messages.spat import Spat
+from scm.traffic.monitor.conflict_table import ConflictTable, GroupLimits
 
 MS = NS_PER_MS
 TIMES = {"green_ns": 1000 * MS, "yellow_ns": 560 * MS, "clearance_ns": 2000 * MS}
-CARD = Card(
+CARD = ConflictTable(
     junction="x",
-    groups=tuple(CardGroup(name=name, **TIMES) for name in "ab"),
+    groups=tuple(GroupLimits(name=name, **TIMES) for name in "ab"),
     conflicts=(("a", "b"),),
 )
 LETTER = {"r": "red", "g": "green", "y": "yellow", "f": "flashing_red", "-": "dark"}

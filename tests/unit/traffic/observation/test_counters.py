@@ -5,7 +5,7 @@ import pytest
 from scm.maps.grid_city import grid_city
 from scm.maps.route import Roads
 from scm.records.signals import SignalGroup
-from scm.traffic.observation.car_estimates import Belief, Beliefs
+from scm.traffic.observation.car_estimates import CarEstimate, CarEstimates
 from scm.traffic.observation.counters import Counters
 from scm.traffic.observation.lane_tracking import Follower, rules_of
 from scm.traffic.observation.service_level import level_of, share_below
@@ -71,8 +71,8 @@ def drive(counters, follower, vehicle, begin_s, wait_s=0.0, stand_m=0.05, speed=
         x, y, yaw = ROADS.lanes[LANES[lane]].at(at)
         now_ns = round((begin_s + t) * NS)
         shown = 0.0 if is_waiting else speed
-        belief = Belief(vehicle, now_ns, x, y, yaw, shown, 0.01, 0.02, "self")
-        counters.see(belief, follower.see(belief))
+        estimate = CarEstimate(vehicle, now_ns, x, y, yaw, shown, 0.01, 0.02, "self")
+        counters.see(estimate, follower.see(estimate))
         t += 0.1
 
 
@@ -111,8 +111,10 @@ def test_a_car_that_waits_is_in_the_queue_until_it_passes():
     stand_at = LINE_M - FRONT_M - 0.05
     drive(counters, follower, "a", 0.0, 50.0, until_m=stand_at - 0.01)
     assert row_of(counters, 12.0).queue == 0
-    belief = Belief("a", 20 * NS, *ROADS.lanes[LANES[0]].at(stand_at), 0.0, 0.01, 0.02, "self")
-    counters.see(belief, follower.see(belief))
+    estimate = CarEstimate(
+        "a", 20 * NS, *ROADS.lanes[LANES[0]].at(stand_at), 0.0, 0.01, 0.02, "self"
+    )
+    counters.see(estimate, follower.see(estimate))
     row = row_of(counters, 21.0)
     assert row.queue == 1
     assert row.queue_m == pytest.approx(0.05 + 0.30, abs=0.01)
@@ -144,23 +146,23 @@ def test_noise_at_the_line_counts_a_car_once():
     for k in range(100):
         s = LINE_M - FRONT_M + (0.03 if k % 2 else -0.03)
         pose = ROADS.lanes[LANES[0]].at(s)
-        belief = Belief("a", (20 + k) * NS // 2, *pose, 0.0, 0.01, 0.02, "self")
-        counters.see(belief, follower.see(belief))
+        estimate = CarEstimate("a", (20 + k) * NS // 2, *pose, 0.0, 0.01, 0.02, "self")
+        counters.see(estimate, follower.see(estimate))
     assert row_of(counters, 80.0).passed == 1
 
 
 def test_the_eye_is_believed_before_the_car_itself():
-    beliefs = Beliefs()
+    estimates = CarEstimates()
     state = VehicleState(
         vehicle="a", t_ns=0, seq=1, x_m=1.0, y_m=0.0, yaw_rad=0.0, speed_mps=0.0,
         yaw_rate_radps=0.0, steering_rad=0.0, throttle=0.0, source="odometry",
     )  # fmt: skip
-    beliefs.take(state, NS)
-    assert [b.source for b in beliefs.now(NS)] == ["self"]
-    beliefs.take(track("a", 2.0), NS)
-    beliefs.take(track("tag-9", 2.1), NS)
-    (one,) = beliefs.now(NS)
+    estimates.add(state, NS)
+    assert [b.source for b in estimates.now(NS)] == ["self"]
+    estimates.add(track("a", 2.0), NS)
+    estimates.add(track("tag-9", 2.1), NS)
+    (one,) = estimates.now(NS)
     assert (one.source, one.x, one.std_m) == ("eye", 2.0, pytest.approx(0.005))
-    beliefs.take(state, 3 * NS)
-    assert [b.source for b in beliefs.now(3 * NS)] == ["self"]
-    assert beliefs.now(5 * NS) == []
+    estimates.add(state, 3 * NS)
+    assert [b.source for b in estimates.now(3 * NS)] == ["self"]
+    assert estimates.now(5 * NS) == []

@@ -54,7 +54,7 @@ def test_no_promise_is_broken_in_hours_of_random_plan_changes(late_ms):
         promises.check(spat)
         plans.add(spat.plan)
         if dice.random() < 0.005:
-            controller.ask(dice.choice(["calm", "brisk"]))
+            controller.request_plan(dice.choice(["calm", "brisk"]))
     assert promises.kept > 500
     assert plans == {"calm", "brisk"}
     assert controller.late_steps == 0
@@ -73,11 +73,11 @@ def test_it_starts_all_red_until_the_longest_clearance_is_over():
 def test_a_plan_changes_when_the_cycle_ends_and_can_be_taken_back():
     controller = Controller("x", CROSSING, "brisk")
     list(run(controller, 60))
-    controller.ask("calm")
+    controller.request_plan("calm")
     assert (controller.plan, controller.pending) == ("brisk", "calm")
-    controller.ask("brisk")
+    controller.request_plan("brisk")
     assert controller.pending == ""
-    controller.ask("calm")
+    controller.request_plan("calm")
     seen = [s.plan for s in run(controller, 400, 60 * S)]
     assert seen[0] == "brisk"
     assert seen[-1] == "calm"
@@ -87,7 +87,7 @@ def test_a_plan_changes_when_the_cycle_ends_and_can_be_taken_back():
 def test_an_unknown_plan_is_refused_with_the_nearest_name():
     controller = Controller("x", CROSSING, "calm")
     with pytest.raises(PlanError, match=r"junction x: no plan 'brisc' \(did you mean 'brisk'"):
-        controller.ask("brisc")
+        controller.request_plan("brisc")
 
 
 def test_flash_is_shown_at_once_promises_nothing_and_ends_through_all_red():

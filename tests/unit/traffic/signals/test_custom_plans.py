@@ -14,8 +14,8 @@ from scm.store.records import PlanRecord
 from scm.traffic.signals.controller import Controller
 from scm.traffic.signals.custom_plans import (
     prove_file,
-    recalled,
     records_of,
+    stages_from_records,
     stages_of,
     table_of,
     wave_of,
@@ -82,7 +82,7 @@ def test_the_stages_of_a_timetable_make_it_again(name):
 
 
 def test_stored_stages_are_recalled_as_they_were():
-    assert recalled(records_of(RUSH)) == RUSH
+    assert stages_from_records(records_of(RUSH)) == RUSH
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -109,9 +109,9 @@ def test_no_promise_is_broken_while_plans_of_people_come_and_go(seed):
             made = tuple(stage(g, green_s=s) for g, s in zip(groups, greens, strict=True))
             table = table_of(dice.choice(["rush", "night"]), made, PROGRAM)
             offset_s = dice.choice([None, dice.randrange(200) / 10])
-            controller.ask_for_guest(table, wave_of(table, offset_s))
+            controller.request_custom_plan(table, wave_of(table, offset_s))
         elif dice.random() < 0.002:
-            controller.ask(dice.choice(["calm", "brisk"]))
+            controller.request_plan(dice.choice(["calm", "brisk"]))
     assert kept > 100
     assert ran == {"calm", "brisk", "rush", "night"}
 
@@ -120,18 +120,18 @@ def test_a_plan_that_nobody_wants_any_more_is_forgotten():
     controller = Controller("x", PROGRAM, "brisk")
     made = (stage("a"), stage("b"), stage("c"))
     controller.step(0)
-    controller.ask_for_guest(table_of("rush", made, PROGRAM))
+    controller.request_custom_plan(table_of("rush", made, PROGRAM))
     steps = iter(range(S, 10_000 * S, S))
     for now_ns in steps:
         controller.step(now_ns)
         if controller.plan == "rush":
             break
     assert controller.pending == ""
-    controller.ask("brisk")
+    controller.request_plan("brisk")
     for _ in range(1000):
         controller.step(next(steps))
     with pytest.raises(PlanError, match="no plan 'rush'"):
-        controller.ask("rush")
+        controller.request_plan("rush")
 
 
 @pytest.fixture
@@ -159,7 +159,7 @@ def test_a_plan_of_the_bus_is_run_told_and_comes_back_after_a_restart(city):
     assert any("takes plan rush (ada asked: school)" in text for text in said)
     assert any("runs plan rush, before brisk" in text for text in said)
     kept = PlanRecord(plan="rush", by="ada", stages=records_of(RUSH))
-    with Lockstep([TrafficPart(MAP, "brisk", kept={"crossing": kept})]) as again:
+    with Lockstep([TrafficPart(MAP, "brisk", restored={"crossing": kept})]) as again:
         spats = again.subscribe(Subscription(Spat))
         again.run_for(8.0)
         assert messages(spats)[-1].plan == "rush"
@@ -185,7 +185,7 @@ def test_a_plan_with_an_offset_begins_its_cycles_in_step_with_the_clock_also_aft
     cycle_s, offset_s = 20.5, 7.3
     assert ask(city, "rush", RUSH, offset_s=offset_s).pending == "rush"
     kept = PlanRecord(plan="rush", by="ada", stages=records_of(RUSH), offset_s=offset_s)
-    with Lockstep([TrafficPart(MAP, "brisk", kept={"crossing": kept})]) as again:
+    with Lockstep([TrafficPart(MAP, "brisk", restored={"crossing": kept})]) as again:
         for running in (city, again):
             told = running.subscribe(Subscription(SignalStatus))
             running.run_for(100.0)
@@ -224,14 +224,14 @@ def test_what_a_junction_is_and_what_is_wished_of_it_is_told(city):
     assert len(messages(told)) == pytest.approx(22, abs=2)
     city.call(SignalRequest(junction="crossing", verb="hold", groups=("south_east",), by="ada"))
     city.run_for(0.2)
-    wishes = messages(told)[-1].wishes
+    wishes = messages(told)[-1].requested
     assert [(wish.verb, wish.by) for wish in wishes] == [("hold", "ada")]
     clear = {"verb": "clear", "groups": ("south_east",), "by": "ada"}
     city.call(SignalRequest(junction="crossing", clears="call", **clear))
     city.run_for(0.2)
     assert len(messages(told)) in (0, 1)
     reply = city.call(SignalRequest(junction="crossing", clears="hold", **clear))
-    assert reply.wishes == ()
+    assert reply.requested == ()
 
 
 def test_greens_to_come_are_told_as_they_come(city):

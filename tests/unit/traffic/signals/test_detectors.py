@@ -7,7 +7,7 @@ import pytest
 from scm.clock import NS_PER_S
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.traffic.signals.detectors import BLIND_NS, FORGET_NS, Seen, Watcher
+from scm.traffic.signals.detectors import BLIND_NS, FORGET_NS, JunctionDetectors, Seen
 
 MAP = load_map("driving_school")
 ROADS = Roads(MAP)
@@ -18,7 +18,7 @@ FEEDER = "west_loop"
 
 @pytest.fixture
 def watcher():
-    return Watcher(JUNCTION, ROADS)
+    return JunctionDetectors(JUNCTION, ROADS)
 
 
 def at(before_m, speed=0.0, who=1, t_s=0.0):
@@ -35,7 +35,7 @@ def read(watcher, t_s=0.0, group="south_east"):
 
 def show(watcher, *cars):
     for car in cars:
-        watcher.show(car, car.t_ns)
+        watcher.add(car, car.t_ns)
 
 
 def test_nobody_is_there_at_first_and_nothing_is_seen(watcher):

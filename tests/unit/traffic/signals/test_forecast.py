@@ -7,10 +7,10 @@ import pytest
 
 from scm.clock import NS_PER_S
 from scm.traffic.signals import rings
-from scm.traffic.signals.controller import Controller, Heard
+from scm.traffic.signals.controller import Controller, Observations
 from scm.traffic.signals.detectors import Detector
-from scm.traffic.signals.forecast import FREED, forecasts, laid_out, within
-from scm.traffic.signals.guaranteed_time import Promise
+from scm.traffic.signals.forecast import FREED, forecasts, schedule, within
+from scm.traffic.signals.guaranteed_time import GuaranteedTime
 from scm.traffic.signals.kernel import GroupTimes, Program
 from scm.traffic.signals.plan import plan_names
 from scm.traffic.signals.policies import actuated
@@ -60,7 +60,7 @@ class Queues:
         return heard
 
 
-def driven(controller, steps, each=lambda now_ns, green: Heard({}, sees=True)):
+def driven(controller, steps, each=lambda now_ns, green: Observations({}, sees=True)):
     """Yield every SPaT, `each` telling what is heard."""
     green = frozenset()
     for k in range(steps):
@@ -74,7 +74,9 @@ def queued(policy, steps, every_s=12.0, seed=0):
     queues = Queues(every_s, seed)
     controller = Controller("x", CROSSING, "calm", policy=policy)
     return driven(
-        controller, steps, lambda t, green: Heard(queues.step(t / NS_PER_S, green), sees=True)
+        controller,
+        steps,
+        lambda t, green: Observations(queues.step(t / NS_PER_S, green), sees=True),
     )
 
 
@@ -101,7 +103,7 @@ def test_under_a_timetable_every_colours_likely_end_is_the_true_one(plan):
 def test_a_plan_that_is_to_come_is_reckoned_with():
     controller = Controller("x", CROSSING, "brisk")
     list(driven(controller, 100))
-    controller.ask("calm")
+    controller.request_plan("calm")
     spats = []
     for k in range(100, 1500):
         controller.step(k * S)
@@ -123,11 +125,11 @@ def test_a_likely_end_lies_between_the_earliest_and_the_latest(policy):
             wish = SignalRequest(
                 junction="x", verb=verb, groups=(group,), by="me", expires_s=dice.uniform(1.0, 9.0)
             )
-            controller.asked = ()
-            controller.take(wish, now_ns)
+            controller.overrides = ()
+            controller.apply_override(wish, now_ns)
         if dice.random() < 0.003:
-            controller.ask(dice.choice(["calm", "brisk", policy]))
-        return Heard(queues.step(now_ns / NS_PER_S, green), sees=dice.random() < 0.9)
+            controller.request_plan(dice.choice(["calm", "brisk", policy]))
+        return Observations(queues.step(now_ns / NS_PER_S, green), sees=dice.random() < 0.9)
 
     for spat in driven(controller, 6000, each):
         for group in spat.groups:
@@ -168,7 +170,7 @@ def test_a_red_is_foreseen_nearer_to_the_truth_than_its_earliest_end(policy):
 def test_a_green_that_nobody_disputes_has_no_likely_end(policy):
     controller = Controller("x", CROSSING, "calm", policy=policy)
     alone = {name: Detector() for name in "bc"} | {"a": Detector(call=True, near=1, queue=1)}
-    last = list(driven(controller, 900, lambda *_: Heard(alone, sees=True)))[-1]
+    last = list(driven(controller, 900, lambda *_: Observations(alone, sees=True)))[-1]
     (green,) = (group for group in last.groups if group.colour == "green")
     assert (green.group, green.likely_end_ns, green.max_end_ns) == ("a", None, None)
 
@@ -178,12 +180,12 @@ def test_nobody_foresees_how_long_a_person_holds_a_green():
     all_of_them = dict.fromkeys("abc", Detector(call=True, near=1, queue=1))
 
     def each(now_ns, green):
-        if green and not controller.asked:
+        if green and not controller.overrides:
             wish = SignalRequest(
                 junction="x", verb="hold", groups=tuple(green), by="me", expires_s=60.0
             )
-            controller.take(wish, now_ns)
-        return Heard(all_of_them, sees=True)
+            controller.apply_override(wish, now_ns)
+        return Observations(all_of_them, sees=True)
 
     spats = list(driven(controller, 700, each))
     held = [g for s in spats[-20:] for g in s.groups if g.likely_end_ns is None]
@@ -195,7 +197,7 @@ def test_a_policy_that_fails_to_foresee_is_given_up_for_fixed_time():
     usual = controller._policies["actuated"]
     broken = Policy(usual.about, usual.start, usual.step, foresee=lambda *_: 1 / 0)
     controller._policies["actuated"] = broken
-    spats = list(driven(controller, 1500, lambda *_: Heard({}, sees=True)))
+    spats = list(driven(controller, 1500, lambda *_: Observations({}, sees=True)))
     assert controller.failure == "policy actuated: ZeroDivisionError: division by zero"
     assert spats[-1].plan == "calm"
 
@@ -210,13 +212,13 @@ def test_turns_are_put_one_after_the_other_with_the_kernels_times_between():
         )
     )
     turns = [Turn(frozenset("a"), 4.0), Turn(frozenset("b"), 3.0), Turn(frozenset("c"), None)]
-    promises = [Promise(10 * S, None), Promise(0, None), Promise(0, None)]
-    ends = forecasts(CROSSING, state, laid_out(CROSSING, state, promises, turns, 0))
+    promises = [GuaranteedTime(10 * S, None), GuaranteedTime(0, None), GuaranteedTime(0, None)]
+    ends = forecasts(CROSSING, state, schedule(CROSSING, state, promises, turns, 0))
     assert ends == {"a": 40 * S, "b": (40 + 52) * S, "c": (40 + 52 + 30 + 52) * S}
 
 
 def test_a_forecast_is_bounded_by_the_promise_and_surer_the_nearer_it_is():
-    promise = Promise(50 * S, 200 * S)
+    promise = GuaranteedTime(50 * S, 200 * S)
 
     def told(at, **more):
         return within(promise, at * S, 10 * S, **({"red": True, "planned": False} | more))
@@ -226,7 +228,7 @@ def test_a_forecast_is_bounded_by_the_promise_and_surer_the_nearer_it_is():
     assert told(300).end_ns == 200 * S
     assert told(60).confidence > told(100).confidence
     assert within(promise, None, 0, red=True, planned=False) is None
-    assert within(Promise(50 * S, 52 * S), None, 0, red=True, planned=False) == (50 * S, 1.0)
+    assert within(GuaranteedTime(50 * S, 52 * S), None, 0, red=True, planned=False) == (50 * S, 1.0)
 
 
 def test_phases_are_foreseen_in_the_order_in_which_the_rings_serve_them():
@@ -243,9 +245,11 @@ def test_what_is_foreseen_of_a_queue_is_its_turn_and_those_who_wait_behind_it():
     controller = Controller("x", CROSSING, "calm", policy="actuated")
     cars = {"a": Detector(call=True, near=3, queue=3), "b": Detector(call=True, near=1, queue=1)}
     heard = cars | {"c": Detector()}
-    list(driven(controller, 60, lambda *_: Heard(heard, sees=True)))
+    list(driven(controller, 60, lambda *_: Observations(heard, sees=True)))
     turns = actuated.foresee(
-        site_of("x", CROSSING), controller._memory, controller._view(60 * S, 0, Heard(heard, True))
+        site_of("x", CROSSING),
+        controller._memory,
+        controller._view(60 * S, 0, Observations(heard, True)),
     )
     assert [turn.groups for turn in turns] == [{"a"}, {"b"}]
     assert turns[1].green_s == pytest.approx(3.9)

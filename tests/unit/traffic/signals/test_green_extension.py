@@ -4,7 +4,7 @@ import pytest
 
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.traffic.signals.detectors import Detector, Watcher, reach_of
+from scm.traffic.signals.detectors import Detector, JunctionDetectors, reach_of
 from scm.traffic.signals.green_extension import is_worth_waiting
 from scm.traffic.signals.guaranteed_time import AHEAD_NS
 from scm.traffic.signals.kernel import GroupState, GroupTimes, Phase, Program
@@ -86,7 +86,7 @@ def test_a_car_is_known_from_where_it_comes_just_when_the_others_green_is_over()
     change_s = max(t.yellow + t.clearance for t in program.times) / 1e9
     assert reach_m >= 0.25 * (change_s + 2.0)
     for reach in (reach_m, 1.5):
-        approaches = {a.line.lane: a for a in Watcher(junction, roads, reach).approaches}
+        approaches = {a.line.lane: a for a in JunctionDetectors(junction, roads, reach).approaches}
         approach = next(iter(approaches.values()))
         farthest = max(s.to_line_m - s.from_m for s in approach.before)
         assert farthest == pytest.approx(reach)

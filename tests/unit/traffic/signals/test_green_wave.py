@@ -4,8 +4,8 @@ import pytest
 
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.traffic.signals.green_wave import Wave, dwell_ns, links_of, stretched
-from scm.traffic.signals.part import TrafficPart, tables_of
+from scm.traffic.signals.green_wave import Wave, dwell_ns, links_of, stretch
+from scm.traffic.signals.part import TrafficPart, timetables_of
 from scm.traffic.signals.plan import load_timetable
 from scm.traffic.signals.program import STEP_NS, program_of
 from scm.traffic.signals.timetables import Timetables
@@ -28,7 +28,7 @@ def test_a_link_runs_from_line_to_line_and_takes_as_long_as_the_slowest_drives()
 
 
 def test_all_junctions_share_a_cycle_and_follow_each_other_by_their_links():
-    tables = tables_of(CITY, ROADS, PROGRAMS, NIGEL)
+    tables = timetables_of(CITY, ROADS, PROGRAMS, NIGEL)
     assert {t["calm"][0].length_ns for t in tables.values()} == {
         max(load_timetable("calm", program).length_ns for program in PROGRAMS.values())
     }
@@ -46,10 +46,10 @@ def test_all_junctions_share_a_cycle_and_follow_each_other_by_their_links():
 
 def test_a_stretched_timetable_keeps_its_order_and_reaches_its_length():
     table = load_timetable("calm", next(iter(PROGRAMS.values())))
-    longer = stretched(table, table.length_ns + 70 * STEP_NS)
+    longer = stretch(table, table.length_ns + 70 * STEP_NS)
     assert longer.length_ns == table.length_ns + 70 * STEP_NS
     before = 0
-    for old, new in zip(table.slots, longer.slots, strict=True):
+    for old, new in zip(table.timed_stages, longer.timed_stages, strict=True):
         assert new.end_ns - new.start_ns >= old.end_ns - old.start_ns
         assert new.start_ns >= before
         before = new.end_ns
@@ -78,4 +78,4 @@ def test_a_single_junction_follows_nobody():
     part = TrafficPart(alone)
     assert part.step(0, [])
     programs = {"crossing": program_of(alone.junctions[0], Roads(alone))}
-    assert tables_of(alone, Roads(alone), programs, NIGEL)["crossing"]["calm"][1] is None
+    assert timetables_of(alone, Roads(alone), programs, NIGEL)["crossing"]["calm"][1] is None

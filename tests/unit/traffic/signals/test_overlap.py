@@ -63,7 +63,7 @@ def in_cycle(*greens_ns, cycle=0, of=ROUND):
 
 def test_a_group_of_two_stages_is_green_through_both_and_all_between_within_a_cycle():
     samples = list(run(runs(ROUND), (START + ROUND.length_ns) // S))
-    first, second, third, last = ROUND.slots
+    first, second, third, last = ROUND.timed_stages
     assert greens(samples, "a") == in_cycle((0, second.end_ns))
     assert greens(samples, "d") == in_cycle((second.start_ns, third.end_ns))
     assert greens(samples, "b") == in_cycle((third.start_ns, last.end_ns))
@@ -72,45 +72,47 @@ def test_a_group_of_two_stages_is_green_through_both_and_all_between_within_a_cy
 
 def test_a_group_of_the_last_and_the_first_stage_stays_green_over_the_end_of_the_cycle():
     samples = list(run(runs(ROUND), (START + 2 * ROUND.length_ns) // S))
-    begin, end = ROUND.slots[-1].start_ns, ROUND.length_ns + ROUND.slots[0].end_ns
+    begin, end = ROUND.timed_stages[-1].start_ns, ROUND.length_ns + ROUND.timed_stages[0].end_ns
     assert greens(samples, "c")[1] == in_cycle((begin, end))[0]
 
 
 def test_its_end_is_promised_through_the_next_stage_from_the_begin():
     samples = list(run(runs(ROUND), (START + ROUND.length_ns) // S))
-    for group, end_ns in (("a", ROUND.slots[1].end_ns), ("d", ROUND.slots[2].end_ns)):
+    for group, end_ns in (("a", ROUND.timed_stages[1].end_ns), ("d", ROUND.timed_stages[2].end_ns)):
         told = [groups[group] for _, groups in samples if groups[group].colour == "green"]
         assert {one.min_end_ns for one in told} == {START + end_ns}
         assert {one.likely_end_ns for one in told} == {START + end_ns}
         assert {one.max_end_ns for one in told} == {START + end_ns + 2 * S}
     last = [groups["c"] for _, groups in samples][-1]
-    assert last.min_end_ns == START + ROUND.length_ns + ROUND.slots[0].end_ns
+    assert last.min_end_ns == START + ROUND.length_ns + ROUND.timed_stages[0].end_ns
 
 
 def test_a_green_that_reaches_the_last_stage_is_promised_no_further_than_any_plan_has_it():
     long = table("long", "bd", "ad", "ac")
     samples = list(run(runs(long, ROUND), (START + long.length_ns) // S))
     told = {now_ns - START: groups["a"] for now_ns, groups in samples}
-    begin_ns, settled_ns = long.slots[1].start_ns, long.slots[-1].start_ns
-    ends_ns = START + long.slots[-1].end_ns
+    begin_ns, settled_ns = long.timed_stages[1].start_ns, long.timed_stages[-1].start_ns
+    ends_ns = START + long.timed_stages[-1].end_ns
     for at_ns in (begin_ns, settled_ns - S):
         assert told[at_ns].colour == "green"
         assert (told[at_ns].min_end_ns, told[at_ns].likely_end_ns) == (ends_ns, ends_ns)
-        assert told[at_ns].max_end_ns == START + long.length_ns + ROUND.slots[1].end_ns + 2 * S
+        assert (
+            told[at_ns].max_end_ns == START + long.length_ns + ROUND.timed_stages[1].end_ns + 2 * S
+        )
     assert told[settled_ns].max_end_ns == ends_ns + 2 * S
-    assert told[long.slots[-1].end_ns].colour == "yellow"
+    assert told[long.timed_stages[-1].end_ns].colour == "yellow"
 
 
 def test_a_plan_that_is_asked_for_once_it_is_settled_who_goes_on_comes_a_cycle_later():
     controller = runs(ROUND)
-    settled = (START + ROUND.slots[-1].start_ns) // S
+    settled = (START + ROUND.timed_stages[-1].start_ns) // S
     list(run(controller, settled + 1))
-    controller.ask("calm")
+    controller.request_plan("calm")
     assert (controller.plan, controller.pending) == ("round", "calm")
     steps = ROUND.length_ns // S
     samples = list(run(controller, steps, settled + 1))
     assert (controller.plan, controller.pending) == ("round", "calm")
-    assert greens(samples, "c")[0][1] * S == START + ROUND.length_ns + ROUND.slots[0].end_ns
+    assert greens(samples, "c")[0][1] * S == START + ROUND.length_ns + ROUND.timed_stages[0].end_ns
     list(run(controller, 60, settled + 1 + steps))
     assert (controller.plan, controller.pending) == ("calm", "")
 
@@ -118,10 +120,10 @@ def test_a_plan_that_is_asked_for_once_it_is_settled_who_goes_on_comes_a_cycle_l
 def test_who_takes_a_plan_back_that_is_settled_gets_the_one_before_a_cycle_later():
     controller = runs(ROUND, table("other", "bc", "ad"))
     list(run(controller, 50))
-    controller.ask("other")
-    settled = (START + ROUND.slots[-1].start_ns) // S
+    controller.request_plan("other")
+    settled = (START + ROUND.timed_stages[-1].start_ns) // S
     list(run(controller, settled - 49, 50))
-    controller.ask("round")
+    controller.request_plan("round")
     assert (controller.plan, controller.pending) == ("round", "round")
     list(run(controller, 100, settled + 1))
     assert (controller.plan, controller.pending) == ("other", "round")
@@ -131,9 +133,9 @@ def test_who_takes_a_plan_back_that_is_settled_gets_the_one_before_a_cycle_later
 
 def test_another_policy_waits_for_who_goes_on_and_comes_within_two_cycles():
     controller = runs(ROUND)
-    settled = (START + ROUND.slots[-1].start_ns) // S
+    settled = (START + ROUND.timed_stages[-1].start_ns) // S
     list(run(controller, settled + 1))
-    controller.ask("actuated")
+    controller.request_plan("actuated")
     cycle = ROUND.length_ns // S
     list(run(controller, cycle, settled + 1))
     assert controller.policy == "fixed"
@@ -144,9 +146,9 @@ def test_another_policy_waits_for_who_goes_on_and_comes_within_two_cycles():
 def test_who_goes_on_stays_green_over_a_pause_of_the_controller():
     through = table("through", "ac", "bd", "ad", "ac")
     controller = runs(through)
-    paused = (START + through.slots[2].start_ns) // S + 10
+    paused = (START + through.timed_stages[2].start_ns) // S + 10
     assert list(run(controller, paused))[-1][1]["a"].colour == "green"
-    late = (START + through.slots[-1].end_ns) // S + 50 - paused
+    late = (START + through.timed_stages[-1].end_ns) // S + 50 - paused
     samples = list(run(controller, through.length_ns // S, paused + late))
     begin = samples[0][0] // S
     (until,) = [until for since, until in greens(samples, "a") if since == begin]
@@ -224,9 +226,9 @@ def test_no_promise_is_broken_and_no_fault_seen_while_overlapping_plans_come_and
             last[group.group] = group
         chance = dice.random()
         if chance < 0.005:
-            controller.ask_for_guest(drawn(dice, dice.randrange(3)), None)
+            controller.request_custom_plan(drawn(dice, dice.randrange(3)), None)
         elif chance < 0.008:
-            controller.ask(dice.choice(["calm", "round", "brisk", "actuated"]))
+            controller.request_plan(dice.choice(["calm", "round", "brisk", "actuated"]))
     assert ended > 100
     assert len(ran) >= 4
     assert controller.late_steps == 0

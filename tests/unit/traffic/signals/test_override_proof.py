@@ -10,8 +10,12 @@ from scm.traffic.signals.kernel import GroupTimes, Program
 from scm.traffic.signals.plan import Stage, Timetable, timetable
 from scm.traffic.signals.policy import Answer, Policy, nothing
 from scm.traffic.signals.program import STEP_NS
-from scm.traffic.signals.proof.load_checks import check_junction, check_serves, check_table
-from scm.traffic.signals.proof.override_proof import check_shape, prove_told
+from scm.traffic.signals.proof.load_checks import (
+    check_called_groups_are_served,
+    check_junction,
+    check_table,
+)
+from scm.traffic.signals.proof.override_proof import check_ring_shape, prove_overrides
 from scm.traffic.signals.proof.ring_proof import small_times
 from tests.unit.traffic.signals.mutants import RINGS_TOLD, mutant_of
 from tests.unit.traffic.signals.test_rings import CROSSING, SHAPES, SIDE, THREE, Junction, program
@@ -23,19 +27,19 @@ REAL = Program(
 
 
 def test_every_wish_of_any_groups_keeps_its_meaning_at_a_crossing():
-    served = prove_told(rings, *small_times(CROSSING))
+    served = prove_overrides(rings, *small_times(CROSSING))
     assert served.transitions > 1000
     assert max(served.worst_wait) < 12
 
 
 @pytest.mark.parametrize("name", ["triangle", "one", "side", "chain"])
 def test_every_wish_for_a_group_keeps_its_meaning_at_a_shape(name):
-    assert prove_told(rings, *small_times(SHAPES[name]), most=1).states > 100
+    assert prove_overrides(rings, *small_times(SHAPES[name]), most=1).states > 100
 
 
 def prove_all(module):
     for shape in (CROSSING, IN_TURN, THREE, SHAPES["one"], SIDE):
-        prove_told(module, *small_times(shape), most=1)
+        prove_overrides(module, *small_times(shape), most=1)
 
 
 @pytest.mark.parametrize("name", sorted(RINGS_TOLD))
@@ -47,8 +51,8 @@ def test_a_mutant_of_the_rings_that_breaks_a_wish_is_caught(name):
 
 def test_junctions_of_one_shape_are_proven_once_and_very_large_ones_not_at_all():
     pairs = frozenset(combinations(range(3), 2))
-    assert check_shape(3, pairs) is check_shape(3, pairs)
-    assert check_shape(8, frozenset()) is None
+    assert check_ring_shape(3, pairs) is check_ring_shape(3, pairs)
+    assert check_ring_shape(8, frozenset()) is None
 
 
 def test_a_hold_beside_leaves_the_other_ring_free_to_go_on():
@@ -61,16 +65,16 @@ def test_a_hold_beside_leaves_the_other_ring_free_to_go_on():
 
 def test_a_policy_that_serves_only_one_is_refused_with_the_others_name():
     lazy = Policy("a alone", nothing, lambda site, memory, view: (memory, Answer(frozenset("a"))))
-    check_serves("lazy", lazy, REAL, frozenset("a"))
+    check_called_groups_are_served("lazy", lazy, REAL, frozenset("a"))
     with pytest.raises(PlanError, match=r"policy 'lazy': \['b'\] called and not green within"):
-        check_serves("lazy", lazy, REAL, frozenset("ab"))
+        check_called_groups_are_served("lazy", lazy, REAL, frozenset("ab"))
 
 
 def test_a_timetable_whose_greens_never_come_is_refused_with_the_group():
     good = timetable("good", (Stage(("a",), 3 * 10**9), Stage(("b",), 3 * 10**9)), REAL)
     check_table(good, REAL)
     check_junction("x", REAL, [good])
-    bad = Timetable("bad", good.slots[:1], good.length_ns)
+    bad = Timetable("bad", good.timed_stages[:1], good.length_ns)
     with pytest.raises(
         PlanError, match=r"junction x: plan 'bad': \['b'\] not green in every cycle"
     ):

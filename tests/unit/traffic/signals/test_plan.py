@@ -21,15 +21,18 @@ def test_groups_that_fit_together_share_a_stage():
 
 def test_slots_follow_each_other_after_the_longest_yellow_and_clearance_and_three_steps():
     table = timetable("p", (Stage(("a", "c"), 3 * S), Stage(("b",), 6 * S)), program("ab", "bc"))
-    assert [(slot.start_ns // S, slot.end_ns // S) for slot in table.slots] == [(0, 3), (12, 18)]
+    assert [(slot.start_ns // S, slot.end_ns // S) for slot in table.timed_stages] == [
+        (0, 3),
+        (12, 18),
+    ]
     assert table.length_ns == 23 * S
 
 
 def test_a_timetable_wishes_its_slots_and_nothing_between():
     table = timetable("p", (Stage(("a", "c"), 3 * S), Stage(("b",), 6 * S)), program("ab", "bc"))
-    assert table.wishes(0) == {"a", "c"}
-    assert table.wishes(3 * S) == frozenset()
-    assert table.wishes(12 * S) == {"b"}
+    assert table.requested(0) == {"a", "c"}
+    assert table.requested(3 * S) == frozenset()
+    assert table.requested(12 * S) == {"b"}
     assert table.first_start_ns("b") == 12 * S
     assert table.green_of("a", 3 * S) is None
     assert table.green_of("b", 0).start_ns == 12 * S
@@ -45,9 +48,9 @@ OVERLAP = (
 
 def test_who_is_in_two_stages_that_follow_each_other_stays_green_between_them():
     table = timetable("p", OVERLAP, program("ab"))
-    assert [slot.start_ns // S for slot in table.slots] == [0, 12, 23, 29]
-    assert [table.wishes(at * S) for at in (2, 3, 11)] == [{"a", "c"}, {"c"}, {"c"}]
-    assert table.wishes(28 * S) == frozenset()
+    assert [slot.start_ns // S for slot in table.timed_stages] == [0, 12, 23, 29]
+    assert [table.requested(at * S) for at in (2, 3, 11)] == [{"a", "c"}, {"c"}, {"c"}]
+    assert table.requested(28 * S) == frozenset()
     assert table.greens_of("c") == [(0, 24 * S)]
     assert table.greens_of("a") == [(0, 3 * S), (29 * S, 33 * S)]
     assert table.green_of("c", 11 * S) == (0, 24 * S)
@@ -56,8 +59,8 @@ def test_who_is_in_two_stages_that_follow_each_other_stays_green_between_them():
 def test_who_only_joins_waits_for_nobody():
     cycle = (Stage(("a",), 3 * S, S), Stage(("a", "c"), 4 * S), Stage(("b",), 5 * S))
     table = timetable("p", cycle, program("ab", "bc"))
-    assert [slot.start_ns // S for slot in table.slots] == [0, 4, 17]
-    assert table.wishes(3 * S) == {"a"}
+    assert [slot.start_ns // S for slot in table.timed_stages] == [0, 4, 17]
+    assert table.requested(3 * S) == {"a"}
 
 
 def test_over_the_end_of_a_cycle_goes_on_who_begins_the_next_and_room_is_left_for_all():
@@ -65,8 +68,8 @@ def test_over_the_end_of_a_cycle_goes_on_who_begins_the_next_and_room_is_left_fo
     other = timetable("q", (Stage(("b", "c"), 6 * S), Stage(("a",), 3 * S)), program("ab"))
     assert table.length_ns == (33 + 9) * S
     assert (table.into(table), table.into(other)) == ({"a"}, frozenset())
-    assert table.wishes(41 * S, frozenset("a")) == {"a"}
-    assert table.wishes(41 * S) == table.wishes(42 * S, frozenset("a")) == frozenset()
+    assert table.requested(41 * S, frozenset("a")) == {"a"}
+    assert table.requested(41 * S) == table.requested(42 * S, frozenset("a")) == frozenset()
 
 
 def test_every_problem_of_a_cycle_is_named_at_once():

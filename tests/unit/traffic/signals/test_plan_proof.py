@@ -5,7 +5,7 @@ import pytest
 from scm.errors import PlanError
 from scm.traffic.signals import kernel
 from scm.traffic.signals.kernel import GroupTimes, Program
-from scm.traffic.signals.plan import Slot, Stage, Timetable, timetable
+from scm.traffic.signals.plan import Stage, TimedStage, Timetable, timetable
 from scm.traffic.signals.program import STEP_NS
 from scm.traffic.signals.proof.plan_proof import prove_plan
 
@@ -33,9 +33,9 @@ def test_extra_red_makes_the_cycle_longer_by_just_that():
 @pytest.mark.parametrize("missing", [2, 3])
 def test_a_gap_too_short_for_late_steps_is_found(missing):
     good = timetable("rush", CYCLE, PROGRAM)
-    first, second = good.slots
+    first, second = good.timed_stages
     start_ns = second.start_ns - missing * S
-    early = Slot(second.groups, start_ns, second.end_ns)
+    early = TimedStage(second.groups, start_ns, second.end_ns)
     tight = Timetable("rush", (first, early), good.length_ns)
     with pytest.raises(PlanError, match=r"group 'b' is red at .* where its green should be"):
         prove_plan(kernel, PROGRAM, tight)
@@ -43,9 +43,11 @@ def test_a_gap_too_short_for_late_steps_is_found(missing):
 
 def test_a_green_that_a_late_step_could_miss_is_refused():
     good = timetable("rush", CYCLE, PROGRAM)
-    short = Slot(good.slots[0].groups, 0, S)
+    short = TimedStage(good.timed_stages[0].groups, 0, S)
     with pytest.raises(PlanError, match="too short for late steps"):
-        prove_plan(kernel, PROGRAM, Timetable("rush", (short, good.slots[1]), good.length_ns))
+        prove_plan(
+            kernel, PROGRAM, Timetable("rush", (short, good.timed_stages[1]), good.length_ns)
+        )
 
 
 RINGS = Program(
@@ -91,7 +93,7 @@ def test_a_green_that_does_not_last_from_stage_to_stage_is_found():
 @pytest.mark.parametrize("missing", [2, 3])
 def test_a_cycle_that_leaves_no_room_for_another_plan_at_its_end_is_found(missing):
     table = timetable("round", ROUND, RINGS)
-    tight = Timetable("round", table.slots, table.length_ns - missing * S)
+    tight = Timetable("round", table.timed_stages, table.length_ns - missing * S)
     with pytest.raises(PlanError, match="its cycle ends before all who went last are clear"):
         prove_plan(kernel, RINGS, tight)
 

@@ -6,7 +6,7 @@ import pytest
 
 from scm.clock import NS_PER_S
 from scm.errors import PlanError
-from scm.traffic.signals.controller import Controller, Heard
+from scm.traffic.signals.controller import Controller, Observations
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.kernel import GroupState, GroupTimes, Phase, Program
 from scm.traffic.signals.policies import actuated
@@ -42,7 +42,7 @@ class Drive:
             if each:
                 each(self)
             cars = {name: THERE if name in self.waits else Detector() for name in "abc"}
-            self.controller.step(self.now_ns, Heard(cars, True, self.priority))
+            self.controller.step(self.now_ns, Observations(cars, True, self.priority))
             spats.append(self.controller.spat(self.now_ns))
             self.check(spats[-1])
             self.now_ns += S
@@ -66,7 +66,7 @@ class Drive:
         request = SignalRequest(
             junction="x", verb=verb, groups=groups, by=by, expires_s=expires_s, policy=policy
         )
-        self.controller.take(request, self.now_ns)
+        self.controller.apply_override(request, self.now_ns)
 
 
 def greens(spats, name):
@@ -96,7 +96,7 @@ def test_promises_are_kept_while_cars_wishes_plans_and_policies_come_and_go(poli
             name = dice.choice(MOVING)
             drive.wish("policy", policy=name, expires_s=dice.uniform(5.0, 90.0))
         if dice.random() < 0.002:
-            drive.controller.ask(dice.choice(["calm", "brisk"]))
+            drive.controller.request_plan(dice.choice(["calm", "brisk"]))
 
     drive.run(12_000, change)
     assert drive.kept > 100
@@ -150,7 +150,7 @@ def test_a_hold_that_would_break_a_promise_waits_until_it_does_not():
     assert {g.colour for g in spats[-1].groups if g.group == "a"} == {"green"}
     after = drive.run(2000)
     assert after[-1].mode == "plan"
-    assert drive.controller.asked == ()
+    assert drive.controller.overrides == ()
 
 
 @pytest.mark.parametrize("policy", ["actuated", "max_pressure", "priority"])
@@ -191,7 +191,7 @@ def test_a_call_is_served_once_and_then_forgotten():
     drive.run(300)
     drive.wish("call", "c", expires_s=200.0)
     assert greens(drive.run(400), "c")
-    assert drive.controller.asked == ()
+    assert drive.controller.overrides == ()
 
 
 def test_flashing_is_a_policy_that_ends_through_all_red():

@@ -6,7 +6,12 @@ import pytest
 from scm.traffic.signals import kernel
 from scm.traffic.signals.kernel import GroupTimes, Program
 from scm.traffic.signals.proof.kernel_proof import prove
-from scm.traffic.signals.proof.random_requests import GREEN, Flood, differences, flood
+from scm.traffic.signals.proof.random_requests import (
+    GREEN,
+    KernelArrays,
+    differences,
+    run_random_requests,
+)
 
 
 def pairs(*names):
@@ -33,17 +38,17 @@ def test_a_difference_is_found(monkeypatch):
 
 
 def test_a_million_random_steps_begin_thousands_of_greens_and_no_conflict():
-    judged = flood(TRIANGLE, 2000, 500, seed=1)
+    judged = run_random_requests(TRIANGLE, 2000, 500, seed=1)
     assert judged.steps == 1_000_000
     assert judged.greens > 10_000
     assert (judged.conflicts, judged.short_clearances) == (0, 0)
 
 
 def test_the_judge_sees_conflicts_and_short_clearances(monkeypatch):
-    def blind(self, wished, flash, dt=1):
-        self.phase[:] = np.where(wished, GREEN, 0)
+    def blind(self, requested, flash, dt=1):
+        self.phase[:] = np.where(requested, GREEN, 0)
 
-    monkeypatch.setattr(Flood, "step", blind)
-    judged = flood(CROSSING, 100, 200, seed=1)
+    monkeypatch.setattr(KernelArrays, "step", blind)
+    judged = run_random_requests(CROSSING, 100, 200, seed=1)
     assert judged.conflicts > 0
     assert judged.short_clearances > 0

@@ -133,8 +133,8 @@ class Junction:
         self.layout = layout_of(shape, phases or phases_of(shape))
         self.node = (kernel.start(shape), rings.start(self.layout))
 
-    def run(self, steps=1, **told):
-        inputs = Inputs(**{k: frozenset(v) if isinstance(v, set) else v for k, v in told.items()})
+    def run(self, steps=1, **inputs):
+        inputs = Inputs(**{k: frozenset(v) if isinstance(v, set) else v for k, v in inputs.items()})
         shown = []
         for _ in range(steps):
             self.node = after(rings, self.program, self.layout, self.node, inputs)
@@ -207,11 +207,11 @@ def test_soft_recall_waits_until_nobody_calls():
 
 def test_a_locked_call_is_kept_although_the_car_has_gone():
     locking = (PhaseTimes(2, 1, 6, 8, locking=True),) * 2
-    for phases, kept in ((locking, True), (phases_of(CROSSING), False)):
+    for phases, current in ((locking, True), (phases_of(CROSSING), False)):
         junction = Junction(CROSSING, phases)
         junction.run(8, calls={0})
         junction.run(1, calls={0, 1}, hold={0})
-        assert any(1 in green for green in junction.run(20)) is kept
+        assert any(1 in green for green in junction.run(20)) is current
 
 
 def test_a_preempted_phase_comes_next_out_of_order_and_stays():
