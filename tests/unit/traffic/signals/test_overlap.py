@@ -5,7 +5,7 @@ import random
 import pytest
 
 from scm.traffic.monitor.checks import Monitor
-from scm.traffic.monitor.conflict_table import Card, CardGroup
+from scm.traffic.monitor.conflict_table import ConflictTable, GroupLimits
 from scm.traffic.signals.controller import Controller
 from scm.traffic.signals.kernel import GroupTimes, Program
 from scm.traffic.signals.plan import Stage, load_timetable, timetable
@@ -169,12 +169,12 @@ def test_a_group_of_all_stages_stays_green_and_nobody_is_told_when_it_ends():
     assert all(one.min_end_ns - now_ns >= 20 * S for now_ns, one in told)
 
 
-def card_of(program):
+def conflict_table_of(program):
     pairs = zip(program.groups, program.times, strict=True)
-    return Card(
+    return ConflictTable(
         junction="x",
         groups=tuple(
-            CardGroup(name=n, green_ns=t.min_green, yellow_ns=t.yellow, clearance_ns=t.clearance)
+            GroupLimits(name=n, green_ns=t.min_green, yellow_ns=t.yellow, clearance_ns=t.clearance)
             for n, t in pairs
         ),
         conflicts=tuple((min(pair), max(pair)) for pair in program.conflicts),
@@ -209,7 +209,7 @@ def drawn(dice, number):
 @pytest.mark.parametrize("seed", range(3))
 def test_no_promise_is_broken_and_no_fault_seen_while_overlapping_plans_come_and_go(seed):
     dice = random.Random(seed)
-    controller, monitor = runs(ROUND), Monitor(card_of(RINGS), 0)
+    controller, monitor = runs(ROUND), Monitor(conflict_table_of(RINGS), 0)
     last, ran, ended = {}, set(), 0
     for step in range(9000):
         now_ns = step * S + dice.randrange(90) * 10**6
