@@ -15,7 +15,7 @@ from scm.maps.grid_city import grid_city
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
-from scm.traffic.monitor.conflict_table import card_of
+from scm.traffic.monitor.conflict_table import conflict_table_of
 from scm.traffic.signals.part import TrafficPart
 from scm.traffic.signals.program import program_of
 
@@ -76,7 +76,7 @@ def test_every_junction_of_more_than_two_streets_has_signals(city):
 
 def test_controller_and_monitor_agree_on_what_conflicts(city, roads):
     for junction in city.junctions:
-        program, card = program_of(junction, roads), card_of(city, junction)
+        program, card = program_of(junction, roads), conflict_table_of(city, junction)
         pairs = {tuple(sorted(pair)) for pair in program.conflicts}
         assert pairs == set(card.conflicts)
         assert pairs
