@@ -28,7 +28,7 @@ from scm.world.driving import send
 from scm.world.part import WorldPart
 from scm.world.world import PERIOD_NS, World
 
-STAGES = ("hear", "steer", "move", "watch", "sense", "publish", "call_out")
+STAGES = ("receive", "steer", "move", "watch", "sense", "publish", "send_radio")
 WARM_S, SPAN_S = 2.0, 4.0
 TICKS = SPAN_S * 1e9 / PERIOD_NS
 BLOCK_M, FULL, LARGE = 12, 0.6, "grid:11x11:32"
@@ -123,7 +123,7 @@ def run(city_map: CityMap, cars: int, stages: Stages, *, lidar: bool = False) ->
         "kib_a_car": held_kib,
         "junctions": len(city_map.junctions),
         "scans": len(scans.take()) / SPAN_S if scans is not None else 0.0,
-        "speed": float(part.world.slots.speed[part.world.slots.hosted].mean()),
+        "speed": float(part.world.vehicles.speed[part.world.vehicles.hosted].mean()),
     }
 
 

@@ -183,7 +183,7 @@ class Count:
 
     def look(self, at_s: float, *, prints_progress: bool) -> None:
         """Take note of an instant; `at_s` after the count began."""
-        self.standing.look(self._world.drivers, self._world.slots.speed, LOOK_S)
+        self.standing.look(self._world.drivers, self._world.vehicles.speed, LOOK_S)
         self.took_s = time.perf_counter() - self._began
         while at_s >= len(self._passed) * self._span_s / 4.0 and len(self._passed) <= 4:
             self._passed.append(self._world.drivers.passed.copy())
@@ -198,7 +198,7 @@ class Count:
 
     def row(self, span_s: float) -> dict[str, float]:
         """Return what there is to tell of a run that lasted so long."""
-        drivers, hosted = self._world.drivers, self._world.slots.hosted
+        drivers, hosted = self._world.drivers, self._world.vehicles.hosted
         passed = drivers.passed - self._passed[0]
         marks = [float(mark.sum()) / 2.0 for mark in self._passed]
         share = 4.0 * 3600.0 / self._span_s

@@ -28,7 +28,7 @@ RADIUS, BLOCK, CARS_A_BLOCK = 0.7, 2.0, 4
 WARM_TICKS, TICKS = 60, 100
 SIZES = (6, 100, 1000)
 LIMIT_MS = PERIOD_NS / 1e6
-STAGES = ("hear", "steer", "move", "watch", "sense", "publish", "call_out")
+STAGES = ("receive", "steer", "move", "watch", "sense", "publish", "send_radio")
 
 
 def city_of(blocks: int) -> CityMap:

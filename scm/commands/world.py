@@ -32,7 +32,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.vehicles.car import car_names
     from scm.vehicles.cold_start import compile_later, is_first_start
     from scm.world.part import WorldPart
-    from scm.world.restore import read_kept
+    from scm.world.restore import read_restored
 
     hosted = tuple((f"n{i + 1}", arguments.car) for i in range(arguments.hosted))
     is_first = is_first_start()
@@ -41,7 +41,7 @@ def _run(arguments: argparse.Namespace) -> int:
             with_radio(load_map(arguments.map), arguments.radio),
             arguments.seed,
             hosted,
-            kept=None if state is None else read_kept(state),
+            restored=None if state is None else read_restored(state),
         )
         # Compiled when its first car comes, a car file would stop the city for 2.5 s.
         others = {car: partial(part.world.garage.prepare, car) for car in car_names()}

@@ -78,7 +78,7 @@ def obstacles_of(boxes: Floats) -> Obstacles:
     return Obstacles(boxes, np.array([*low, edge]), np.array([columns, rows]), starts, items)
 
 
-class Near:
+class BroadPhase:
     """Keeps the lists of a set of bodies that comes in the same order at most steps."""
 
     def __init__(self, obstacles: Obstacles) -> None:
@@ -149,12 +149,12 @@ def _buckets(n: int) -> int:
 
 
 @array_kernel
-def has_strayed(order: Ints, listed: Ints, begun: Floats, leeway: Floats, motion: Floats) -> bool:
+def has_strayed(order: Ints, known: Ints, begun: Floats, leeway: Floats, motion: Floats) -> bool:
     """Return whether others were listed, or any body is further from there than its leeway."""
-    if order.shape[0] != listed.shape[0]:
+    if order.shape[0] != known.shape[0]:
         return True
-    for i in range(listed.shape[0]):
-        if order[i] != listed[i]:
+    for i in range(known.shape[0]):
+        if order[i] != known[i]:
             return True
         dx, dy = motion[i, 0] - begun[i, 0], motion[i, 1] - begun[i, 1]
         if not dx * dx + dy * dy <= leeway[i] * leeway[i]:

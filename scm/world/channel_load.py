@@ -12,7 +12,7 @@ from scm.vehicles.drivers.channel import add_busy_time
 OnAir = tuple[Floats, Floats, Floats]
 
 
-class Busy:
+class ChannelLoad:
     """The load of the one channel; on an endless one nothing is measured.
 
     Attributes:

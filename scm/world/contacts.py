@@ -24,17 +24,17 @@ from scm.arrays import Bools, Floats, Ints
 from scm.geometry import Pose2
 from scm.records.city_map import CityMap
 from scm.world.boxes import Boxes, is_still
-from scm.world.broad_phase import Near, obstacles_of
+from scm.world.broad_phase import BroadPhase, obstacles_of
 from scm.world.solids import Hull, box_body, car_body, obstacle_boxes, outline_of, solids
 
 INSTANT = 1e-9
 STEP_S = 0.005
-OVERLAP_KEPT = 2e-4
+ALLOWED_OVERLAP_M = 2e-4
 SHARE_CORRECTED = 0.2
 ITERATIONS = 30
 MAX_ITERATIONS = 300  # where bodies were stopped: a light one between heavy ones takes many
 MAX_SPEED_GAIN = 2.0  # one hit gives a free box at most 1 + restitution of the car's speed
-KEPT_STEPS = 40
+STEPS_IN_SPACE = 40
 WALL, FIRST_BOX = -1, -2
 
 _MOTION = (
@@ -82,50 +82,50 @@ class Contacts:
     def __init__(self, city_map: CityMap) -> None:
         self.boxes = Boxes(city_map.boxes)
         self._obstacles = obstacles_of(obstacle_boxes(city_map))
-        self._near = Near(self._obstacles)
+        self._near = BroadPhase(self._obstacles)
         self._cores = obstacle_boxes(city_map, round_ends=False)
         self._ring = _Ring(city_map, self.boxes)
         rows = [(0.0, 0.0, a, b, np.hypot(a, b), 1.0) for a, b in self.boxes.sizes.tolist()]
         self._outlines: Floats = np.array(rows, dtype=float).reshape(-1, 6)
 
-    def add(self, slot: int, hull: Hull) -> None:
+    def add(self, index: int, hull: Hull) -> None:
         """Give a car a body under a number of the caller's; its motion comes with every step."""
-        key = slot + len(self.boxes)
+        key = index + len(self.boxes)
         if key >= len(self._outlines):
             more = np.zeros((max(64, 2 * key) - len(self._outlines), 6))
             self._outlines = np.concatenate((self._outlines, more))
         self._outlines[key] = outline_of(hull)
         self._ring.known[key] = hull
 
-    def remove(self, slot: int) -> None:
+    def remove(self, index: int) -> None:
         """Take a car's body away."""
-        self._ring.forget(slot + len(self.boxes))
+        self._ring.forget(index + len(self.boxes))
 
     def is_free(self, hull: Hull, pose: Pose2) -> bool:
         """Return whether a car with its centre of gravity at a pose touches no wall and no box."""
         motion = np.vstack(([*pose, 0.0, 0.0, 0.0], self.boxes.motion))
         outlines = np.vstack((outline_of(hull), self._outlines[: len(self.boxes)]))
-        marks = Near(self._obstacles).touching(np.arange(len(motion)), motion, outlines, 1)
+        marks = BroadPhase(self._obstacles).touching(np.arange(len(motion)), motion, outlines, 1)
         return not marks[0]
 
     def warm(self) -> None:
         """Compile or load now what `step` needs, not when the first cars meet."""
         outlines, walls = np.full((2, 6), 0.1), np.array([[5.0, 0.0, 1.0, 0.0, 1.0, 0.1]])
-        near = Near(obstacles_of(walls))
+        near = BroadPhase(obstacles_of(walls))
         for _ in range(2):  # at the second step it looks who has strayed
             marks = near.touching(np.arange(2), np.zeros((2, 6)), outlines, 1)
         for marked in (np.zeros(2, np.bool_), marks):
             near.shares(np.zeros((2, 3)), np.zeros((2, 3)), outlines, walls, marked)
 
-    def step(self, slots: Ints, motion: Floats) -> Touches:
+    def step(self, indices: Ints, motion: Floats) -> Touches:
         """Solve the contacts of this instant.
 
         Args:
-            slots: (n,) the caller's numbers of all cars that were added, in any order.
+            indices: (n,) the caller's numbers of all cars that were added, in any order.
             motion: (n, 6) x, y, yaw, velocity x, y and yaw rate of the centres of gravity.
         """
-        n, count = len(slots), len(self.boxes)
-        keys = slots + count
+        n, count = len(indices), len(self.boxes)
+        keys = indices + count
         if count:
             self.boxes.slide(STEP_S)
             keys = np.concatenate((keys, np.arange(count)))
@@ -199,7 +199,7 @@ def _nothing(n: int) -> Touches:
 class _Ring:
     """The pymunk space: everything that stays, and whoever touched something a moment ago.
 
-    Coming in costs a body ten microseconds, so it stays for `KEPT_STEPS` steps that solve.
+    Coming in costs a body ten microseconds, so it stays for `STEPS_IN_SPACE` steps that solve.
 
     Attributes:
         known: Cars that may come in, by key; boxes have the first keys.
@@ -287,7 +287,7 @@ class _Ring:
         """
         left = {key: steps - 1 for key, steps in self._left.items()}
         new = {key: pose for key, pose in zip(keys, poses, strict=True) if key not in left}
-        left.update(dict.fromkeys(keys, KEPT_STEPS))
+        left.update(dict.fromkeys(keys, STEPS_IN_SPACE))
         self._left = left
         for key, (x, y, yaw) in new.items():
             if key not in self._bodies:
@@ -332,7 +332,7 @@ def _shifts(pairs: Ints, normals: Floats, depths: Floats, lightness: Floats) -> 
     way = np.zeros((len(lightness), 2))
     if len(pairs):
         a, b = pairs.T
-        out = SHARE_CORRECTED * np.maximum(depths - OVERLAP_KEPT, 0.0)
+        out = SHARE_CORRECTED * np.maximum(depths - ALLOWED_OVERLAP_M, 0.0)
         whole = lightness[a] + lightness[b]
         out /= np.where(whole > 0.0, whole, np.inf)
         np.add.at(way, a, -normals * (out * lightness[a])[:, None])

@@ -7,47 +7,54 @@ their own drivers drive are decided for in one call.
 
 import numpy as np
 
+from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.vehicles.guard import Guard
 from scm.world import lease as rules
 from scm.world.hosted import HostedCar
-from scm.world.slots import CODES, DRIVE, IDLE, STOP
-from scm.world.world import World
+from scm.world.vehicle_arrays import CODES, DRIVE, IDLE, STOP
+from scm.world.world import World, city_event, lease_record
 
 
-def steer(world: World, now_ns: int) -> None:
-    """Set the commands of all hosted cars for the time after `now_ns`."""
+def steer(world: World, now_ns: int) -> list[Outgoing]:
+    """Set the commands of all hosted cars for the time after `now_ns`; return lost leases."""
+    out: list[Outgoing] = []
     stop = world.stop.engaged
     _stand(world, stop=stop)
     for car in list(world.leased.values()):
         lost = _loss(car, now_ns)
         if lost is not None:
-            take_over(world, car, rules.sent_home(car.lease), now_ns)
-            world.slots.hazard[car.slot] = True
-            world.slots.mode[car.slot] = STOP
+            out.append(hand_over(world, car, rules.sent_home(car.lease), now_ns))
+            world.vehicles.hazard[car.index] = True
+            world.vehicles.mode[car.index] = STOP
             text = f"{car.name} stands: {lost}"
-            world.say("warning", "lease_lost", text, now_ns, car.name)
+            out.append(city_event("warning", "lease_lost", text, now_ns, car.name))
         else:
             _obey(world, car, now_ns, stop=stop)
     _drive(world, now_ns, stop=stop)
-    world.garage.command(world.slots)
+    world.garage.command(world.vehicles)
+    return out
 
 
-def take_over(world: World, car: HostedCar, lease: rules.Lease, now_ns: int) -> None:
-    """Put a car under another lease; its trip is over, older commands are refused."""
+def hand_over(world: World, car: HostedCar, lease: rules.Lease, now_ns: int) -> Keep:
+    """Put a car under another lease, and return its record.
+
+    Its trip is over, and older commands are refused.
+    """
     if lease.is_at_home:
         world.leased.pop(car.name, None)
         car.guard = None
-        world.slots.throttle[car.slot] = 0.0
+        world.vehicles.throttle[car.index] = 0.0
     else:
         world.leased[car.name] = car
         car.guard = car.guard or Guard(car.lease.epoch)
         car.guard.set_epoch(lease.epoch, now_ns)
     car.lease = lease
-    world.keep(car)
-    world.trips.end(car.slot, now_ns)
-    world.slots.driven[car.slot] = False
-    world.slots.hazard[car.slot] = False
+    record = lease_record(car)
+    world.trips.end(car.index, now_ns)
+    world.vehicles.driven[car.index] = False
+    world.vehicles.hazard[car.index] = False
+    return record
 
 
 def send(world: World, car: HostedCar, request: RouteRequest, now_ns: int) -> RouteReply:
@@ -56,20 +63,20 @@ def send(world: World, car: HostedCar, request: RouteRequest, now_ns: int) -> Ro
     Raises:
         ScmError: when the lanes do not allow the route, or the car stands on none.
     """
-    reply = world.trips.begin(car.slot, car.name, request, car.pose, now_ns)
-    slots = world.slots
-    slots.driven[car.slot] = not car.has_diverged
-    slots.hazard[car.slot] = slots.arrived[car.slot] = False
+    reply = world.trips.begin(car.index, car.name, request, car.pose, now_ns)
+    vehicles = world.vehicles
+    vehicles.driven[car.index] = not car.has_diverged
+    vehicles.hazard[car.index] = vehicles.arrived[car.index] = False
     return reply
 
 
 def _stand(world: World, *, stop: bool) -> None:
     """Let go of the pedals of those that nobody drives; their wheels stay as they are steered."""
-    slots = world.slots
-    standing = slots.hosted & ~slots.driven
-    slots.throttle[standing] = 0.0
-    slots.mode[standing] = STOP if stop else IDLE
-    slots.mode[standing & slots.hazard] = STOP
+    vehicles = world.vehicles
+    standing = vehicles.hosted & ~vehicles.driven
+    vehicles.throttle[standing] = 0.0
+    vehicles.mode[standing] = STOP if stop else IDLE
+    vehicles.mode[standing & vehicles.hazard] = STOP
 
 
 def _loss(car: HostedCar, now_ns: int) -> str | None:
@@ -85,25 +92,25 @@ def _obey(world: World, car: HostedCar, now_ns: int, *, stop: bool) -> None:
         return
     car.guard.stop(stop)
     allowed = car.guard.output(now_ns)
-    slots, slot = world.slots, car.slot
-    slots.throttle[slot], slots.steering[slot] = allowed.throttle, allowed.steering
-    slots.mode[slot] = STOP if allowed.mode == "lost" else CODES[allowed.mode]
-    slots.hazard[slot] = allowed.hazard
+    vehicles, index = world.vehicles, car.index
+    vehicles.throttle[index], vehicles.steering[index] = allowed.throttle, allowed.steering
+    vehicles.mode[index] = STOP if allowed.mode == "lost" else CODES[allowed.mode]
+    vehicles.hazard[index] = allowed.hazard
 
 
 def _drive(world: World, now_ns: int, *, stop: bool) -> None:
     """Let the drivers decide, and note who has arrived."""
-    slots, drivers = world.slots, world.drivers
-    driven = slots.driven
+    vehicles, drivers = world.vehicles, world.drivers
+    driven = vehicles.driven
     if not driven.any():
         return
-    drivers.decide(now_ns, slots.x, slots.y, slots.yaw, slots.speed, driven, stop=stop)
-    np.copyto(slots.throttle, drivers.throttle, where=driven)
-    np.copyto(slots.steering, drivers.steering, where=driven)
-    if world.stuck.against:
-        slots.throttle[driven & world.stuck.rests(now_ns - world.pace.lost_ns)] = 0.0
+    drivers.decide(now_ns, vehicles.x, vehicles.y, vehicles.yaw, vehicles.speed, driven, stop=stop)
+    np.copyto(vehicles.throttle, drivers.throttle, where=driven)
+    np.copyto(vehicles.steering, drivers.steering, where=driven)
+    if world.alerts.stuck.against:
+        vehicles.throttle[driven & world.alerts.stuck.rests(now_ns - world.pace.lost_ns)] = 0.0
     world.trips.check_arrivals(now_ns)
-    np.copyto(slots.arrived, drivers.arrived & driven)
-    slots.mode[driven] = STOP if stop else DRIVE
+    np.copyto(vehicles.arrived, drivers.arrived & driven)
+    vehicles.mode[driven] = STOP if stop else DRIVE
     if not stop:
-        slots.mode[slots.arrived] = IDLE
+        vehicles.mode[vehicles.arrived] = IDLE

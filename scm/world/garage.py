@@ -14,9 +14,8 @@ from scm.vehicles.battery_pack import Packs
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.ground import Ground
-from scm.world.hull import hull_of
-from scm.world.slots import Slots
-from scm.world.solids import Hull
+from scm.world.solids import Hull, hull_of
+from scm.world.vehicle_arrays import VehicleArrays
 
 _log = logging.getLogger(__name__)
 _NOBODY: Ints = np.empty(0, np.int64)
@@ -41,7 +40,7 @@ class Garage:
         self.fleets: dict[str, Fleet] = {}
         self._packs: dict[str, Packs] = {}
         self._rows: dict[str, Ints] = {}
-        self._slots: dict[str, Ints] = {}
+        self._indices: dict[str, Ints] = {}
         self._threads = 1
         self._preparing = threading.Lock()
 
@@ -85,7 +84,7 @@ class Garage:
                     self.fleets[name] = fleet
         return self.fleets[name]
 
-    def park(self, name: str, pose: Pose2, slot: int) -> tuple[Fleet, int]:
+    def park(self, name: str, pose: Pose2, index: int) -> tuple[Fleet, int]:
         """Put a car of a file on the floor; return its fleet and row.
 
         Raises:
@@ -96,22 +95,25 @@ class Garage:
         row = fleet.add(pose)
         self._packs[name].renew(row)
         self._rows[name] = np.append(self.rows(name), row)
-        self._slots[name] = np.append(self.slots(name), slot)
+        self._indices[name] = np.append(self.indices(name), index)
         return fleet, row
 
     def scrap(self, name: str, row: int) -> None:
         """Take a car off the floor."""
         self.fleets[name].remove(row)
-        kept = self._rows[name] != row
-        self._rows[name], self._slots[name] = self._rows[name][kept], self._slots[name][kept]
+        others = self._rows[name] != row
+        self._rows[name], self._indices[name] = (
+            self._rows[name][others],
+            self._indices[name][others],
+        )
 
     def rows(self, name: str) -> Ints:
         """Return the rows in use of a fleet, in the order its cars came."""
         return self._rows.get(name, _NOBODY)
 
-    def slots(self, name: str) -> Ints:
+    def indices(self, name: str) -> Ints:
         """Return the world's numbers of the cars in `rows`."""
-        return self._slots.get(name, _NOBODY)
+        return self._indices.get(name, _NOBODY)
 
     def use_threads(self, count: int) -> None:
         """Let fleets advance on several threads, those of today and those to come."""
@@ -119,12 +121,12 @@ class Garage:
         for fleet in self.fleets.values():
             fleet.threads = count
 
-    def command(self, slots: Slots) -> None:
+    def command(self, indices: VehicleArrays) -> None:
         """Tell all motors and servos what stands in the slots."""
         for name, rows in self._rows.items():
-            fleet, own = self.fleets[name], self._slots[name]
-            fleet.throttle[rows] = slots.throttle[own]
-            fleet.steering[rows] = slots.steering[own]
+            fleet, own = self.fleets[name], self._indices[name]
+            fleet.throttle[rows] = indices.throttle[own]
+            fleet.steering[rows] = indices.steering[own]
 
     def advance(self, ground: Ground, t_ns: int, duration: float) -> None:
         """Let all cars move for a time [s] on the floor and in the wind of an instant."""
@@ -138,29 +140,29 @@ class Garage:
         for name, rows in self._rows.items():
             self._packs[name].drain(rows, duration)
 
-    def locate(self, slots: Slots) -> None:
+    def locate(self, indices: VehicleArrays) -> None:
         """Write where all cars are and how they move into the slots."""
         for name, rows in self._rows.items():
-            fleet, own = self.fleets[name], self._slots[name]
-            slots.x[own] = fleet.x[rows]
-            slots.y[own] = fleet.y[rows]
-            slots.yaw[own] = fleet.yaw[rows]
-            slots.speed[own] = fleet.speed[rows]
-            slots.yaw_rate[own] = fleet.yaw_rate[rows]
+            fleet, own = self.fleets[name], self._indices[name]
+            indices.x[own] = fleet.x[rows]
+            indices.y[own] = fleet.y[rows]
+            indices.yaw[own] = fleet.yaw[rows]
+            indices.speed[own] = fleet.speed[rows]
+            indices.yaw_rate[own] = fleet.yaw_rate[rows]
 
     def signal(self, name: str) -> Floats:
         """Return one signal of all cars by slot, (capacity,); 0 where there is no hosted car."""
         values = np.zeros(self._capacity)
         for car_file, rows in self._rows.items():
             of_fleet = cast("Floats", getattr(self.fleets[car_file], name))
-            values[self._slots[car_file]] = of_fleet[rows]
+            values[self._indices[car_file]] = of_fleet[rows]
         return values
 
     def batteries(self) -> tuple[Floats, Floats]:
         """Return voltage under load [V] and charge left by slot; NaN: there is no battery."""
         volts, charge = np.full((2, self._capacity), np.nan)
         for name, rows in self._rows.items():
-            own, packs = self._slots[name], self._packs[name]
+            own, packs = self._indices[name], self._packs[name]
             volts[own], charge[own] = packs.volts[rows], packs.charge[rows]
         return volts, charge
 
@@ -168,7 +170,7 @@ class Garage:
         """Return the slots of cars whose numbers left every physical range."""
         return np.concatenate(
             [
-                self._slots[name][self.fleets[name].status[rows] != VehicleStatus.OK]
+                self._indices[name][self.fleets[name].status[rows] != VehicleStatus.OK]
                 for name, rows in self._rows.items()
             ]
             or [_NOBODY]

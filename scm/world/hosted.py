@@ -1,6 +1,6 @@
 """A car that the world itself simulates, as people ask for it: no stage of a tick walks over these.
 
-Its dynamics live in the `Garage`, what it does now in the `Slots`, its driver in the crowd.
+Its dynamics live in the `Garage`, what it does now in the `VehicleArrays`, its driver in the crowd.
 """
 
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from scm.vehicles.fleet import Fleet, VehicleStatus
 from scm.vehicles.guard import Guard
 from scm.vehicles.lights import OFF, Switches
 from scm.world.lease import Lease
-from scm.world.slots import MODES, Slots
+from scm.world.vehicle_arrays import MODES, VehicleArrays
 
 
 @dataclass(slots=True, eq=False)
@@ -32,8 +32,8 @@ class HostedCar:
     car: Car
     car_file: str
     tag_id: int
-    slot: int
-    slots: Slots
+    index: int
+    vehicles: VehicleArrays
     fleet: Fleet
     row: int
     lease: Lease
@@ -56,12 +56,12 @@ class HostedCar:
     @property
     def mode(self) -> str:
         """As in `VehicleState`."""
-        return MODES[self.slots.mode[self.slot]]
+        return MODES[self.vehicles.mode[self.index]]
 
     @property
     def hazard(self) -> bool:
         """Whether its hazard lights flash: its commander was lost."""
-        return bool(self.slots.hazard[self.slot])
+        return bool(self.vehicles.hazard[self.index])
 
     def command_age_ms(self, now_ns: int) -> float | None:
         """Return the age of its leaseholder's newest command; None: there is none."""
@@ -71,7 +71,7 @@ class HostedCar:
     @property
     def is_sent(self) -> bool:
         """Whether its own driver drives it; else it stands until it is sent or leased."""
-        return bool(self.slots.driven[self.slot])
+        return bool(self.vehicles.driven[self.index])
 
     @property
     def has_diverged(self) -> bool:

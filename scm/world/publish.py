@@ -1,4 +1,4 @@
-"""The last stage of a tick: what the city is told, each kind at its own rate.
+"""Publish what is due: states, snapshots, trips, contacts and status, each at its own rate.
 
 Hosted cars report themselves in turns, `STATES_A_TICK` a tick at most: up to so many cars each one
 reports every tick, beyond that each one's rate falls in proportion (1000 cars: 20 Hz each).
@@ -12,6 +12,7 @@ import numpy as np
 
 from scm.arrays import Ints
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
+from scm.v2x.exchange import Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState
@@ -20,7 +21,7 @@ from scm.vehicles.lights import Indicators, lamps
 from scm.world import lease as rules
 from scm.world.hosted import HostedCar
 from scm.world.remote import RemoteCar
-from scm.world.slots import MODES
+from scm.world.vehicle_arrays import MODES
 from scm.world.world import NAME, World
 
 STATES_A_TICK = 400
@@ -29,46 +30,48 @@ TRIP_NS = NS_PER_S // 2
 TURNS: dict[int, Indicators] = {1: "left", -1: "right", 0: "off"}
 
 
-class Told(TypedDict):
-    """What the lamps of a car are told besides its switches."""
+class LampState(TypedDict):
+    """What its driver or guard switches on a car's lamps."""
 
     hazard: bool
     turn: Indicators
 
 
 LAMPS = {
-    (hazard, code): Told(hazard=hazard, turn=turn)
+    (hazard, code): LampState(hazard=hazard, turn=turn)
     for hazard in (False, True)
     for code, turn in TURNS.items()
 }
 
 
-def publish(world: World, now_ns: int) -> None:
-    """Put states, snapshot, trips, contacts and vital signs into the outbox."""
-    if world.wishes.any(VehicleState):
-        slots = _whose_turn(world)
-        world.slots.seq[slots] += 1
-        world.outbox += states_of(world, slots, now_ns)
-    world.outbox += world.blows.take(now_ns)
+def publish(world: World, now_ns: int) -> list[Outgoing]:
+    """Return the states, snapshot, trips, contacts and status messages that are due."""
+    out: list[Outgoing] = []
+    if world.subscribers.any(VehicleState):
+        turn = _whose_turn(world)
+        world.vehicles.seq[turn] += 1
+        out += states_of(world, turn, now_ns)
+    out += world.impulses.reports.pop(now_ns)
     for remote in world.remote.values():
         contact = remote.contact(now_ns)
         if contact is not None:
-            world.outbox.append(contact)
-    if world.every["snapshot"].is_due(now_ns) and world.wishes.any(WorldSnapshot):
-        world.outbox.append(snapshot(world, now_ns))
+            out.append(contact)
+    if world.every["snapshot"].is_due(now_ns) and world.subscribers.any(WorldSnapshot):
+        out.append(snapshot(world, now_ns))
     world.trips.every_ns = max(TRIP_NS, len(world.hosted) * NS_PER_S // TRIPS_A_SECOND)
-    world.outbox += world.trips.reports(now_ns)
+    out += world.trips.reports(now_ns)
     if world.every["second"].is_due(now_ns):
-        world.outbox += _each_second(world, now_ns)
+        out += _each_second(world, now_ns)
+    return out
 
 
 def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
     """Yield the reports of the hosted cars in some slots."""
-    slots, signal = world.slots, world.garage.signal
+    vehicles, signal = world.vehicles, world.garage.signal
     columns = (
-        slots.seq, slots.x, slots.y, slots.yaw, slots.speed, signal("lateral_speed"),
-        slots.yaw_rate, signal("accel_x") + signal("contact_accel_x"), signal("steer_angle"),
-        slots.throttle, slots.steering, slots.mode, *world.garage.batteries(),
+        vehicles.seq, vehicles.x, vehicles.y, vehicles.yaw, vehicles.speed, signal("lateral_speed"),
+        vehicles.yaw_rate, signal("accel_x") + signal("contact_accel_x"), signal("steer_angle"),
+        vehicles.throttle, vehicles.steering, vehicles.mode, *world.garage.batteries(),
     )  # fmt: skip
     rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
     for (
@@ -100,13 +103,13 @@ def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
         )
 
 
-def _cars(world: World, of: Ints) -> list[tuple[HostedCar, Told]]:
+def _cars(world: World, of: Ints) -> list[tuple[HostedCar, LampState]]:
     """Return the cars of some slots, and what their lamps are told by driver and guard."""
-    slots, hosted, names = world.slots, world.hosted, world.slots.names
-    hazards = slots.hazard[of].tolist()
-    turns = (world.drivers.turn * slots.driven)[of].tolist()
-    told = zip(of.tolist(), hazards, turns, strict=True)
-    return [(hosted[names[slot]], LAMPS[hazard, turn]) for slot, hazard, turn in told]
+    vehicles, hosted, names = world.vehicles, world.hosted, world.vehicles.names
+    hazards = vehicles.hazard[of].tolist()
+    turns = (world.drivers.turn * vehicles.driven)[of].tolist()
+    states = zip(of.tolist(), hazards, turns, strict=True)
+    return [(hosted[names[index]], LAMPS[hazard, turn]) for index, hazard, turn in states]
 
 
 def snapshot(world: World, now_ns: int) -> WorldSnapshot:
@@ -125,11 +128,12 @@ def snapshot(world: World, now_ns: int) -> WorldSnapshot:
 
 
 def _hosted_in_snapshot(world: World, now_ns: int) -> Iterator[SnapshotVehicle]:
-    slots, signal = world.slots, world.garage.signal
-    of = np.flatnonzero(slots.hosted)
+    vehicles, signal = world.vehicles, world.garage.signal
+    of = np.flatnonzero(vehicles.hosted)
     columns = (
-        slots.x, slots.y, slots.yaw, slots.speed, slots.throttle, signal("steer_angle"),
-        signal("roll"), signal("pitch"), slots.mode, *world.garage.batteries(),
+        vehicles.x, vehicles.y, vehicles.yaw, vehicles.speed, vehicles.throttle,
+        signal("steer_angle"), signal("roll"), signal("pitch"), vehicles.mode,
+        *world.garage.batteries(),
     )  # fmt: skip
     rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
     for (
@@ -156,7 +160,7 @@ def _hosted_in_snapshot(world: World, now_ns: int) -> Iterator[SnapshotVehicle]:
             command_age_ms=car.command_age_ms(now_ns),
             mode=MODES[mode],
             lights=lamps(car.switches, throttle, speed, now_ns, **lit),
-            stuck=world.stuck.against.get(car.slot),
+            stuck=world.alerts.stuck.against.get(car.index),
         )
 
 
@@ -184,7 +188,7 @@ def _remote_in_snapshot(world: World, car: RemoteCar, now_ns: int) -> SnapshotVe
         age_ms=age_ms,
         alive=car.alive,
         lights=() if state is None else state.lights,
-        stuck=world.stuck.against.get(car.slot),
+        stuck=world.alerts.stuck.against.get(car.index),
     )
 
 
@@ -196,7 +200,7 @@ def _command_age_ms(state: VehicleState | None, age_ms: float) -> float | None:
 
 def _whose_turn(world: World) -> Ints:
     """Return the slots of the hosted cars that report in this tick."""
-    hosted = np.flatnonzero(world.slots.hosted)
+    hosted = np.flatnonzero(world.vehicles.hosted)
     if len(hosted) <= STATES_A_TICK:
         return hosted
     first = world.tick * STATES_A_TICK % len(hosted)

@@ -5,6 +5,7 @@ are cars, and the roadside units at their junctions. What hosted cars hear their
 for themselves (`vehicles/drivers/driver_batch.py`); here are all other receivers.
 """
 
+import heapq
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from scm.arrays import Bools, Floats, Ints
 from scm.maps.roadside import roadside_place
 from scm.records.city_map import CityMap, Point
 from scm.v2x.etsi.convert import roadside_station
+from scm.v2x.message import Message
 from scm.vehicles.drivers.channel import (
     DELAY_NS,
     FADING,
@@ -100,13 +102,13 @@ class Radio:
             if column is not None:
                 own[row, column] = True
         near &= ~own
-        heard = near & ~self._lost(near, x, y, receivers, load)
+        received = near & ~self._lost(near, x, y, receivers, load)
         counts = self.counts
         counts.sent += len(senders)
-        counts.delivered += int(heard.sum())
-        counts.lost += int((near & ~heard).sum())
+        counts.delivered += int(received.sum())
+        counts.lost += int((near & ~received).sum())
         counts.out_of_range += int((~near & ~own).sum())
-        return heard
+        return received
 
     def delays(self, count: int) -> Ints:
         """Return how late frames that are heard arrive [ns], (count,)."""
@@ -152,3 +154,26 @@ def roadside_places(city_map: CityMap) -> dict[str, Point]:
         roadside_station(junction.name): roadside_place(city_map, junction.name)
         for junction in city_map.junctions
     }
+
+
+class DelayQueue:
+    """Delayed frames by their arrival time; equal times keep the order of `put`."""
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[int, int, Message]] = []
+        self._count = 0
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def put(self, due_ns: int, frame: Message) -> None:
+        """Add a frame that arrives at a time."""
+        self._count += 1
+        heapq.heappush(self._waiting, (due_ns, self._count, frame))
+
+    def arrived(self, now_ns: int) -> list[Message]:
+        """Return and forget the frames that have arrived by now."""
+        frames = []
+        while self._waiting and self._waiting[0][0] <= now_ns:
+            frames.append(heapq.heappop(self._waiting)[2])
+        return frames

@@ -19,9 +19,9 @@ from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import Car
 from scm.vehicles.shape import shape_of
-from scm.world.hull import cog_motion
 from scm.world.lease import Lease
 from scm.world.pace import LONGEST_TICK_NS
+from scm.world.solids import cog_motion
 
 FARTHEST_M = 10_000.0
 FASTEST = 100.0
@@ -87,10 +87,10 @@ class RemoteCar:
     car: Car
     car_file: str
     tag_id: int
-    slot: int
+    index: int
     lease: Lease
     pose: Pose2
-    heard_ns: int
+    received_ns: int
     state: VehicleState | None = None
     lost_ns: int | None = None
     dead: bool = False
@@ -98,7 +98,7 @@ class RemoteCar:
     _ahead: float = field(init=False)  # from the rear axle to the centre of gravity [m]
     _motion: tuple[VehicleState | None, Floats] | None = None  # reported, for all contact steps
     _echo: deque[Echo] = field(default_factory=deque)
-    _told: int = 0
+    _contact_number: int = 0
     _dv: Floats = field(default_factory=lambda: np.zeros(3))
     _shift: Floats = field(default_factory=lambda: np.zeros(3))
     _against: set[str] = field(default_factory=set)
@@ -124,7 +124,7 @@ class RemoteCar:
 
     def age_ns(self, now_ns: int) -> int:
         """Return how old its newest report is, on the world's clock."""
-        return max(0, now_ns - self.heard_ns)
+        return max(0, now_ns - self.received_ns)
 
     def follow(self, state: VehicleState, now_ns: int) -> bool:
         """Take a report; return whether it was newer than the last one."""
@@ -132,7 +132,7 @@ class RemoteCar:
             return False
         if self.state is not None:
             self.missed_ns += missed_between(self.state, state)
-        self.state, self.heard_ns, self.lost_ns = state, now_ns, None
+        self.state, self.received_ns, self.lost_ns = state, now_ns, None
         self.pose = Pose2(state.x_m, state.y_m, state.yaw_rad)
         while self._echo and self._echo[0].number <= state.contacts:
             self._make_up(self._echo.popleft(), now_ns)
@@ -146,14 +146,14 @@ class RemoteCar:
         late = seconds(min(max(0, now_ns - felt.hit_ns - REPORT_NS), ANSWER_NS))
         if felt.dv.any() and late:
             self._shift += late * felt.dv
-            self._echo.append(Echo(self._told + 1, now_ns, np.zeros(3), late * felt.dv))
+            self._echo.append(Echo(self._contact_number + 1, now_ns, np.zeros(3), late * felt.dv))
 
     def motion(self, now_ns: int) -> Floats:
         """Return x, y, yaw, vx, vy, yaw rate of the centre of gravity, (6,), map frame."""
         row = self._reported()
         row[:3] += row[3:] * seconds(min(self.age_ns(now_ns), STALE_NS))
         patience_ns = ANSWER_NS if self.state is not None and self.state.contacts else ECHO_NS
-        while self._echo and self.heard_ns - self._echo[0].hit_ns > patience_ns:
+        while self._echo and self.received_ns - self._echo[0].hit_ns > patience_ns:
             self._echo.popleft()
         for echo in self._echo:
             since = seconds(min(max(0, now_ns - echo.hit_ns), STALE_NS))
@@ -173,7 +173,7 @@ class RemoteCar:
 
     def hit(self, dv: Floats, shift: Floats, against: set[str], now_ns: int) -> None:
         """Note what one contact step did to it: both changes are (3,), as in `Echo`."""
-        self._echo.append(Echo(self._told + 1, now_ns, dv, shift))
+        self._echo.append(Echo(self._contact_number + 1, now_ns, dv, shift))
         self._dv += dv
         self._shift += shift
         self._against |= against
@@ -183,11 +183,11 @@ class RemoteCar:
         if not (self._dv.any() or self._shift.any()):
             return None
         (dvx, dvy, rate), (dx, dy, turn) = self._dv.tolist(), self._shift.tolist()
-        self._told += 1
-        told = Contact(
+        self._contact_number += 1
+        contact = Contact(
             vehicle=self.name,
             t_ns=now_ns,
-            number=self._told,
+            number=self._contact_number,
             dvx_mps=dvx,
             dvy_mps=dvy,
             dyaw_rate_radps=rate,
@@ -197,4 +197,4 @@ class RemoteCar:
             against=tuple(sorted(self._against)),
         )
         self._dv, self._shift, self._against = np.zeros(3), np.zeros(3), set()
-        return told
+        return contact

@@ -1,4 +1,4 @@
-"""What the world is asked to do, one function a request; what cannot be done is refused in words.
+"""The requests that the world answers, one function each; a refusal says why.
 
 To add a request: write its message, a function here, and its line in `_ANSWERS`.
 """
@@ -14,7 +14,7 @@ from scm.maps.room import AHEAD_S, CLEARANCE_M
 from scm.maps.vehicle_tags import LAST_TAG_ID
 from scm.runtime.part import Service
 from scm.store.records import StopRecord
-from scm.v2x.exchange import Keep
+from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
@@ -30,10 +30,10 @@ from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.car import car_names
 from scm.vehicles.drivers.limits import limits_of, turning_radius_m
 from scm.world import lease as rules
-from scm.world.driving import send, take_over
+from scm.world.driving import hand_over, send
 from scm.world.hosted import HostedCar
 from scm.world.remote import RemoteCar
-from scm.world.world import NAME, AnyCar, World
+from scm.world.world import NAME, AnyCar, World, city_event, lease_record
 
 KINDS = ("remote", "real")
 
@@ -46,10 +46,19 @@ class _RefusedError(ScmError):
         self.code = code
 
 
-def reply_to(world: World, request: Request, now_ns: int) -> Message:
-    """Do what is asked, or refuse it in words."""
+def reply_to(
+    world: World, request: Request, now_ns: int, out: list[Outgoing] | None = None
+) -> Message:
+    """Do what is requested, or refuse it and say why.
+
+    Args:
+        world: The world.
+        request: The request.
+        now_ns: The present time.
+        out: Collects what else is to be sent: events, and records to store.
+    """
     try:
-        return _ANSWERS[type(request)](world, request, now_ns)
+        return _ANSWERS[type(request)](world, request, now_ns, [] if out is None else out)
     except _RefusedError as refusal:
         return Refused(code=refusal.code, detail=str(refusal))
     except LeaseError as refusal:
@@ -60,19 +69,19 @@ def reply_to(world: World, request: Request, now_ns: int) -> Message:
         return Refused(code="invalid", detail=str(refusal))
 
 
-def _spawn(world: World, request: SpawnRequest, now_ns: int) -> SpawnReply:
+def _spawn(world: World, request: SpawnRequest, now_ns: int, out: list[Outgoing]) -> SpawnReply:
     name = request.vehicle or world.free_name()
     _check_new(world, name, request.car)
     car = world.host(name, request.car, _place(world, request.spawn, request.car), now_ns)
-    world.say(
-        "info", "vehicle_spawned", f"{name}, a {request.car}, stands on the map", now_ns, name
-    )
-    _warn_of_bends(world, name, request.car, now_ns)
+    out += world.arrival(car, now_ns)
+    text = f"{name}, a {request.car}, stands on the map"
+    out.append(city_event("info", "vehicle_spawned", text, now_ns, name))
+    out += _lane_misfits(world, name, request.car, now_ns)
     x, y, yaw = car.pose
     return SpawnReply(vehicle=name, x_m=x, y_m=y, yaw_rad=yaw, tag_id=car.tag_id)
 
 
-def _join(world: World, request: JoinRequest, now_ns: int) -> JoinReply:
+def _join(world: World, request: JoinRequest, now_ns: int, out: list[Outgoing]) -> JoinReply:
     name, before = request.vehicle, world.remote.get(request.vehicle)
     if request.kind not in KINDS:
         raise _RefusedError("invalid", f"kind: got {request.kind!r}, expected remote or real")
@@ -83,27 +92,29 @@ def _join(world: World, request: JoinRequest, now_ns: int) -> JoinReply:
     if before is not None and before.session == request.session and before.alive:
         return _welcome(before, now_ns)
     if before is not None and not before.alive:
-        world.remove(name)
+        out += world.remove(name)
     _check_new(world, name, request.car)
     _check_tag(world, request.tag_id)
     pose = _place(world, request.spawn, request.car)
     car = world.admit(
         name, request.kind, request.session, request.car, pose, now_ns, request.tag_id
     )
-    world.say("info", "vehicle_joined", f"{name}, a {request.car}, joined the city", now_ns, name)
-    _warn_of_bends(world, name, request.car, now_ns)
+    out += world.arrival(car, now_ns, request.tag_id)
+    text = f"{name}, a {request.car}, joined the city"
+    out.append(city_event("info", "vehicle_joined", text, now_ns, name))
+    out += _lane_misfits(world, name, request.car, now_ns)
     return _welcome(car, now_ns)
 
 
-def _warn_of_bends(world: World, name: str, car_file: str, now_ns: int) -> None:
-    """Say which lanes a car cannot follow, at the first car of its file."""
-    if car_file in world.warned_of_bends:
-        return
-    world.warned_of_bends.add(car_file)
+def _lane_misfits(world: World, name: str, car_file: str, now_ns: int) -> list[Outgoing]:
+    """Return a warning of lanes that a car cannot follow, at the first car of its file."""
+    if car_file in world.alerts.checked_files:
+        return []
+    world.alerts.checked_files.add(car_file)
     car = world.garage.car(car_file)
     problem = misfit(world.city_map, turning_radius_m(car), limits_of(car).width)
-    if problem:
-        world.say("warning", "lanes_misfit", f"{name}, a {car_file}: {problem}", now_ns, name)
+    text = f"{name}, a {car_file}: {problem}"
+    return [city_event("warning", "lanes_misfit", text, now_ns, name)] if problem else []
 
 
 def _welcome(car: RemoteCar, now_ns: int) -> JoinReply:
@@ -119,26 +130,27 @@ def _welcome(car: RemoteCar, now_ns: int) -> JoinReply:
     )
 
 
-def _remove(world: World, request: RemoveRequest, now_ns: int) -> RemoveReply:
+def _remove(world: World, request: RemoveRequest, now_ns: int, out: list[Outgoing]) -> RemoveReply:
     car = _known(world, request.vehicle)
     if request.session and getattr(car, "session", "") != request.session:
         detail = f"{car.name} did not join by session {request.session!r}: it is somebody else's"
         raise _RefusedError("owned", detail)
-    world.remove(car.name)
+    out += world.remove(car.name)
     name = "vehicle_removed" if isinstance(car, HostedCar) else "vehicle_left"
     reason = f": {request.reason}" if request.reason else ""
-    world.say("info", name, f"{car.name} left the city{reason}", now_ns, car.name)
+    out.append(city_event("info", name, f"{car.name} left the city{reason}", now_ns, car.name))
     return RemoveReply(vehicle=car.name)
 
 
-def _route(world: World, request: RouteRequest, now_ns: int) -> RouteReply:
+def _route(world: World, request: RouteRequest, now_ns: int, out: list[Outgoing]) -> RouteReply:
     car = _at_home(world, request.vehicle)
     if request.speed_mps is not None and not request.speed_mps > 0.0:
         raise _RefusedError("invalid", f"speed_mps: got {request.speed_mps}, expected above 0")
+    del out
     return send(world, car, request, now_ns)
 
 
-def _lease(world: World, request: LeaseRequest, now_ns: int) -> LeaseReply:
+def _lease(world: World, request: LeaseRequest, now_ns: int, out: list[Outgoing]) -> LeaseReply:
     car = _known(world, request.vehicle)
     before, owner, ttl_ms = car.lease, request.owner, request.ttl_ms
     if not owner:
@@ -152,40 +164,43 @@ def _lease(world: World, request: LeaseRequest, now_ns: int) -> LeaseReply:
     else:
         lease = rules.steal(before, owner, ttl_ms, request.reason, now_ns)
         text = f"{owner} took {car.name} from {before.owner}: {request.reason}"
-        world.say("warning", "lease_stolen", text, now_ns, car.name)
+        out.append(city_event("warning", "lease_stolen", text, now_ns, car.name))
     is_new = lease.epoch != before.epoch
     if isinstance(car, HostedCar) and is_new:
-        take_over(world, car, lease, now_ns)
+        out.append(hand_over(world, car, lease, now_ns))
     car.lease = lease
     if isinstance(car, RemoteCar) and is_new:
-        world.keep(car)
+        out.append(lease_record(car))
     return LeaseReply(vehicle=car.name, owner=lease.owner, epoch=lease.epoch, ttl_ms=lease.ttl_ms)
 
 
-def _lights(world: World, request: LightRequest, now_ns: int) -> LightReply:
-    del now_ns
+def _lights(world: World, request: LightRequest, now_ns: int, out: list[Outgoing]) -> LightReply:
+    del now_ns, out
     car = _at_home(world, request.vehicle)
     car.switches = car.switches.updated(request.headlights, request.indicators)
-    told = car.switches
-    return LightReply(vehicle=car.name, headlights=told.headlights, indicators=told.indicators)
+    switches = car.switches
+    return LightReply(
+        vehicle=car.name, headlights=switches.headlights, indicators=switches.indicators
+    )
 
 
-def _echo(world: World, request: EchoRequest, now_ns: int) -> EchoReply:
+def _echo(world: World, request: EchoRequest, now_ns: int, out: list[Outgoing]) -> EchoReply:
+    del out
     car = _known(world, request.vehicle)
     if isinstance(car, RemoteCar):
         raise _RefusedError("not_found", f"{car.name} is not hosted: its own agent answers for it")
     return EchoReply(vehicle=car.name, t_ns=now_ns)
 
 
-def _stop(world: World, request: StopRequest, now_ns: int) -> CityStop:
+def _stop(world: World, request: StopRequest, now_ns: int, out: list[Outgoing]) -> CityStop:
     world.stop = CityStop(
         t_ns=now_ns, engaged=request.engaged, by=request.by, reason=request.reason
     )
     verb = "stopped the city" if request.engaged else "let the city drive again"
     reason = f": {request.reason}" if request.reason else ""
-    world.say("warning", "city_stop", f"{request.by} {verb}{reason}", now_ns)
+    out.append(city_event("warning", "city_stop", f"{request.by} {verb}{reason}", now_ns))
     record = StopRecord(engaged=request.engaged, by=request.by, reason=request.reason)
-    world.outbox += [world.stop, Keep("latches", "stop", record)]
+    out += [world.stop, Keep("latches", "stop", record)]
     return world.stop
 
 
@@ -210,7 +225,7 @@ def _at_home(world: World, name: str) -> HostedCar:
 
 def _check_new(world: World, name: str, car_file: str) -> None:
     check_name(name, "vehicle")
-    if world.car(name) is not None or name in (NAME, *world.roadside):
+    if world.car(name) is not None or name in (NAME, *world.radio.roadside):
         raise _RefusedError("owned", f"vehicle: there is already one named {name!r}")
     if car_file not in car_names():  # no paths: whoever asks may be far away
         known = ", ".join(car_names())
@@ -254,19 +269,20 @@ def _place(world: World, spawn: str, car_file: str) -> Pose2:
 
 def is_free(world: World, pose: Pose2) -> bool:
     """Return whether a car can be put there."""
-    return world.slots.nearest_m(pose, ahead_s=AHEAD_S) >= CLEARANCE_M
+    return world.vehicles.nearest_m(pose, ahead_s=AHEAD_S) >= CLEARANCE_M
 
 
-def _boxes(world: World, request: BoxesRequest, now_ns: int) -> BoxesReply:
+def _boxes(world: World, request: BoxesRequest, now_ns: int, out: list[Outgoing]) -> BoxesReply:
     boxes = world.contacts.boxes
     boxes.reset()
     if len(boxes):
         by = request.by or "somebody"
-        world.say("info", "boxes_reset", f"{by} put the boxes back to their places", now_ns)
+        text = f"{by} put the boxes back to their places"
+        out.append(city_event("info", "boxes_reset", text, now_ns))
     return BoxesReply(boxes=len(boxes))
 
 
-_ANSWERS: dict[type[Message], Callable[[World, Any, int], Message]] = {
+_ANSWERS: dict[type[Request], Callable[[World, Any, int, list[Outgoing]], Message]] = {
     SpawnRequest: _spawn,
     JoinRequest: _join,
     RemoveRequest: _remove,
@@ -278,7 +294,4 @@ _ANSWERS: dict[type[Message], Callable[[World, Any, int], Message]] = {
     StopRequest: _stop,
 }
 
-SERVES = tuple(Service(kind) for kind in (
-    SpawnRequest, JoinRequest, RemoveRequest, RouteRequest, LeaseRequest, LightRequest,
-    BoxesRequest, EchoRequest, StopRequest,
-))  # fmt: skip
+SERVICES = tuple(Service(kind) for kind in _ANSWERS)

@@ -1,9 +1,9 @@
-"""What of the world outlives its process: its hosted cars, all leases, the red button.
+"""Restore the state of the world that outlives its process: hosted cars, leases, emergency stop.
 
-What changes goes out with the step as `Keep`, and comes back at the next start as `Kept`. A hosted
-car comes back at the place where it was put, or the first free one; its lease is its holder's as
-before, under the same epoch and with the whole of its time to live, for nobody could renew it
-meanwhile. Cars of agents join again by themselves, under a newer epoch.
+Changes leave a step as `Keep`, and come back at the next start as `RestoredState`. A hosted car
+comes back at its old place, or the first free one; its leaseholder keeps the lease, under the same
+epoch and with the full time to live, since nobody could renew it meanwhile. Cars of agents join
+again by themselves, under a newer epoch.
 """
 
 from collections.abc import Mapping
@@ -13,16 +13,16 @@ from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.store.records import CarRecord, EpochRecord, StopRecord, record, records
 from scm.store.repository import Repository
-from scm.v2x.exchange import Keep
-from scm.world.driving import take_over
+from scm.v2x.exchange import Keep, Outgoing
+from scm.world.driving import hand_over
 from scm.world.hosted import HostedCar
 from scm.world.lease import Lease
 from scm.world.requests import is_free
-from scm.world.world import NAME, World
+from scm.world.world import NAME, World, city_event, lease_record
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class RestoredState:
     """What an earlier run of the world left behind.
 
     Attributes:
@@ -38,7 +38,7 @@ class Kept:
     stop: StopRecord | None = None
 
 
-def read_kept(store: Repository) -> Kept:
+def read_restored(store: Repository) -> RestoredState:
     """Read what earlier runs of the world left in a store.
 
     Raises:
@@ -49,48 +49,50 @@ def read_kept(store: Repository) -> Kept:
     stop = record(store, "latches", NAME, "stop", StopRecord)
     leavers = [car.epoch for car in cars.values() if not car.hosted]
     highest = max([0 if epochs is None else epochs.highest, *leavers])
-    return Kept(epochs is None, cars, highest, stop)
+    return RestoredState(epochs is None, cars, highest, stop)
 
 
-def bring_back(world: World, kept: Kept, now_ns: int) -> None:
+def restore(world: World, restored: RestoredState, now_ns: int) -> list[Outgoing]:
     """Put the cars of an earlier run back, under the leases that they had."""
-    world.highest_epoch = max(world.highest_epoch, kept.highest_epoch)
-    for name, car in kept.cars.items():
+    out: list[Outgoing] = []
+    world.identities.highest_epoch = max(world.identities.highest_epoch, restored.highest_epoch)
+    for name, car in restored.cars.items():
         if car.hosted:
-            _bring_back(world, name, car, now_ns)
+            out += _restore_car(world, name, car, now_ns)
         else:
-            world.outbox.append(Keep("leases", name, None))
-    world.outbox.append(Keep("latches", "epochs", EpochRecord(highest=world.highest_epoch)))
+            out.append(Keep("leases", name, None))
+    epochs = EpochRecord(highest=world.identities.highest_epoch)
+    return [*out, Keep("latches", "epochs", epochs)]
 
 
-def _bring_back(world: World, name: str, record: CarRecord, now_ns: int) -> None:
+def _restore_car(world: World, name: str, record: CarRecord, now_ns: int) -> list[Outgoing]:
     pose = _place(world, Pose2(record.x_m, record.y_m, record.yaw_rad))
     if pose is None:
-        world.highest_epoch = max(world.highest_epoch, record.epoch)
-        world.outbox.append(Keep("leases", name, None))
+        world.identities.highest_epoch = max(world.identities.highest_epoch, record.epoch)
         text = f"{name} could not be put back onto the map: no place is free"
-        world.say("warning", "vehicle_removed", text, now_ns, name)
-        return
+        event = city_event("warning", "vehicle_removed", text, now_ns, name)
+        return [Keep("leases", name, None), event]
     car = world.host(name, record.car_file, pose, now_ns, record.tag_id)
+    out = world.arrival(car, now_ns, record.tag_id)
     car.lease = Lease(record.home, record.home, record.epoch)
     if record.owner != record.home:
-        _lease_again(world, car, record, now_ns)
-    world.keep(car)
+        out += _lease_again(world, car, record, now_ns)
+    return [*out, lease_record(car)]
 
 
-def _lease_again(world: World, car: HostedCar, record: CarRecord, now_ns: int) -> None:
+def _lease_again(world: World, car: HostedCar, record: CarRecord, now_ns: int) -> list[Outgoing]:
     """Let the holder go on; until a command of its own comes the car stands."""
     before = record.epoch - 1
     car.lease = Lease(record.home, record.home, before)
     expires_ns = now_ns + record.ttl_ms * NS_PER_MS
     lease = Lease(record.home, record.owner, record.epoch, record.ttl_ms, expires_ns)
-    take_over(world, car, lease, now_ns)
+    handed_over = hand_over(world, car, lease, now_ns)
     text = f"{car.name} is still leased to {record.owner} after the world was started again"
-    world.say("info", "lease_kept", text, now_ns, car.name)
+    return [handed_over, city_event("info", "lease_kept", text, now_ns, car.name)]
 
 
-def _place(world: World, wished: Pose2) -> Pose2 | None:
-    if is_free(world, wished):
-        return wished
+def _place(world: World, preferred: Pose2) -> Pose2 | None:
+    if is_free(world, preferred):
+        return preferred
     poses = (world.roads.spawn_pose(place.name) for place in world.city_map.spawns)
     return next((pose for pose in poses if is_free(world, pose)), None)

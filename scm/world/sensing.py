@@ -13,7 +13,7 @@ from scm.vehicles.bank import Readings
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import ENCODERS, sensor_messages
 from scm.vehicles.sensors import lidar
-from scm.world.hull import outline
+from scm.world.solids import outline
 from scm.world.world import SCANNER, World
 
 
@@ -22,34 +22,34 @@ def sense(world: World, now_ns: int) -> list[Message]:
     scans, sensors = _wanted(world, LidarScan), _wanted(world, VehicleSensors)
     out: list[Message] = []
     fresh: list[Readings] = []
-    for kind, bank in world.banks.items():
+    for kind, bank in world.sensors.banks.items():
         bank.wanted[:] = scans if kind == SCANNER else sensors
         if kind == SCANNER:
             for readings in bank.step(now_ns, lambda: _scene(world)):
                 out += _scans(world, readings)
             continue
         for readings in bank.step(now_ns):
-            world.readings[kind][readings.indices] = readings.values
+            world.sensors.readings[kind][readings.indices] = readings.values
             if kind == ENCODERS:
                 fresh.append(readings)
     for readings in fresh:
-        newest = {kind: values[readings.indices] for kind, values in world.readings.items()}
-        names = [world.slots.names[slot] for slot in readings.indices.tolist()]
+        newest = {kind: values[readings.indices] for kind, values in world.sensors.readings.items()}
+        names = [world.vehicles.names[index] for index in readings.indices.tolist()]
         out += sensor_messages(names, readings.t_ns, newest)
     return out
 
 
 def _wanted(world: World, kind: type[Message]) -> Bools:
     """Return by slot whether anybody wants such messages of its car."""
-    slots, wishes = world.slots, world.wishes
-    if wishes.all(kind, "vehicle"):
-        return slots.used
-    wanted = np.zeros(slots.capacity, np.bool_)
-    if not wishes.any(kind):
+    vehicles, subscribers = world.vehicles, world.subscribers
+    if subscribers.all(kind, "vehicle"):
+        return vehicles.used
+    wanted = np.zeros(vehicles.capacity, np.bool_)
+    if not subscribers.any(kind):
         return wanted
-    used = np.flatnonzero(slots.used)
-    names = [slots.names[slot] for slot in used.tolist()]
-    wanted[used] = wishes.of(kind, "vehicle", names)
+    used = np.flatnonzero(vehicles.used)
+    names = [vehicles.names[index] for index in used.tolist()]
+    wanted[used] = subscribers.of(kind, "vehicle", names)
     return wanted
 
 
@@ -59,13 +59,13 @@ def _scene(world: World) -> Scene:
     outlines: list[Floats] = [boxes.outline()]
     owners: list[Ints] = [np.full(len(boxes), -1)]
     for name in world.garage.fleets:
-        if len(own := world.garage.slots(name)):
+        if len(own := world.garage.indices(name)):
             outlines.append(outline(world.garage.car(name), world.garage.poses(name)))
             owners.append(own)
     for car in world.remote.values():
         outlines.append(outline(car.car, np.array([car.pose])))
-        owners.append(np.array([car.slot]))
-    return Scene(world.wall_grid, np.concatenate(outlines), np.concatenate(owners))
+        owners.append(np.array([car.index]))
+    return Scene(world.sensors.walls, np.concatenate(outlines), np.concatenate(owners))
 
 
 def _scans(world: World, scans: Readings) -> Iterator[LidarScan]:
@@ -74,9 +74,9 @@ def _scans(world: World, scans: Readings) -> Iterator[LidarScan]:
     sweep_ns = round(lidar.sweep_s(scans.car) * NS_PER_S)
     period_ns = round(NS_PER_S / scans.car.value("lidar.rate_hz"))
     ranges = scans.values.astype("<f4")
-    for row, slot in enumerate(scans.indices.tolist()):
+    for row, index in enumerate(scans.indices.tolist()):
         yield LidarScan(
-            vehicle=world.slots.names[slot],
+            vehicle=world.vehicles.names[index],
             t_ns=scans.t_ns,
             beams=ranges.shape[1],
             range_min_m=nearest,

@@ -38,9 +38,9 @@ class Stuck:
         self._stuck = np.zeros(capacity, np.bool_)
         self._touches: deque[tuple[int, Ints, Ints]] = deque()
 
-    def feel(self, t_ns: int, slots: Ints, pairs: Ints) -> None:
-        """Remember for a moment who touched whom, as `Touches` tells it: rows of `slots`."""
-        self._touches.append((t_ns, slots, pairs))
+    def feel(self, t_ns: int, indices: Ints, pairs: Ints) -> None:
+        """Remember for a moment who touched whom, as `Touches` tells it: rows of `vehicles`."""
+        self._touches.append((t_ns, indices, pairs))
         while self._touches[0][0] < t_ns - TOUCH_NS:
             self._touches.popleft()
 
@@ -67,8 +67,8 @@ class Stuck:
         new = np.flatnonzero(pushes & (t_ns - self._since_ns >= PATIENCE_NS))
         self._stuck[new] = True
         self._since_ns[new] = t_ns
-        for slot in free.tolist():
-            del self.against[slot]
+        for index in free.tolist():
+            del self.against[index]
         self.against.update(dict.fromkeys(new.tolist(), ()))
         return new, free
 
@@ -78,8 +78,8 @@ class Stuck:
         rests: Bools = self._stuck & (at_ns < PAUSE_NS)
         return rests
 
-    def forget(self, slot: int) -> None:
+    def forget(self, index: int) -> None:
         """Forget a car that leaves."""
-        self._stuck[slot] = False
-        self._x[slot] = self._y[slot] = np.inf
-        self.against.pop(slot, None)
+        self._stuck[index] = False
+        self._x[index] = self._y[index] = np.inf
+        self.against.pop(index, None)

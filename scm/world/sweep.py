@@ -147,7 +147,7 @@ def share_moves(
         walls: (l, 2) bodies and the obstacles near them.
         starts: (n, 3) x, y, yaw of the centres of gravity before the move.
         moves: (n, 3) what is to be added to them.
-        outlines: (n, 6) as `Near.touching` takes them; then 1, or 0 where nobody moves the body.
+        outlines: (n, 6) as in `BroadPhase.touching`; then 1, or 0 where nothing moves the body.
         boxes: (m, 6) obstacles without the round ends of walls.
         marks: (n,) whether a body overlaps something after the move.
         fast: Whether bodies may have passed through something, and overlap nothing now.

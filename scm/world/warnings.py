@@ -20,11 +20,12 @@ from scm.v2x.etsi.events import (
     STATIONARY_VEHICLE,
     CarWarnings,
 )
+from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.denm import DenmTx
 from scm.world.publish import states_of
-from scm.world.slots import DRIVE
-from scm.world.world import World
+from scm.world.vehicle_arrays import DRIVE
+from scm.world.world import World, city_event
 
 _CALLED = {
     (ACCIDENT, None): "an accident",
@@ -33,44 +34,44 @@ _CALLED = {
 }
 
 
-def watch(world: World) -> None:
-    """Note who brakes hard: at every step, since a Nigel stops within a tenth of a second."""
-    slots = world.slots
+def note_hard_braking(world: World) -> None:
+    """Note who brakes hard; every tick, since a Nigel stops within a tenth of a second."""
+    vehicles = world.vehicles
     hard = world.garage.signal("accel_x") <= -HARD_BRAKING_MPS2
-    hard &= slots.hosted & (slots.mode == DRIVE) & (slots.speed > MIN_BRAKING_MPS)
-    world.dangers.braked.update(np.flatnonzero(hard).tolist())
+    hard &= vehicles.hosted & (vehicles.mode == DRIVE) & (vehicles.speed > MIN_BRAKING_MPS)
+    world.radio.warnings.braked.update(np.flatnonzero(hard).tolist())
 
 
-def call_denms(world: World, now_ns: int) -> list[DenmTx]:
+def due_denms(world: World, now_ns: int) -> list[DenmTx]:
     """Return the DENMs that hosted cars send now."""
-    slots, hosted, warners = world.slots, world.hosted, world.dangers.warners
+    vehicles, hosted, warners = world.vehicles, world.hosted, world.radio.warnings.warners
     stranded = _stranded(world)
-    braked = world.dangers.braked
+    braked = world.radio.warnings.braked
     for gone in set(warners) - set(hosted):
         del warners[gone]
     busy = {name for name, one in warners.items() if one.is_busy}
-    struck = {slots.names[n] for n in {*np.flatnonzero(stranded).tolist(), *braked}}
-    names = sorted((busy | struck | set(world.dangers.hits)) & set(hosted))
-    of = np.array([hosted[name].slot for name in names], np.int64)
+    struck = {vehicles.names[n] for n in {*np.flatnonzero(stranded).tolist(), *braked}}
+    names = sorted((busy | struck | set(world.radio.warnings.hits)) & set(hosted))
+    of = np.array([hosted[name].index for name in names], np.int64)
     frames: list[DenmTx] = []
     for state in states_of(world, of, now_ns):
         name = state.vehicle
         bodies = warners.setdefault(name, CarWarnings(name)).step(
             state,
-            _contacts(name, world.dangers.hits.get(name), now_ns),
-            is_stranded=bool(stranded[hosted[name].slot]),
-            has_braked=hosted[name].slot in braked,
+            _contacts(name, world.radio.warnings.hits.get(name), now_ns),
+            is_stranded=bool(stranded[hosted[name].index]),
+            has_braked=hosted[name].index in braked,
         )
         frames += [DenmTx(station=name, t_ns=now_ns, body=body) for body in bodies]
-    world.dangers.hits.clear()
+    world.radio.warnings.hits.clear()
     braked.clear()
     return frames
 
 
-def tell(world: World, frame: DenmTx, now_ns: int) -> None:
-    """Put what is new on the air into the log of the city, whoever warns."""
+def log_warning(world: World, frame: DenmTx, now_ns: int) -> list[Outgoing]:
+    """Return an event for a warning that is new or over, whoever sent it."""
     found, situation = (
-        world.dangers.told.receive(frame.body, now_ns),
+        world.radio.warnings.denms.receive(frame.body, now_ns),
         frame.body.situation_container,
     )
     if found == "new" and situation is not None:
@@ -78,21 +79,22 @@ def tell(world: World, frame: DenmTx, now_ns: int) -> None:
         of_any_kind = _CALLED.get((event.cause, None), "a danger")
         what = _CALLED.get((event.cause, event.subcause), of_any_kind)
         text = f"{frame.station} warns of {what}"
-        world.say("warning", "denm", text, now_ns, frame.station)
-    elif found == "ended":
+        return [city_event("warning", "denm", text, now_ns, frame.station)]
+    if found == "ended":
         text = f"{frame.station} says that its warning is over"
-        world.say("info", "denm", text, now_ns, frame.station)
+        return [city_event("info", "denm", text, now_ns, frame.station)]
+    return []
 
 
 def _stranded(world: World) -> Bools:
     """Return by slot which hosted cars stand though they should not."""
-    slots = world.slots
-    stands: Bools = slots.hosted & (np.abs(slots.speed) < STANDSTILL_MPS)
+    vehicles = world.vehicles
+    stands: Bools = vehicles.hosted & (np.abs(vehicles.speed) < STANDSTILL_MPS)
     if world.stop.engaged:
-        return stands & slots.diverged
-    stranded = slots.hazard | slots.diverged
+        return stands & vehicles.diverged
+    stranded = vehicles.hazard | vehicles.diverged
     inside = np.zeros_like(stands)
-    of = np.flatnonzero(stands & slots.driven & ~slots.arrived)
+    of = np.flatnonzero(stands & vehicles.driven & ~vehicles.arrived)
     inside[of] = world.drivers.is_in_junction(of)
     return stands & (stranded | inside)
 

@@ -5,85 +5,97 @@ import math
 import numpy as np
 
 from scm.clock import NS_PER_S, seconds
+from scm.v2x.exchange import Outgoing
+from scm.v2x.messages.city_event import CityEvent
 from scm.vehicles.fleet import VehicleStatus
 from scm.world import lease as rules
 from scm.world.collide import WALL, touched_lately
 from scm.world.remote import GONE_NS, STALE_NS, RemoteCar
-from scm.world.world import World
+from scm.world.world import World, city_event, lease_record
 
 FIRST_REPORT_NS = 10 * NS_PER_S
 
 
-def watch(world: World, now_ns: int) -> None:
-    """Mark who is gone, take off the map who has been gone for long, tell who is frozen."""
+def watch(world: World, now_ns: int) -> list[Outgoing]:
+    """Mark lost cars, remove those lost for long, and report frozen, stuck and low cars."""
+    out: list[Outgoing] = []
     for car in list(world.remote.values()):
-        _watch_agent(world, car, now_ns)
-        _watch_lease(world, car, now_ns)
-    slots = world.slots
-    for slot in world.garage.frozen().tolist():
-        if not slots.diverged[slot]:
-            slots.diverged[slot] = True
-            slots.driven[slot] = False
-            hosted = world.hosted[slots.names[slot]]
+        out += _watch_agent(world, car, now_ns)
+        out += _watch_lease(car, now_ns)
+    vehicles = world.vehicles
+    for index in world.garage.frozen().tolist():
+        if not vehicles.diverged[index]:
+            vehicles.diverged[index] = True
+            vehicles.driven[index] = False
+            hosted = world.hosted[vehicles.names[index]]
             status = VehicleStatus(int(hosted.fleet.status[hosted.row]))
             name = f"vehicle_{status.name.lower()}"
-            world.say("error", name, status.sentence, now_ns, hosted.name)
+            out.append(city_event("error", name, status.sentence, now_ns, hosted.name))
     if world.every["battery"].is_due(now_ns):
-        _watch_batteries(world, now_ns)
+        out += _watch_batteries(world, now_ns)
     if world.every["stuck"].is_due(now_ns):
-        _watch_stuck(world, now_ns)
+        out += _watch_stuck(world, now_ns)
+    return out
 
 
-def _watch_batteries(world: World, now_ns: int) -> None:
+def _watch_batteries(world: World, now_ns: int) -> list[CityEvent]:
     _, left = world.garage.batteries()
-    hosted = {name: float(left[car.slot]) for name, car in world.hosted.items()}
+    hosted = {name: float(left[car.index]) for name, car in world.hosted.items()}
     remote = {name: car.battery_charge for name, car in world.remote.items()}
     charges = {name: None if math.isnan(c) else c for name, c in hosted.items()} | remote
-    for name in world.batteries.news(charges):
-        text = f"the battery of {name} is low: {100.0 * (charges[name] or 0.0):.0f} % left"
-        world.say("warning", "battery_low", text, now_ns, name)
+    texts = {
+        name: f"the battery of {name} is low: {100.0 * (charges[name] or 0.0):.0f} % left"
+        for name in world.alerts.low_batteries.news(charges)
+    }
+    return [city_event("warning", "battery_low", t, now_ns, name) for name, t in texts.items()]
 
 
-def _watch_stuck(world: World, now_ns: int) -> None:
-    slots, stuck = world.slots, world.stuck
-    throttle = np.where(slots.hosted & ~slots.diverged, slots.throttle, 0.0)
+def _watch_stuck(world: World, now_ns: int) -> list[CityEvent]:
+    out: list[CityEvent] = []
+    vehicles, stuck = world.vehicles, world.alerts.stuck
+    throttle = np.where(vehicles.hosted & ~vehicles.diverged, vehicles.throttle, 0.0)
     for car in world.remote.values():
         if car.alive and car.state is not None:
-            throttle[car.slot] = car.state.throttle
-    new, free = stuck.look(throttle, slots.x, slots.y, now_ns - world.pace.lost_ns)
-    for slot in new.tolist():
-        name, against = slots.names[slot], touched_lately(world, slot, now_ns)
-        stuck.against[slot] = against
+            throttle[car.index] = car.state.throttle
+    new, free = stuck.look(throttle, vehicles.x, vehicles.y, now_ns - world.pace.lost_ns)
+    for index in new.tolist():
+        name, against = vehicles.names[index], touched_lately(world, index, now_ns)
+        stuck.against[index] = against
         others = ", ".join("a wall" if other == WALL else other for other in against)
         pushes = f"pushes against {others}" if against else "is told to drive, touches nothing"
-        world.say("warning", "stuck", f"{name} is stuck: it {pushes} and stays", now_ns, name)
-    for slot in free.tolist():
-        name = slots.names[slot]
-        world.say("info", "stuck", f"{name} is free again", now_ns, name)
+        text = f"{name} is stuck: it {pushes} and stays"
+        out.append(city_event("warning", "stuck", text, now_ns, name))
+    for index in free.tolist():
+        name = vehicles.names[index]
+        out.append(city_event("info", "stuck", f"{name} is free again", now_ns, name))
+    return out
 
 
-def lose(world: World, car: RemoteCar, why: str, now_ns: int, *, dead: bool) -> None:
+def lose(car: RemoteCar, why: str, now_ns: int, *, dead: bool) -> list[CityEvent]:
     """Mark a remote car as lost, once; it leaves the map a while later."""
     car.dead = car.dead or dead
-    if car.alive:
-        car.lost_ns = now_ns
-        world.say("warning", "vehicle_lost", why, now_ns, car.name)
+    if not car.alive:
+        return []
+    car.lost_ns = now_ns
+    return [city_event("warning", "vehicle_lost", why, now_ns, car.name)]
 
 
-def _watch_agent(world: World, car: RemoteCar, now_ns: int) -> None:
+def _watch_agent(world: World, car: RemoteCar, now_ns: int) -> list[Outgoing]:
+    out: list[Outgoing] = []
     patience_ns = STALE_NS if car.state is not None else FIRST_REPORT_NS
     if car.alive and car.age_ns(now_ns) > patience_ns:
         why = f"{car.name} has been silent for {seconds(car.age_ns(now_ns)):.1f} s"
-        lose(world, car, why, now_ns, dead=False)
+        out += lose(car, why, now_ns, dead=False)
     if car.lost_ns is not None and now_ns - car.lost_ns >= GONE_NS:
-        world.remove(car.name)
+        out += world.remove(car.name)
         text = f"{car.name} was taken off the map: nobody drives it any more"
-        world.say("info", "vehicle_removed", text, now_ns, car.name)
+        out.append(city_event("info", "vehicle_removed", text, now_ns, car.name))
+    return out
 
 
-def _watch_lease(world: World, car: RemoteCar, now_ns: int) -> None:
-    if rules.is_expired(car.lease, now_ns):
-        text = f"{car.lease.owner} did not renew the lease of {car.name}: it is its agent's again"
-        car.lease = rules.sent_home(car.lease)
-        world.keep(car)
-        world.say("warning", "lease_lost", text, now_ns, car.name)
+def _watch_lease(car: RemoteCar, now_ns: int) -> list[Outgoing]:
+    if not rules.is_expired(car.lease, now_ns):
+        return []
+    text = f"{car.lease.owner} did not renew the lease of {car.name}: it is its agent's again"
+    car.lease = rules.sent_home(car.lease)
+    return [lease_record(car), city_event("warning", "lease_lost", text, now_ns, car.name)]

@@ -1,7 +1,7 @@
-"""The world: everything that one tick moves, and how cars come into it and leave it.
+"""The world: everything that one tick moves, and how cars enter and leave it.
 
-`step.tick` moves it. Nothing here knows a bus or a clock: time comes with every call, and what is
-to be sent waits in `outbox`.
+`step.tick` moves it. Nothing here knows a bus or a clock: time comes with every call, and stages
+return what is to be sent.
 """
 
 from collections.abc import Iterable, Iterator
@@ -34,24 +34,22 @@ from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sensor, all_sensors
 from scm.world import lease as rules
-from scm.world.batteries import Batteries
-from scm.world.blows import Blows
-from scm.world.cams import CamTriggers
-from scm.world.channel_load import Busy
+from scm.world.alerts import Alerts
+from scm.world.cam_triggers import CamTriggers
+from scm.world.channel_load import ChannelLoad
+from scm.world.contact_impulses import ContactImpulses
 from scm.world.contacts import Contacts
-from scm.world.dangers import Dangers
-from scm.world.delay_queue import Late
 from scm.world.garage import Garage
 from scm.world.hosted import HostedCar
-from scm.world.hull import outline
-from scm.world.impacts import Impacts
 from scm.world.pace import Every, Pace
-from scm.world.radio import Radio, RadioCounts, Receivers, roadside_places
+from scm.world.radio import Radio, Receivers, roadside_places
 from scm.world.remote import RemoteCar
 from scm.world.seeds import generator, number
-from scm.world.slots import Numbers, Slots
+from scm.world.solids import outline
+from scm.world.state import Identities, RadioState, SensorState
 from scm.world.stuck import Stuck
-from scm.world.wishes import Wishes
+from scm.world.subscribers import Subscribers
+from scm.world.vehicle_arrays import Numbers, VehicleArrays
 
 NAME = "world"
 PERIOD_NS = 20 * NS_PER_MS
@@ -71,6 +69,38 @@ RATES_HZ = {
 AnyCar = HostedCar | RemoteCar
 
 
+def city_event(
+    severity: Literal["info", "warning", "error"],
+    name: str,
+    text: str,
+    now_ns: int,
+    vehicle: str | None = None,
+) -> CityEvent:
+    """Return an event of the world."""
+    return CityEvent(
+        severity=severity, source=NAME, t_ns=now_ns, name=name, text=text, vehicle=vehicle
+    )
+
+
+def lease_record(car: AnyCar) -> Keep:
+    """Return a car and its lease, to be stored."""
+    x, y, yaw = car.pose
+    lease = car.lease
+    record = CarRecord(
+        car_file=car.car_file,
+        hosted=isinstance(car, HostedCar),
+        x_m=x,
+        y_m=y,
+        yaw_rad=yaw,
+        home=lease.home,
+        owner=lease.owner,
+        epoch=lease.epoch,
+        ttl_ms=lease.ttl_ms,
+        tag_id=car.tag_id,
+    )
+    return Keep("leases", car.name, record)
+
+
 class World:
     """The shared state of one city.
 
@@ -82,34 +112,23 @@ class World:
         prepare: Car files whose kernels are compiled now and not when their first car comes.
 
     Attributes:
-        slots: What every car has, as arrays.
         ground: The floor under the wheels, and the wind.
-        impacts: What contacts add to the cars' accelerations in this tick.
-        blows: What contacts did to hosted cars in this tick, for who watches.
-        hosted: Cars simulated here, by name, in the order they came; likewise `remote`.
-        sessions: Of agents that are on the bus: the station of each.
-        leased: Those of the hosted that somebody else drives.
+        vehicles: What every car has, as arrays by vehicle index.
+        garage: The dynamics of the hosted cars.
+        contacts: The contact solver.
+        impulses: What contacts did in this tick.
         drivers: The drivers of the hosted cars, and the radio frames that they receive.
         trips: Where these were sent.
-        front: By slot, from the rear axle to the front bumper [m].
-        placed: Where the remote cars are, for their LIDARs: only the world can see for them.
-        banks: The devices of all cars, by kind of sensor.
-        readings: By kind and slot the newest reading, NaN before the first; not of LIDARs.
-        radio: How frames come to everybody but the drivers of hosted cars.
-        radio_before: What had become of frames when that was last told.
-        busy: How full the channel is.
-        late: Frames on their way.
-        wishes: What anybody would hear.
-        stop: The red button as it stands.
-        outbox: What the tick under way sends.
-        ignored: Messages that fitted nothing: unknown cars, commands without the lease.
-        last_hit_ns: When a car's contact was last told.
-        touched_ns: When anything last pushed a car.
-        dangers: What is known of warnings on the air.
-        batteries: Which of them were told to be low.
-        stuck: Which cars push in vain.
-        highest_epoch: Of any car that left: a newcomer's is higher, whatever its name.
-        warned_of_bends: Car files of which it was said whether they fit the lanes.
+        radio: The radio to everybody else.
+        sensors: The sensors of all cars.
+        subscribers: Who subscribes to what.
+        hosted: Cars simulated here, by name, in the order they came; likewise `remote`.
+        sessions: Of agents that are on the bus: the station of each.
+        leased: Hosted cars that somebody else drives.
+        stop: The state of the emergency stop.
+        ignored: Messages without effect: unknown cars, commands without the lease.
+        alerts: What is wrong with cars and was reported.
+        identities: What tells cars apart.
     """
 
     def __init__(
@@ -124,33 +143,35 @@ class World:
         self.seed = seed
         self.roads = Roads(city_map)
         self.ground = Ground(city_map, seed)
-        self.wall_grid = WallGrid(wall_segments(city_map))
-        self.slots = Slots(capacity)
+        self.vehicles = VehicleArrays(capacity)
         self.garage = Garage(capacity, self.ground.fit)
         self.contacts = Contacts(city_map)
-        self.impacts = Impacts()
-        self.blows = Blows()
+        self.impulses = ContactImpulses()
         radio = replace(city_map.radio, loss=loss) if loss else city_map.radio
         self.drivers = DriverBatch(lane_graph_of(self.roads), capacity, seed=seed, radio=radio)
         self.trips = Trips(self.drivers, spread=True)
-        channel = self.drivers.channel
-        self.radio = Radio(channel, generator(seed, NAME, "radio"))
-        self.radio_before = RadioCounts()
-        self.busy = Busy(radio, float(channel.numbers[RANGE]), channel.load)
-        self.late = Late()
-        self.roadside = roadside_places(city_map)
-        self.cams = CamTriggers(capacity)
-        self.front = np.zeros(capacity)
-        self.placed = ExternalVehicles(capacity)
+        channel, roadside = self.drivers.channel, roadside_places(city_map)
+        self.radio = RadioState(
+            Radio(channel, generator(seed, NAME, "radio")),
+            ChannelLoad(radio, float(channel.numbers[RANGE]), channel.load),
+            CamTriggers(capacity),
+            roadside,
+            Receivers(roadside),
+        )
+        walls = WallGrid(wall_segments(city_map))
         sensors = all_sensors()
-        self._compile(prepare, sensors[SCANNER])
-        self.banks = {name: Bank(sensor, seed, capacity) for name, sensor in sensors.items()}
-        self.readings = {
-            name: np.full((capacity, len(sensor.values)), np.nan)
-            for name, sensor in sensors.items()
-            if name != SCANNER
-        }
-        self.wishes = Wishes()
+        self._compile(prepare, sensors[SCANNER], walls)
+        self.sensors = SensorState(
+            {name: Bank(sensor, seed, capacity) for name, sensor in sensors.items()},
+            {
+                name: np.full((capacity, len(sensor.values)), np.nan)
+                for name, sensor in sensors.items()
+                if name != SCANNER
+            },
+            ExternalVehicles(capacity),
+            walls,
+        )
+        self.subscribers = Subscribers()
         self.hosted: dict[str, HostedCar] = {}
         self.remote: dict[str, RemoteCar] = {}
         self.sessions: dict[str, str] = {}
@@ -158,18 +179,10 @@ class World:
         self.pace = Pace(PERIOD_NS)
         self.every = {name: Every(rate_hz) for name, rate_hz in RATES_HZ.items()}
         self.stop = CityStop(t_ns=0, engaged=False)
-        self.outbox: list[Outgoing] = []
-        self.tick = 0
-        self.ignored = self.highest_epoch = 0
-        self.warned_of_bends: set[str] = set()
-        self.last_hit_ns, self.touched_ns = dict[str, int](), dict[str, int]()
-        self.dangers = Dangers()
-        self.batteries = Batteries()
-        self.stuck = Stuck(capacity)
-        self._tags = Numbers(city_map.first_vehicle_tag_id, never=reserved_tags(city_map))
-        self._unnamed = 0
-        self._came = 0
-        self._receivers = Receivers(self.roadside)
+        self.tick = self.ignored = 0
+        self.alerts = Alerts(Stuck(capacity))
+        first_tag = city_map.first_vehicle_tag_id
+        self.identities = Identities(Numbers(first_tag, never=reserved_tags(city_map)))
 
     def cars(self) -> Iterator[AnyCar]:
         """Yield all cars, hosted ones first."""
@@ -192,9 +205,9 @@ class World:
     def receivers(self) -> Receivers:
         """Return all stations that frames are brought to, but for the hosted cars."""
         if not self.remote:
-            return self._receivers
+            return self.radio.units
         cars = {car.name: (car.pose.x, car.pose.y) for car in self.remote.values()}
-        return Receivers({**self.roadside, **cars})
+        return Receivers({**self.radio.roadside, **cars})
 
     def antenna(self, station: str) -> Point | None:
         """Return where a station that is no hosted car sends from; None: nobody knows."""
@@ -203,7 +216,7 @@ class World:
         if station == EYE or station.startswith(f"{EYE}-"):
             (left, right), (low, high) = self.city_map.floor.x_m, self.city_map.floor.y_m
             return 0.5 * (left + right), 0.5 * (low + high)
-        return self.roadside.get(station)
+        return self.radio.roadside.get(station)
 
     def lost_ns(self, station: str) -> int:
         """Return the time that passed without a station's car being moved, since it came [ns]."""
@@ -212,30 +225,15 @@ class World:
 
     def locate(self) -> None:
         """Note where all cars are and how they move."""
-        slots, placed = self.slots, self.placed
-        self.garage.locate(slots)
+        vehicles, placed = self.vehicles, self.sensors.external
+        self.garage.locate(vehicles)
         for car in self.remote.values():
-            slots.put(car.slot, car.pose)
-            placed.x[car.slot], placed.y[car.slot], placed.yaw[car.slot] = car.pose
+            vehicles.put(car.index, car.pose)
+            placed.x[car.index], placed.y[car.index], placed.yaw[car.index] = car.pose
             if car.state is not None:
-                placed.speed[car.slot] = car.state.speed_mps
-                placed.lateral_speed[car.slot] = car.state.lateral_speed_mps
-                placed.yaw_rate[car.slot] = car.state.yaw_rate_radps
-
-    def say(
-        self,
-        severity: Literal["info", "warning", "error"],
-        name: str,
-        text: str,
-        now_ns: int,
-        vehicle: str | None = None,
-    ) -> None:
-        """Put an event into the log of the city."""
-        self.outbox.append(
-            CityEvent(
-                severity=severity, source=NAME, t_ns=now_ns, name=name, text=text, vehicle=vehicle
-            )
-        )
+                placed.speed[car.index] = car.state.speed_mps
+                placed.lateral_speed[car.index] = car.state.lateral_speed_mps
+                placed.yaw_rate[car.index] = car.state.yaw_rate_radps
 
     def host(
         self, name: str, car_name: str, pose: Pose2, now_ns: int, tag_id: int | None = None
@@ -249,24 +247,23 @@ class World:
             RunError: when no room is left for cars of this file.
         """
         model = self.garage.car(car_name)
-        slot = self._take(name, car_name, pose, hosted=True)
-        fleet, row = self.garage.park(car_name, pose, slot)
+        index = self._add(name, car_name, pose, hosted=True)
+        fleet, row = self.garage.park(car_name, pose, index)
         self.ground.place_at_rest(fleet, row)
-        self.drivers.enter(slot, limits_of(model), number(self.seed, name, "driver"))
-        for kind, bank in self.banks.items():
-            bank.fit(slot, name, model, fleet, row, now_ns, self._offset(kind))
+        self.drivers.enter(index, limits_of(model), number(self.seed, name, "driver"))
+        for kind, bank in self.sensors.banks.items():
+            bank.fit(index, name, model, fleet, row, now_ns, self._offset(kind))
         self.hosted[name] = HostedCar(
             name=name,
             car=model,
             car_file=car_name,
-            tag_id=self._tag(name, tag_id, now_ns),
-            slot=slot,
-            slots=self.slots,
+            tag_id=self._tag(name, tag_id),
+            index=index,
+            vehicles=self.vehicles,
             fleet=fleet,
             row=row,
             lease=rules.grant(NAME, self._first_epoch(now_ns)),
         )
-        self.keep(self.hosted[name])
         return self.hosted[name]
 
     def admit(
@@ -285,60 +282,53 @@ class World:
             CarError: when there is no such car file.
         """
         model = self.garage.car(car_name)
-        slot = self._take(name, car_name, pose, hosted=False, movable=kind != "real")
+        index = self._add(name, car_name, pose, hosted=False, movable=kind != "real")
         if kind != "real":
-            placed, offset = self.placed, self._offset(SCANNER)
-            self.banks[SCANNER].fit(slot, name, model, placed, slot, now_ns, offset)
+            placed, offset = self.sensors.external, self._offset(SCANNER)
+            self.sensors.banks[SCANNER].fit(index, name, model, placed, index, now_ns, offset)
         self.remote[name] = RemoteCar(
             name=name,
             kind=kind,
             session=session,
             car=model,
             car_file=car_name,
-            tag_id=self._tag(name, tag_id, now_ns),
-            slot=slot,
+            tag_id=self._tag(name, tag_id),
+            index=index,
             lease=rules.grant(name, self._first_epoch(now_ns)),
             pose=pose,
-            heard_ns=now_ns,
+            received_ns=now_ns,
         )
-        self.keep(self.remote[name])
         return self.remote[name]
 
-    def remove(self, name: str) -> None:
-        """Take a car off the map; nothing happens when there is none of that name."""
+    def arrival(self, car: AnyCar, now_ns: int, worn: int | None = None) -> list[Outgoing]:
+        """Return what follows from a car that has just come; `worn` is the tag that it has."""
+        bound = None if worn is not None else bound_tag(self.city_map, car.name)
+        if bound is None or bound == car.tag_id:
+            return [lease_record(car)]
+        wearer = next((one.name for one in self.cars() if one.tag_id == bound), "another car")
+        text = (
+            f"{car.name} has tag {car.tag_id}: {wearer} wears tag {bound}, which is printed for it"
+        )
+        return [city_event("warning", "other_tag", text, now_ns, car.name), lease_record(car)]
+
+    def remove(self, name: str) -> list[Outgoing]:
+        """Take a car off the map, if there is one of that name; return what must be stored."""
         if name in self.hosted:
             car = self.hosted.pop(name)
             self.leased.pop(name, None)
             self.garage.scrap(car.car_file, car.row)
-            self._forget(car)
-        elif name in self.remote:
-            self._forget(self.remote.pop(name))
-
-    def keep(self, car: AnyCar) -> None:
-        """Have a car and its lease stored."""
-        x, y, yaw = car.pose
-        lease = car.lease
-        record = CarRecord(
-            car_file=car.car_file,
-            hosted=isinstance(car, HostedCar),
-            x_m=x,
-            y_m=y,
-            yaw_rad=yaw,
-            home=lease.home,
-            owner=lease.owner,
-            epoch=lease.epoch,
-            ttl_ms=lease.ttl_ms,
-            tag_id=car.tag_id,
-        )
-        self.outbox.append(Keep("leases", car.name, record))
+            return self._forget(car)
+        if name in self.remote:
+            return self._forget(self.remote.pop(name))
+        return []
 
     def free_name(self) -> str:
         """Return a name for a car that has none."""
-        while self.car(f"n{self._unnamed + 1}") is not None:
-            self._unnamed += 1
-        return f"n{self._unnamed + 1}"
+        while self.car(f"n{self.identities.unnamed + 1}") is not None:
+            self.identities.unnamed += 1
+        return f"n{self.identities.unnamed + 1}"
 
-    def _compile(self, car_names: Iterable[str], scanner: Sensor) -> None:
+    def _compile(self, car_names: Iterable[str], scanner: Sensor, walls: WallGrid) -> None:
         """Compile or load now all that a tick calls, so that no car waits for it later."""
         names = tuple(car_names)
         for name in (DEFAULT_CAR, *names):
@@ -346,7 +336,7 @@ class World:
         compile_together(
             {
                 "drivers": self.drivers.warm_up_controller,
-                "LIDAR": lambda: self._warm_scanner(scanner),
+                "LIDAR": lambda: self._warm_scanner(scanner, walls),
                 **{name: partial(self._warm_car, name) for name in names},
                 "contacts": self.contacts.warm,
                 "reception": self.drivers.warm_up_rest,
@@ -356,11 +346,11 @@ class World:
     def _warm_car(self, name: str) -> None:
         self.ground.warm(self.garage.prepare(name))
 
-    def _warm_scanner(self, scanner: Sensor) -> None:
+    def _warm_scanner(self, scanner: Sensor, walls: WallGrid) -> None:
         """Scan once for nobody, so that the kernels are there before the first car scans."""
         bank, model = Bank(scanner, self.seed, 1), self.garage.car(DEFAULT_CAR)
         bank.fit(0, "nobody", model, ExternalVehicles(1), 0, 0)
-        nowhere = Scene(self.wall_grid, np.zeros((0, 4)), np.zeros(0, np.int64))
+        nowhere = Scene(walls, np.zeros((0, 4)), np.zeros(0, np.int64))
         bank.step(0, lambda: nowhere)
 
     def has_room(self, car_name: str, pose: Pose2) -> bool:
@@ -381,56 +371,49 @@ class World:
         ahead = car.vector("body.footprint_x_m")[1] - hull.front
         return self.contacts.is_free(hull, Pose2(*pose.apply(ahead, 0.0), pose.yaw))
 
-    def _take(
+    def _add(
         self, name: str, car_name: str, pose: Pose2, *, hosted: bool, movable: bool = True
     ) -> int:
         hull = self.garage.hull(car_name, movable=movable)
-        slot = self.slots.take(name, pose, hosted=hosted)
-        self.contacts.add(slot, hull)
-        _, self.front[slot] = self.garage.car(car_name).vector("body.footprint_x_m")
-        return slot
+        index = self.vehicles.add(name, pose, hosted=hosted)
+        self.contacts.add(index, hull)
+        _, self.vehicles.front[index] = self.garage.car(car_name).vector("body.footprint_x_m")
+        return index
 
-    def _tag(self, name: str, worn: int | None, now_ns: int) -> int:
+    def _tag(self, name: str, worn: int | None) -> int:
         """Return the tag on a new car's roof: the one that it wears, its name's, or a free one."""
+        tags = self.identities.tags
         if worn is not None:
-            return self._tags.claim(worn)
+            return tags.claim(worn)
         bound = bound_tag(self.city_map, name)
-        if bound is not None and self._tags.is_free(bound):
-            return self._tags.claim(bound)
-        given = self._tags.take()
-        if bound is not None:
-            wearer = next((car.name for car in self.cars() if car.tag_id == bound), "another car")
-            text = f"{name} has tag {given}: {wearer} wears tag {bound}, which is printed for it"
-            self.say("warning", "other_tag", text, now_ns, name)
-        return given
+        if bound is not None and tags.is_free(bound):
+            return tags.claim(bound)
+        return tags.acquire()
 
     def _first_epoch(self, now_ns: int) -> int:
         """Return an epoch above all that any car of this city has had so far."""
-        return max(now_ns // NS_PER_MS, self.highest_epoch + 1)
+        return max(now_ns // NS_PER_MS, self.identities.highest_epoch + 1)
 
-    def _forget(self, car: AnyCar) -> None:
-        slot = car.slot
-        self.highest_epoch = max(self.highest_epoch, car.lease.epoch)
-        self.outbox += [
+    def _forget(self, car: AnyCar) -> list[Outgoing]:
+        index = car.index
+        self.identities.highest_epoch = max(self.identities.highest_epoch, car.lease.epoch)
+        self.contacts.remove(index)
+        self.trips.forget(index)
+        self.drivers.leave(index)
+        self.radio.cams.forget(index)
+        self.alerts.stuck.forget(index)
+        self.sensors.remove(index)
+        self.impulses.event_ns.pop(car.name, None)
+        self.impulses.touched_ns.pop(car.name, None)
+        self.identities.tags.release(car.tag_id)
+        self.identities.unnamed = 0
+        self.vehicles.remove(index)
+        return [
             Keep("leases", car.name, None),
-            Keep("latches", "epochs", EpochRecord(highest=self.highest_epoch)),
+            Keep("latches", "epochs", EpochRecord(highest=self.identities.highest_epoch)),
         ]
-        self.contacts.remove(slot)
-        self.trips.forget(slot)
-        self.drivers.leave(slot)
-        self.cams.forget(slot)
-        self.stuck.forget(slot)
-        for bank in self.banks.values():
-            bank.unfit(slot)
-        for values in self.readings.values():
-            values[slot] = np.nan
-        self.last_hit_ns.pop(car.name, None)
-        self.touched_ns.pop(car.name, None)
-        self._tags.give_back(car.tag_id)
-        self._unnamed = 0
-        self.slots.free(slot)
 
     def _offset(self, kind: str) -> float:
         # The golden ratio spreads the cars' first scans evenly over a period, however many come.
-        self._came += kind == SCANNER
-        return self._came * 0.618034 % 1.0 if kind == SCANNER else 0.0
+        self.identities.scanners += kind == SCANNER
+        return self.identities.scanners * 0.618034 % 1.0 if kind == SCANNER else 0.0

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from scm.records.city_map import Box, CityMap, Floor, MapTag, Wall
 from scm.world.boxes import Boxes, arm_of, inertia_of
-from scm.world.contacts import KEPT_STEPS, STEP_S, Contacts
+from scm.world.contacts import STEP_S, STEPS_IN_SPACE, Contacts
 from scm.world.solids import Hull
 
 HULL = Hull(2.4, 0.0229, -0.14, 0.16, -0.0875, 0.0875, restitution=0.3, friction=0.5)
@@ -88,7 +88,7 @@ def test_a_box_that_left_the_solver_is_braked_when_it_is_hit_again():
         scene.step()
         start = moved[3]
         assert start > 0.3
-        for _ in range(KEPT_STEPS + 100):  # at last the wall's car alone is in the solver
+        for _ in range(STEPS_IN_SPACE + 100):  # at last the wall's car alone is in the solver
             scene.motion[:] = apart, at_the_wall
             scene.step()
         expected = start**2 / (2 * friction * GRAVITY)

@@ -18,8 +18,8 @@ from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
+from scm.world import step
 from scm.world.requests import reply_to
-from scm.world.step import tick
 from scm.world.world import PERIOD_NS, World
 
 TICK_S = 0.02
@@ -55,6 +55,11 @@ def run(world, seconds):
         cars = world.hosted.values()
         history.append([car.fleet.planar_cog(car.row) for car in cars])
     return np.array(history)
+
+
+def tick(world, now_ns, inbox):
+    """Make a tick, and note what the world sends."""
+    world.sent = step.tick(world, now_ns, inbox)
 
 
 def command(world, name, throttle, seconds):
@@ -150,7 +155,7 @@ def test_cars_that_touch_nothing_move_as_if_they_were_alone_bit_for_bit():
 
 
 def sensed(world, name):
-    found = [m for m in world.outbox if isinstance(m, VehicleSensors) and m.vehicle == name]
+    found = [m for m in world.sent if isinstance(m, VehicleSensors) and m.vehicle == name]
     return found[-1]
 
 
@@ -183,6 +188,7 @@ class Agent:
 
     def __init__(self, world, name, pose, speed, ice=False):
         self.world, self.name, self.seq = world, name, 0
+        world.sent = []
         self.car = world.admit(name, "remote", "s", "nigel", Pose2(*pose), 0)
         self.fleet = Fleet(NIGEL, 1)
         self.fleet.add(Pose2(*pose), speed)
@@ -194,7 +200,7 @@ class Agent:
         """Move a tick, having heard the contacts of the tick before last; report."""
         arrived, self._under_way = (
             self._under_way,
-            [m for m in self.world.outbox if isinstance(m, Contact) and m.number],
+            [m for m in self.world.sent if isinstance(m, Contact) and m.number],
         )
         for contact in arrived:
             self.felt = contact.number

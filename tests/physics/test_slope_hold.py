@@ -37,8 +37,8 @@ def parked(slope, cars):
     for i in range(MINUTE_TICKS + 1):
         if i in {0, MINUTE_TICKS // 2, MINUTE_TICKS}:
             world.locate()
-            of = [world.car(f"c{k}").slot for k in range(len(cars))]
-            places.append(np.column_stack((world.slots.x[of], world.slots.y[of])))
+            of = [world.car(f"c{k}").index for k in range(len(cars))]
+            places.append(np.column_stack((world.vehicles.x[of], world.vehicles.y[of])))
         move(world, i * PERIOD_NS)
     start, half, end = places
     return np.hypot(*(end - start).T), np.hypot(*(end - half).T)

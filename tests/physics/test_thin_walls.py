@@ -12,7 +12,7 @@ from scm.geometry import Pose2
 from scm.records.city_map import Box, CityMap, Floor, MapTag, Wall
 from scm.vehicles.car import load_car
 from scm.world.contacts import STEP_S, Contacts
-from scm.world.hull import hull_of
+from scm.world.solids import hull_of
 from scm.world.step import tick
 from scm.world.world import PERIOD_NS, World
 

@@ -9,7 +9,7 @@ from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.sensors.imu import lever_arm
 from scm.vehicles.shape import Shape, shape_of
-from scm.world.hull import cog_motion, hull_of, outline
+from scm.world.solids import cog_motion, hull_of, outline
 
 NIGEL = load_car("nigel")
 LADEN = NIGEL.with_terms(

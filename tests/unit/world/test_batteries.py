@@ -9,7 +9,7 @@ from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.vehicle_state import VehicleState
-from scm.world.batteries import CHARGED, LOW, Batteries
+from scm.world.alerts import LOW_CHARGE, RECHARGED, LowBatteries
 
 
 def low(city):
@@ -37,17 +37,17 @@ def test_a_low_battery_is_told_once_and_again_after_it_was_charged(city):
 
 
 def test_low_is_below_a_fifth_and_charged_is_three_tenths():
-    batteries = Batteries()
-    assert batteries.news({"n7": LOW}) == []
-    assert batteries.news({"n7": LOW - 0.001}) == ["n7"]
-    assert batteries.news({"n7": CHARGED - 0.001}) == []
-    assert batteries.news({"n7": LOW - 0.001}) == []
-    assert batteries.news({"n7": CHARGED}) == []
-    assert batteries.news({"n7": LOW - 0.001}) == ["n7"]
+    batteries = LowBatteries()
+    assert batteries.news({"n7": LOW_CHARGE}) == []
+    assert batteries.news({"n7": LOW_CHARGE - 0.001}) == ["n7"]
+    assert batteries.news({"n7": RECHARGED - 0.001}) == []
+    assert batteries.news({"n7": LOW_CHARGE - 0.001}) == []
+    assert batteries.news({"n7": RECHARGED}) == []
+    assert batteries.news({"n7": LOW_CHARGE - 0.001}) == ["n7"]
 
 
 def test_another_car_under_the_name_of_one_that_has_left_is_told_too():
-    batteries = Batteries()
+    batteries = LowBatteries()
     assert batteries.news({"n7": 0.1}) == ["n7"]
     assert batteries.news({}) == []
     assert batteries.news({"n7": 0.1}) == ["n7"]

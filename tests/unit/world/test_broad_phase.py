@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scm.records.city_map import Box, CityMap, Floor, MapTag, Wall
-from scm.world.broad_phase import TOUCH_M, Near, obstacles_of
+from scm.world.broad_phase import TOUCH_M, BroadPhase, obstacles_of
 from scm.world.solids import obstacle_boxes
 
 RNG = np.random.default_rng(4)
@@ -60,7 +60,7 @@ def test_marks_are_those_of_every_pair_tried(spread):
     walls = np.column_stack(
         (x, y, np.cos(yaw), np.sin(yaw), RNG.uniform(0.1, 2.5, 12), np.full(12, 0.005))
     )
-    marks = Near(obstacles_of(walls)).touching(np.arange(40), motion, outlines, 40)
+    marks = BroadPhase(obstacles_of(walls)).touching(np.arange(40), motion, outlines, 40)
     gaps = brute_force(motion, outlines, walls)
     clear = np.abs(gaps - TOUCH_M) > 1e-9
     assert_array_equal(marks[clear], (gaps < TOUCH_M)[clear])
@@ -70,18 +70,18 @@ def test_marks_are_those_of_every_pair_tried(spread):
 def test_lists_that_are_kept_for_many_steps_miss_nobody():
     motion, outlines = crowd(60, 2.0)
     walls = np.array([[0.0, 0.0, 1.0, 0.0, 2.0, 0.01]])
-    kept = Near(obstacles_of(walls))
+    kept = BroadPhase(obstacles_of(walls))
     for step in range(200):
         motion[:, :3] += 0.005 * motion[:, 3:]
         if step == 100:
             motion[:, 3:5] *= -8.0  # all turn round and race
         marks = kept.touching(np.arange(60), motion, outlines, 60)
-        fresh = Near(obstacles_of(walls)).touching(np.arange(60), motion, outlines, 60)
+        fresh = BroadPhase(obstacles_of(walls)).touching(np.arange(60), motion, outlines, 60)
         assert_array_equal(marks, fresh)
 
 
 def test_boxes_at_rest_against_each_other_wait_until_one_is_touched():
-    near = Near(obstacles_of(np.array([[0.0, -0.11, 1.0, 0.0, 2.0, 0.01]])))
+    near = BroadPhase(obstacles_of(np.array([[0.0, -0.11, 1.0, 0.0, 2.0, 0.01]])))
     outlines = np.tile([0.0, 0.0, 0.1, 0.1, 0.15], (3, 1))
     motion = np.zeros((3, 6))
     motion[:, 0] = [1.0, 0.2, 0.0]  # a car to the right, then two boxes side by side

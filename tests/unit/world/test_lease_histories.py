@@ -19,7 +19,7 @@ from scm.v2x.request_retry import RetriedRequest
 from scm.vehicles.guard import Guard
 from scm.world import driving
 from scm.world.part import WorldPart
-from scm.world.restore import read_kept
+from scm.world.restore import read_restored
 
 MAP = load_map("driving_school")
 OWNERS = {"ann": 0.1, "bob": 0.2, "eve": 0.3}
@@ -87,8 +87,8 @@ class Leases(RuleBasedStateMachine):
         self.start()
 
     def start(self):
-        kept = read_kept(self.store)
-        self.part = WorldPart(MAP, hosted=((CAR, "nigel"),), room=2, kept=kept)
+        kept = read_restored(self.store)
+        self.part = WorldPart(MAP, hosted=((CAR, "nigel"),), room=2, restored=kept)
         self.city.add(self.part, self.store)
         self.city.run_for(0.02)
 

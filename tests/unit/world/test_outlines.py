@@ -6,7 +6,7 @@ import pytest
 from scm.maps.load import load_map
 from scm.vehicles.car import load_car
 from scm.world.contacts import Contacts
-from scm.world.hull import outline
+from scm.world.solids import outline
 
 
 def turns_left(faces):

@@ -9,8 +9,7 @@ from scm.records.city_map import CityMap, Floor, Group, Junction, Light, MapTag,
 from scm.records.city_map import Conflict as Stretch
 from scm.v2x.messages.part_status import PartStatus
 from scm.vehicles.drivers.channel import channel_of
-from scm.world.delay_queue import Late
-from scm.world.radio import Radio, Receivers, roadside_places
+from scm.world.radio import DelayQueue, Radio, Receivers, roadside_places
 
 PLACES = {"n1": (0.0, 0.0), "n2": (3.0, 4.0), "n3": (0.0, 5.1), "rsu-x": (1.0, 0.0)}
 STATIONS = Receivers(PLACES)
@@ -117,11 +116,11 @@ def test_delays_lie_between_the_least_and_the_most():
     assert delays_ms.min() >= 30.0
     assert delays_ms.max() <= 80.0
     assert delays_ms.mean() == pytest.approx(55.0, abs=2.0)
-    assert air.counts.late == 2000
+    assert air.counts.in_flight == 2000
 
 
 def test_late_frames_come_in_the_order_of_their_time_and_never_before():
-    late = Late()
+    late = DelayQueue()
     for due_ns, name in ((50, "b"), (20, "a"), (50, "c")):
         late.put(due_ns, PartStatus(station=name, t_ns=0))
     assert late.arrived(19) == []

@@ -55,7 +55,7 @@ def test_time_that_a_slow_computer_lost_makes_nobody_stuck(make_city):
     city.run_for(1.0)
     city.now += 3 * PATIENCE_NS
     city.run_for(0.5)
-    assert city.world.slots.throttle[0] > LEAST_THROTTLE, "it drives"
+    assert city.world.vehicles.throttle[0] > LEAST_THROTTLE, "it drives"
     assert told(city) == []
 
 
@@ -124,7 +124,7 @@ def test_a_driver_lets_go_of_a_stuck_car_and_tries_again_once_in_a_while(city, b
     throttles = []
     for seq in range(2, round(50 * (0.5 + PATIENCE_S + PAUSE_S + TRY_S + 0.5 * PAUSE_S) / 5)):
         city.run(5, stand(seq))
-        throttles.append(city.world.slots.throttle[car.slot] > 0.0)
+        throttles.append(city.world.vehicles.throttle[car.index] > 0.0)
     assert told(city)[:1] == ["n1 is stuck: it pushes against n7 and stays"]
     changes = np.flatnonzero(np.diff(throttles)) + 1
     spans_s = np.diff(changes) * 0.1
@@ -138,7 +138,7 @@ def test_a_driver_lets_go_of_a_stuck_car_and_tries_again_once_in_a_while(city, b
 def test_a_queue_before_a_red_light_is_not_stuck(make_city):
     city = make_city(hosted=tuple((f"n{i}", "nigel") for i in range(1, 7)))
     city.run_for(8.0 + 1.5 * PATIENCE_S)
-    assert city.world.slots.speed.max() < 0.02, "all wait at the dark light by now"
+    assert city.world.vehicles.speed.max() < 0.02, "all wait at the dark light by now"
     assert told(city) == []
 
 

@@ -26,7 +26,7 @@ def causes(city):
 def test_cars_that_drive_brake_and_wait_at_a_dark_light_warn_of_nothing(make_city):
     city = make_city(hosted=CARS)
     city.run_for(20.0)
-    assert city.world.slots.speed.max() < 0.02, "all wait by now"
+    assert city.world.vehicles.speed.max() < 0.02, "all wait by now"
     assert causes(city) == []
 
 
@@ -94,8 +94,8 @@ def test_a_car_that_stands_within_a_junction_warns(make_city):
     lane = world.roads.lane(inside.lane)
     car = world.host("n5", "nigel", lane.at(0.5 * (inside.from_m + inside.to_m) - 0.08), city.now)
     city.ask(RouteRequest(vehicle="n5"))
-    world.drivers.halt(car.slot)
-    world.drivers.throttle[car.slot] = 0.0
+    world.drivers.halt(car.index)
+    world.drivers.throttle[car.index] = 0.0
     city.run_for(3.0)
     assert {f.station for f in city.heard(DenmTx)} == {"n5"}
     assert set(causes(city)) == {STATIONARY_VEHICLE}

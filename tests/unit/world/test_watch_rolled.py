@@ -8,13 +8,13 @@ from scm.world.step import tick
 from scm.world.world import PERIOD_NS, World
 
 
-def test_a_car_that_rolled_over_is_told_once():
+def test_a_car_that_rolled_over_is_reported_once():
     world = World(load_map("parking_school"), capacity=4)
     car = world.host("a", "nigel", Pose2(0.0, 0.0, 0.0), 0)
     tick(world, 0, [])
     car.fleet.status[car.row] = VehicleStatus.ROLLED
-    told = []
+    events = []
     for i in range(1, 4):
-        tick(world, i * PERIOD_NS, [])
-        told += [m for m in world.outbox if isinstance(m, CityEvent) and m.name == "vehicle_rolled"]
-    assert [event.text for event in told] == [VehicleStatus.ROLLED.sentence]
+        sent = tick(world, i * PERIOD_NS, [])
+        events += [m for m in sent if isinstance(m, CityEvent) and m.name == "vehicle_rolled"]
+    assert [event.text for event in events] == [VehicleStatus.ROLLED.sentence]

@@ -58,9 +58,9 @@ def test_the_radio_carries_a_hosted_cars_own_frame_only_once(city):
     city.ask(SpawnRequest(vehicle="n1"))
     city.run_for(1.0)
     own = city.heard(CamTx)
-    before = city.world.radio.counts.sent
+    before = city.world.radio.link.counts.sent
     city.run(1, own[-1])
-    assert city.world.radio.counts.sent == before == len(own)
+    assert city.world.radio.link.counts.sent == before == len(own)
 
 
 def test_agents_in_range_receive_what_hosted_cars_send(city):

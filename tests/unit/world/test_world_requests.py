@@ -26,7 +26,7 @@ from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.vehicles.car import load_car
 from scm.world.requests import is_free, reply_to
-from scm.world.slots import Numbers
+from scm.world.vehicle_arrays import Numbers
 from scm.world.world import World
 
 MAP = load_map("driving_school")
@@ -541,4 +541,4 @@ def test_a_car_given_back_beside_its_lane_drives_there_where_no_wall_is(city):
     city.ask(RouteRequest(vehicle="n1"))
     city.run_for(8.0)
     assert "contact" not in city.events()
-    assert abs(city.world.drivers.cross_track[car.slot]) < 0.02
+    assert abs(city.world.drivers.cross_track[car.index]) < 0.02

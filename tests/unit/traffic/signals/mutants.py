@@ -48,9 +48,9 @@ KERNEL = {
         "return tuple(GroupState(Phase.CLEARANCE) for _",
         "return tuple(GroupState(Phase.RED) for _",
     ),
-    "green that nobody wished": ("is Phase.RED and name in wishes and", "is Phase.RED and"),
+    "green that nobody requested": ("is Phase.RED and name in requested and", "is Phase.RED and"),
     "never green": (
-        "is Phase.RED and name in wishes",
+        "is Phase.RED and name in requested",
         "is Phase.RED and name not in program.groups",
     ),
     "flash ignored": ("if flash:", "if flash and not state:"),
@@ -58,7 +58,7 @@ KERNEL = {
         "else GroupState(group.phase, elapsed)",
         "else GroupState(group.phase, group.elapsed)",
     ),
-    "a green never ends": ("times.min_green) if wished", "times.min_green) if True"),
+    "a green never ends": ("if is_requested\n", "if True\n"),
     "all-red one step short": ("elapsed >= times.clearance", "elapsed + 1 >= times.clearance"),
     "yellow one step short": ("elapsed >= times.yellow", "elapsed + 1 >= times.yellow"),
     "min green one step short": ("elapsed >= times.min_green:", "elapsed + 1 >= times.min_green:"),
@@ -69,9 +69,12 @@ RINGS = {
         "if all(ready) and all(is_last) and",
         "if any(ready) and any(is_last) and",
     ),
-    "no max": ("or ring.waited >= _most(times, ring.phase, told)", "or False"),
+    "no max": ("or ring.waited >= _most(times, ring.phase, inputs)", "or False"),
     "max does not run": ("waited=min(ring.waited + dt,", "waited=min(ring.waited,"),
-    "max runs for nobody else": ("return bool(rivals - {phase})", "return not rivals - {phase}"),
+    "max runs for nobody else": (
+        "return bool(conflicting - {phase})",
+        "return not conflicting - {phase}",
+    ),
     "others in the ring not seen": ("if phase not in ring:", "if True:"),
     "no gap-out and no max": ("and is_over and", "and False and"),
     "min green endless": ("green=min(ring.green + dt, times.min_green)", "green=0"),
@@ -91,54 +94,57 @@ RINGS = {
     ),
     "never begins again": ("if following is None and wraps:", "if following is None and False:"),
     "calls not heard": (
-        "called = (told.calls | state.calls | always)",
+        "called = (inputs.calls | state.calls | always)",
         "called = (state.calls | always)",
     ),
     "all in one ring side by side": (
-        "rings = _components(members, rivals)",
+        "rings = _components(members, conflicting)",
         "rings = tuple((i,) for i in members)",
     ),
-    "friends are rivals": (
-        "if j not in rivals[i] and j != i} for i in numbers}",
+    "friends are conflicting": (
+        "if j not in conflicting[i] and j != i} for i in numbers}",
         "if j != i} for i in numbers}",
     ),
     "odd conflicts not cut into stages": (
-        "if all(j in rivals[i] for ring in rings for i in ring for j in ring if i != j):",
+        "if all(j in conflicting[i] for ring in rings for i in ring for j in ring if i != j):",
         "if rings:",
     ),
-    "wishes for all that is called": (
+    "requests all that is called": (
         "return frozenset(ring.phase for ring in state.rings if ring.phase is not None)",
         "return frozenset(range(2))",
     ),
 }
 
-RINGS_TOLD = {
+RINGS_WITH_INPUTS = {
     "crosses to where nobody waits": (
         "if any(i in called for ring in layout.sections[section] for i in ring)",
         "if layout.sections[section]",
     ),
-    "hold ignored": ("is_over and ring.phase not in told.hold", "is_over"),
+    "hold ignored": ("is_over and ring.phase not in inputs.hold", "is_over"),
     "hold shuts the ring beside it": ("wraps=is_shut or not others", "wraps=not others"),
-    "omit ignored": ("| always) - told.omit\n", "| always)\n"),
-    "omit too late": ("is_left_out = ring.phase in told.omit", "is_left_out = False"),
+    "omit ignored": ("| always) - inputs.omit\n", "| always)\n"),
+    "omit too late": ("is_left_out = ring.phase in inputs.omit", "is_left_out = False"),
     "omit loses the place": ("Ring(None, passed=ring.phase)", "Ring(None)"),
     "omit opens the barrier": (
         "_place(ring) is None or following",
         "ring.phase is None or following",
     ),
-    "pre-emption ignored": ("if told.preempt is not None:", "if told.preempt == 99:"),
+    "pre-emption ignored": ("if inputs.preempt is not None:", "if inputs.preempt == 99:"),
     "pre-emption waits for its turn": (
-        "if told.preempt is not None:",
-        "if told.preempt is not None and not state.rings[0].green:",
+        "if inputs.preempt is not None:",
+        "if inputs.preempt is not None and not state.rings[0].green:",
     ),
     "pre-emption drags others along": (
         "else tuple(Ring() for _ in sequences)",
         "else tuple(Ring(sequence[0]) for sequence in sequences)",
     ),
-    "pre-emption never ends": ("return _go_on(layout, state, told, called)", "return state"),
-    "force-off holds": ("or ring.phase in told.force_off", "and ring.phase not in told.force_off"),
+    "pre-emption never ends": ("return _go_on(layout, state, inputs, called)", "return state"),
+    "force-off holds": (
+        "or ring.phase in inputs.force_off",
+        "and ring.phase not in inputs.force_off",
+    ),
     "no max while max 2 is told": (
-        "or ring.waited >= _most(times, ring.phase, told)",
-        "or (ring.waited >= times.max1 and not told.max2)",
+        "or ring.waited >= _most(times, ring.phase, inputs)",
+        "or (ring.waited >= times.max1 and not inputs.max2)",
     ),
 }

@@ -224,14 +224,14 @@ def test_what_a_junction_is_and_what_is_wished_of_it_is_told(city):
     assert len(messages(told)) == pytest.approx(22, abs=2)
     city.call(SignalRequest(junction="crossing", verb="hold", groups=("south_east",), by="ada"))
     city.run_for(0.2)
-    wishes = messages(told)[-1].requested
+    wishes = messages(told)[-1].wishes
     assert [(wish.verb, wish.by) for wish in wishes] == [("hold", "ada")]
     clear = {"verb": "clear", "groups": ("south_east",), "by": "ada"}
     city.call(SignalRequest(junction="crossing", clears="call", **clear))
     city.run_for(0.2)
     assert len(messages(told)) in (0, 1)
     reply = city.call(SignalRequest(junction="crossing", clears="hold", **clear))
-    assert reply.requested == ()
+    assert reply.wishes == ()
 
 
 def test_greens_to_come_are_told_as_they_come(city):

@@ -24,7 +24,7 @@ def test_a_link_runs_from_line_to_line_and_takes_as_long_as_the_slowest_drives()
     )
     turn_m = ROADS.length_of("j1_0_en")
     way_m = 0.14 + turn_m + link.end.at_m
-    assert link.takes_s == pytest.approx(way_m / NIGEL.slow_mps, rel=1e-3)
+    assert link.travel_s == pytest.approx(way_m / NIGEL.slow_mps, rel=1e-3)
 
 
 def test_all_junctions_share_a_cycle_and_follow_each_other_by_their_links():
@@ -38,7 +38,7 @@ def test_all_junctions_share_a_cycle_and_follow_each_other_by_their_links():
         start, end = (tables[line.junction]["calm"] for line in (link.start, link.end))
         leaves = start[1].offset_ns + start[0].first_start_ns(link.start.group)
         comes = end[1].offset_ns + end[0].first_start_ns(link.end.group)
-        late = (comes - leaves - round(link.takes_s * 1e9)) % start[1].length_ns
+        late = (comes - leaves - round(link.travel_s * 1e9)) % start[1].length_ns
         return late == 0
 
     assert sum(map(in_step, links)) >= len(PROGRAMS) - 1

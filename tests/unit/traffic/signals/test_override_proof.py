@@ -17,7 +17,7 @@ from scm.traffic.signals.proof.load_checks import (
 )
 from scm.traffic.signals.proof.override_proof import check_ring_shape, prove_overrides
 from scm.traffic.signals.proof.ring_proof import small_times
-from tests.unit.traffic.signals.mutants import RINGS_TOLD, mutant_of
+from tests.unit.traffic.signals.mutants import RINGS_WITH_INPUTS, mutant_of
 from tests.unit.traffic.signals.test_rings import CROSSING, SHAPES, SIDE, THREE, Junction, program
 
 IN_TURN = program("abc", "ab", "ac", "bc")
@@ -42,9 +42,9 @@ def prove_all(module):
         prove_overrides(module, *small_times(shape), most=1)
 
 
-@pytest.mark.parametrize("name", sorted(RINGS_TOLD))
+@pytest.mark.parametrize("name", sorted(RINGS_WITH_INPUTS))
 def test_a_mutant_of_the_rings_that_breaks_a_wish_is_caught(name):
-    mutant = mutant_of(rings, *RINGS_TOLD[name])
+    mutant = mutant_of(rings, *RINGS_WITH_INPUTS[name])
     with pytest.raises(PlanError):
         prove_all(mutant)
 

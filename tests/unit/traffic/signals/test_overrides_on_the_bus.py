@@ -59,7 +59,7 @@ def test_a_wish_is_answered_with_what_is_in_force_and_told(city):
     reply = wish(city, "hold", "south_east", expires_s=30.0)
     assert isinstance(reply, SignalReply)
     assert (reply.policy, reply.pending) == ("actuated", "")
-    (held,) = reply.requested
+    (held,) = reply.wishes
     assert (held.verb, held.groups, held.by) == ("hold", ("south_east",), "me")
     assert held.ends_ns == pytest.approx(city.now_ns + 30 * NS_PER_S, abs=NS_PER_S)
     city.run_for(31.0)

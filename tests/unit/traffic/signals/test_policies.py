@@ -171,7 +171,7 @@ def test_a_green_waits_for_a_car_while_that_costs_those_who_stand_less_than_it_a
     coming = Detector(call=True, near=1, arrivals_s=(5.0,))
     queue = Detector(call=True, extend=True, near=waiting, queue=waiting)
     view = JunctionView(0, S, state, {"a": coming, "b": queue}, sees=True)
-    told = actuated.told_of(site, actuated.start(site), view)
+    told = actuated.inputs_of(site, actuated.start(site), view)
     assert (0 not in told.inputs.calls) is ends
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from scm.arrays import Bools, Ints
 from scm.v2x.cam_trigger import HEADING_RAD, N_GEN_CAM, POSITION_M, SPEED_MPS, T_MAX_NS, T_MIN_NS
 from scm.v2x.congestion import ReactiveControl
-from scm.world.slots import Slots
+from scm.world.vehicle_arrays import VehicleArrays
 
 FEW, TICKS_BETWEEN = 100, 5
 _NEVER_NS = -(2**62)
@@ -24,40 +24,45 @@ class CamTriggers:
         self._quiet = np.zeros(capacity, np.int64)
         self._x, self._y, self._yaw, self._speed = (np.zeros(capacity) for _ in range(4))
 
-    def forget(self, slot: int) -> None:
+    def forget(self, index: int) -> None:
         """Let the next car in a slot begin anew."""
-        self._sent_ns[slot], self._interval_ns[slot], self._quiet[slot] = _NEVER_NS, T_MAX_NS, 0
+        self._sent_ns[index], self._interval_ns[index], self._quiet[index] = _NEVER_NS, T_MAX_NS, 0
 
-    def due(self, slots: Slots, now_ns: int, control: ReactiveControl | None = None) -> Ints:
+    def due(
+        self, vehicles: VehicleArrays, now_ns: int, control: ReactiveControl | None = None
+    ) -> Ints:
         """Return the slots, ascending, whose CAM must go now; they count as sent.
 
         `control` may allow each car less than a CAM every 100 ms.
         """
         gap_ns = T_MIN_NS if control is None else np.maximum(T_MIN_NS, control.gap_ns)
-        asked = np.flatnonzero(slots.hosted & (now_ns - self._sent_ns >= gap_ns))
-        moved = self._moved(slots, asked)
-        owed = moved | (now_ns - self._sent_ns[asked] >= self._interval_ns[asked])
-        due, moved = asked[owed], moved[owed]
-        most = max(FEW, int(slots.hosted.sum()) // TICKS_BETWEEN)
+        candidates = np.flatnonzero(vehicles.hosted & (now_ns - self._sent_ns >= gap_ns))
+        moved = self._moved(vehicles, candidates)
+        owed = moved | (now_ns - self._sent_ns[candidates] >= self._interval_ns[candidates])
+        due, moved = candidates[owed], moved[owed]
+        most = max(FEW, int(vehicles.hosted.sum()) // TICKS_BETWEEN)
         if len(due) > most:
             first = np.sort(np.argsort(self._sent_ns[due], kind="stable")[:most])
             due, moved = due[first], moved[first]
         self._after_motion(due[moved], now_ns)
         self._after_rest(due[~moved])
         self._sent_ns[due] = now_ns
-        for kept, now in (
-            (self._x, slots.x), (self._y, slots.y), (self._yaw, slots.yaw),
-            (self._speed, slots.speed),
+        for last, now in (
+            (self._x, vehicles.x), (self._y, vehicles.y), (self._yaw, vehicles.yaw),
+            (self._speed, vehicles.speed),
         ):  # fmt: skip
-            kept[due] = now[due]
+            last[due] = now[due]
         return due
 
-    def _moved(self, slots: Slots, asked: Ints) -> Bools:
-        turned = np.abs(slots.yaw[asked] - self._yaw[asked])
+    def _moved(self, vehicles: VehicleArrays, candidates: Ints) -> Bools:
+        turned = np.abs(vehicles.yaw[candidates] - self._yaw[candidates])
         turned = np.minimum(turned, 2.0 * np.pi - turned)
-        way = np.hypot(slots.x[asked] - self._x[asked], slots.y[asked] - self._y[asked])
-        faster = np.abs(slots.speed[asked] - self._speed[asked])
-        first = self._sent_ns[asked] == _NEVER_NS
+        way = np.hypot(
+            vehicles.x[candidates] - self._x[candidates],
+            vehicles.y[candidates] - self._y[candidates],
+        )
+        faster = np.abs(vehicles.speed[candidates] - self._speed[candidates])
+        first = self._sent_ns[candidates] == _NEVER_NS
         moved: Bools = (turned > HEADING_RAD) | (way > POSITION_M) | (faster > SPEED_MPS)
         moved &= ~first
         return moved

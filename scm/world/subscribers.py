@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from scm.runtime.part import IsWanted
 from scm.v2x.message import Message
 
-ASK_EVERY_TICKS = 50
-ASK_FOR_ANY_EVERY_TICKS = 5
+REFRESH_EVERY_TICKS = 50
+REFRESH_CLASSES_EVERY_TICKS = 5
 NOBODY = "_"
 
 
-class Wishes:
+class Subscribers:
     """Asks the bus, ten times a second for whole classes and once for single stations.
 
     Without a bus everything is wanted.
@@ -19,10 +19,10 @@ class Wishes:
     def __init__(self) -> None:
         self._is_wanted: IsWanted | None = None
         self._tick = 0
-        self._asked: dict[tuple[type[Message], str], bool] = {}
+        self._known: dict[tuple[type[Message], str], bool] = {}
         self._any: dict[type[Message], bool] = {}
 
-    def learn(self, is_wanted: IsWanted) -> None:
+    def attach(self, is_wanted: IsWanted) -> None:
         """Take the bus's word from now on."""
         self._is_wanted = is_wanted
         self._any.clear()
@@ -30,10 +30,10 @@ class Wishes:
     def begin_tick(self) -> None:
         """Let a tick pass: answers grow old."""
         self._tick += 1
-        if self._tick % ASK_FOR_ANY_EVERY_TICKS == 0:
+        if self._tick % REFRESH_CLASSES_EVERY_TICKS == 0:
             self._any.clear()
-        if self._tick % ASK_EVERY_TICKS == 0:
-            self._asked.clear()
+        if self._tick % REFRESH_EVERY_TICKS == 0:
+            self._known.clear()
 
     def any(self, kind: type[Message]) -> bool:
         """Return whether anybody hears any message of a class."""
@@ -55,8 +55,8 @@ class Wishes:
         return [self._one(kind, key, name) for name in names]
 
     def _one(self, kind: type[Message], key: str, name: str) -> bool:
-        known = self._asked.get((kind, name))
+        known = self._known.get((kind, name))
         if known is None:
             known = self._is_wanted is None or self._is_wanted(kind, {key: name})
-            self._asked[kind, name] = known
+            self._known[kind, name] = known
         return known

@@ -26,9 +26,9 @@ from scm.v2x.messages.srem import SremTx
 from scm.v2x.messages.ssem import SsemTx
 from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.drivers.channel import channel_of, has_arrived
-from scm.world.air import OF_ROADSIDE, RECEIVED, transmit
-from scm.world.channel_load import Busy
+from scm.world.channel_load import ChannelLoad
 from scm.world.remote import missed_between
+from scm.world.transmission import OF_ROADSIDE, RECEIVED, transmit
 from scm.world.world import World
 
 MAP = load_map("driving_school")
@@ -45,15 +45,14 @@ class Air:
 
     def remote(self, name, x, y):
         pose = SimpleNamespace(x=x, y=y)
-        self.world.remote[name] = SimpleNamespace(name=name, pose=pose, slot=0, missed_ns=0)
+        self.world.remote[name] = SimpleNamespace(name=name, pose=pose, index=0, missed_ns=0)
 
     def send(self, kind, station, now_ns=0):
-        self.world.outbox = []
         body = warning(station, now_ns) if kind is DenmTx else None
         sent = kind(station=station, t_ns=now_ns, body=body)
-        transmit(self.world, sent, now_ns)
-        heard = [out for out in self.world.outbox if not isinstance(out, CityEvent)]
-        return [(type(out), out.receiver) for out in heard]
+        out = transmit(self.world, sent, now_ns)
+        heard = [one for one in out if not isinstance(one, CityEvent)]
+        return [(type(one), one.receiver) for one in heard]
 
 
 def warning(station, now_ns):
@@ -85,16 +84,16 @@ def test_a_car_cannot_say_what_roadside_units_say(air, kind):
 
 
 def test_a_frame_of_nobody_is_counted_and_dropped(air):
-    before = air.world.radio.counts.unknown
+    before = air.world.radio.link.counts.unknown
     assert air.send(DenmTx, "ghost") == []
-    assert air.world.radio.counts.unknown == before + 1
+    assert air.world.radio.link.counts.unknown == before + 1
 
 
 def test_a_late_frame_waits_for_its_time():
     air = Air(delay_ms=70.0)
     assert air.send(DenmTx, "n7") == []
-    assert air.world.late.arrived(70 * NS_PER_MS - 1) == []
-    assert [out.receiver for out in air.world.late.arrived(70 * NS_PER_MS)] == [RSU]
+    assert air.world.radio.in_flight.arrived(70 * NS_PER_MS - 1) == []
+    assert [out.receiver for out in air.world.radio.in_flight.arrived(70 * NS_PER_MS)] == [RSU]
 
 
 def test_the_radio_tells_once_a_second_what_became_of_frames(make_city):
@@ -157,7 +156,7 @@ def test_a_car_misses_what_its_reports_leave_out_unless_they_were_lost(
 
 def test_the_channel_is_as_busy_as_the_frames_in_range_make_it():
     lost = np.zeros(2)
-    busy = Busy(RadioChannel(data_rate_mbps=6.0, hidden_share=0.5), 5.0, lost)
+    busy = ChannelLoad(RadioChannel(data_rate_mbps=6.0, hidden_share=0.5), 5.0, lost)
     x, hosted = np.array([0.0, 20.0]), np.ones(2, np.bool_)
     for window in range(1, 4):
         busy.note("cam", np.zeros(100), np.zeros(100))
@@ -234,7 +233,7 @@ def test_a_cam_tells_that_its_sender_touches_something(make_city):
     city = make_city(hosted=(("n1", "nigel"),))
     city.run_for(1.0)
     assert not any(out.touches for out in city.heard(CamRx))
-    city.world.touched_ns["n1"] = city.now
+    city.world.impulses.touched_ns["n1"] = city.now
     touched_ns = city.now
     city.run_for(2.0)
     lately = [out.touches for out in city.heard(CamRx) if touched_ns <= out.t_ns]

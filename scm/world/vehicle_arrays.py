@@ -25,7 +25,7 @@ class Numbers:
         self._never = frozenset(never)
         self._used: set[int] = set()
 
-    def take(self) -> int:
+    def acquire(self) -> int:
         """Return a number and keep it from others."""
         while self._lowest in self._used or self._lowest in self._never:
             self._lowest += 1
@@ -40,20 +40,21 @@ class Numbers:
         self._used.add(number)
         return number
 
-    def give_back(self, number: int) -> None:
+    def release(self, number: int) -> None:
         """Let a number be taken again."""
         self._used.discard(number)
         if number >= self._first:
             self._lowest = min(self._lowest, number)
 
 
-class Slots:
+class VehicleArrays:
     """Arrays of shape (capacity,).
 
     Attributes:
         names: Of the car in each slot; empty where there is none.
         used: Whether a car has the slot; `hosted`: and the world simulates it.
         x, y, yaw: Pose of the rear axle, map frame, at the end of the last tick.
+        front: From the rear axle to the front bumper [m].
         speed, yaw_rate: Along the body, about the vertical; 0 for remote cars.
         driven: Whether its own driver drives it: at home, sent, and in one piece.
         throttle, steering: What the hosted cars are commanded.
@@ -73,40 +74,41 @@ class Slots:
         self.x, self.y, self.yaw, self.speed, self.yaw_rate, self.throttle, self.steering = (
             np.zeros(capacity) for _ in range(7)
         )
+        self.front = np.zeros(capacity)
         self.mode = np.full(capacity, IDLE, np.int8)
         self.seq = np.zeros(capacity, np.int64)
         self._numbers = Numbers()
 
-    def take(self, name: str, pose: Pose2, *, hosted: bool) -> int:
+    def add(self, name: str, pose: Pose2, *, hosted: bool) -> int:
         """Give a car a slot.
 
         Raises:
             RunError: when all are in use.
         """
-        slot = self._numbers.take()
-        if slot >= self.capacity:
-            self._numbers.give_back(slot)
+        index = self._numbers.acquire()
+        if index >= self.capacity:
+            self._numbers.release(index)
             msg = f"the city is full: it holds {self.capacity} cars"
             raise RunError(msg)
-        self.names[slot], self.used[slot], self.hosted[slot] = name, True, hosted
-        self.put(slot, pose)
-        return slot
+        self.names[index], self.used[index], self.hosted[index] = name, True, hosted
+        self.put(index, pose)
+        return index
 
-    def put(self, slot: int, pose: Pose2) -> None:
+    def put(self, index: int, pose: Pose2) -> None:
         """Say where a car is."""
-        self.x[slot], self.y[slot], self.yaw[slot] = pose
+        self.x[index], self.y[index], self.yaw[index] = pose
 
-    def free(self, slot: int) -> None:
+    def remove(self, index: int) -> None:
         """Take a slot back and forget what its car was doing."""
-        self.names[slot] = ""
+        self.names[index] = ""
         for flags in (
             self.used, self.hosted, self.driven, self.arrived, self.hazard, self.diverged,
         ):  # fmt: skip
-            flags[slot] = False
+            flags[index] = False
         for values in (self.speed, self.yaw_rate, self.throttle, self.steering):
-            values[slot] = 0.0
-        self.mode[slot], self.seq[slot] = IDLE, 0
-        self._numbers.give_back(slot)
+            values[index] = 0.0
+        self.mode[index], self.seq[index] = IDLE, 0
+        self._numbers.release(index)
 
     def nearest_m(self, pose: Pose2, *, ahead_s: float = 0.0) -> float:
         """Return how far the nearest car is [m], as `maps.room` counts; infinity: there is none."""

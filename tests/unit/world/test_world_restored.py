@@ -15,7 +15,7 @@ from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.world.part import WorldPart
-from scm.world.restore import read_kept
+from scm.world.restore import read_restored
 
 MAP = load_map("driving_school")
 
@@ -31,7 +31,7 @@ class Reborn:
 
     def start(self):
         hosted = tuple((name, "nigel") for name in self.hosted)
-        self.part = WorldPart(MAP, hosted=hosted, kept=read_kept(self.store))
+        self.part = WorldPart(MAP, hosted=hosted, kept=read_restored(self.store))
         self.city.add(self.part, self.store)
         self.city.run_for(0.1)
 
@@ -116,7 +116,7 @@ def test_the_epoch_grows_across_a_kill_though_the_clock_was_set_back():
     stolen = reborn.lease("steal", vehicle="r1", owner="ann", reason="test")
     assert stolen.epoch > joined.epoch
     city = Lockstep([])  # a clock that begins at 0 again
-    part = WorldPart(MAP, kept=read_kept(reborn.store))
+    part = WorldPart(MAP, kept=read_restored(reborn.store))
     city.add(part, reborn.store)
     city.run_for(0.1)
     again = city.call(JoinRequest(vehicle="r1", session="s2"))
@@ -160,12 +160,12 @@ def test_a_car_for_which_no_place_is_left_is_told_of_and_forgotten():
     for _ in MAP.spawns:
         reborn.city.call(SpawnRequest())
     car = next(iter(reborn.world.hosted.values()))
-    record = read_kept(reborn.store).cars[car.name]
+    record = read_restored(reborn.store).cars[car.name]
     reborn.store.put("leases", "world/zz", msgspec.json.encode(record))
     reborn.kill()
     assert "zz" not in reborn.world.hosted
     assert len(reborn.world.hosted) == len(MAP.spawns)
-    assert "zz" not in read_kept(reborn.store).cars
+    assert "zz" not in read_restored(reborn.store).cars
     reborn.city.close()
 
 

@@ -1,0 +1,61 @@
+"""Conditions that are reported once: warnings on the air, low batteries, lanes too narrow."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from scm.v2x.etsi.events import CarWarnings, DenmReceiver
+from scm.world.stuck import Stuck
+
+LOW_CHARGE = 0.2  # a battery below this is reported
+RECHARGED = 0.3  # above this it may be reported again
+
+
+@dataclass(slots=True)
+class WarningState:
+    """Who warns of what.
+
+    Attributes:
+        hits: What cars have hit since their last warning of it could be sent, by name.
+        braked: Indices of hosted cars that have braked hard since the last check.
+        warners: What hosted cars warn of, by name.
+        denms: What all stations warn of.
+    """
+
+    hits: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    braked: set[int] = field(default_factory=set)
+    warners: dict[str, CarWarnings] = field(default_factory=dict)
+    denms: DenmReceiver = field(default_factory=DenmReceiver)
+
+
+class LowBatteries:
+    """Which cars were reported with a low battery."""
+
+    def __init__(self) -> None:
+        self._low: set[str] = set()
+
+    def news(self, charges: Mapping[str, float | None]) -> list[str]:
+        """Return who is low since the last call, of all cars; a charge is None where unknown."""
+        known = {name: charge for name, charge in charges.items() if charge is not None}
+        self._low = {
+            name for name in self._low & charges.keys() if known.get(name, LOW_CHARGE) < RECHARGED
+        }
+        news = [
+            name for name, charge in known.items() if charge < LOW_CHARGE and name not in self._low
+        ]
+        self._low.update(news)
+        return news
+
+
+@dataclass(slots=True)
+class Alerts:
+    """What is wrong with cars and was reported.
+
+    Attributes:
+        stuck: Which cars push in vain.
+        low_batteries: Which cars were reported with a low battery.
+        checked_files: Car files whose fit to the lanes was checked.
+    """
+
+    stuck: Stuck
+    low_batteries: LowBatteries = field(default_factory=LowBatteries)
+    checked_files: set[str] = field(default_factory=set)

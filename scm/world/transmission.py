@@ -1,0 +1,251 @@
+"""Radio transmission: each sent frame is delivered to the stations that receive it.
+
+Drivers of hosted cars get it directly, everybody else who subscribes gets it on the bus. Bodies are
+not read here, except the CAMs, SPATEMs and DENMs that drivers use.
+"""
+
+from collections.abc import Sequence
+from dataclasses import fields
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.v2x.etsi.cam_spatem import CamBody
+from scm.v2x.etsi.convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, cam_of, read_cam
+from scm.v2x.exchange import Outgoing
+from scm.v2x.messages.cam import CamRx
+from scm.v2x.messages.cam import CamTx
+from scm.v2x.messages.cpm import CpmRx
+from scm.v2x.messages.cpm import CpmTx
+from scm.v2x.messages.denm import DenmRx
+from scm.v2x.messages.denm import DenmTx
+from scm.v2x.messages.mapem import MapemRx
+from scm.v2x.messages.mapem import MapemTx
+from scm.v2x.messages.radio_status import RadioStatus
+from scm.v2x.messages.spatem import SpatemRx
+from scm.v2x.messages.spatem import SpatemTx
+from scm.v2x.messages.srem import SremRx
+from scm.v2x.messages.srem import SremTx
+from scm.v2x.messages.ssem import SsemRx
+from scm.v2x.messages.ssem import SsemTx
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.world.publish import states_of
+from scm.world.radio import Receivers
+from scm.world.warnings import due_denms, log_warning, note_hard_braking
+from scm.world.world import World
+
+Frame = CamTx | CpmTx | DenmTx | MapemTx | SpatemTx | SremTx | SsemTx
+ReceivedFrame = CamRx | CpmRx | DenmRx | MapemRx | SpatemRx | SremRx | SsemRx
+
+RECEIVED: dict[type[Frame], type[ReceivedFrame]] = {
+    CamTx: CamRx,
+    CpmTx: CpmRx,
+    DenmTx: DenmRx,
+    MapemTx: MapemRx,
+    SpatemTx: SpatemRx,
+    SremTx: SremRx,
+    SsemTx: SsemRx,
+}
+"""All frame types: as sent, and as received."""
+TOUCHES_NS = NS_PER_S // 2
+"""For how long a car that was pushed counts as touching: some CAMs long."""
+OF_ROADSIDE = (MapemTx, SpatemTx, SsemTx)
+"""What nobody else may send."""
+
+
+def send_radio(world: World, now_ns: int) -> list[Outgoing]:
+    """Send the frames of hosted cars that are due; return what is received, late frames first."""
+    out: list[Outgoing] = [*world.radio.in_flight.arrived(now_ns)]
+    if world.radio.load.is_due(now_ns):
+        _measure(world, now_ns)
+    if world.every["radio"].is_due(now_ns):
+        out.append(status(world, now_ns))
+    due = world.radio.cams.due(world.vehicles, now_ns, world.radio.load.control)
+    if len(due):
+        out += _send_cams(world, due, now_ns)
+    note_hard_braking(world)
+    if world.every["denm"].is_due(now_ns):
+        for frame in due_denms(world, now_ns):
+            out += _send_denm(world, frame, now_ns)
+    return out
+
+
+def transmit(world: World, frame: Frame, now_ns: int) -> list[Outgoing]:
+    """Return a frame as every station receives it now; one of an unknown sender is dropped."""
+    if isinstance(frame, OF_ROADSIDE) and frame.station not in world.radio.roadside:
+        world.ignored += 1
+        return []
+    receivers = world.receivers()
+    place = world.antenna(frame.station)
+    if place is None:
+        world.radio.link.counts.sent += 1
+        world.radio.link.counts.unknown += 1
+        return []
+    x, y = np.array([place[0]]), np.array([place[1]])
+    world.radio.load.note(kind_of(frame), x, y)
+    out = _deliver_to_drivers(world, frame, now_ns)
+    received = world.radio.link.reach([frame.station], x, y, receivers, _load(world, receivers))
+    listen = np.array(
+        world.subscribers.of(RECEIVED[type(frame)], "receiver", receivers.names), np.bool_
+    )
+    return out + _deliver(world, [frame], received & listen, receivers, now_ns)
+
+
+def kind_of(frame: Frame) -> str:
+    """Return a frame's message type, as in `scm.v2x.congestion.BYTES`."""
+    return frame.KEY.rpartition("/")[2]
+
+
+def status(world: World, now_ns: int) -> RadioStatus:
+    """Return what became of the frames since the last time, and how busy the channel is."""
+    counts, before = world.radio.link.counts, world.radio.published
+    new = {f.name: getattr(counts, f.name) - getattr(before, f.name) for f in fields(counts)}
+    for name, value in new.items():
+        setattr(before, name, getattr(before, name) + value)
+    late_ns, _ = new.pop("late_ns"), new.pop("lost")
+    busy = world.radio.load
+    others = {name: busy.ratio_of(name) for name in world.receivers().names}
+    all_of_them = np.array([*busy.ratio[world.vehicles.hosted], *others.values(), 0.0])
+    stations = max(1, len(all_of_them) - 1)
+    return RadioStatus(
+        t_ns=now_ns,
+        waiting=len(world.radio.in_flight),
+        late_ms=late_ns / NS_PER_MS / max(1, new["late"]),
+        busy_mean=float(all_of_them.sum()) / stations,
+        busy_most=float(all_of_them.max()),
+        stations=tuple(others),
+        busy=tuple(others.values()),
+        **new,
+    )
+
+
+def _measure(world: World, now_ns: int) -> None:
+    vehicles = world.vehicles
+    world.radio.load.measure(
+        now_ns, vehicles.x, vehicles.y, vehicles.hosted, world.receivers().places
+    )
+
+
+def _load(world: World, receivers: Receivers) -> Floats | None:
+    return world.radio.load.loss_of(receivers.names) if world.radio.load.is_measured else None
+
+
+def _send_cams(world: World, due: Ints, now_ns: int) -> list[Outgoing]:
+    vehicles = world.vehicles
+    front = world.vehicles.front[due]
+    x, y, yaw = vehicles.x[due], vehicles.y[due], vehicles.yaw[due]
+    bumper_x, bumper_y = x + front * np.cos(yaw), y + front * np.sin(yaw)
+    world.radio.load.note("cam", x, y)
+    world.drivers.receive_cams(
+        due, now_ns, bumper_x, bumper_y, yaw, vehicles.speed[due], vehicles.yaw_rate[due]
+    )
+    return _deliver_cams(world, due, x, y, now_ns)
+
+
+def _send_denm(world: World, frame: DenmTx, now_ns: int) -> list[Outgoing]:
+    """Send a hosted car's warning."""
+    index = world.hosted[frame.station].index
+    x, y = world.vehicles.x[index : index + 1].copy(), world.vehicles.y[index : index + 1].copy()
+    world.radio.load.note("denm", x, y)
+    out = _deliver_to_drivers(world, frame, now_ns)
+    receivers = world.receivers()
+    reached = world.radio.link.reach([frame.station], x, y, receivers, _load(world, receivers))
+    listen = np.array(world.subscribers.of(DenmRx, "receiver", receivers.names), np.bool_)
+    return out + _deliver(world, [frame], reached & listen, receivers, now_ns, also_sent=True)
+
+
+def _deliver_to_drivers(world: World, frame: Frame, now_ns: int) -> list[Outgoing]:
+    """Give a frame to the drivers of hosted cars; return the events of a DENM."""
+    if isinstance(frame, SpatemTx):
+        world.drivers.receive_spatem(frame.body, now_ns)
+    elif isinstance(frame, DenmTx):
+        world.drivers.receive_denm(frame.body, now_ns)
+        return log_warning(world, frame, now_ns)
+    elif isinstance(frame, CamTx) and (car := world.remote.get(frame.station)) is not None:
+        _deliver_cam(world, car.index, frame.body, now_ns)
+    return []
+
+
+def _deliver_cam(world: World, index: int, body: CamBody, now_ns: int) -> None:
+    """Give drivers a remote car's CAM; one without a place or a heading is ignored.
+
+    A missing speed or yaw rate counts as zero, a missing size as that of a Nigel.
+    """
+    cam = read_cam(body)
+    if cam.place is None or cam.yaw_rad is None:
+        return
+    length_m, width_m = cam.length_m or ASSUMED_LENGTH_M, cam.width_m or ASSUMED_WIDTH_M
+    world.drivers.show(index, length_m, width_m)
+    numbers = (*cam.place, cam.yaw_rad, cam.speed_mps or 0.0, cam.yaw_rate_radps or 0.0)
+    columns = [np.array([number]) for number in numbers]
+    world.drivers.receive_cams(np.array([index]), now_ns, *columns)
+
+
+def _deliver_cams(world: World, due: Ints, x: Floats, y: Floats, now_ns: int) -> list[Outgoing]:
+    """Return hosted cars' CAMs for all other receivers and the bus, if anybody subscribes."""
+    receivers, on_bus = world.receivers(), world.subscribers.any(CamTx)
+    listen = np.array(world.subscribers.of(CamRx, "receiver", receivers.names), np.bool_)
+    if not (on_bus or listen.any()):
+        world.radio.link.counts.sent += len(due)
+        return []
+    names = [world.vehicles.names[index] for index in due.tolist()]
+    reached = world.radio.link.reach(names, x, y, receivers, _load(world, receivers)) & listen
+    is_received = reached.any(axis=1) | on_bus
+    frames: list[Frame] = [
+        _cam(world, s, now_ns) for s in states_of(world, due[is_received], now_ns)
+    ]
+    return _deliver(world, frames, reached[is_received], receivers, now_ns, also_sent=True)
+
+
+def _deliver(
+    world: World,
+    frames: Sequence[Frame],
+    reached: Bools,
+    receivers: Receivers,
+    now_ns: int,
+    *,
+    also_sent: bool = False,
+) -> list[Outgoing]:
+    """Return frames (k,) as receivers (k, n) get them now; delayed ones wait for their arrival."""
+    out: list[Outgoing] = []
+    delays = iter(world.radio.link.delays(int(reached.sum())).tolist())
+    for row, frame in enumerate(frames):
+        if also_sent:
+            out.append(frame)
+        for i in np.flatnonzero(reached[row]).tolist():
+            received = _received(world, receivers.names[i], frame, now_ns)
+            delay_ns = next(delays)
+            if delay_ns:
+                world.radio.in_flight.put(now_ns + delay_ns, received)
+            else:
+                out.append(received)
+    return out
+
+
+def _cam(world: World, state: VehicleState, now_ns: int) -> CamTx:
+    hosted = world.hosted[state.vehicle]
+    rear, front = hosted.car.vector("body.footprint_x_m")
+    right, left = hosted.car.vector("body.footprint_y_m")
+    body = cam_of(
+        state,
+        length_m=front - rear,
+        width_m=left - right,
+        front_m=front,
+        low_frequency=hosted.slow_news.due(state, front),
+    )
+    return CamTx(station=state.vehicle, t_ns=now_ns, body=body)
+
+
+def _received(world: World, receiver: str, frame: Frame, now_ns: int) -> ReceivedFrame:
+    if isinstance(frame, CamTx):
+        car = world.car(frame.station)
+        return CamRx(
+            receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body,
+            signed=frame.signed, lost_ns=world.lost_ns(frame.station),
+            car="" if car is None else car.car_file,
+            by_hand=car is not None and not car.lease.is_at_home, stopped=world.stop.engaged,
+            touches=now_ns - world.impulses.touched_ns.get(frame.station, -TOUCHES_NS) < TOUCHES_NS,
+        )  # fmt: skip
+    kind = RECEIVED[type(frame)]
+    return kind(receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body)  # type: ignore[arg-type]
