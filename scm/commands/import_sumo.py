@@ -54,7 +54,7 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.net,
         scale=arguments.scale,
         floor_m=arguments.floor,
-        say=lambda words: print(f"{arguments.net}: {words}", flush=True),
+        report=lambda words: print(f"{arguments.net}: {words}", flush=True),
     )
     built, unsafe = adopted(made.city_map)
     city = _written(built, arguments.out)

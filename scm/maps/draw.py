@@ -136,8 +136,8 @@ def _road(city_map: CityMap) -> str:
 def _paint(city_map: CityMap, roads: Roads) -> str:
     """Return what is painted on the road: arrows, crosswalks, stop lines."""
     crossings = [(walk.x_m, walk.y_m, walk.length_m) for walk in city_map.crosswalks]
-    kept_clear = np.array(crossings, np.float64).reshape(-1, 3)
-    arrows = [arrow for lane in roads.lanes.values() for arrow in _arrows(lane, roads, kept_clear)]
+    clear_areas = np.array(crossings, np.float64).reshape(-1, 3)
+    arrows = [arrow for lane in roads.lanes.values() for arrow in _arrows(lane, roads, clear_areas)]
     stops = []
     for line in city_map.stop_lines:
         lane = roads.lanes[line.lane]
@@ -214,7 +214,7 @@ def _movements(roads: Roads) -> list[str]:
     return drawn
 
 
-def _arrows(lane: LanePath, roads: Roads, kept_clear: Floats) -> list[str]:
+def _arrows(lane: LanePath, roads: Roads, clear_areas: Floats) -> list[str]:
     """Return arrows along a lane, none on its crosswalks, stop lines or conflict stretches."""
     stretches = [(move.from_m - 0.12, move.to_m) for _, move in roads.movements_on(lane.name)]
     count = max(1, round(lane.length_m / ARROW_EVERY_M))
@@ -223,7 +223,7 @@ def _arrows(lane: LanePath, roads: Roads, kept_clear: Floats) -> list[str]:
         s = (k + 0.5) * lane.length_m / count
         pose = lane.at(s)
         in_conflict = any(low <= s <= high for low, high in stretches)
-        x, y, reach = kept_clear.T
+        x, y, reach = clear_areas.T
         on_stripes = bool((np.hypot(pose.x - x, pose.y - y) < reach + 0.06).any())
         if not in_conflict and not on_stripes:
             arrows.append(_arrow(pose))

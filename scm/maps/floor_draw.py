@@ -49,21 +49,21 @@ def wind_arrow(city_map: CityMap, x: float, y: float) -> str:
     shaft = element("path", d="M-0.05 0H0.03", stroke="#7f8792", stroke_width=0.012)
     head = element("path", d="M0.02 -0.026L0.065 0L0.02 0.026Z", fill="#7f8792")
     text = f"wind {speed:g} m/s" + (f", gusts {wind.gust_mps:g} m/s" if wind.gust_mps else "")
-    said = label(text, x - 0.09, y, 0.055, fill="#7f8792", text_anchor="end")
+    caption = label(text, x - 0.09, y, 0.055, fill="#7f8792", text_anchor="end")
     arrow = element("g", shaft, head, transform=placed(Pose2(x, y, yaw)))
-    return element("g", arrow, said, class_="wind")
+    return element("g", arrow, caption, class_="wind")
 
 
 def _patch(patch: Patch) -> str:
     data = outline(outline_of(patch), closed=True)
     fill, strength = _tint(patch.grip, patch.rolling)
-    said = [f"grip {patch.grip:g}"] if patch.grip != 1.0 else []
-    said += [f"rolling {patch.rolling:g}"] if patch.rolling else []
+    caption = [f"grip {patch.grip:g}"] if patch.grip != 1.0 else []
+    caption += [f"rolling {patch.rolling:g}"] if patch.rolling else []
     shape = element(
         "path", d=data, fill=fill, fill_opacity=strength, stroke=fill, stroke_opacity=0.8,
         stroke_width=0.006, stroke_dasharray="0.03 0.02",
     )  # fmt: skip
-    title = element("title", f"{patch.name}: {', '.join(said) or 'as usual'}")
+    title = element("title", f"{patch.name}: {', '.join(caption) or 'as usual'}")
     return element("g", title, shape, class_="patch", id=f"patch-{patch.name}")
 
 

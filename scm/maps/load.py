@@ -79,8 +79,8 @@ def map_of(text: str, path: Path) -> CityMap:
     city_map = _with_pictures(_read(text, path), path)
     problems = problems_of(city_map)
     if problems:
-        listed = "".join(f"\n  {problem}" for problem in problems)
-        raise MapError(f"{path}: {len(problems)} problem(s){listed}")
+        lines = "".join(f"\n  {problem}" for problem in problems)
+        raise MapError(f"{path}: {len(problems)} problem(s){lines}")
     return city_map
 
 

@@ -170,9 +170,9 @@ def walls_of(grid: OccupancyGrid, room: Room | None = None) -> tuple[Wall, ...]:
         return ()
     lasts = np.append(begins[1:], len(corners)) - 1
     is_closed = (corners[begins] == corners[lasts]).all(axis=1)
-    is_kept = _straightened(corners, begins, lasts, is_closed)
-    points = _places(grid, corners[is_kept])
-    bounds = np.append(0, np.cumsum(np.add.reduceat(is_kept, begins, dtype=np.int64))).tolist()
+    is_corner = _straightened(corners, begins, lasts, is_closed)
+    points = _places(grid, corners[is_corner])
+    bounds = np.append(0, np.cumsum(np.add.reduceat(is_corner, begins, dtype=np.int64))).tolist()
     return tuple(
         Wall(points=tuple(points[low : high - closed]), closed=closed, thickness_m=0.0)
         for low, high, closed in zip(bounds[:-1], bounds[1:], is_closed.tolist(), strict=True)
@@ -264,8 +264,8 @@ def _straightened(corners: Ints, begins: Ints, lasts: Ints, is_closed: Bools) ->
     All chains are divided at once (Douglas and Peucker), a closed one first at the corner that is
     furthest from its first.
     """
-    is_kept = np.zeros(len(corners), np.bool_)
-    is_kept[begins] = is_kept[lasts] = True
+    is_corner = np.zeros(len(corners), np.bool_)
+    is_corner[begins] = is_corner[lasts] = True
     is_long = lasts - begins > 1
     low, high, is_far = begins[is_long], lasts[is_long], is_closed[is_long]
     while low.size:
@@ -275,12 +275,12 @@ def _straightened(corners: Ints, begins: Ints, lasts: Ints, is_closed: Bools) ->
         is_furthest = np.flatnonzero(away == furthest[of])
         middle = index[is_furthest[np.searchsorted(of[is_furthest], np.arange(len(low)))]]
         divides = (furthest > STRAIGHTEN_CELLS) | is_far
-        is_kept[middle[divides]] = True
+        is_corner[middle[divides]] = True
         low, middle, high = low[divides], middle[divides], high[divides]
         low, high = np.append(low, middle), np.append(middle, high)
         low, high = low[high - low > 1], high[high - low > 1]
         is_far = np.zeros(len(low), np.bool_)
-    return is_kept
+    return is_corner
 
 
 def _between(low: Ints, high: Ints) -> tuple[Ints, Ints]:

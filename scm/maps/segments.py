@@ -62,13 +62,13 @@ def _edges(outline: Sequence[Point]) -> Iterator[tuple[float, float, float, floa
 
 def _without_repeats(points: Sequence[Point], *, closed: bool) -> tuple[Point, ...]:
     """Return the points without any that equals the one before it."""
-    kept = [points[0]]
+    distinct = [points[0]]
     for point in points[1:]:
-        if point != kept[-1]:
-            kept.append(point)
-    if closed and len(kept) > 1 and kept[-1] == kept[0]:
-        kept.pop()
-    return tuple(kept)
+        if point != distinct[-1]:
+            distinct.append(point)
+    if closed and len(distinct) > 1 and distinct[-1] == distinct[0]:
+        distinct.pop()
+    return tuple(distinct)
 
 
 def _beside(points: Sequence[Point], distance: float, *, closed: bool) -> list[Point]:

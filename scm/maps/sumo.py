@@ -71,7 +71,7 @@ def import_sumo(
     *,
     scale: float | None = None,
     floor_m: tuple[float, float] | None = None,
-    say: Callable[[str], None] = lambda _: None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> Imported:
     """Return the city that a SUMO network stands for.
 
@@ -79,7 +79,7 @@ def import_sumo(
         path: The network, `.net.xml`.
         scale: Full size over ours; None: 14, or what makes it fit the floor.
         floor_m: Width and depth of the floor that it must fit; None: as large as it needs.
-        say: Called with what is known before it is computed: sizes.
+        report: Called with what is known before it is computed: sizes.
 
     Raises:
         MapError: it cannot be read, does not fit the floor, is too narrow or too tight, or has
@@ -87,14 +87,14 @@ def import_sumo(
     """
     head = read_head(path)
     if head.size_m is not None:
-        say(_sizes(head.size_m, scale or (DEFAULT_SCALE if floor_m is None else None)))
+        report(_sizes(head.size_m, scale or (DEFAULT_SCALE if floor_m is None else None)))
     net = read_net(path)
-    say(f"{len(net.lanes)} lanes, {len(net.links)} ways over junctions")
+    report(f"{len(net.lanes)} lanes, {len(net.links)} ways over junctions")
     scale = _scale(path, net, scale, floor_m)
     lanes = {lane.name: _scaled(lane, scale) for lane in net.lanes}
     _check_widths(path, lanes.values(), scale)
     laid, builder, city_map = _clear_city(path, net, lanes, scale, floor_m)
-    error_m = max(distance_m(laid.kept(name), laid.curve(name)) for name in lanes)
+    error_m = max(distance_m(laid.remaining(name), laid.curve(name)) for name in lanes)
     if error_m > WORST_ERROR_M:
         raise MapError(
             f"{path}: bends are too tight at 1:{scale:g}: a lane that a Nigel can drive lies "
@@ -244,7 +244,7 @@ class _Laying:
         """How many lanes were cut back."""
         return sum(1 for ends in self._cuts.values() if any(ends))
 
-    def kept(self, name: str) -> list[Point]:
+    def remaining(self, name: str) -> list[Point]:
         """Return what is left of a lane's polyline."""
         points, (front, back) = self._lanes[name].points, self._cuts[name]
         return cut(points, front, length_of(points) - back)
@@ -253,7 +253,7 @@ class _Laying:
         """Return a lane as it is laid."""
         if name not in self._curves:
             radius_m = WIDE_RADIUS_M if name in self._wide else LEAST_RADIUS_M
-            self._curves[name] = fit(self.kept(name), radius_m, ERROR_M)
+            self._curves[name] = fit(self.remaining(name), radius_m, ERROR_M)
         return self._curves[name]
 
     def lay(self) -> None:

@@ -56,13 +56,13 @@ def length_of(points: Sequence[Point]) -> float:
 
 def cut(points: Sequence[Point], from_m: float, to_m: float) -> list[Point]:
     """Return the piece of a polyline between two distances from its start."""
-    kept, at = [_point_at(points, from_m)], 0.0
+    points_left, at = [_point_at(points, from_m)], 0.0
     for before, point in itertools.pairwise(points):
         at += math.dist(before, point)
         if from_m + DUST_M < at < to_m - DUST_M:
-            kept.append(point)
-    kept.append(_point_at(points, to_m))
-    return kept
+            points_left.append(point)
+    points_left.append(_point_at(points, to_m))
+    return points_left
 
 
 def _point_at(points: Sequence[Point], at_m: float) -> Point:
@@ -83,10 +83,10 @@ def fit(points: Sequence[Point], least_radius_m: float, error_m: float) -> Curve
     """
     tolerance_m = error_m / 2.0
     while True:
-        kept = simplified(points, tolerance_m)
-        radii = _radii(kept, least_radius_m, error_m)
-        if len(kept) == 2 or min(radii) >= least_radius_m:
-            return _rounded(kept, radii)
+        points_left = simplified(points, tolerance_m)
+        radii = _radii(points_left, least_radius_m, error_m)
+        if len(points_left) == 2 or min(radii) >= least_radius_m:
+            return _rounded(points_left, radii)
         tolerance_m *= 1.5
 
 
@@ -142,13 +142,13 @@ def _yaws(points: Sequence[Point]) -> list[float]:
 def _rounded(points: Sequence[Point], radii: Sequence[float]) -> Curve:
     legs = [math.dist(a, b) for a, b in itertools.pairwise(points)]
     turns = _turns(points)
-    taken = [
+    tangents_m = [
         radius * math.tan(abs(turn) / 2.0) if math.isfinite(radius) else 0.0
         for radius, turn in zip(radii, turns, strict=True)
     ]
     segments: list[Segment] = []
     for k, leg in enumerate(legs):
-        used = (taken[k - 1] if k else 0.0) + (taken[k] if k < len(taken) else 0.0)
+        used = (tangents_m[k - 1] if k else 0.0) + (tangents_m[k] if k < len(tangents_m) else 0.0)
         if leg - used > DUST_M:
             segments.append(Segment(length_m=leg - used))
         if k < len(turns) and math.isfinite(radii[k]):

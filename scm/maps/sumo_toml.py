@@ -11,24 +11,24 @@ from scm.records.city_map import CityMap
 
 def map_toml(city_map: CityMap) -> str:
     """Return the map file of a map; reading it gives the same map."""
-    return "\n".join(_table(_told(city_map), ())) + "\n"
+    return "\n".join(_table(_own_values(city_map), ())) + "\n"
 
 
-def _told(record: msgspec.Struct) -> dict[str, Any]:
+def _own_values(record: msgspec.Struct) -> dict[str, Any]:
     """Return what a record says beyond its defaults."""
-    told = {}
+    values = {}
     for field in msgspec.structs.fields(type(record)):
         value = getattr(record, field.name)
         if value is None or (not field.required and value == field.default):
             continue
-        told[field.name] = value
-    return told
+        values[field.name] = value
+    return values
 
 
-def _table(told: dict[str, Any], path: tuple[str, ...]) -> Iterator[str]:
+def _table(values: dict[str, Any], path: tuple[str, ...]) -> Iterator[str]:
     """Yield the lines of a table: its own values first, then what has a header of its own."""
-    headed = {key: value for key, value in told.items() if _has_header(value, path)}
-    for key, value in told.items():
+    headed = {key: value for key, value in values.items() if _has_header(value, path)}
+    for key, value in values.items():
         if key not in headed:
             yield f"{key} = {_inline(value)}"
     for key, value in headed.items():
@@ -36,7 +36,7 @@ def _table(told: dict[str, Any], path: tuple[str, ...]) -> Iterator[str]:
         for record in value if isinstance(value, tuple) else (value,):
             yield ""
             yield f"[[{name}]]" if isinstance(value, tuple) else f"[{name}]"
-            yield from _table(_told(record), (*path, key))
+            yield from _table(_own_values(record), (*path, key))
 
 
 def _has_header(value: Any, path: tuple[str, ...]) -> bool:
@@ -47,7 +47,7 @@ def _has_header(value: Any, path: tuple[str, ...]) -> bool:
 
 def _inline(value: Any) -> str:
     if isinstance(value, msgspec.Struct):
-        pairs = (f"{key} = {_inline(one)}" for key, one in _told(value).items())
+        pairs = (f"{key} = {_inline(one)}" for key, one in _own_values(value).items())
         return "{" + ", ".join(pairs) + "}"
     if isinstance(value, tuple):
         return "[" + ", ".join(_inline(one) for one in value) + "]"

@@ -35,10 +35,10 @@ def element(tag: str, /, *children: str, **attributes: str | float | None) -> st
 
 def layer(name: str, children: Iterable[str], **attributes: str | float) -> str:
     """Return a group of one kind of thing, one a line; empty if there is none of it."""
-    listed = list(children)
-    if not listed:
+    drawn = list(children)
+    if not drawn:
         return ""
-    return element("g", "\n", "\n".join(listed), "\n", class_=name, **attributes) + "\n"
+    return element("g", "\n", "\n".join(drawn), "\n", class_=name, **attributes) + "\n"
 
 
 def placed(pose: Pose2) -> str:
@@ -51,7 +51,7 @@ def label(
     text: str, x: float, y: float, height: float, *, yaw_rad: float = 0.0, **attributes: str | float
 ) -> str:
     """Return text about its middle; drawn large and shrunk, for browsers refuse tiny fonts."""
-    anchor = {"text_anchor": "middle", **attributes}
+    style = {"text_anchor": "middle", **attributes}
     turn = f" rotate({number(-math.degrees(yaw_rad))})" if yaw_rad else ""
     where = f"translate({number(x)} {number(-y)}){turn} scale(0.001)"
     return element(
@@ -61,7 +61,7 @@ def label(
         font_size=number(height * 1000.0),
         font_family="system-ui, 'Segoe UI', 'DejaVu Sans', sans-serif",
         dy="0.35em",
-        **anchor,
+        **style,
     )
 
 

@@ -403,7 +403,7 @@ def test_sizes_are_known_before_anything_is_computed(tmp_path):
     path, told = tmp_path / "t.net.xml", []
     path.write_text(tee())
     with pytest.raises(MapError, match="wide at 1:20"):
-        import_sumo(path, scale=20.0, say=told.append)
+        import_sumo(path, scale=20.0, report=told.append)
     assert told[0] == "120 x 120 m at full size; at 1:20 a floor of some 7 x 7 m"
     assert told[1] == "5 lanes, 3 ways over junctions"
 
