@@ -17,7 +17,8 @@ from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.records.city_map import CityMap
-from scm.traffic.signals.controller import Controller, Observations
+from scm.traffic.signals.controller import Controller
+from scm.traffic.signals.controller_state import Observations
 from scm.traffic.signals.detectors import JunctionDetectors, Seen, reach_of
 from scm.traffic.signals.part import timetables_of
 from scm.traffic.signals.program import STEP_NS, program_of

@@ -5,6 +5,7 @@ return what is to be sent.
 """
 
 from collections.abc import Iterable, Iterator
+import hashlib
 from functools import partial
 from typing import Literal
 
@@ -44,7 +45,6 @@ from scm.world.hosted import HostedCar
 from scm.world.pace import Every, Pace
 from scm.world.radio import Radio, Receivers, roadside_places
 from scm.world.remote import RemoteCar
-from scm.world.seeds import generator, number
 from scm.world.solids import outline
 from scm.world.state import Identities, RadioState, SensorState
 from scm.world.stuck import Stuck
@@ -67,6 +67,18 @@ RATES_HZ = {
 }
 
 AnyCar = HostedCar | RemoteCar
+
+
+def generator(seed: int, *names: str) -> np.random.Generator:
+    """Return the generator of one component of a run; equal seed and names, equal numbers."""
+    digest = hashlib.blake2s("/".join(names).encode()).digest()
+    return np.random.default_rng([seed, *digest])
+
+
+def number(seed: int, *names: str) -> int:
+    """Return 31 bits that belong to one component of a run."""
+    digest = hashlib.blake2s("/".join((str(seed), *names)).encode(), digest_size=4).digest()
+    return int.from_bytes(digest, "big") >> 1
 
 
 def city_event(

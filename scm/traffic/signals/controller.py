@@ -8,13 +8,19 @@ red; then it starts again through all red.
 """
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from scm.errors import PlanError, nearest
 from scm.records.signals import Colour, SignalGroup
 from scm.traffic.signals import kernel, operator_overrides
-from scm.traffic.signals.detectors import Detector
+from scm.traffic.signals.controller_state import (
+    NO_OBSERVATIONS,
+    Observations,
+    Outlook,
+    PolicyState,
+    ShownColour,
+    StepTimes,
+)
 from scm.traffic.signals.forecast import Coming, forecasts, schedule, within
 from scm.traffic.signals.green_wave import Wave
 from scm.traffic.signals.guaranteed_time import (
@@ -33,7 +39,6 @@ from scm.traffic.signals.policy import (
     FIXED,
     Answer,
     JunctionView,
-    PriorityCall,
     Status,
     load_policy,
     policy_names,
@@ -62,27 +67,6 @@ _NEXT: dict[Colour, Colour] = {
     "yellow": "red",
     "flashing_red": "red",
 }
-
-
-@dataclass(slots=True)
-class _Shown:
-    """What one group shows, since when, and what was promised of it."""
-
-    colour: Colour
-    since_ns: int
-    guaranteed: GuaranteedTime
-
-
-@dataclass(frozen=True, slots=True)
-class Observations:
-    """What detectors and vehicles tell a policy at one step; see `JunctionView`."""
-
-    detectors: Mapping[str, Detector]
-    sees: bool = False
-    priority: tuple[PriorityCall, ...] = ()
-
-
-NO_OBSERVATIONS = Observations({})
 
 
 class Controller:
@@ -132,26 +116,21 @@ class Controller:
         self._timetables = Timetables(tables, _checked_plan(junction, plan, tables))
         self._site = site_of(junction, program, learned, car)
         self._policies = {name: load_policy(name) for name in policy_names()}
-        self._default_policy = self._checked_policy(policy)
+        self._policy_state = PolicyState(self._checked_policy(policy))
         self.policy = FIXED
-        self._memory: Any = None
         self.overrides: tuple[Override, ...] = ()
         self.priority: Mapping[tuple[int, int], Status] = {}
-        self.failure = self._failed = ""
+        self.failure = ""
         self.mode = "start"
         self.changed = False
         self.late_steps = 0
         self._flash_reasons: set[str] = set()
         self._state = kernel.start(program)
-        self._shown: dict[str, _Shown] = {}
+        self._shown: dict[str, ShownColour] = {}
         self._requested: frozenset[str] = frozenset()
-        self._last_ns: int | None = None
-        self._shown_ns: int | None = None
-        self._is_late = False
+        self._times = StepTimes()
         self._seq = 0
-        self._foreseen_ns = 0
-        self._forecasts: Mapping[str, int | None] = {}
-        self._coming: tuple[Coming, ...] = ()
+        self._outlook = Outlook()
         self._restart_ns = max(times.clearance for times in program.times) + STEP_NS
 
     @property
@@ -196,30 +175,30 @@ class Controller:
         """
         plans = self._timetables.names
         if plan not in plans and plan in self._policies:
-            self._default_policy = plan
+            self._policy_state.default = plan
         else:
             self._timetables.request(_checked_plan(self.junction, plan, plans))
-            self._default_policy = FIXED
-        self.failure = self._failed = ""
+            self._policy_state.default = FIXED
+        self.failure = self._policy_state.failed = ""
 
     def end_flash(self) -> bool:
         """Return whether to flash was usual; a timetable is then, for flash has to end."""
-        was_default = self._policies[self._default_policy].is_flash
+        was_default = self._policies[self._policy_state.default].is_flash
         if was_default:
-            self._default_policy = FIXED
+            self._policy_state.default = FIXED
         return was_default
 
     def request_custom_plan(self, table: Timetable, wave: Wave | None = None) -> None:
         """Wish for a plan that somebody made; it comes once every promise reckons with it."""
         self._timetables.offer_custom_plan(table, wave)
-        self._default_policy = FIXED
-        self.failure = self._failed = ""
+        self._policy_state.default = FIXED
+        self.failure = self._policy_state.failed = ""
 
     def outlook(self, now_ns: int) -> tuple[Coming, ...]:
         """Return the greens to come, as the timetable says or the policy foresees."""
         if self.mode == FLASH:
             return ()
-        return self._timetables.outlook(now_ns) if self.policy == FIXED else self._coming
+        return self._timetables.outlook(now_ns) if self.policy == FIXED else self._outlook.coming
 
     def apply_override(self, request: SignalRequest, now_ns: int) -> None:
         """Take a wish of an operator or a script.
@@ -231,7 +210,7 @@ class Controller:
             self.overrides, request, self._program, self._policies, now_ns
         )
         if request.verb == "policy":
-            self.failure = self._failed = ""
+            self.failure = self._policy_state.failed = ""
 
     def flash(self, reason: str, *, on: bool) -> None:
         """Give or take back a reason to flash; it ends when the last reason is gone."""
@@ -255,7 +234,7 @@ class Controller:
             self._program, self._state, requested, dt_ns, flash=self.mode == FLASH
         )
         self._show(now_ns)
-        if self.changed or now_ns - self._foreseen_ns >= FORESEE_EVERY_NS:
+        if self.changed or now_ns - self._outlook.updated_ns >= FORESEE_EVERY_NS:
             self._foresee(now_ns, observations)
 
     def spat(self, now_ns: int) -> Spat:
@@ -284,24 +263,27 @@ class Controller:
     def _target_policy(self) -> str:
         """Return the policy that should run: wished, or usual; rings, where wishes need them."""
         target = next(
-            (one.policy for one in self.overrides if one.verb == "policy"), self._default_policy
+            (one.policy for one in self.overrides if one.verb == "policy"),
+            self._policy_state.default,
         )
-        policy = FIXED if target == self._failed else target
+        policy = FIXED if target == self._policy_state.failed else target
         needs_rings = any(one.verb in NEED_RINGS for one in self.overrides)
         needs_override_policy = (
-            needs_rings and self._policies[policy].is_timed and self._failed != POLICY_FOR_OVERRIDES
+            needs_rings
+            and self._policies[policy].is_timed
+            and self._policy_state.failed != POLICY_FOR_OVERRIDES
         )
         return POLICY_FOR_OVERRIDES if needs_override_policy else policy
 
     def _elapsed_ns(self, now_ns: int) -> int:
         """Return the time since the last step; what is far too much of it puts the cycle off."""
-        if self._last_ns is None:
-            self._last_ns = now_ns
+        if self._times.last_ns is None:
+            self._times.last_ns = now_ns
             self._restart_cycle(now_ns)
-        dt_ns = now_ns - self._last_ns
-        self._last_ns = now_ns
-        self._is_late = dt_ns > LATE_NS
-        if self._is_late:
+        dt_ns = now_ns - self._times.last_ns
+        self._times.last_ns = now_ns
+        self._times.is_late = dt_ns > LATE_NS
+        if self._times.is_late:
             self.late_steps += 1
             self._timetables.put_off(dt_ns - STEP_NS)
         return dt_ns
@@ -342,7 +324,7 @@ class Controller:
 
     def _begin_policy(self, name: str) -> None:
         self.policy = name
-        self._memory = self._policies[name].start(self._site)
+        self._policy_state.memory = self._policies[name].start(self._site)
 
     def _return_to_timetable(self, now_ns: int) -> None:
         """Clear the junction, then begin a cycle."""
@@ -357,7 +339,9 @@ class Controller:
     def _step_policy(self, now_ns: int, dt_ns: int, observations: Observations) -> frozenset[str]:
         view = self._view(now_ns, dt_ns, observations)
         try:
-            self._memory, answer = self._policies[self.policy].step(self._site, self._memory, view)
+            self._policy_state.memory, answer = self._policies[self.policy].step(
+                self._site, self._policy_state.memory, view
+            )
             self._check(answer)
         except Exception as cause:  # noqa: BLE001 a policy is a plug-in: whatever it does, cars go on
             self._fail(cause)
@@ -367,7 +351,7 @@ class Controller:
         return self._with_overrides(answer.groups)
 
     def _fail(self, cause: Exception) -> None:
-        self._failed = self.policy
+        self._policy_state.failed = self.policy
         self.failure = f"policy {self.policy}: {type(cause).__name__}: {cause}"
 
     def _view(self, now_ns: int, dt_ns: int, observations: Observations) -> JunctionView:
@@ -384,13 +368,13 @@ class Controller:
 
     def _foresee(self, now_ns: int, observations: Observations) -> None:
         """Ask timetable or policy when the present colours will likely end."""
-        self._foreseen_ns = now_ns
-        self._forecasts, self._coming = {}, ()
+        self._outlook.updated_ns = now_ns
+        self._outlook.ends, self._outlook.coming = {}, ()
         if self.mode == FLASH:
             return
         if self.policy == FIXED:
             if self._target_policy() == FIXED:
-                self._forecasts = {
+                self._outlook.ends = {
                     name: self._timetables.likely_end_ns(name, now_ns, red=shown.colour == "red")
                     for name, shown in self._shown.items()
                     if not shown.guaranteed.is_exact
@@ -398,9 +382,11 @@ class Controller:
             return
         view, guarantees = self._view(now_ns, 0, observations), self._guarantees()
         try:
-            turns = self._policies[self.policy].foresee(self._site, self._memory, view)
-            self._coming = tuple(schedule(self._program, self._state, guarantees, turns, now_ns))
-            self._forecasts = forecasts(self._program, self._state, self._coming)
+            turns = self._policies[self.policy].foresee(self._site, self._policy_state.memory, view)
+            self._outlook.coming = tuple(
+                schedule(self._program, self._state, guarantees, turns, now_ns)
+            )
+            self._outlook.ends = forecasts(self._program, self._state, self._outlook.coming)
         except Exception as cause:  # noqa: BLE001 as above; the next step gives it up
             self._fail(cause)
 
@@ -433,7 +419,7 @@ class Controller:
 
     def _just_changed(self) -> tuple[list[str], list[str]]:
         """Return whose green began, and whose ended, at the last step."""
-        new = {n: s.colour for n, s in self._shown.items() if s.since_ns == self._shown_ns}
+        new = {n: s.colour for n, s in self._shown.items() if s.since_ns == self._times.shown_ns}
         return [n for n in new if new[n] == "green"], [n for n in new if new[n] == "yellow"]
 
     def _guarantees(self) -> list[GuaranteedTime | None]:
@@ -442,7 +428,7 @@ class Controller:
 
     def _show(self, now_ns: int) -> None:
         self.changed = False
-        self._shown_ns = now_ns
+        self._times.shown_ns = now_ns
         before = self._guarantees()
         for index, name in enumerate(self._program.groups):
             colour = _COLOUR[self._state[index].phase]
@@ -450,16 +436,16 @@ class Controller:
             if shown is None or shown.colour != colour:
                 self.changed = True
                 guaranteed = self._guarantee_of(index, colour, now_ns, before)
-                self._shown[name] = _Shown(colour, now_ns, guaranteed)
+                self._shown[name] = ShownColour(colour, now_ns, guaranteed)
             elif colour == "red":
                 guaranteed = self._guarantee_of(index, colour, now_ns, before)
                 shown.guaranteed = (
-                    guaranteed if self._is_late else shown.guaranteed.narrowed(guaranteed)
+                    guaranteed if self._times.is_late else shown.guaranteed.narrowed(guaranteed)
                 )
             elif colour == "green" and not shown.guaranteed.is_exact:
                 shown.guaranteed = self._of_green(index, shown, now_ns)
 
-    def _of_green(self, index: int, shown: _Shown, now_ns: int) -> GuaranteedTime:
+    def _of_green(self, index: int, shown: ShownColour, now_ns: int) -> GuaranteedTime:
         """Return what can be promised by now of a green whose end was not known."""
         name, least_ns = self._program.groups[index], self._program.times[index].min_green
         if self.policy != FIXED or self._timetables.cycle.timetable is None:
@@ -467,7 +453,7 @@ class Controller:
                 shown.guaranteed, now_ns, least_ns, requested=name in self._requested
             )
         guaranteed = self._timetables.green_end(name, now_ns, shown.since_ns + least_ns)
-        return guaranteed if self._is_late else shown.guaranteed.narrowed(guaranteed)
+        return guaranteed if self._times.is_late else shown.guaranteed.narrowed(guaranteed)
 
     def _guarantee_of(
         self, index: int, colour: Colour, now_ns: int, before: list[GuaranteedTime | None]
@@ -489,10 +475,10 @@ class Controller:
             case _:
                 return GuaranteedTime(now_ns, None)
 
-    def _signal_group(self, name: str, shown: _Shown, now_ns: int) -> SignalGroup:
+    def _signal_group(self, name: str, shown: ShownColour, now_ns: int) -> SignalGroup:
         likely = None
         if self.mode != FLASH:
-            forecast_ns, is_red = self._forecasts.get(name), shown.colour == "red"
+            forecast_ns, is_red = self._outlook.ends.get(name), shown.colour == "red"
             planned = self.policy == FIXED
             likely = within(shown.guaranteed, forecast_ns, now_ns, red=is_red, planned=planned)
         return SignalGroup(

@@ -8,7 +8,8 @@ from msgspec.structs import replace
 from scm.clock import NS_PER_MS
 from scm.records.city_map import Junction
 from scm.store.records import PlanRecord
-from scm.traffic.signals.controller import Controller, Observations
+from scm.traffic.signals.controller import Controller
+from scm.traffic.signals.controller_state import Observations
 from scm.traffic.signals.custom_plans import (
     check_plan_name,
     records_of,

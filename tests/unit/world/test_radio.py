@@ -116,7 +116,7 @@ def test_delays_lie_between_the_least_and_the_most():
     assert delays_ms.min() >= 30.0
     assert delays_ms.max() <= 80.0
     assert delays_ms.mean() == pytest.approx(55.0, abs=2.0)
-    assert air.counts.in_flight == 2000
+    assert air.counts.late == 2000
 
 
 def test_late_frames_come_in_the_order_of_their_time_and_never_before():

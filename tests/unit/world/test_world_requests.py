@@ -108,11 +108,11 @@ def test_a_car_whose_tag_another_wears_gets_a_free_one_and_a_warning(city):
 
 def test_numbers_are_given_once_however_they_come_back():
     numbers = Numbers(1, never={0, 3})
-    assert [numbers.take(), numbers.take()] == [1, 2]
-    numbers.give_back(1)
+    assert [numbers.acquire(), numbers.acquire()] == [1, 2]
+    numbers.release(1)
     assert (numbers.claim(1), numbers.is_free(1)) == (1, False)
-    numbers.give_back(1)
-    assert [numbers.take(), numbers.take(), numbers.take()] == [1, 4, 5]
+    numbers.release(1)
+    assert [numbers.acquire(), numbers.acquire(), numbers.take()] == [1, 4, 5]
 
 
 def test_the_agent_that_asks_again_after_its_death_gets_its_tag_again(city):

@@ -31,7 +31,7 @@ class Reborn:
 
     def start(self):
         hosted = tuple((name, "nigel") for name in self.hosted)
-        self.part = WorldPart(MAP, hosted=hosted, kept=read_restored(self.store))
+        self.part = WorldPart(MAP, hosted=hosted, restored=read_restored(self.store))
         self.city.add(self.part, self.store)
         self.city.run_for(0.1)
 
@@ -116,7 +116,7 @@ def test_the_epoch_grows_across_a_kill_though_the_clock_was_set_back():
     stolen = reborn.lease("steal", vehicle="r1", owner="ann", reason="test")
     assert stolen.epoch > joined.epoch
     city = Lockstep([])  # a clock that begins at 0 again
-    part = WorldPart(MAP, kept=read_restored(reborn.store))
+    part = WorldPart(MAP, restored=read_restored(reborn.store))
     city.add(part, reborn.store)
     city.run_for(0.1)
     again = city.call(JoinRequest(vehicle="r1", session="s2"))

@@ -7,7 +7,8 @@ import pytest
 
 from scm.clock import NS_PER_S
 from scm.traffic.signals import rings
-from scm.traffic.signals.controller import Controller, Observations
+from scm.traffic.signals.controller import Controller
+from scm.traffic.signals.controller_state import Observations
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.forecast import FREED, forecasts, schedule, within
 from scm.traffic.signals.guaranteed_time import GuaranteedTime
@@ -248,7 +249,7 @@ def test_what_is_foreseen_of_a_queue_is_its_turn_and_those_who_wait_behind_it():
     list(driven(controller, 60, lambda *_: Observations(heard, sees=True)))
     turns = actuated.foresee(
         site_of("x", CROSSING),
-        controller._memory,
+        controller._policy_state.memory,
         controller._view(60 * S, 0, Observations(heard, True)),
     )
     assert [turn.groups for turn in turns] == [{"a"}, {"b"}]

@@ -6,7 +6,8 @@ import pytest
 
 from scm.clock import NS_PER_S
 from scm.errors import PlanError
-from scm.traffic.signals.controller import Controller, Observations
+from scm.traffic.signals.controller import Controller
+from scm.traffic.signals.controller_state import Observations
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.kernel import GroupState, GroupTimes, Phase, Program
 from scm.traffic.signals.policies import actuated
