@@ -62,7 +62,7 @@ class Cameras(BasePart):
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Tell a track of every hosted car."""
         del inbox
-        vehicles = self._world.slots
+        vehicles = self._world.vehicles
         of = np.flatnonzero(vehicles.hosted)
         noise = self._dice.normal(size=(4, len(of)))
         rows = zip(
@@ -79,7 +79,7 @@ class Cameras(BasePart):
         self, now_ns: int, vehicle: int, x: float, y: float, yaw: float, speed: float
     ) -> EyeTrack:
         return EyeTrack(
-            vehicle=self._world.slots.names[vehicle], tag_id=1, t_ns=now_ns, x_m=x, y_m=y,
+            vehicle=self._world.vehicles.names[vehicle], tag_id=1, t_ns=now_ns, x_m=x, y_m=y,
             yaw_rad=yaw, speed_mps=speed, lateral_speed_mps=0.0, yaw_rate_radps=0.0, age_s=0.0,
             stale=False, covariance=self._covariance,  # type: ignore[arg-type]
         )  # fmt: skip

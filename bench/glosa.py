@@ -87,10 +87,13 @@ def drive(city_map: CityMap, cars: int, span_s: float, policy: str, seed: int) -
     fill(world, cars)
     with Lockstep([part, TrafficPart(city_map, policy=policy), MonitorPart(city_map)]) as city:
         city.run_for(WARM_UP_S)
-        watch, passed = Watch(world.slots.hosted.copy(), world.slots.speed), drivers.passed.sum()
+        watch, passed = (
+            Watch(world.vehicles.hosted.copy(), world.vehicles.speed),
+            drivers.passed.sum(),
+        )
         for _ in range(round(span_s / LOOK_S)):
             city.run_for(LOOK_S)
-            watch.look(world.timed_stages.speed)
+            watch.look(world.vehicles.speed)
     watch.tally.contacts = len(touched.began)
     watch.tally.lines = float(drivers.passed.sum() - passed) / 2.0 / span_s
     return watch.tally

@@ -105,9 +105,9 @@ class Flow:
     def _signals(self) -> None:
         for name, controller in self.controllers.items():
             watcher = self.watchers[name]
-            observation = Heard({})
+            observation = Observations({})
             if controller.needs_detectors:
-                observation = Heard(watcher.by_group(watcher.read(self.now_ns)), sees=True)
+                observation = Observations(watcher.by_group(watcher.read(self.now_ns)), sees=True)
             controller.step(self.now_ns, observation)
             for group in controller.spat(self.now_ns).groups:
                 self.colours[name, group.group] = group.colour

@@ -13,8 +13,8 @@ import msgspec
 
 from scm.clock import NS_PER_MS
 from scm.records.signals import Colour, SignalGroup
-from scm.v2x.messages.spat import Spat
 from scm.traffic.monitor.conflict_table import ConflictTable
+from scm.v2x.messages.spat import Spat
 
 OutputFault = Callable[[Spat], Spat | None]
 

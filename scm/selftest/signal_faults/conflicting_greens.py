@@ -8,8 +8,8 @@ from scm.selftest.signal_fault import (
     long_green,
     recolour,
 )
-from scm.v2x.messages.spat import Spat
 from scm.traffic.monitor.conflict_table import ConflictTable
+from scm.v2x.messages.spat import Spat
 
 
 def _output_fault(table: ConflictTable) -> OutputFault:

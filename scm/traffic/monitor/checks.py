@@ -23,8 +23,8 @@ from dataclasses import dataclass
 
 from scm.clock import NS_PER_MS
 from scm.records.signals import Colour
-from scm.v2x.messages.spat import Spat
 from scm.traffic.monitor.conflict_table import ConflictTable
+from scm.v2x.messages.spat import Spat
 
 STALE_NS = 500 * NS_PER_MS
 GRACE_NS = 5_000 * NS_PER_MS

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from scm.records.signals import Colour
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.forecast import Coming
 from scm.traffic.signals.guaranteed_time import GuaranteedTime
 from scm.traffic.signals.policy import PriorityCall
-from scm.v2x.messages.spat import Colour
 
 
 @dataclass(slots=True)

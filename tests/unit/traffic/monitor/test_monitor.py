@@ -6,8 +6,8 @@ import pytest
 from scm.clock import NS_PER_MS
 from scm.records.signals import SignalGroup
 from scm.traffic.monitor.checks import Monitor
-from scm.v2x.messages.spat import Spat
 from scm.traffic.monitor.conflict_table import ConflictTable, GroupLimits
+from scm.v2x.messages.spat import Spat
 
 MS = NS_PER_MS
 TIMES = {"green_ns": 1000 * MS, "yellow_ns": 560 * MS, "clearance_ns": 2000 * MS}
