@@ -42,7 +42,7 @@ class ContactReports:
 
 
 class ImpulseAccelerations:
-    """Adds up the tick's contacts in `contact_accel_x`, `contact_accel_y` and `contact_yaw_accel` of the fleets."""
+    """Adds up the tick's contacts in the fleets' `contact_accel_x` and its siblings."""
 
     def __init__(self) -> None:
         self._struck: list[tuple[Fleet, Ints]] = []
@@ -51,7 +51,9 @@ class ImpulseAccelerations:
     def begin(self, duration: float) -> None:
         """Forget the last tick's; the new tick lasts `duration` [s]."""
         for fleet, rows in self._struck:
-            fleet.contact_accel_x[rows] = fleet.contact_accel_y[rows] = fleet.contact_yaw_accel[rows] = 0.0
+            fleet.contact_accel_x[rows] = fleet.contact_accel_y[rows] = fleet.contact_yaw_accel[
+                rows
+            ] = 0.0
         self._struck.clear()
         self._share = 1.0 / duration if duration > 0.0 else 0.0
 

@@ -4,8 +4,8 @@
 return what is to be sent.
 """
 
-from collections.abc import Iterable, Iterator
 import hashlib
+from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Literal
 
