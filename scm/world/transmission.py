@@ -14,21 +14,14 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.etsi.convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, cam_of, read_cam
 from scm.v2x.exchange import Outgoing
-from scm.v2x.messages.cam import CamRx
-from scm.v2x.messages.cam import CamTx
-from scm.v2x.messages.cpm import CpmRx
-from scm.v2x.messages.cpm import CpmTx
-from scm.v2x.messages.denm import DenmRx
-from scm.v2x.messages.denm import DenmTx
-from scm.v2x.messages.mapem import MapemRx
-from scm.v2x.messages.mapem import MapemTx
+from scm.v2x.messages.cam import CamRx, CamTx
+from scm.v2x.messages.cpm import CpmRx, CpmTx
+from scm.v2x.messages.denm import DenmRx, DenmTx
+from scm.v2x.messages.mapem import MapemRx, MapemTx
 from scm.v2x.messages.radio_status import RadioStatus
-from scm.v2x.messages.spatem import SpatemRx
-from scm.v2x.messages.spatem import SpatemTx
-from scm.v2x.messages.srem import SremRx
-from scm.v2x.messages.srem import SremTx
-from scm.v2x.messages.ssem import SsemRx
-from scm.v2x.messages.ssem import SsemTx
+from scm.v2x.messages.spatem import SpatemRx, SpatemTx
+from scm.v2x.messages.srem import SremRx, SremTx
+from scm.v2x.messages.ssem import SsemRx, SsemTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.publish import states_of
 from scm.world.radio import Receivers
