@@ -11,7 +11,7 @@ import signal
 import sys
 import time
 
-from bench.watched_watchdog import say
+from bench.watched_watchdog import report
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.parent_watch import PR_SET_PDEATHSIG
@@ -30,7 +30,7 @@ _write_beside = FallbackPort.write_beside
 
 def _failing_look(self, now_ns):
     if _signals:
-        say("deed")
+        report("deed")
         if _signals.pop() == signal.SIGUSR1:
             raise ZeroDivisionError("asked for by the bench")
         time.sleep(STALL_S)
@@ -39,12 +39,12 @@ def _failing_look(self, now_ns):
 
 def _reporting_disconnect(self):
     if self._socket is not None:
-        say("watchdog gone")
+        report("watchdog gone")
     _disconnect(self)
 
 
 def _reporting_write(self, frames):
-    say("watchdog gone")
+    report("watchdog gone")
     _write_beside(self, frames)
 
 
@@ -65,7 +65,7 @@ def serve() -> None:
     warm_up()
     kernel = ctypes.CDLL(None)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for them
-    say("ready")
+    report("ready")
     for line in sys.stdin:
         pid = os.fork()
         if not pid:

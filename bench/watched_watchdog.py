@@ -10,8 +10,8 @@ from vehicle_agent.nigel.cable import Cable
 from vehicle_agent.nigel.host import Host, NigelCommand
 
 
-def say(what: str) -> None:
-    """Tell the bench, which reads our output, on the clock that all processes share."""
+def report(what: str) -> None:
+    """Print an event for the benchmark, on the clock that all processes share."""
     print(f"{what} {time.monotonic_ns()}", flush=True)
 
 
@@ -21,13 +21,13 @@ class WatchedHost(Host):
     _watched_moves = False
     owes = False
 
-    def frames_due(self, wish: NigelCommand, now_ns: int) -> list[bytes]:
-        self.note(wish.throttle)
-        return super().frames_due(wish, now_ns)
+    def frames_due(self, command: NigelCommand, now_ns: int) -> list[bytes]:
+        self.note(command.throttle)
+        return super().frames_due(command, now_ns)
 
     def note(self, throttle: float) -> None:
         if self._watched_moves and throttle == 0.0:
-            say("notice")
+            report("notice")
             WatchedHost.owes = True
         self._watched_moves = throttle != 0.0
 
@@ -47,7 +47,7 @@ class WatchedCable(Cable):
         super().write(frames)
         if frames and WatchedHost.owes:
             WatchedHost.owes = False
-            say("written")
+            report("written")
 
 
 if __name__ == "__main__":

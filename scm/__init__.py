@@ -19,4 +19,4 @@ fleet       scripts that spawn, route and time cars, live or in lockstep
 commands    the command line, one file a command
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -131,9 +131,9 @@ def _sent(operation: Schema, schemas: Schema) -> Iterator[str]:
 
 def _success(operation: Schema) -> tuple[str, Schema]:
     """Return the media type and the schema of an operation's answer."""
-    for status, told in sorted(operation["responses"].items()):
+    for status, answer in sorted(operation["responses"].items()):
         if status.startswith("2"):
-            for media, content in told.get("content", {}).items():
+            for media, content in answer.get("content", {}).items():
                 return media, content.get("schema", {})
     return "", {}
 
