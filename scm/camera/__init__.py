@@ -1,7 +1,7 @@
-"""The cars' own cameras: what a front or rear camera sees of the city, rendered on demand.
+"""The cars' own cameras: front and rear, rendered only for subscribers.
 
-optics, lens        what a car file says of a camera; the pinhole, its view and its distortion
-floor, standing, car_mesh   what is to be seen: the map's flat picture, walls and heads, other cars
-mesh, painter       flat faces in painter's order, cut before the lens, shaded by daylight
-sensor, studio, part        noise; one whole picture; the part that makes them while somebody asks
+optics, lens        the camera's parameters in a car file; pinhole projection and distortion
+floor, standing, car_mesh   the scene: the map's floor, walls and signal heads, other cars
+mesh, painter       flat faces in painter's order, clipped at the near plane, shaded by daylight
+sensor, studio, part        noise; rendering of one picture; the part that publishes pictures
 """

@@ -1,4 +1,4 @@
-"""A car as other cars see it: wheels, shell, cabin, and lamps that are on or off."""
+"""The mesh of a car seen by other cars: wheels, shell, cabin, and lamps that are on or off."""
 
 import math
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""The light in which cameras see the city: a sun, and what comes from everywhere."""
+"""The light of the city: a sun and ambient light."""
 
 import math
 from dataclasses import dataclass

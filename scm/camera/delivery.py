@@ -1,8 +1,7 @@
-"""From a camera's exposure to its picture: a share of the frames is lost, the others come late.
+"""Delivery of pictures after exposure: some frames are lost, the others arrive late.
 
-Whether a frame is lost is counted, not drawn (`scm/vehicles/noise.py`): a function of seed, car,
-camera and the frame's number on the camera's grid. So no frame's fate depends on another camera, or
-on whether anybody looked before.
+Whether a frame is lost is a function of seed, car, camera and frame number
+(`scm/vehicles/noise.py`), so it depends neither on other cameras nor on earlier subscribers.
 """
 
 import numpy as np

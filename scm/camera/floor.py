@@ -1,8 +1,8 @@
-"""The floor through a car's lens: the map's flat picture laid out by one homography a strip.
+"""Renders the floor: the map's flat picture warped by one homography per strip.
 
-Far away one pixel covers many texels in depth and few across. So the frame is cut into strips of
-rows by distance; each takes the picture at a fitting size (a pyramid), far ones are painted
-finer in depth than the frame and averaged.
+Far away one pixel covers many texels in depth and few across. So the frame is divided into strips
+of rows by distance. Each uses a suitable level of an image pyramid; far strips are rendered with
+more rows than the frame has, then averaged.
 """
 
 import math

@@ -1,11 +1,11 @@
-"""The lens of a car's camera: a pinhole whose picture is bent afterwards, as Brown and Conrady say.
+"""The lens of a car's camera: a pinhole with Brown-Conrady distortion.
 
     p_camera = camera_R_body (body_R_map (p_map - car) - mount)      a, b = p_x / p_z, p_y / p_z
     pixel = K distort(a, b)        distort: radial k1 k2 k3, tangential p1 p2 (OpenCV's five)
 
-Everything is painted on a canvas without distortion, a little larger than the frame; `bend` then
-looks up where each pixel of the frame is on it. Camera axes: x to the picture's right, y to its
-bottom, z out of the lens. The centre of the first pixel is (0, 0).
+The scene is rendered on an undistorted canvas slightly larger than the frame; `bend` then looks up
+each pixel of the frame there. Camera axes: x to the picture's right, y to its bottom, z out of the
+lens. The centre of the first pixel is (0, 0).
 """
 
 import math

@@ -1,9 +1,9 @@
-"""Things with flat faces: where they are, which way they look, what colour they are.
+"""Objects made of flat faces, with position, normal and colour.
 
-A `Part` is convex, so its faces that look at the camera never hide one another. Parts of one thing
-are ordered by planes that separate them (`Chain`): whoever stands beyond a plane sees what is on
-this side of it later, so it is painted first. No distance between faces is ever compared inside a
-thing; between things the farther one is painted first.
+A `Part` is convex, so its faces that look at the camera never hide one another. Parts of one object
+are ordered by separating planes (`Chain`): the parts on the far side of a plane, seen from the
+camera, are painted first. Distances are compared only between objects: the farther one is painted
+first.
 """
 
 import math

@@ -1,9 +1,9 @@
-"""What a car file says of its cameras, and what it leaves out.
+"""The camera parameters of a car file and their defaults.
 
-Optional keys of `[camera]`, with what holds when they are missing: `distortion` k1 k2 p1 p2 k3
-(none), `exposure` and `gain` (1), `read_noise` and `shot_noise` in grey levels (1 and 3, see
-`scm.camera.sensor`), `rate_hz` (15), `latency_s` and `drop_out` (0), `jpeg_quality` (80), and
-`fov_axis`, along which side of the picture the field of view is measured (horizontal).
+Optional keys of `[camera]` and their defaults: `distortion` k1 k2 p1 p2 k3 (none), `exposure` and
+`gain` (1), `read_noise` and `shot_noise` in grey levels (1 and 3, see `scm.camera.sensor`),
+`rate_hz` (15), `latency_s` and `drop_out` (0), `jpeg_quality` (80), and `fov_axis`, the side of the
+picture that the field of view spans (horizontal).
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Painting faces onto a canvas, the farther thing first; what is behind the lens is cut off."""
+"""Paints faces onto a canvas, farthest object first, clipped at the near plane."""
 
 from typing import NamedTuple
 

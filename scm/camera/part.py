@@ -1,9 +1,9 @@
-"""The cameras of all cars as one part: frames are made only while somebody subscribes to them.
+"""The part that renders the cameras of all cars, only for subscribers.
 
-While nobody does, the part hears nothing: no snapshot is even read. A frame's time lies on the
-camera's own grid; it is pictured when the world's snapshots have passed that time, from the two
-around it. So a frame is up to one snapshot late (50 ms), as a real camera's is, and smooth; a car
-file's `latency_s` counts from the frame's time, so it is hidden in those 50 ms or adds to them.
+Without subscribers it receives nothing, not even snapshots. The time of a frame is a multiple of
+the camera's period. It is rendered once the world's snapshots have passed that time, interpolated
+between the two around it. So a frame is up to one snapshot (50 ms) late; a car file's `latency_s`
+counts from the frame's time and includes these 50 ms.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,10 +1,10 @@
-"""The sensor behind a lens: shot noise that grows with the light, read noise that does not.
+"""The image sensor: shot noise that grows with the light, and constant read noise.
 
     sigma(s) = sqrt(gain) sqrt(gain read^2 + shot^2 s / 255)      s: grey level, 0 to 255
 
-With the light doubled and the gain halved a picture looks the same and has less noise. The noise
-is cut at a random place from a sheet that is drawn once: fresh noise would cost more than all else.
-Which place is a function of seed, car, camera and time alone.
+With twice the light and half the gain a picture looks the same with less noise. The noise is cut
+from a random place of a sheet that is drawn once, since fresh noise would cost more than all the
+rest. The place is a function of seed, car, camera and time alone.
 """
 
 import hashlib

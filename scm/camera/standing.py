@@ -1,4 +1,4 @@
-"""What stands in a city and how it looks from the floor: walls, boxes, signal heads, signs."""
+"""The standing objects of a city: walls, boxes, signal heads, signs."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""One picture of the city through one camera: sky, floor, shadows, things, lens, sensor."""
+"""Renders one picture of one camera: sky, floor, shadows, objects, lens, sensor."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, TypeVar

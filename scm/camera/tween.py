@@ -1,4 +1,4 @@
-"""Where the cars were between two snapshots."""
+"""Interpolates the cars' poses between two snapshots."""
 
 import math
 

@@ -1,7 +1,6 @@
-"""Recordings of cars, anybody's: a `recording.yaml` says what stands where, in which unit.
+"""Recordings of cars from any source, described by a `recording.yaml`.
 
-`description.py` is that file as data, `expression.py` its formulas, `units.py` its units,
-`table.py` reads the files it names (`parquet.py`, `matlab.py` and `bag.py` those that need a
-library of their own) as `columns.py`, `read.py` makes a `Recording` of channels in SI. May import
-errors.
+`description.py` is that file as data, `expression.py` its formulas, `units.py` its units;
+`table.py` reads its files as `columns.py` (`parquet.py`, `matlab.py`, `bag.py` with libraries), and
+`read.py` makes a `Recording` of channels in SI. May import errors.
 """

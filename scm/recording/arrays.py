@@ -1,8 +1,8 @@
-"""Arrays as columns: NPZ and NPY files, and what MATLAB's files hold.
+"""Arrays as columns: NPZ and NPY files, and the contents of MATLAB files.
 
-A vector is a column. Of a matrix `m` the columns are `m[0]`, `m[1]`; of one that is wider than
-high, such as Simulink writes to a file, its rows are. Of a structured array `log` the field `x` is
-`log.x`. The one array of an NPY file has no name: `[0]`, `x`.
+A vector is a column. The columns of a matrix `m` are `m[0]`, `m[1]`; if it is wider than high, as
+written by Simulink, its rows are. The field `x` of a structured array `log` is `log.x`. The array
+of an NPY file has no name: `[0]`, `x`.
 """
 
 import zipfile

@@ -1,8 +1,8 @@
-"""The files of AutoDRIVE's data recorder: their columns, their stamps and how they write numbers.
+"""The files of AutoDRIVE's data recorder: columns, stamps and number format.
 
-One `V1 Log.csv` a car and one `TL1 Log.csv` a light, without a header: a row is known by how many
-cells it has. Poses are those of the rear axle's centre, at the height of the axle, in the frame of
-the map tag; x forward, y left, z up; angles in [0, 2 pi), steering + = left, in radian.
+One `V1 Log.csv` per car and one `TL1 Log.csv` per light, without a header; the number of cells
+tells the type of a row. Poses are those of the rear axle's centre, at the height of the axle, in
+the frame of the map tag; x forward, y left, z up; angles in [0, 2 pi), steering + = left, in rad.
 
 Source: `Assets/Scripts/DataRecorder.cs`, `IMU.cs` of Tinker-Twins/AutoDRIVE, and the Nigel data
 set of the same authors.

@@ -1,7 +1,7 @@
-"""A folder of AutoDRIVE's logs as a recording of ours: tables as CSV, and their description.
+"""Converts a folder of AutoDRIVE's logs to a recording: tables as CSV, and their description.
 
-Cells are copied as they stand. Only where the logs have Unity's axes are they converted:
-x = z, y = -x, z = y, and angles about them to match.
+Cells are copied unchanged. Only logs with Unity's axes are converted: x = z, y = -x, z = y, and
+angles accordingly.
 """
 
 import csv

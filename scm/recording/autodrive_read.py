@@ -1,4 +1,4 @@
-"""AutoDRIVE's logs as columns of cells; a row that is no row of theirs is set aside, not lost."""
+"""Reads AutoDRIVE's logs as columns of cells; invalid rows are kept separately, not lost."""
 
 import csv
 import math

@@ -1,4 +1,4 @@
-"""What is to be known of AutoDRIVE's logs before one believes them: clocks, signs, wheels."""
+"""Checks AutoDRIVE's logs and reports problems with clocks, signs and wheels."""
 
 import numpy as np
 

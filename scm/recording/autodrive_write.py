@@ -1,7 +1,7 @@
-"""What cars and lights did, as the files that AutoDRIVE's data recorder would have written.
+"""Writes cars and lights in the format of AutoDRIVE's data recorder.
 
-One row a stamp, for all cars the same stamps. Where the poses have a gap there are no rows; a cell
-that nobody knows is empty.
+One row per stamp, with the same stamps for all cars. There are no rows in gaps of the poses; cells
+of unknown values are empty.
 """
 
 import math

@@ -1,7 +1,7 @@
 """ROS bags as columns: one topic's messages are the rows, their fields the columns.
 
-`pose.position.x` is a field, `axes[1]` an element of an array. Every time in a message counts as
-seconds; `received_s` is when a message was recorded, `stamp_s` the time in its header.
+`pose.position.x` is a field, `axes[1]` an element of an array. All times in a message are in
+seconds; `received_s` is the time of recording, `stamp_s` the time in the message's header.
 """
 
 import re

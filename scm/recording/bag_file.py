@@ -1,7 +1,7 @@
-"""The raw messages of ROS bags, as far as they are whole: ROS 1, and ROS 2's SQLite and MCAP files.
+"""The raw messages of ROS bags, as far as intact: ROS 1, and ROS 2's SQLite and MCAP files.
 
-A bag that was cut off, or is still being written, is read from its begin to where it stops making
-sense. The folder of a ROS 2 bag needs no `metadata.yaml`.
+A bag that is truncated or still being written is read up to the first invalid record. The folder
+of a ROS 2 bag needs no `metadata.yaml`.
 """
 
 import bz2

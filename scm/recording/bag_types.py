@@ -1,4 +1,4 @@
-"""Types of ROS messages: from the bag, from `.msg` files, or those that are known here."""
+"""Types of ROS messages: from the bag, from `.msg` files, or built in."""
 
 from collections.abc import Callable, Iterator
 from functools import lru_cache

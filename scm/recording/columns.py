@@ -1,4 +1,4 @@
-"""The columns of one file, as numbers or words, whatever the file's format."""
+"""The columns of one file as numbers or text, for every file format."""
 
 import re
 from collections import Counter

@@ -1,4 +1,4 @@
-"""The file `recording.yaml` as data, checked while it is read."""
+"""The file `recording.yaml` as data, validated when read."""
 
 import math
 from collections import Counter

@@ -2,10 +2,10 @@
 
 The functions are `abs`, `sqrt`, `sin`, `cos`, `tan`, `atan`, `atan2(y, x)`, `min(a, b)` and
 `max(a, b)`; angles are in rad. `row` counts the rows of the file from 0.
-A text column may be compared with a word: "source == 'pose'". A column name that is not a plain
-word stands in backquotes: "`elapsed time` > 0 and gas > 0.1"; fields of messages need none:
+A text column can be compared with a word: "source == 'pose'". A column name that is not a plain
+word is written in backquotes: "`elapsed time` > 0 and gas > 0.1"; fields of messages need none:
 "2 * pose.position.x + axes[1]".
-Where arithmetic has no answer (1 / 0) the value is not finite, and its row is left out.
+Undefined results (1 / 0) are not finite, and such rows are left out.
 """
 
 import ast

@@ -1,7 +1,7 @@
 """MATLAB's .mat files up to version 7.2 as columns; see `arrays.py` for their names.
 
-Of an array of structs `log` the field of the first is `log[0].x`, and `log.x` where each holds one
-number. The format is read here: scipy's reader ends the process over a damaged file.
+In an array of structs `log` the field of the first is `log[0].x`, and `log.x` is a column if each
+holds one number. The format is read here because scipy's reader crashes on damaged files.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The measured motion of a car: its rear axle's pose and velocities at any time, from its poses."""
+"""The measured motion of a car: pose and velocities of its rear axle at any time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

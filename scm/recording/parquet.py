@@ -1,4 +1,4 @@
-"""Parquet and Feather files as columns: numbers, times in seconds, words.
+"""Parquet and Feather files as columns: numbers, times in seconds, text.
 
 A field of a struct is `pose.x`, an element of a list `points[0]`.
 """

@@ -1,4 +1,4 @@
-"""A recording as channels in SI, each with its own times."""
+"""Reads a recording as channels in SI, each with its own times."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

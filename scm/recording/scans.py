@@ -1,4 +1,4 @@
-"""The scans of a LIDAR in a ROS bag (`sensor_msgs/LaserScan`), as arrays."""
+"""Reads LIDAR scans of a ROS bag (`sensor_msgs/LaserScan`) as arrays."""
 
 import importlib
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Names under `channels` that stand for the fields of a ROS message.
+"""Names under `channels` that expand to the fields of a ROS message.
 
 `odometry` stands for five channels of `nav_msgs/Odometry`, `scan` for `sensor_msgs/LaserScan`.
 """

@@ -1,4 +1,4 @@
-"""A part of a recording: what was recorded between two moments."""
+"""Cuts a recording to the span between two times."""
 
 import math
 from dataclasses import replace

@@ -1,6 +1,6 @@
-"""The door to all files of rows: which reader a file needs, and why it may not be read.
+"""Reads a table in any supported format: chooses the reader and reports unreadable files.
 
-Whatever a library makes of a damaged file leaves here as one line that names the file.
+Every error of a library on a damaged file becomes one line that names the file.
 """
 
 import importlib

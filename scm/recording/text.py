@@ -1,7 +1,7 @@
-"""Text tables as columns: CSV, TSV, tables parted by blanks, trajectories of the TUM format.
+"""Text tables as columns: CSV, TSV, tables separated by blanks, trajectories in TUM format.
 
-What parts the cells, which line names the columns and how many cells a row has is found from the
-lines themselves. A line that is no row is left out, and recorded.
+Separator, header line and number of cells are detected from the lines. Invalid lines are left out
+and recorded.
 """
 
 import codecs

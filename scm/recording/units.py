@@ -1,4 +1,4 @@
-"""Units a recording may be written in, and their factors to SI."""
+"""The units of recordings and their factors to SI."""
 
 import math
 

@@ -1,7 +1,7 @@
-"""A recording driven again by the simulator.
+"""Simulates a recorded drive again.
 
-`free_run` starts windows in the measured motion and gives them the recorded commands. `drive` holds
-a recording on the simulation's grid, `commands` what the car was commanded, `smooth` its smoothed
-poses, `camera` what was seen of it, `windows` drives many windows side by side. May import
+`free_run` starts windows in the measured motion and applies the recorded commands. `drive` holds a
+recording on the simulation's time grid, `commands` the car's commands, `smooth` its smoothed poses,
+`camera` the camera's faults; `windows` simulates many windows side by side. May import
 data_quality, vehicles.
 """

@@ -1,4 +1,4 @@
-"""What a camera with faults sees of a car, and where a car is that such a camera saw."""
+"""Converts between true poses and those recorded by a camera with faults."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The recorded commands of a car: held between their rows, or as their mean over each step."""
+"""The recorded commands of a car: held between rows, or averaged over each step."""
 
 from dataclasses import dataclass, field, replace
 

@@ -1,4 +1,4 @@
-"""A recorded drive, ready to be driven again: commands, measured streams, and the measured motion.
+"""A recorded drive ready for simulation: commands, measured streams, and the measured motion.
 
 Streams keep the times and values of the recording; nothing is resampled.
 """

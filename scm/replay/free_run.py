@@ -1,10 +1,10 @@
-"""Drive a recording again: free runs of the simulator from the measured state, and their error.
+"""Simulates a recording again: free runs from the measured state, and their error.
 
-A window starts in the smoothed measured motion and then gets nothing but the recorded commands. All
-windows run side by side as rows of one fleet. What else a car remembers where a window starts, such
-as its servo's angle or its motor's heat, comes from the same car having driven the whole recording
-up to there. Faults of the poses that the car file states, such as a tilted camera, are taken out of
-the recording first. A report of `scm mismatch` is judged by these same windows.
+A window starts in the smoothed measured motion and then only receives the recorded commands. All
+windows run side by side as rows of one fleet. The rest of the car's state at the start, such as the
+servo's angle or the motor's temperature, comes from simulating the same car up to there. Faults of
+the poses that the car file states, such as a tilted camera, are first removed from the recording.
+Reports of `scm mismatch` are judged by the same windows.
 """
 
 from collections import Counter

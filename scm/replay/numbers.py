@@ -1,4 +1,4 @@
-"""Numbers of a car and of its sensors' faults by key, and what they are where nothing is wrong."""
+"""The parameters of a car and of its sensor faults by key, with their neutral values."""
 
 from collections.abc import Mapping
 

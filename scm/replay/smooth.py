@@ -1,6 +1,6 @@
-"""The smoothest motion that a noisy channel allows: a Kalman smoother that knows no car.
+"""Smooths a noisy channel with a Kalman smoother that needs no car model.
 
-Between samples the acceleration wanders as a random walk (white jerk). How fast is chosen by
+Between samples the acceleration is a random walk (white jerk). Its intensity is chosen by maximum
 likelihood, once for the whole channel.
 """
 

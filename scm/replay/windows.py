@@ -1,8 +1,7 @@
-"""Free runs of many windows of one drive, by several cars, side by side in one fleet.
+"""Free runs of many windows of one drive by several cars, side by side in one fleet.
 
-A window starts in the measured motion. Whatever else a car remembers, such as its servo, the state
-of its motor's warmth and the time since it was switched on, comes from the same car having driven
-the whole recording up to there.
+A window starts in the measured motion. The rest of the car's state, such as its servo, motor
+temperature and time since power-on, comes from simulating the same car up to there.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What is printed to calibrate a lens with: a chessboard, a ChArUco board, or a grid of tags."""
+"""Calibration boards: a chessboard, a ChArUco board, or a grid of tags."""
 
 from dataclasses import dataclass
 from typing import Literal

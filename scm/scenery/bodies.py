@@ -1,4 +1,4 @@
-"""What a picture knows of a kind of car: its outline, its paint, and where its tag sits."""
+"""The appearance of a type of car: its outline, its paint, and the place of its tag."""
 
 import math
 import tomllib

@@ -1,4 +1,4 @@
-"""A supersampled window onto a frame: draw in frame pixels, then put it back with smooth edges."""
+"""A supersampled window of a frame: draw in frame pixels, then blend back with smooth edges."""
 
 from collections.abc import Sequence
 

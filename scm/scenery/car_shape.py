@@ -1,4 +1,4 @@
-"""The shape of a car above its wheels, after the measures of its file."""
+"""The shape of a car above its wheels, from the dimensions in its file."""
 
 import math
 

@@ -1,7 +1,7 @@
-"""What is printed for the Eye, at true size: roof tags of named cars, the map's tag, and boards.
+"""Prints for the Eye at true size: roof tags of named cars, the map's tag, and boards.
 
-Each tag stands upright as `scm.scenery.tags` has it: the right of the print is the front of the
-car, or the x of the map. OpenCV and many web pages draw the family turned by 180 degrees.
+Each tag is upright as in `scm.scenery.tags`: the right of the print is the front of the car, or the
+x of the map. OpenCV and many web pages draw the family turned by 180 degrees.
 """
 
 from collections.abc import Sequence

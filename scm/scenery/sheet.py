@@ -1,4 +1,4 @@
-"""The floor as one flat picture: what is painted on it, whoever looks at it from wherever."""
+"""The floor as one flat picture, seen from above."""
 
 import math
 from collections.abc import Mapping

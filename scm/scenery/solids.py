@@ -1,4 +1,4 @@
-"""Prisms and frustums seen through the lens: near sides shaded by the light, then the top."""
+"""Prisms and frustums seen through the lens: visible sides shaded by the light, then the top."""
 
 import math
 from dataclasses import dataclass

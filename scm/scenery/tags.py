@@ -1,8 +1,9 @@
-"""What a printed tag36h11 tag looks like, and where its corners are.
+"""The pattern of a printed tag36h11 tag and the positions of its corners.
 
 A printed tag is a white margin one cell wide around a black square of 8 x 8 cells. Its size is the
-edge of the black square. Corners go lower left, lower right, upper right, upper left of the print;
-its right is the x of the tag's frame (a car's front, the map's x), its top the y (a car's left).
+edge of the black square. The order of corners is lower left, lower right, upper right, upper left
+of the print. Its right is the x of the tag's frame (a car's front, the map's x), its top the y (a
+car's left).
 """
 
 from functools import lru_cache
