@@ -1,4 +1,4 @@
-"""Who is near whom: the compiled first sieve of the contact step, over any number of bodies.
+"""Broad phase of the contact step: which bodies may touch, compiled, for any number of bodies.
 
 Bodies carry a circle about their centre of gravity. Lists of pairs whose circles come close are
 made anew only when a body has moved by its leeway; between that each step looks at the listed pairs

@@ -1,4 +1,4 @@
-"""When hosted cars owe the air a CAM: the rule of `v2x.cam_trigger` for all of them at once."""
+"""When hosted cars must send a CAM: the rule of `v2x.cam_trigger` for all of them at once."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Who moves a hosted car's pedals this tick: its leaseholder through the guard, or its driver.
+"""Who drives a hosted car in this tick: its leaseholder through the guard, or its own driver.
 
 While somebody else holds the lease the car obeys nothing but guarded commands. When that lease is
 lost or given back the car stands, its trip over, until it is leased or sent again. All cars that

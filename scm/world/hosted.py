@@ -1,4 +1,4 @@
-"""A car that the world itself simulates, as people ask for it: no stage of a tick walks over these.
+"""A car that the world simulates, for requests; no stage of a tick walks over these.
 
 Its dynamics live in the `Garage`, what it does now in the `VehicleArrays`, its driver in the crowd.
 """

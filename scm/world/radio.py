@@ -1,4 +1,4 @@
-"""The radio: who hears what is sent, by distance and luck.
+"""The radio: which stations receive a frame, by distance and chance.
 
 A frame sent by one station reaches other stations as `vehicles/drivers/channel.py` says. Stations
 are cars, and the roadside units at their junctions. What hosted cars hear their drivers keep, all

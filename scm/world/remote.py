@@ -1,10 +1,10 @@
-"""A car with dynamics of its own, as the world keeps it: a body that follows its agent's reports.
+"""A car with its own dynamics, as the world sees it: a body that follows its agent's reports.
 
-Between reports the body goes on as reported. A contact changes the body at once and is told to the
-agent under a number; until a report says that the agent has felt this number, the change is kept on
-top of its reports, so that one hit is not told twice: also while no report comes, for who pushes a
-car that is silent would else add up speed. What the agent drove on before it felt a hit is told as
-a shift of place. Agents that never say what they felt are given `ECHO_NS` of reports.
+Between reports the body is extrapolated. A contact changes the body at once and is sent to the
+agent with a number; until a report confirms this number, the change is added to the reports, so
+that one hit does not count twice, also while no report comes: pushing a silent car would otherwise
+add up speed. The distance that the agent drove before it applied a hit is sent as a shift of
+position. For agents that never confirm, a change lasts `ECHO_NS` of reports.
 """
 
 from collections import deque

@@ -1,12 +1,12 @@
-"""Cars that push in vain: told to drive for seconds, and their rear axle stays where it is.
+"""Detect stuck cars: commanded to drive for seconds, while the rear axle stays where it is.
 
     throttle of LEAST_THROTTLE or more, either way, for PATIENCE_NS
     and the rear axle within NEAR_M of where that began             stuck
     the rear axle farther than that, whoever moved it              free again
 
-Who waits in a queue or at a line is told no throttle, and never stuck. At the least throttle a
-Nigel drives twice as far as NEAR_M in that time. What it most likely pushes against is what it
-touched last. A driver of the world's lets go of a stuck car, and tries again once in a while.
+A car that waits in a queue or at a line has no throttle and is never stuck. At the least throttle
+a Nigel drives twice as far as NEAR_M in that time. It most likely pushes against what it touched
+last. A hosted driver releases the throttle of a stuck car, and tries again from time to time.
 """
 
 from collections import deque

@@ -1,4 +1,4 @@
-"""What anybody would hear of what the world could say: what is dear is not made for nobody."""
+"""Who subscribes to what: costly messages are made only for subscribers."""
 
 from collections.abc import Sequence
 

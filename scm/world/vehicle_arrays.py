@@ -1,4 +1,4 @@
-"""What every car of the city has, as arrays by slot: stages of a tick work on these, not on cars.
+"""The state of all cars as arrays by vehicle index; stages of a tick work on these, not on cars.
 
 A slot is a car's number in the whole world, hosted or remote, the lowest free one first. Motion is
 read from the fleets once a tick; what only a person asks for is read from them on demand.

@@ -1,4 +1,4 @@
-"""Watching over cars: who vanishes, whose lease or battery runs out, who is stuck or frozen."""
+"""Watch all cars: lost agents, expired leases, low batteries, stuck and frozen cars."""
 
 import math
 

@@ -294,7 +294,7 @@ def test_time_never_goes_back_between_steps():
 
 
 class Picky(Talker):
-    """Hears trips only while told to, and knows whether anybody hears the events of `x`."""
+    """Subscribes to trips on demand, and knows whether the events of `x` have subscribers."""
 
     def __init__(self, name):
         super().__init__(name)
