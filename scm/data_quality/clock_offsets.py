@@ -10,15 +10,15 @@ from scm.data_quality.pose_track import FEWEST, Grid
 
 Spectrum = NDArray[np.complex128]
 
-STEP_S = 0.02
-WIDTH_S = 0.12
-WINDOW_S = 15.0
-LOCAL_S = 1.5
-LARGEST_S = 20.0
-ALIKE = 0.6
-BETTER = 0.05
-SURE = 0.9
-SAME_S = 0.06
+STEP_S = 0.02  # of the even times on which signals are compared
+WIDTH_S = 0.12  # of the Gaussian that smooths both signals
+WINDOW_S = 15.0  # of each stretch in which a delay is measured for itself
+LOCAL_S = 1.5  # around no delay: a peak there is preferred
+MAX_DELAY_S = 20.0  # that is looked for
+MIN_WINDOW_CORRELATION = 0.6  # of a window whose delay counts
+MIN_GAIN = 0.05  # of correlation, by which a far peak beats the one near no delay
+SURE_CORRELATION = 0.9  # from which on one window is enough
+MAX_SPREAD_S = 0.06  # of the delays of windows that agree
 MOST, LARGE = 98, 0.3  # a car may stand for nearly all of a recording
 
 
@@ -46,7 +46,7 @@ class Lag:
 def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     """Return how the first signal, on even times, lags behind the second on the same ones."""
     first, second = _clipped(first), _clipped(second)
-    reach = int(min(LARGEST_S, 0.4 * on.length_s) / on.step_s)
+    reach = int(min(MAX_DELAY_S, 0.4 * on.length_s) / on.step_s)
     curve = _correlations(first, second, reach)
     best = _best(curve, reach)
     sign = float(np.sign(curve[best])) or 1.0
@@ -55,7 +55,7 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
     gain = float(abs(curve[best]) - abs(curve[reach]))
     a, b = _overlap(first, second, whole)
     windows = _windows(a, sign * b, on.step_s)
-    sure = len(windows) < 3 and abs(curve[best]) > SURE
+    sure = len(windows) < 3 and abs(curve[best]) > SURE_CORRELATION
     if len(windows) >= 3:
         at, late = windows.T
         slopes = [
@@ -65,7 +65,7 @@ def lag_between(first: Floats, second: Floats, on: Grid) -> Lag:
         ]
         rate = float(np.median(slopes))
         off = late - rate * at
-        sure = float(np.median(np.abs(off - np.median(off)))) < SAME_S
+        sure = float(np.median(np.abs(off - np.median(off)))) < MAX_SPREAD_S
         delay = whole * on.step_s + float(np.median(late - rate * at))
     if abs(rate) * on.length_s < 0.05:
         delay, rate = (whole + _between(sign * curve, best)) * on.step_s, 0.0
@@ -112,7 +112,7 @@ def _best(curve: Floats, reach: int) -> int:
     if len(peaks) == 0:
         return best
     here = low + int(peaks[np.argmax(middle[peaks])])
-    return best if size[best] > size[here] + BETTER else here
+    return best if size[best] > size[here] + MIN_GAIN else here
 
 
 def _correlations(first: Floats, second: Floats, reach: int) -> Floats:
@@ -161,7 +161,7 @@ def _windows(first: Floats, second: Floats, step_s: float) -> Floats:
             continue
         curve = _correlations(a, b, near)
         best = int(np.argmax(curve))
-        if curve[best] > ALIKE and 0 < best < len(curve) - 1:
+        if curve[best] > MIN_WINDOW_CORRELATION and 0 < best < len(curve) - 1:
             late = (best - near + _between(curve, best)) * step_s
             found.append(((start + 0.5 * length) * step_s, late))
     return np.array(found).reshape(-1, 2)

@@ -11,13 +11,13 @@ from scm.recording.read import Recording
 from scm.vehicles.car import Car
 from scm.vehicles.drive_channel import COMMANDED_SPEEDS
 
-LARGEST_COMMAND = 1.05
-LARGEST_ANGLE = 1.2
-EXCITED = 0.02
+MAX_RATIO = 1.05  # of a command, 1 with some rounding
+MAX_ANGLE_RAD = 1.2  # that wheels steer
+MIN_REACH = 0.02  # of a command that changes, as a share of its largest
 WIDTH_S = 0.3
 STEP_S = 0.05
-LATEST_S = 1.5
-RELATED = 0.35
+MAX_DELAY_S = 1.5  # of motion behind its command
+MIN_CORRELATION = 0.35  # of commands and motion of one drive
 HARDLY = 0.2  # a driver who holds the speed against slopes and turns undoes most of it
 VARIED = 0.5  # a speed held steady by its driver says nothing about the throttle
 CLEARLY, CLOSELY = 0.8, 0.6
@@ -101,7 +101,7 @@ def _missing(recording: Recording) -> Iterator[DataProblem]:
 
 def _range(recording: Recording, name: str, channel: Series) -> Iterator[DataProblem]:
     angle = recording.channels[name].dimension == "angle"
-    limit = LARGEST_ANGLE if angle else LARGEST_COMMAND
+    limit = MAX_ANGLE_RAD if angle else MAX_RATIO
     largest = float(np.abs(channel.values).max())
     if name in COMMANDED_SPEEDS or largest <= limit:
         return
@@ -148,7 +148,7 @@ def _without_effect(recording: Recording, movement: Series, poses: Track) -> Ite
     if len(on.t) < SHORT_S / STEP_S:
         return
     short = len(on.t) < LONGEST_S / STEP_S
-    related = RELATED_SHORT if short else RELATED
+    related = RELATED_SHORT if short else MIN_CORRELATION
     speed, rate = on.smooth(movement), on.smooth(yaw, 1)
     steering, throttle = (_command(recording, n) for n in ("command.steering", "command.throttle"))
     if steering is not None:
@@ -193,7 +193,7 @@ def _stays(recording: Recording, name: str) -> bool:
 
 def _excited(channel: Series) -> bool:
     reach = float(np.percentile(channel.values, 99) - np.percentile(channel.values, 1))
-    return reach >= EXCITED * max(0.1, float(np.abs(channel.values).max()))
+    return reach >= MIN_REACH * max(0.1, float(np.abs(channel.values).max()))
 
 
 def _varied(speed: Floats) -> bool:
@@ -205,7 +205,7 @@ def _command(recording: Recording, name: str) -> Series | None:
     if name not in recording.channels:
         return None
     channel = clean(recording.channels[name])
-    varied = len(channel.t) > 20 and np.ptp(channel.values) > EXCITED
+    varied = len(channel.t) > 20 and np.ptp(channel.values) > MIN_REACH
     return channel if varied else None
 
 
@@ -220,7 +220,7 @@ def _follows(motion: Floats, expected: Floats, on: Grid, related: float) -> bool
     """Return whether the motion follows within a second or two, better than at any other delay."""
     if motion.std() < 1e-6 or expected.std() < 1e-6:
         return True
-    near = best_correlation(motion, expected, on, LATEST_S)
+    near = best_correlation(motion, expected, on, MAX_DELAY_S)
     return near > related
 
 
@@ -234,7 +234,7 @@ def _belongs(motion: Floats, expected: Floats, on: Grid) -> bool:
     if not _follows(motion, expected, on, HARDLY):
         return False
     motion, expected = (_quick(values, on.step_s) for values in (motion, expected))
-    near, apart = best_correlation(motion, expected, on, LATEST_S), round(APART_S / on.step_s)
+    near, apart = best_correlation(motion, expected, on, MAX_DELAY_S), round(APART_S / on.step_s)
     others = range(apart, len(expected) - apart, 4)
     far = [abs(float(np.corrcoef(motion, np.roll(expected, d))[0, 1])) for d in others]
     return near > CLOSELY or near > max(far, default=0.0)

@@ -19,17 +19,17 @@ from scm.data_quality.problem import DataProblem, Span
 from scm.data_quality.row_spacing import called
 from scm.recording.read import Recording
 
-FROZEN_S = 1.0
-FEWEST_FROZEN = 10
+MIN_FROZEN_S = 1.0  # that a value stays while the car moves
+MIN_FROZEN_ROWS = 10  # of one value
 OUTLASTS = 10.0  # times what values are usually repeated for
 MOVING = 0.2  # of the speed that is hardly ever exceeded
-COARSE = 0.02
-SAME = 0.999999
-DERIVED = 0.99995
+MAX_STEP_SHARE = 0.02  # of a channel's reach; larger steps are coarse
+COPY_CORRELATION = 0.999999  # from which on two channels are copies
+DERIVED_CORRELATION = 0.99995  # from which on a speed was computed from the poses
 MOTION = ("pose.", "velocity.", "speed", "yaw_rate", "wheel_speed.", "encoder.", "imu.")
-LEAST_M = 0.05
-NOISES = 6.0
-COUNTED_M = 0.1
+MIN_REACH_M = 0.05  # of poses that move
+MIN_NOISES = 6.0  # of poses that move, in their noise
+MIN_COUNTED_M = 0.1  # of distance that wheels count when a car moves
 
 
 def frozen_problems(
@@ -62,7 +62,7 @@ def _held(recording: Recording) -> Iterator[DataProblem]:
     by_rate: dict[tuple[float, float], list[str]] = {}
     for name, channel in recording.channels.items():
         cleaned = clean(channel)
-        if name.startswith(MOTION) and len(cleaned.t) > FEWEST_FROZEN:
+        if name.startswith(MOTION) and len(cleaned.t) > MIN_FROZEN_ROWS:
             every = rows_a_value(cleaned)
             period = float(np.median(np.diff(cleaned.t)))
             if every > 1:
@@ -103,13 +103,13 @@ def _frozen(
 
 def frozen_spans(channel: Series, witness: Series | None) -> tuple[Span, ...]:
     """Return spans in which values are equal to the last bit while the witness moves."""
-    if witness is None or len(channel.t) < FEWEST_FROZEN:
+    if witness is None or len(channel.t) < MIN_FROZEN_ROWS:
         return ()
     fast = np.percentile(np.abs(witness.values), 98) * MOVING
     starts, ends = runs(channel.values, channel.t)
     usual = OUTLASTS * float(np.percentile(ends - starts, 95))
-    long = ends - starts >= max(FEWEST_FROZEN, usual)
-    long &= channel.t[ends - 1] - channel.t[starts] >= FROZEN_S
+    long = ends - starts >= max(MIN_FROZEN_ROWS, usual)
+    long &= channel.t[ends - 1] - channel.t[starts] >= MIN_FROZEN_S
     spans = []
     for i, j in zip(starts[long], ends[long], strict=True):
         inside = (witness.t >= channel.t[i]) & (witness.t <= channel.t[j - 1])
@@ -127,10 +127,10 @@ def _copied(recording: Recording) -> Iterator[DataProblem]:
     """Yield pairs of channels that hold the same numbers."""
     for one, other in combinations(recording.channels, 2):
         a, b = recording.channels[one], recording.channels[other]
-        if len(a.values) != len(b.values) or len(a.values) < FEWEST_FROZEN:
+        if len(a.values) != len(b.values) or len(a.values) < MIN_FROZEN_ROWS:
             continue
         same = float((a.values == b.values).mean())
-        if same > SAME and np.ptp(a.values) > 0.0 and _both_move(a.values):
+        if same > COPY_CORRELATION and np.ptp(a.values) > 0.0 and _both_move(a.values):
             yield DataProblem(
                 channel=other,
                 name="copied",
@@ -141,7 +141,7 @@ def _copied(recording: Recording) -> Iterator[DataProblem]:
 
 
 def _both_move(values: Floats) -> bool:
-    return len(np.unique(values)) > FEWEST_FROZEN
+    return len(np.unique(values)) > MIN_FROZEN_ROWS
 
 
 def _derived(recording: Recording, movement: Series) -> Iterator[DataProblem]:
@@ -163,7 +163,7 @@ def _derived(recording: Recording, movement: Series) -> Iterator[DataProblem]:
             continue
         inside = (pose.t >= given.t[0]) & (pose.t <= given.t[-1])
         noisy = [_alike(given.at(pose.t[inside]), values[inside]) for values in derived]
-        if noisy and max(noisy) > DERIVED:
+        if noisy and max(noisy) > DERIVED_CORRELATION:
             yield DataProblem(
                 channel=name,
                 name="derived",
@@ -186,13 +186,13 @@ def _coarse(recording: Recording) -> Iterator[DataProblem]:
         if not name.startswith(MOTION) or name.startswith("encoder."):
             continue
         values = np.unique(channel.values[np.isfinite(channel.values)])
-        if len(values) < FEWEST_FROZEN:
+        if len(values) < MIN_FROZEN_ROWS:
             continue
         step = float(np.percentile(np.diff(values), 10))
         middle = channel.values[np.isfinite(channel.values)]
         reach = float(np.percentile(middle, 97.5) - np.percentile(middle, 2.5))
         even = np.abs(np.diff(values) / step - np.rint(np.diff(values) / step)).mean() < 0.02
-        if reach > 0.0 and step > COARSE * reach and even:
+        if reach > 0.0 and step > MAX_STEP_SHARE * reach and even:
             yield DataProblem(
                 channel=name,
                 name="coarse",
@@ -205,12 +205,12 @@ def moves(poses: Track) -> bool:
     """Return whether the poses go anywhere, beyond their own noise."""
     reach = np.hypot(_reach(poses.x), _reach(poses.y))
     noise = np.hypot(_noise(poses.x), _noise(poses.y))
-    return bool(reach > LEAST_M + NOISES * noise)
+    return bool(reach > MIN_REACH_M + MIN_NOISES * noise)
 
 
 def stands(poses: Track, found: Iterable[DistanceSensor]) -> bool:
     """Return whether neither the poses nor any other sensor see the car move."""
-    return not moves(poses) and all(np.ptp(way.distance.values) < COUNTED_M for way in found)
+    return not moves(poses) and all(np.ptp(way.distance.values) < MIN_COUNTED_M for way in found)
 
 
 def standing_problem() -> DataProblem:

@@ -17,26 +17,26 @@ from scm.vehicles.fleet import Fleet
 
 OTHER_CAR = "the car file is another car's"
 ANOTHER = "Nothing: give the file of the car that was driven."
-TOO_FAST = 1.4
-TOO_SLOW = 0.3
-TURNS = (0.55, 1.8)
+MAX_SPEED_RATIO = 1.4  # of the speed driven to the file's; beyond, it is another car
+MIN_SPEED_RATIO = 0.3  # likewise
+TURN_RATIO = (0.55, 1.8)  # of curvature driven to the file's, lowest and highest of the same car
 IMPOSSIBLE = (0.15, 4.0)  # in between, play, slow servos and weak steering may be to blame alone
 # No play, and no give of a steering, is so wide [rad]; a floor that is slippery follows worse.
 DOUBTFUL, MORE_THAN_PLAY, CLOSELY = (0.53, 1.9), 0.1, 0.9
-ROLLS = (0.7, 1.4)
-FOLLOWS = 0.7
+ROLL_RATIO = (0.7, 1.4)  # of distance that wheels count to the poses', likewise
+MIN_CORRELATION = 0.7  # of turning with steering that shows a ratio
 THROTTLES: Floats = np.linspace(0.0, 1.0, 11)
 STEERINGS: Floats = np.linspace(-1.0, 1.0, 21)
 STEADY_S, STEERED_S = 8.0, 3.0
-UNSURE_THROTTLE = 0.1
+THROTTLE_MARGIN = 0.1  # by which a motor's dead zone may be wider than the file says
 LEAST_SHARE_OF_TOP = 0.05  # of the top speed
 WIDTH_S = 0.3
 STEP_S = 0.05
-QUIET_MPS2 = 1.5
-LATE_S = 0.15
+MAX_LATERAL_MPS2 = 1.5  # beyond, tyres slip
+SERVO_DELAY_S = 0.15  # usual, of steering
 SHORTEST_S = 5.0
-STRAIGHT_RAD_S = 0.02
-LEAST_SWING = 0.2
+MIN_YAW_STD_RAD_S = 0.02  # of a drive that turns
+MIN_SWING = 0.2  # of steering, as a share of its largest
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,16 +67,16 @@ def steered(recording: Recording, car: Car, movement: Series, poses: Track) -> S
     if len(on.t) < SHORTEST_S / STEP_S:
         return None
     speed, rate = on.smooth(movement), on.smooth(Series(poses.t, poses.yaw), 1)
-    wheels = on.smooth_even(held(steering, on.t - LATE_S))
+    wheels = on.smooth_even(held(steering, on.t - SERVO_DELAY_S))
     expected = speed * wheels / car.value("body.wheelbase_m")
     fast = np.percentile(np.abs(speed), 90)
-    rows = (np.abs(speed) > 0.3 * fast) & (np.abs(speed * rate) < QUIET_MPS2)
-    if rows.sum() < SHORTEST_S / STEP_S or rate[rows].std() < STRAIGHT_RAD_S:
+    rows = (np.abs(speed) > 0.3 * fast) & (np.abs(speed * rate) < MAX_LATERAL_MPS2)
+    if rows.sum() < SHORTEST_S / STEP_S or rate[rows].std() < MIN_YAW_STD_RAD_S:
         return None
     a, b = expected[rows] - expected[rows].mean(), rate[rows] - rate[rows].mean()
     both, own = float((a * b).sum()), float((a * a).sum())
     swing = float(np.ptp(np.percentile(steering.values, (5, 95))))
-    if own <= 0.0 or swing < LEAST_SWING * float(np.abs(steering.values).max()):
+    if own <= 0.0 or swing < MIN_SWING * float(np.abs(steering.values).max()):
         return None
     seen = float(np.ptp(np.percentile(wheels[rows], (5, 95))))
     return Steered(both / math.sqrt(own * float((b * b).sum())), both / own, seen)
@@ -162,11 +162,11 @@ def _speed(recording: Recording, car: Car, movement: Series) -> str:
         return ""
     top = steady.top
     fast = float(np.percentile(np.abs(movement.values), 98))
-    if fast > TOO_FAST * top:
+    if fast > MAX_SPEED_RATIO * top:
         metres = ", or its positions are not in metres" if fast > 20.0 * top else ""
         return f"it drives {fast:.2f} m/s, the car file's car at most {top:.2f} m/s{metres}"
     share = share_of_expected_speed(recording, movement, steady)
-    if share is None or share > TOO_SLOW:
+    if share is None or share > MIN_SPEED_RATIO:
         return ""
     return f"it drives {100.0 * share:.0f} % of the speed that the throttle asks of the file's car"
 
@@ -183,7 +183,7 @@ def share_of_expected_speed(
     speed, push = np.abs(on.smooth(movement)), np.abs(on.smooth(movement, 1))
     fast = float(np.percentile(speed, 98))
     steady = (throttles > 0.3) & (push < 0.1 * fast) & (speed > 0.3 * fast)
-    full = wanted.at(np.maximum(throttles - UNSURE_THROTTLE, 0.0) if wanted.bent else throttles)
+    full = wanted.at(np.maximum(throttles - THROTTLE_MARGIN, 0.0) if wanted.bent else throttles)
     steady &= full > LEAST_SHARE_OF_TOP * wanted.top
     return float(np.median(speed[steady] / full[steady])) if steady.sum() * STEP_S > 3.0 else None
 
@@ -198,7 +198,7 @@ def _turning(
     found = steered_in_wheel_angles(recording, car, movement, poses)
     if found is None:
         return None, 0.0
-    odd = found.correlation >= FOLLOWS and not TURNS[0] < found.gain < TURNS[1]
+    odd = found.correlation >= MIN_CORRELATION and not TURN_RATIO[0] < found.gain < TURN_RATIO[1]
     lost_rad = found.swing * abs(1.0 - found.gain) if found.correlation > CLOSELY else 0.0
     return (found.gain if odd else None), lost_rad
 
@@ -241,6 +241,6 @@ def _in_wheel_angles(recording: Recording, car: Car) -> tuple[Recording, float]:
 def _wheels(found: Relation) -> str:
     scale = found.numbers.get("scale")
     wheels = found.pair[1].startswith(("encoder", "wheel_speed")) and found.pair[0] == "pose.x"
-    if not wheels or scale is None or ROLLS[0] < scale.value < ROLLS[1]:
+    if not wheels or scale is None or ROLL_RATIO[0] < scale.value < ROLL_RATIO[1]:
         return ""
     return f"the way driven is {scale.value:.2f} times what its wheels count"

@@ -10,7 +10,7 @@ from scm.data_quality.accelerometer import push_of
 from scm.data_quality.distance import distance_sensors, travel_against
 from scm.data_quality.heading import yaw_against
 from scm.data_quality.other_car import (
-    FOLLOWS,
+    MIN_CORRELATION,
     share_of_expected_speed,
     steady_speed,
     steered_in_wheel_angles,
@@ -101,7 +101,11 @@ def _length_by_commands(
         slower = Series(movement.t, length * movement.values)
         nearer = Track(poses.t, length * poses.x, length * poses.y, poses.yaw)
         turns = steered_in_wheel_angles(now.recording, car, slower, nearer)
-        if turns and turns.correlation > FOLLOWS and abs(math.log(turns.gain)) < math.log(2.0):
+        if (
+            turns
+            and turns.correlation > MIN_CORRELATION
+            and abs(math.log(turns.gain)) < math.log(2.0)
+        ):
             yield _length(now, length, "its commands ask for")
             return
 
@@ -199,7 +203,7 @@ def _offsets(now: Repairs, car: Car | None, pairs: list[Pair]) -> Iterator[DataP
         return
     spread = max(p.far_s for p in far) - min(p.far_s for p in far)
     moves: list[tuple[tuple[str, ...], float]]
-    if len(far) == len(pairs) and spread < unit_errors.FAR_S:
+    if len(far) == len(pairs) and spread < unit_errors.MIN_CLOCK_OFFSET_S:
         names = tuple(n for n in now.recording.channels if n.startswith("pose."))
         best = min(far, key=lambda p: p.what)  # heading tells a clock better than speed
         moves = [(names, -_refined(now, best, car))]
@@ -240,7 +244,7 @@ def _refined(now: Repairs, pair: Pair, car: Car | None) -> float:
         moved = Series(way.distance.t + pair.far_s, way.distance.values)
         found = travel_against(poses, moved, way.name, (0.0, pair.lag.rate))
     left = found.numbers["delay"].value if found else 0.0
-    return pair.far_s + (left if abs(left) < 0.5 * unit_errors.FAR_S else 0.0)
+    return pair.far_s + (left if abs(left) < 0.5 * unit_errors.MIN_CLOCK_OFFSET_S else 0.0)
 
 
 def _clocked_with(recording: Recording, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -8,14 +8,14 @@ from scm.arrays import Floats
 from scm.data_quality.problem import DataProblem, Span
 from scm.recording.read import Recording
 
-SHORTEST_S = 5.0
-GAP_S = 0.25
-GAP_STEPS = 5.0
-COMMAND_GAP_S = 1.0
-SLOWEST_POSE_S = 0.1
-UNEVEN = 2.0
-BURST_SHARE = 0.1
-FEW_BURSTS = 0.005  # not worth a word
+MIN_LENGTH_S = 5.0  # of a table
+MIN_GAP_S = 0.25  # a longer pause between rows is a gap, if it is also longer than
+MIN_GAP_STEPS = 5.0  # usual steps
+MIN_COMMAND_GAP_S = 1.0  # a command is held, so it may pause longer
+MAX_POSE_STEP_S = 0.1  # slower poses do not show how driving starts
+MAX_JITTER = 2.0  # of the 95th percentile of steps, in usual steps
+MAX_BURST_SHARE = 0.1  # of rows right after another
+MIN_BURST_SHARE = 0.005  # of rows; fewer are not mentioned
 
 
 def tables(recording: Recording) -> list[tuple[str, ...]]:
@@ -54,11 +54,11 @@ def _spacing(t: Floats, at: str, names: Sequence[str]) -> Iterator[DataProblem]:
         return
     period, span = float(np.median(step)), float(np.ptp(t))
     command = all(name.startswith("command.") for name in names)
-    if span < SHORTEST_S and not command:
+    if span < MIN_LENGTH_S and not command:
         yield DataProblem(
             channel=at,
             name="too_short",
-            text=f"Holds {span:.1f} s, less than {SHORTEST_S:.0f} s.",
+            text=f"Holds {span:.1f} s, less than {MIN_LENGTH_S:.0f} s.",
             record_instead="Drive for 60 s or more: straights, both turns, starts and stops.",
         )
     gaps = gaps_of(t, command)
@@ -71,7 +71,7 @@ def _spacing(t: Floats, at: str, names: Sequence[str]) -> Iterator[DataProblem]:
             when_s=gaps,
             corrected="Nothing is compared across a gap.",
         )
-    if any(name.startswith("pose.") for name in names) and period > SLOWEST_POSE_S:
+    if any(name.startswith("pose.") for name in names) and period > MAX_POSE_STEP_S:
         yield DataProblem(
             channel=at,
             name="slow",
@@ -92,10 +92,10 @@ def _gaps_text(gaps: Sequence[Span], lost_s: float, span_s: float) -> str:
 def _jitter(step: Floats, period: float, at: str, *, command: bool) -> Iterator[DataProblem]:
     high = float(np.percentile(step, 95))
     bursts = float((step < 0.1 * period).mean())
-    if not command and (high > UNEVEN * period or bursts > BURST_SHARE):
+    if not command and (high > MAX_JITTER * period or bursts > MAX_BURST_SHARE):
         text = f"Rows come every {1e3 * period:.1f} ms as a rule, but one in twenty "
         text += f"only after {1e3 * high:.0f} ms or more"
-        if bursts > FEW_BURSTS:
+        if bursts > MIN_BURST_SHARE:
             text += f", and {100.0 * bursts:.0f} % right after another"
         yield DataProblem(
             channel=at,
@@ -111,5 +111,7 @@ def gaps_of(t: Floats, command: bool = False) -> tuple[Span, ...]:
     forward = step[step > 0.0]
     if len(forward) == 0:
         return ()
-    longest = max(COMMAND_GAP_S if command else GAP_S, GAP_STEPS * float(np.median(forward)))
+    longest = max(
+        MIN_COMMAND_GAP_S if command else MIN_GAP_S, MIN_GAP_STEPS * float(np.median(forward))
+    )
     return tuple((float(t[i]), float(t[i + 1])) for i in np.flatnonzero(step > longest))

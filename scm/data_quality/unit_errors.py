@@ -36,14 +36,16 @@ FACTORS: Mapping[str, Mapping[float, str]] = {
         1e-3: "m/s^2 labelled mm/s^2", 1e2: "cm/s^2", 1e-2: "m/s^2 labelled cm/s^2",
     },
 }  # fmt: skip
-NEAR = 0.08
-SHORTEST_S = 4.0
-MOST_POINTS = 20_000  # of a comparison: slower steps show a long drive as well
+MAX_LOG_DISTANCE = 0.08  # of a size from the factor of a unit that explains it
+MIN_OVERLAP_S = 4.0  # of two signals that are compared
+MAX_POINTS = 20_000  # of a comparison: slower steps show a long drive as well
 RELATED = 0.6
 LEVEL, BETTER = 0.95, 0.05  # wheels that spin follow the car that badly
 UNLIKE = 0.35
-FAR_S = 0.2
-LARGEST_UNKNOWN = 1500.0  # a factor that is no unit's: beyond milli-units one signal hardly moves
+MIN_CLOCK_OFFSET_S = 0.2  # less may be a latency
+MAX_UNKNOWN_FACTOR = (
+    1500.0  # a factor that is no unit's: beyond milli-units one signal hardly moves
+)
 SMALLEST_SIZE, LARGEST_SIZE = 0.6, 1.0 / 0.6
 
 
@@ -77,7 +79,7 @@ class Pair:
             return 1.0
         found = nearest_factor(size, self.what)
         believable = (
-            unit_of(found, self.what) or 1.0 / LARGEST_UNKNOWN < abs(size) < LARGEST_UNKNOWN
+            unit_of(found, self.what) or 1.0 / MAX_UNKNOWN_FACTOR < abs(size) < MAX_UNKNOWN_FACTOR
         )
         return found if believable else math.copysign(1.0, size)
 
@@ -89,7 +91,7 @@ class Pair:
         if not self.shift_s and not (certain and self.lag.gain > gain):
             return 0.0
         total = self.lag.delay_s + self.shift_s
-        return total if abs(total) > FAR_S else 0.0
+        return total if abs(total) > MIN_CLOCK_OFFSET_S else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,15 +118,15 @@ def compare(first: MotionSignal, second: MotionSignal, clipped: Sequence[Span] =
         shift = float(a.t[0] - b.t[0])
         b = Series(b.t + shift, b.values)
         overlap = min(a.t[-1], b.t[-1]) - max(a.t[0], b.t[0])
-    if overlap < SHORTEST_S:
+    if overlap < MIN_OVERLAP_S:
         return None
     start = max(a.t[0], b.t[0])
     gaps = long_gaps(a.t, b.t)
     end = start + overlap
     length_s = between_gaps_s(start, end, gaps) if gaps else overlap
-    step = max(STEP_S, length_s / MOST_POINTS)
+    step = max(STEP_S, length_s / MAX_POINTS)
     on = grid(start, end, step, max(WIDTH_S, 2.0 * step), gaps)
-    if len(on.t) * step < SHORTEST_S:
+    if len(on.t) * step < MIN_OVERLAP_S:
         return None
     left, right = on.smooth(a, first.order), on.smooth(b, second.order)
     if left.std() < 1e-9 or right.std() < 1e-9:
@@ -140,7 +142,7 @@ def nearest_factor(size: float, what: str) -> float:
     """Return the unit's factor that explains a size, or the size itself where none does."""
     known = (1.0, *FACTORS[what])
     best = min(known, key=lambda f: abs(math.log(abs(size) / f)))
-    exact = best if abs(math.log(abs(size) / best)) < NEAR else abs(size)
+    exact = best if abs(math.log(abs(size) / best)) < MAX_LOG_DISTANCE else abs(size)
     return math.copysign(exact, size)
 
 

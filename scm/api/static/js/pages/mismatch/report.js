@@ -53,7 +53,7 @@ function Sheet({ report, children }) {
 function show(host, text, drawn) {
   const within = (tag) => text.split(`<${tag}>`)[1]?.split(`</${tag}>`)[0] ?? "";
   const style = new CSSStyleSheet();
-  style.replaceSync(within("style"));
+  style.replaceSync(`${within("style")} main { max-width: none; padding: 0; }`);
   const root = host.shadowRoot ?? host.attachShadow({ mode: "open" });
   root.adoptedStyleSheets = [style];
   const page = new DOMParser().parseFromString(`<main>${within("main")}</main>`, "text/html");

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scm.data_quality.commands import CLEARLY, LATEST_S, STEP_S, _belongs, best_correlation
+from scm.data_quality.commands import CLEARLY, MAX_DELAY_S, STEP_S, _belongs, best_correlation
 from scm.data_quality.pose_track import grid
 
 SECONDS = 60.0
@@ -26,7 +26,7 @@ def quick(on, seed):
 
 
 def raw(motion, asked, on):
-    return best_correlation(motion, asked, on, LATEST_S)
+    return best_correlation(motion, asked, on, MAX_DELAY_S)
 
 
 def test_a_motion_that_is_alike_only_in_what_is_slow_is_of_another_drive(on):
