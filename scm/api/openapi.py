@@ -259,7 +259,7 @@ def _record(schema: Schema, schemas: Schema, depth: int) -> Any:
 
 
 def _is_a(kind: str, value: object) -> bool:
-    """Say whether a value is of a type of JSON."""
+    """Return whether a value is of a type of JSON."""
     if isinstance(value, bool):
         return kind == "boolean"
     if isinstance(value, int) and kind == "number":

@@ -46,7 +46,7 @@ class ProgressReporter:
         self.cancelled = cancel
 
     def __call__(self, doing: str = "", progress: float | None = None) -> None:
-        """Tell the step and the share of work done."""
+        """Report the step and the share of work done."""
         self.check()
         changes = {"doing": doing, "progress": progress}
         self._operations.change(self._name, **changes)

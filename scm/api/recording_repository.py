@@ -178,7 +178,7 @@ class RecordingRepository:
         return "cut off" if self._is_quiet(index.path) else "being written"
 
     def _is_quiet(self, path: Path) -> bool:
-        """Say whether nobody has written to a file for a while."""
+        """Return whether nobody has written to a file for a while."""
         return self._clock.now_ns() - _written_s(path) * NS_PER_S > QUIET_S * NS_PER_S
 
 

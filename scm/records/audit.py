@@ -10,16 +10,16 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         number: Of the entry; numbers have no gaps.
-        t_ns: When it was asked for [ns since 1970].
+        t_ns: When it was requested [ns since 1970].
         station: Who did it: `world`, `traffic`, `api`.
         kind: The request's class, or method and path of a call of the web; `unreadable`: what
             stands there is no entry.
         text: What was done, in words.
-        by: Who asked: the owner of the API key, the program that called, the part.
+        by: Who requested it: the owner of the API key, the program that called, the part.
         request_id: Id of the request; empty: it had none.
         trace_id: Of what led to it: the call of the web and what the city did for it have the same;
             empty: nobody traced it.
-        request, reply: What was asked and answered, as the station noted it.
+        request, reply: The request and its reply, as the station noted them.
     """
 
     number: int

@@ -8,7 +8,9 @@ from msgspec import Meta
 By = Annotated[
     str,
     Meta(
-        max_length=64, description="who asks, for the log; empty: whoever calls", examples=["ada"]
+        max_length=64,
+        description="who requests it, for the log; empty: whoever calls",
+        examples=["ada"],
     ),
 ]
 Reason = Annotated[

@@ -13,13 +13,13 @@ class CityRow(msgspec.Struct, kw_only=True, frozen=True):
         map: Name of its map; `title` is for people.
         software: Version of this program.
         interface: Version of this interface, the first chunk of all addresses.
-        seed: Of all its randomness; None: the world was not heard yet.
+        seed: Of all its randomness; None: the world was not received yet.
         lanes: How many the map has; likewise `junctions`.
         vehicles: How many cars are on the map.
-        t_ns: Time of the world; None: it was not heard yet.
+        t_ns: Time of the world; None: not received yet.
         tick: Of the world's newest snapshot; None: likewise.
         real_time_factor: Simulated over elapsed time, over the last second.
-        snapshot_age_s: How long ago the world was heard.
+        snapshot_age_s: Age of the world's newest snapshot.
         stopped: Whether the city-wide stop is engaged.
         parts: Its own processes that are there.
     """

@@ -1,4 +1,4 @@
-"""The map as data: what a map file says, and what travels to agents that do not have the file.
+"""The map as data: the contents of a map file, and what travels to agents without that file.
 
 Frame: x right, y up on the floor, lengths in metre, yaw counter-clockwise from x in radian. The
 map's tag fixes it: its centre is the origin unless the file puts the tag elsewhere. Positions along
@@ -115,7 +115,7 @@ class Floor(Record, kw_only=True, frozen=True):
     """The ground plate: a rectangle [m], and how it holds, rolls and rises.
 
     Attributes:
-        grip: Factor on the tyres' friction everywhere that nothing else is said.
+        grip: Factor on the tyres' friction everywhere else.
         rolling: Likewise, coefficient of rolling resistance on top of the tyres' own.
     """
 
@@ -265,7 +265,7 @@ class Approach(Record, kw_only=True, frozen=True):
 
 
 class Crossing(Record, kw_only=True, frozen=True):
-    """Where lanes cross without lights: signs say who goes first, else right before left."""
+    """Where lanes cross without lights: signs decide who goes first, else right before left."""
 
     name: str
     approaches: tuple[Approach, ...]
@@ -407,16 +407,17 @@ class RadioChannel(Record, kw_only=True, frozen=True):
     """What the air does to frames; as it stands, nothing. See docs/radio.md.
 
     Attributes:
-        range_m: How far frames reach; None: the map's `radio_range_m`, and hosted drivers hear all.
+        range_m: How far frames reach; None: the map's `radio_range_m`, and hosted drivers receive
+            all.
         loss: Share of frames that each receiver misses whatever the distance.
         fading_db: Standard deviation of the strength at a distance; 0: a sharp edge at the range.
         path_loss_exponent: How the strength falls with distance: 2 in the open.
         wall_db: What each wall between two stations takes.
         delay_ms: From antenna to reader; `jitter_ms` more at most, evenly spread.
         data_rate_mbps: Of the one channel; 0: endless.
-        hidden_share: How much of the load at a receiver its senders do not hear themselves: these
-            frames collide.
-        congestion_control: Whether cars speak less on a busy channel.
+        hidden_share: How much of the load at a receiver its senders do not receive themselves:
+            these frames collide.
+        congestion_control: Whether cars send less on a busy channel.
     """
 
     range_m: float | None = None

@@ -21,8 +21,8 @@ class DriveStatus(msgspec.Struct, kw_only=True, frozen=True, tag="told"):
     Attributes:
         seq, t_ms: Of that packet, to measure the way; None: none came yet.
         why: `driving`, `released` (no hand on the dead-man) or `silent` (no packet for 250 ms).
-        throttle, steering: What the car was told.
-        mode: The car's, as the world last told it: `stop` also while the city is stopped.
+        throttle, steering: The command in force.
+        mode: The car's, as the world last reported it: `stop` also while the city is stopped.
     """
 
     seq: int | None
@@ -56,7 +56,7 @@ class AcquirePacket(
 class DrivePacket(
     msgspec.Struct, kw_only=True, frozen=True, tag="drive", forbid_unknown_fields=True
 ):
-    """What is wished for now.
+    """The command requested now.
 
     Attributes:
         seq: Counts up, below 2^53: more than that is no exact number in a browser.

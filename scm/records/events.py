@@ -14,7 +14,7 @@ class Acknowledgement(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         event: Id of the event.
         by: Who took note of it.
-        note: What was said to it; may be empty.
+        note: A comment; may be empty.
         at_ns: When [ns since 1970].
     """
 
@@ -52,7 +52,7 @@ class EventRow(msgspec.Struct, kw_only=True, frozen=True):
         vehicle: The car it is about; null: none.
         acknowledged_by: Who took note of it; null: nobody yet.
         acknowledged_ns: When [ns since 1970]; null: not yet.
-        note: What was said to it.
+        note: A comment.
     """
 
     seq: int

@@ -15,7 +15,7 @@ class TagSeen(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         corners_px: Lower left, lower right, upper right, upper left of the printed tag.
         margin: Decision margin of the detector.
-        hamming: Bits of 36 that were read wrong and corrected; None: not told.
+        hamming: Bits of 36 that were read wrong and corrected; None: not reported.
     """
 
     tag_id: int
@@ -128,7 +128,7 @@ class TagRow(msgspec.Struct, kw_only=True, frozen=True):
         what: `car`; `map`: it lies on the floor, known to the map; `other`: nobody's.
         vehicle: The car that wears it; empty: none does.
         margin: Decision margin of the detector, higher is clearer.
-        hamming: Bits of 36 that were read wrong and corrected; null: not told.
+        hamming: Bits of 36 that were read wrong and corrected; null: not reported.
         size_px: Mean side of its black square in the picture [px].
         seen_s: How long ago the camera saw it last [s].
         x_m, y_m, yaw_rad: Of the car, by this camera; of a map tag as its map has it; null: not
@@ -152,7 +152,7 @@ class PoseRow(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         t_ns: When the frame was exposed.
-        std_x_m, std_y_m, std_yaw_rad: Standard deviations, as the Eye tells them.
+        std_x_m, std_y_m, std_yaw_rad: Standard deviations, as the Eye reports them.
         map_tag_age_ms: Since the camera last saw the map's tag.
         flags: What is wrong with the camera, by its own account: do not trust it.
     """
@@ -182,9 +182,9 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
         tags: Those of that frame, or of the newest detection when that frame was skipped.
         tags_t_ns: Exposure of the frame that they were found in, as text; None: none yet.
         known: Tags of the last minute, whose they are, and where.
-        good: Whether its poses can be trusted, by its own account; None: not said.
+        good: Whether its poses can be trusted, by its own report; None: not reported.
         complaints: What is wrong, in sentences.
-        in_force: By which calibration it sees; null: not said.
+        in_force: By which calibration it sees; null: not reported.
     """
 
     camera: str

@@ -24,7 +24,7 @@ class CalibrationRow(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         kind: `lens`: for `scm eye --calibration`; `place`: a `[[cameras]]` block for the map.
-        camera: Whose place it is; empty: a lens does not say.
+        camera: Whose place it is; empty: it is a lens alone.
         made_ns: When its file was written [ns since 1970].
         rms_px: What was left at the board's points [px]; null: of a place.
         views: Pictures of the board it was made from; null: of a place.
@@ -134,7 +134,7 @@ class PlaceBody(Body, kw_only=True, frozen=True):
 
     lens: Annotated[
         SaveAs | None,
-        Meta(description="a lens on the shelf; null: the map's", examples=["overhead-lens"]),
+        Meta(description="a stored lens; null: the map's", examples=["overhead-lens"]),
     ] = None
     tags: Annotated[
         tuple[dict[str, float], ...],
@@ -178,7 +178,7 @@ class InForceBody(BackBody, kw_only=True, frozen=True):
 
     calibration: Annotated[
         str,
-        Meta(pattern=NAME, description="a calibration on the shelf", examples=["overhead-place"]),
+        Meta(pattern=NAME, description="a stored calibration", examples=["overhead-place"]),
     ]
     accept_unsure: Annotated[
         bool,

@@ -18,7 +18,7 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         name: `router`: its connection to the bus; `world`: snapshots come; `parts`: every part of
-            the city that should be there is; `disk`: there is room on the shelves for recordings,
+            the city that should be there is; `disk`: there is room on the disk for recordings,
             reports and the like.
         good: Whether it is there.
         detail: What was found, in words.
@@ -34,7 +34,7 @@ class Ready(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         status: `ready`.
-        snapshot_age_s: How long ago the world was heard.
+        snapshot_age_s: Age of the world's newest snapshot.
         checks: What was looked at.
     """
 

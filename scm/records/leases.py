@@ -30,7 +30,7 @@ class AcquireBody(Body, kw_only=True, frozen=True):
         str,
         Meta(
             pattern=r"^[a-z0-9_-]{0,32}$",
-            description="tells programs of one caller apart: each holds its own leases",
+            description="distinguishes programs of one caller: each holds its own leases",
             examples=["lane_keeper"],
         ),
     ] = ""

@@ -25,10 +25,11 @@ class StationScore(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Misbehaviour(msgspec.Struct, kw_only=True, frozen=True):
-    """What is held against those who speak on the air.
+    """Scores of the stations on the air.
 
     Attributes:
-        watched: Whether a misbehaviour part is there: it has told scores within the last seconds.
+        watched: Whether a misbehaviour part is there: it has published scores within the last
+            seconds.
         witness: Whether an Eye is there to hold claims against.
         t_ns: Of these scores; None: there are none.
         stations: With the score of each.

@@ -14,7 +14,7 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     """What a report was made from.
 
     Attributes:
-        recordings: Of the shelf, or uploads: paths below the shelves.
+        recordings: Of the repository, or uploads: paths below its folders.
         told: Drives that earlier reports suggested, recorded since: likewise.
         source: The same in words.
         vehicle: Which car of the recordings; empty: all.
@@ -23,7 +23,7 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
         from_s: Part of the recording, seconds since its begin; None: its start.
         to_s: None: its end.
         asked_ns: When.
-        owner: Who asked.
+        owner: Who requested it.
     """
 
     recordings: tuple[str, ...]
@@ -52,7 +52,7 @@ class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
         before_m: Position error of free runs on unseen parts with the car as given; None: unknown.
         after_m: The same with what was found.
         runtime_s: Of the search.
-        cut_short: Whether time ran out before all was asked.
+        cut_short: Whether time ran out before everything was tried.
     """
 
     name: str
@@ -83,10 +83,10 @@ class Together(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Offers(msgspec.Struct, kw_only=True, frozen=True):
-    """What a search may be asked of.
+    """What a search can be run on.
 
     Attributes:
-        recordings: Runs of the city on the shelf, newest first.
+        recordings: Recorded runs of the city, newest first.
         cars: Names of car files.
         most_upload_bytes: The largest zip that is taken.
     """
@@ -144,7 +144,7 @@ class Upload(msgspec.Struct, kw_only=True, frozen=True):
     """A recording that was sent.
 
     Attributes:
-        upload: Its id, for a mismatch job; the newest twenty are kept.
+        upload: Its id, for a mismatch job; the newest twenty are stored.
         files: Of how many files it is.
         size_bytes: Unpacked.
         vehicles: Car files or cars that its description names; empty of a city's run.
@@ -157,13 +157,13 @@ class Upload(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class JobBody(Body, kw_only=True, frozen=True):
-    """A search: of a recording of the shelf, of an upload, or again with what was driven since."""
+    """A search: of a stored recording, of an upload, or again with what was driven since."""
 
     recording: Annotated[
         str,
         Meta(
             max_length=128,
-            description="name on the recordings shelf",
+            description="name of a stored recording",
             examples=["city-120000.mcap"],
         ),
     ] = ""
@@ -191,7 +191,7 @@ class JobBody(Body, kw_only=True, frozen=True):
         str,
         Meta(
             pattern=r"^[a-z0-9_-]{0,32}$",
-            description="its car file's name; empty: what the recording says",
+            description="its car file's name; empty: as in the recording",
             examples=["nigel"],
         ),
     ] = ""
@@ -202,7 +202,7 @@ class JobBody(Body, kw_only=True, frozen=True):
                 ge=5.0,
                 le=4 * BUDGET_S,
                 description=(
-                    "what is not found in time to be told after it is not looked for "
+                    "time allowed for the search; it reports what it found by then "
                     "[s]; null: 1800, of a search again as before"
                 ),
                 examples=[120.0],

@@ -14,11 +14,11 @@ class Operation(msgspec.Struct, kw_only=True, frozen=True):
         id: Of this operation, below `/operations`.
         kind: What work it is: `mismatch`, `export`, ...
         what: Of which thing, in words.
-        progress: 0 to 1; None: nobody can tell.
+        progress: 0 to 1; None: not known.
         doing: The step it is at, in words.
         result: Address of what it made; empty until it is done.
         error: Why it failed; empty unless it did.
-        owner: Who asked for it.
+        owner: Who requested it.
     """
 
     id: str

@@ -10,13 +10,13 @@ class Problem(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
     """The body of an error, RFC 9457.
 
     Attributes:
-        type: `about:blank`: the status says it all.
+        type: `about:blank`: the status is enough.
         title: The status in words.
         status: Of the answer.
         code: A short word for programs.
         detail: What is wrong, where, what was expected, in a sentence.
         asked: Where a part of the city did not answer: the request and its key on the bus.
-        instance: What was asked.
+        instance: The path of the request.
         trace_id: Names this request in the log of the server (W3C trace context).
         errors: Each wrong field: `where` it stands, and what was `expected` there.
     """

@@ -29,9 +29,9 @@ class RecordingRow(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         state: `being written`; `complete`; `cut off`: its writer was killed, and it is read as far
-            as it goes; `unreadable`: `trouble` says why.
-        begin_ns: When the first message was heard, since 1970; None: it holds none.
-        cars: Those that told of themselves, in the order people count.
+            as it goes; `unreadable`: `trouble` gives the reason.
+        begin_ns: When the first message arrived, since 1970; None: it holds none.
+        cars: Those that reported their state, in natural order.
     """
 
     name: str
@@ -51,8 +51,8 @@ class CarAt(msgspec.Struct, kw_only=True, frozen=True, array_like=True):
     Attributes:
         car: Number of its entry in `cars`.
         lights: Names of those that are on.
-        stuck: It was told to drive and stayed: what it most likely pushed against, names of cars,
-            `wall`, boxes; empty: nothing that is known. None: it was not stuck.
+        stuck: It was commanded to drive and stayed: what it most likely pushed against, names of
+            cars, `wall`, boxes; empty: nothing that is known. None: it was not stuck.
     """
 
     car: int
@@ -118,7 +118,7 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
     """A stretch of a recording.
 
     Attributes:
-        to_s: How far it goes: less than was asked where that would be too much for one answer.
+        to_s: How far it goes: less than requested where that would be too much for one answer.
         cars: Whom the frames' numbers mean.
         signals: Changes, the colours at `from_s` first; a group is `junction/group`.
         pictures: The Eye's and the cars' own, of each camera the one that is newest at `from_s`
@@ -155,9 +155,9 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
     """What is known of a recording before any of it is shown.
 
     Attributes:
-        cars: All cars that it tells of.
-        map_title: Of the map that was driven on; empty: it does not tell.
-        first_frame_s: When the world first told where cars are: it may have begun later.
+        cars: All cars in it.
+        map_title: Of the map that was driven on; empty: not known.
+        first_frame_s: When the world first reported where cars are: it may have begun later.
         eye_cameras: The overhead cameras of which it has pictures.
         car_cameras: The cars' own, likewise.
     """

@@ -34,7 +34,7 @@ class ScenarioBody(Body, kw_only=True, frozen=True):
         str,
         Meta(
             max_length=MOST_BYTES,
-            description="Python that drives the fleet, as `scm.fleet` says",
+            description="Python that drives the fleet, with `scm.fleet`",
             examples=['"""Say hello."""\nprint("hello")\n'],
         ),
     ]

@@ -17,4 +17,4 @@ class Session(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Ended(msgspec.Struct, kw_only=True, frozen=True):
-    """The cookie is forgotten: nothing more to say."""
+    """The cookie is removed."""

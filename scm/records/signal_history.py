@@ -30,8 +30,8 @@ class History(msgspec.Struct, kw_only=True, frozen=True):
     """The last minutes of one junction, on its controller's clock.
 
     Attributes:
-        t_ns: Of the last step that was heard; None: none was yet.
-        kept_s: How far back anything is kept.
+        t_ns: Of the last message received; None: none yet.
+        kept_s: How far back anything is stored.
     """
 
     junction: str
@@ -42,16 +42,16 @@ class History(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class LeadScore(msgspec.Struct, kw_only=True, frozen=True):
-    """Likely ends as told some time before the end, against the end.
+    """Likely ends as forecast some time before the end, against the end.
 
     Attributes:
         colour: That ended.
         lead_s: How long before.
-        errors_s: Told less true, one for each colour that ended; + = it ended earlier than told.
-        unknown: How often no likely end was told.
+        errors_s: Forecast minus truth, one for each colour that ended; + = it ended earlier.
+        unknown: How often there was no forecast.
         mean_s, worst_s: Of the errors; None: there are none. `worst_s` by its amount.
         within: Share of errors of a second at most.
-        told: Mean of the confidence that was told.
+        told: Mean of the published confidence.
     """
 
     colour: str
@@ -65,13 +65,13 @@ class LeadScore(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class ForecastScore(msgspec.Struct, kw_only=True, frozen=True):
-    """What became of what SPaT told in the last minutes.
+    """How the forecasts of SPaT of the last minutes came true.
 
     Attributes:
         judged: Colours that ended.
-        early: Of them, before the earliest end that was told.
-        late: After the latest end that was told.
-        open: Whose latest end was never told.
+        early: Of them, before the earliest published end.
+        late: After the latest published end.
+        open: Whose latest end was never published.
         cut: Ended by flash; not judged.
     """
 
@@ -86,7 +86,7 @@ class ForecastScore(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Verdict(msgspec.Struct, kw_only=True, frozen=True):
-    """What the monitor said from a time on, on its clock."""
+    """A verdict of the monitor, from a time on its clock."""
 
     t_ns: int
     fault: str | None

@@ -72,7 +72,7 @@ class SignalPlan(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SignalPolicy(msgspec.Struct, kw_only=True, frozen=True):
-    """A policy that may be asked for; `has_detectors`: it listens for cars."""
+    """A policy that may be requested; `has_detectors`: it uses detectors."""
 
     policy: str
     about: str
@@ -84,7 +84,7 @@ class PlanProof(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         digest: Of what was proven.
-        states, transitions: Of the kernel, under any wishes.
+        states, transitions: Of the kernel, under any requests.
         plan_states, plan_transitions: Of the kernel under this plan, however late its steps.
         cycle_s: What the stages make, with yellow and red clear.
         took_s: How long the search took.
@@ -100,7 +100,7 @@ class PlanProof(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
-    """A plan as it may be asked for.
+    """A plan that may be requested.
 
     Attributes:
         source: `shipped` with the city or its map, or `saved` by somebody.

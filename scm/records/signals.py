@@ -21,7 +21,7 @@ Colour = Literal["red", "green", "yellow", "flashing_red", "dark"]
 
 
 class SignalOverride(msgspec.Struct, kw_only=True, frozen=True):
-    """A wish that is in force.
+    """An override in force.
 
     Attributes:
         ends_ns: When it lapses at the latest.
@@ -100,7 +100,7 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class MonitorRow(msgspec.Struct, kw_only=True, frozen=True):
-    """The second channel; `fault` is None while all is well, `age_s` since it was last heard."""
+    """The second channel; `fault` is None while all is well, `age_s` since its last message."""
 
     fault: str | None
     detail: str
@@ -108,10 +108,10 @@ class MonitorRow(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class JunctionRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One junction; `fresh` tells whether its controller was heard within the last second.
+    """One junction; `fresh`: its controller was received within the last second.
 
     Attributes:
-        t_ns: The controller's clock now; None: it was never heard.
+        t_ns: The controller's clock now; None: never received.
     """
 
     junction: str
@@ -149,13 +149,13 @@ class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class FlashReply(msgspec.Struct, kw_only=True, frozen=True):
-    """What runs now: a `SignalReply` where the wish has an end of its own, else a `PlanReply`.
+    """What runs now: a `SignalReply` where the override has an end of its own, else a `PlanReply`.
 
     Attributes:
-        policy: In force now; not told by a `PlanReply`.
-        plan: In force now; not told by a `SignalReply`.
+        policy: In force now; absent from a `PlanReply`.
+        plan: In force now; absent from a `SignalReply`.
         pending: To come into force at the next safe moment; empty: none.
-        wishes: In force now; not told by a `PlanReply`.
+        wishes: In force now; absent from a `PlanReply`.
     """
 
     junction: str
@@ -197,7 +197,7 @@ class PlanChoiceBody(Attributed, kw_only=True, frozen=True):
 
 
 class OverrideBody(Attributed, kw_only=True, frozen=True):
-    """A wish for signal groups; it lapses, and the junction goes back to what runs."""
+    """An override of signal groups; it ends by itself, and the junction goes back to what runs."""
 
     groups: Annotated[
         tuple[Annotated[str, Meta(max_length=64)], ...],
@@ -228,19 +228,19 @@ class FlashBody(Attributed, kw_only=True, frozen=True):
 
 
 class ClearBody(Attributed, kw_only=True, frozen=True):
-    """Which wishes to take back; both empty: all."""
+    """Which overrides to withdraw; both empty: all."""
 
     groups: Annotated[
         tuple[Annotated[str, Meta(max_length=64)], ...],
         Meta(
             max_length=64,
-            description="wishes for any of these groups; empty: whatever they are for",
+            description="overrides of any of these groups; empty: of all groups",
             examples=[["south_east"]],
         ),
     ] = ()
     verb: Annotated[
         Literal["", "call", "hold", "force_off", "omit", "preempt", "policy"],
-        Meta(description="wishes of this kind; empty: of any", examples=["hold"]),
+        Meta(description="overrides of this kind; empty: of any", examples=["hold"]),
     ] = ""
 
 

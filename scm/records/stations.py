@@ -47,7 +47,7 @@ class StationEvents(msgspec.Struct, kw_only=True, frozen=True):
     """What the log still holds of one station.
 
     Attributes:
-        events: Those it told, and those about it, newest first.
+        events: Those it reported, and those about it, newest first.
     """
 
     events: tuple[LoggedEvent, ...]

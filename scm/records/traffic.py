@@ -56,7 +56,7 @@ class ApproachCount(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class TrackPoint(msgspec.Struct, kw_only=True, frozen=True):
-    """Where the car was believed to be: rear axle, map frame; `source` says who told it."""
+    """Where the car was estimated to be: rear axle, map frame; `source` reported it."""
 
     t_ns: int
     x_m: float
@@ -79,7 +79,7 @@ class Counts(TrafficCounts, kw_only=True, frozen=True):
     """Counts of the observer.
 
     Attributes:
-        void: Why the window's counts, delays and queues say nothing of plans, in words; none: they
+        void: Why the window's counts, delays and queues do not count for plans; none: they
             do.
     """
 
@@ -87,15 +87,15 @@ class Counts(TrafficCounts, kw_only=True, frozen=True):
 
 
 class Violation(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """One event: told once, however long it lasts.
+    """One event: published once, however long it lasts.
 
     Attributes:
-        number: Counts the violations that this observer has told, from 1.
+        number: Counts the violations of this observer, from 1.
         lane: Where it happened; empty: on no lane.
         at_m: Where along that lane the rear axle was.
         text: One sentence with what was allowed and what was done.
         certainty: That it was beyond what is allowed, from the doubt of the poses; 0 to 1.
-        sources: Who told the poses, and what was shown: `eye`, `self`, `spat`, `contact`.
+        sources: Sources of the poses, and of what was shown: `eye`, `self`, `spat`, `contact`.
         junction, signal: Whose signal, and what its group showed then.
         against: In a collision: names of cars, or `wall`.
         track: The seconds before, oldest first.

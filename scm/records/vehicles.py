@@ -27,7 +27,7 @@ class TripRow(msgspec.Struct, kw_only=True, frozen=True):
     """Progress of a trip; `length_m` is None for a route without end.
 
     Attributes:
-        void: Why its time so far says nothing of the city, in words; none: it counts.
+        void: Why its time so far does not count; none: it does.
     """
 
     trip_id: str
@@ -52,8 +52,8 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
         command_age_ms: How old the newest command of its leaseholder is, since it reached the car,
             the snapshot's age included; None: nobody else drives it, or none came yet.
         throttle: As the car reports it; None: it reports nothing.
-        stuck: It was told to drive for seconds and stays: what it most likely pushes against, names
-            of cars, `wall`, boxes; empty: nothing that is known. None: it is not stuck.
+        stuck: It was commanded to drive for seconds and stays: what it most likely pushes against,
+            names of cars, `wall`, boxes; empty: nothing that is known. None: it is not stuck.
         eye: What the Eye's newest pose differs from the truth; None: not seen lately.
     """
 
@@ -84,7 +84,7 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class VehiclesTopic(msgspec.Struct, kw_only=True, frozen=True):
-    """All vehicles and the world's pulse; `t_ns` and `tick` are None until it is heard."""
+    """All vehicles and the world's time; `t_ns` and `tick` are None until it is received."""
 
     t_ns: int | None
     tick: int | None
@@ -153,7 +153,10 @@ class RouteBody(Body, kw_only=True, frozen=True):
         Annotated[
             float,
             Meta(
-                gt=0.0, le=10.0, description="wished on free road; null: the limits", examples=[0.3]
+                gt=0.0,
+                le=10.0,
+                description="target speed on a free road; null: the limits",
+                examples=[0.3],
             ),
         ]
         | None

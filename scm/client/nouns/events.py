@@ -112,7 +112,7 @@ class EventsNoun:
 
         Args:
             events: ids of the events
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             note: what there is to say
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

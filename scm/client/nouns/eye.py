@@ -212,7 +212,7 @@ class EyeNoun:
 
         Args:
             name: a name on the bus
-            lens: a lens on the shelf; null: the map's
+            lens: a stored lens; null: the map's
             tags: tags on the floor beside the map's: id, x_m, y_m, yaw_rad, size_m of each
             save_as: what the result is called, with a number where it is taken by then
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -332,9 +332,9 @@ class EyeNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why
-            calibration: a calibration on the shelf
+            calibration: a stored calibration
             accept_unsure: whether it is meant although the Eye would flag its poses as unsure and
                 guarded cars would stop; without it such a calibration is a 409 of code `unsure`
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -359,7 +359,7 @@ class EyeNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

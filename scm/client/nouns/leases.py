@@ -47,7 +47,7 @@ class LeasesNoun:
 
         Args:
             name: a name on the bus
-            program: tells programs of one caller apart: each holds its own leases
+            program: distinguishes programs of one caller: each holds its own leases
             ttl_ms: how long it lives unless renewed [ms]
             reason: why it is taken from whoever holds it; empty: only if it is free
             idempotency_key: Same key, same effect, once; empty: a new one.

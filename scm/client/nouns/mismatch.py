@@ -37,12 +37,12 @@ class MismatchNoun:
         """Search for what the simulator left out.
 
         Args:
-            recording: name on the recordings shelf
+            recording: name of a stored recording
             upload: id of an upload, instead
             again: a report, instead: its recordings and drives since
             vehicle: which car of it; empty: all
-            car: its car file's name; empty: what the recording says
-            budget_s: what is not found in time to be told after it is not looked for [s]; null:
+            car: its car file's name; empty: as in the recording
+            budget_s: time allowed for the search; it reports what it found by then [s]; null:
                 1800, of a search again as before
             from_s: leave out what is before, since its begin [s]
             to_s: leave out what is after [s]

@@ -49,7 +49,7 @@ class ScenariosNoun:
             name: a script without .py
             if_match: ETag of the state that was edited; `*`: whichever there is
             if_none_match: `*`: only where there is none yet
-            text: Python that drives the fleet, as `scm.fleet` says
+            text: Python that drives the fleet, with `scm.fleet`
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.request(

@@ -98,7 +98,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -126,7 +126,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -154,7 +154,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -182,7 +182,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -210,7 +210,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -238,10 +238,10 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
-            groups: wishes for any of these groups; empty: whatever they are for
-            verb: wishes of this kind; empty: of any
+            groups: overrides of any of these groups; empty: of all groups
+            verb: overrides of this kind; empty: of any
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
         return self._connection.request(
@@ -259,7 +259,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
             plan: a plan by name (shipped, the map's own, or saved), a policy, or `flash`
             idempotency_key: Same key, same effect, once; empty: a new one.
@@ -286,7 +286,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
             policy: its name
             expires_s: seconds until it lapses by itself
@@ -314,7 +314,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
             engaged: true: flash; false: go on, all red first
             expires_s: seconds until it ends by itself; null: not by itself
@@ -350,7 +350,7 @@ class SignalsNoun:
 
         Args:
             name: a name on the bus
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why it is over
             idempotency_key: Same key, same effect, once; empty: a new one.
         """
@@ -410,7 +410,7 @@ class SignalsNoun:
             if_match: ETag of the state that was edited; `*`: whichever there is
             if_none_match: `*`: only where there is none yet
             about: what it is for
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
             stages: in the order of the cycle
             offset_s: when its cycle begins, after a time that is a whole number of cycles on the

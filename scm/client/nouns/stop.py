@@ -24,7 +24,7 @@ class StopNoun:
 
         Args:
             engaged: true: stop every car
-            by: who asks, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

@@ -84,7 +84,7 @@ class VehiclesNoun:
             name: a name on the bus
             via: lanes to pass, in this order
             laps: how often to pass them
-            speed_mps: wished on free road; null: the limits
+            speed_mps: target speed on a free road; null: the limits
             then: at the end of the last lane: stand, or drive on without end
             idempotency_key: Same key, same effect, once; empty: a new one.
         """

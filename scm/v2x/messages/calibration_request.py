@@ -1,4 +1,4 @@
-"""A wish for an overhead camera: see by this calibration from the next frame on."""
+"""A request to an overhead camera: use this calibration from the next frame on."""
 
 from typing import ClassVar, Literal
 
@@ -33,7 +33,7 @@ class MeasuredLens(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class CalibrationReply(Message, kw_only=True, frozen=True):
-    """The wish was taken: what the camera sees by from its next frame on."""
+    """The request was accepted: what the camera uses from its next frame on."""
 
     KEY: ClassVar[str] = "eye/{camera}/req/reply"
 
@@ -42,12 +42,12 @@ class CalibrationReply(Message, kw_only=True, frozen=True):
 
 
 class CalibrationRequest(Request, kw_only=True, frozen=True):
-    """See by a lens, by a place, or by what was in force before; with who asks and why.
+    """Use a lens, a place, or the calibration before; with who requests it and why.
 
     It is checked first, and refused where the floor's tags, as they are seen now, contradict it.
 
     Attributes:
-        verb: `use` what follows; `back`: what was in force before, whatever the tags say of it.
+        verb: `use` what follows; `back`: what was in force before, whatever the tags show.
         calibration: What it is called.
         place: Where the camera hangs, and the lens it was found with: the map file's block.
         lens: Alone: in place of the lens in force. With a place: the doubt of that place's lens.

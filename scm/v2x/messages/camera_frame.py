@@ -1,4 +1,4 @@
-"""A picture of a car's own camera, as JPEG; sent only while somebody asks for it by name."""
+"""A picture of a car's own camera, as JPEG; sent only while somebody subscribes to it by name."""
 
 from typing import ClassVar
 

@@ -9,7 +9,7 @@ class CityEvent(Message, kw_only=True, frozen=True):
     """One event.
 
     Attributes:
-        source: The station that tells it.
+        source: The station that reports it.
         name: A fixed short name: `vehicle_joined`, `vehicle_lost`, `plan_changed` ...
         text: One sentence for a person.
     """

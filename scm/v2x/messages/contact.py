@@ -1,4 +1,4 @@
-"""The world tells that a car was hit: what the contact did to its motion.
+"""The world reports a contact of a car: what it did to the car's motion.
 
 A remote car is to apply it; a hosted one has done so already, and others only watch.
 """
@@ -12,7 +12,8 @@ class Contact(Message, kw_only=True, frozen=True):
     """What contacts did to the centre of gravity since the last one sent, map frame.
 
     Attributes:
-        number: Counts the contacts told to this car, from 1; its reports say what it has felt.
+        number: Counts the contacts reported to this car, from 1; its state names the newest
+            applied.
             0: a hosted car, whose report needs not say.
         dx_m: Position correction out of the overlap, and for what it drove on before it felt the
             hit; likewise `dy_m`, `dyaw_rad`.

@@ -1,4 +1,4 @@
-"""What a car is told to do now, by the one who holds its lease."""
+"""The command of whoever holds a car's lease: throttle and steering."""
 
 from typing import ClassVar, Literal
 

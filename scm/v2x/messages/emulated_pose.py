@@ -1,4 +1,4 @@
-"""Where an emulated car truly is: what there is to see for an emulated camera, told to nobody else.
+"""Where an emulated car truly is: what an emulated camera sees, published to nobody else.
 
 It is truth, as the world's snapshot is: never for agents, who have only what the Eye sees.
 """

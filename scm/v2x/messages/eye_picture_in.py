@@ -9,7 +9,7 @@ class EyePictureIn(Message, kw_only=True, frozen=True):
     """One frame as the lens gives it; `payload` is the JPEG file.
 
     `EyeFrame` is what the Eye shows of its pictures, this is what it is given to look at. The key
-    is verbatim at its end: nobody gets these pictures who does not ask for them by name.
+    is verbatim at its end: only who subscribes to them by name gets these pictures.
 
     Attributes:
         t_ns: When it was exposed, on the sender's clock.

@@ -8,7 +8,7 @@ from scm.v2x.message import Message
 class EyePreview(Message, kw_only=True, frozen=True):
     """One frame with its tags outlined and named, and the camera's complaints below.
 
-    Made only while somebody asks for it by name. `EyeFrame` is the bare picture.
+    Made only while somebody subscribes to it by name. `EyeFrame` is the bare picture.
     """
 
     KEY: ClassVar[str] = "eye/{camera}/@preview"

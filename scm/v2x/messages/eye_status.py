@@ -1,4 +1,4 @@
-"""What an overhead camera says of itself: whether its poses can be trusted, and why not."""
+"""The status of an overhead camera: whether its poses can be trusted, and why not."""
 
 from typing import ClassVar
 
@@ -25,7 +25,7 @@ class EyeStatus(Message, kw_only=True, frozen=True):
 
     Attributes:
         good: Nothing spoils its poses.
-        in_force: By what it sees; None: not told.
+        in_force: By what it sees; None: not reported.
     """
 
     KEY: ClassVar[str] = "eye/{camera}/status"

@@ -1,4 +1,4 @@
-"""Where a car is, told by all overhead cameras together."""
+"""Where a car is, by all overhead cameras together."""
 
 from typing import ClassVar
 
@@ -12,7 +12,7 @@ class EyeTrack(Message, kw_only=True, frozen=True):
 
     Attributes:
         vehicle: The car; `tag-<id>` for a tag that belongs to nobody.
-        t_ns: The time that it is told for: when it was sent, not when a frame was exposed.
+        t_ns: The time of the estimate: when it was sent, not when a frame was exposed.
         speed_mps: Along the car, + = forward; `lateral_speed_mps`: + = to its left.
         covariance: Rows over x, y, yaw, speed, lateral speed, yaw rate, in the units of these.
         age_s: Since a camera last saw it.

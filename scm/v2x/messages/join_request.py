@@ -1,4 +1,4 @@
-"""A car with dynamics of its own (or a real one) asks to join the city."""
+"""A car with dynamics of its own (or a real one) requests to join the city."""
 
 from typing import ClassVar
 

@@ -26,7 +26,7 @@ class LeaseRequest(Request, kw_only=True, frozen=True):
     """Acquire, renew, release or steal the lease of a car.
 
     Attributes:
-        owner: Who asks.
+        owner: Who requests it.
         epoch: Of the lease to renew or release; ignored when acquiring.
         reason: Why it is stolen; must be given then, and is put into the event log.
     """

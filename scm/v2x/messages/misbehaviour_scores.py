@@ -1,4 +1,4 @@
-"""What is held against each station that speaks on the air."""
+"""The misbehaviour score of each station on the air."""
 
 from typing import ClassVar
 
@@ -7,7 +7,7 @@ from scm.v2x.message import Message
 
 
 class MisbehaviourScores(Message, kw_only=True, frozen=True):
-    """All stations heard within the last minute, once a second.
+    """All stations received within the last minute, once a second.
 
     Attributes:
         witness: Whether an Eye is there to hold CAMs against.

@@ -10,7 +10,7 @@ class PartStatus(Message, kw_only=True, frozen=True):
 
     Attributes:
         detail: One line for a person: `6 cars`, `plan calm`, `7 tags`.
-        steps: Steps that were made, since its start; 0: not told.
+        steps: Steps that were made, since its start; 0: not reported.
         late_steps: Steps that were due and left out, for the one before them took too long.
         dropped: Messages its mailboxes had to drop.
         cars: Of the world: how many are on the map.

@@ -1,4 +1,4 @@
-"""A wish for a junction's signals: another plan, or flashing red. The kernel decides when."""
+"""A request to a junction's signals: another plan, or flashing red. The kernel decides when."""
 
 from typing import ClassVar
 
@@ -7,7 +7,7 @@ from scm.v2x.message import Message, Request
 
 
 class PlanReply(Message, kw_only=True, frozen=True):
-    """The wish was taken.
+    """The request was accepted.
 
     Attributes:
         plan: In force now.
@@ -22,10 +22,11 @@ class PlanReply(Message, kw_only=True, frozen=True):
 
 
 class PlanRequest(Request, kw_only=True, frozen=True):
-    """Use a plan by name, or `flash`; with who asks and why.
+    """Use a plan by name, or `flash`; with who requests it and why.
 
     Attributes:
-        plan: Empty: end a flash that a person asked for; what ran, what is to come and wishes stay.
+        plan: Empty: end a flash that a person asked for; what ran, what is to come and overrides
+            stay.
         stages: Of a plan that the junction does not have: it is checked, taken and run under that
             name for as long as it is wanted. Empty: one of its own.
         offset_s: Of these stages: when their cycle begins, after a time that is a whole number of

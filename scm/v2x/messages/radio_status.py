@@ -9,9 +9,9 @@ class RadioStatus(Message, kw_only=True, frozen=True):
     """The last second on the air, to all stations but hosted cars.
 
     Attributes:
-        sent: Frames; one that two stations hear counts once here and twice in `delivered`.
-        delivered: To a station that heard it.
-        out_of_range: Not heard because too far away.
+        sent: Frames; one that two stations receive counts once here and twice in `delivered`.
+        delivered: To a station that received it.
+        out_of_range: Not received: too far away.
         by_chance: Lost whatever the distance.
         by_distance: Lost to fading and walls.
         by_load: Lost to collisions, or never sent because the channel is full.
@@ -20,7 +20,7 @@ class RadioStatus(Message, kw_only=True, frozen=True):
         late_ms: Their mean delay; 0: none was late.
         waiting: On their way now.
         busy_mean: Share of time that the channel is busy, mean of all stations; 0: not measured.
-        busy_most: Of the station that hears most.
+        busy_most: Of the station that receives most.
         stations: Those that are not hosted cars; `busy` of each.
     """
 

@@ -1,4 +1,4 @@
-"""A wish for a junction's signals in a traffic engineer's words; nobody ever sets a colour."""
+"""An operator override of a junction's signals; nobody ever sets a colour."""
 
 from typing import ClassVar, Literal
 
@@ -7,7 +7,7 @@ from scm.v2x.message import Message, Request
 
 
 class SignalReply(Message, kw_only=True, frozen=True):
-    """The wish was taken; what is in force now, and what is to come at the next safe moment.
+    """The request was accepted: what is in force now, and what comes at the next safe moment.
 
     Attributes:
         policy: In force now.
@@ -23,16 +23,16 @@ class SignalReply(Message, kw_only=True, frozen=True):
 
 
 class SignalRequest(Request, kw_only=True, frozen=True):
-    """Wish something for signal groups; it lapses, and then the junction goes back to its plan.
+    """Override signal groups for a time; then the junction goes back to its plan.
 
     Attributes:
         verb: `call`: serve them once. `hold`: stay green, once green. `force_off`: end the green
             when its least time is over and others are called. `omit`: do not begin. `preempt`: go
-            to this one group and stay. `policy`: run the one named. `clear`: take back all
-            wishes, or those for these groups.
-        clears: With `clear`: takes back wishes with this verb alone; empty: with any.
-        by: Who wishes; `reason`: why. Both are told.
-        expires_s: When the wish lapses, from now; 900 s at most.
+            to this one group and stay. `policy`: run the one named. `clear`: withdraw all
+            overrides, or those for these groups.
+        clears: With `clear`: withdraws overrides with this verb alone; empty: with any.
+        by: Who requests it; `reason`: why. Both are published.
+        expires_s: When it ends, from now; 900 s at most.
     """
 
     KEY: ClassVar[str] = "tl/{junction}/wish"

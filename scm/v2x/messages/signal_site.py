@@ -7,7 +7,7 @@ from scm.v2x.message import Delivery, Message
 
 
 class SignalSite(Message, kw_only=True, frozen=True):
-    """One junction for whoever joins; told at the start and every 10 s.
+    """One junction, for late joiners; published at the start and every 10 s.
 
     Attributes:
         conflicts: Pairs of groups that are never green together.

@@ -8,12 +8,12 @@ from scm.v2x.message import Message
 
 
 class SignalStatus(Message, kw_only=True, frozen=True):
-    """Told once a second, and at once when what runs or a wish changes.
+    """Published once a second, and at once when what runs or an override changes.
 
     Attributes:
         plan: Of the timetable, also while another policy runs.
         pending: Plan or policy to come at the next safe moment; empty: none.
-        wishes: Of people and scripts, in force.
+        wishes: Overrides of people and scripts, in force.
         detectors: Of the groups; none: nobody listens for cars now.
         turns: Greens to come, by the timetable or as the policy foresees; none: nobody knows.
         failure: Why a policy was given up for fixed time; empty: none was.

@@ -1,4 +1,4 @@
-"""What a car's own sensors say: encoders, inertial measurements, feedback, indoor position."""
+"""Measurements of a car's own sensors: encoders, inertial ones, feedback, indoor position."""
 
 from typing import ClassVar
 
@@ -16,7 +16,7 @@ class VehicleSensors(Message, kw_only=True, frozen=True):
         accel_mps2: x forward, y left, z up, gravity included, at the IMU.
         gyro_radps: Roll, pitch and yaw rate.
         orientation_rad: Roll, pitch and yaw by the IMU.
-        throttle: What the motor controller was last told, -1 to 1.
+        throttle: The last command to the motor controller, -1 to 1.
         steering_rad: Mean angle of the front wheels, + = left.
         ips_m: Where the tag on the roof is, map frame; `ips_yaw_rad` which way it looks.
     """

@@ -13,7 +13,8 @@ class VehicleState(Message, kw_only=True, frozen=True):
         source: Where the pose comes from: `simulated`, `eye`, `odometry`.
         steering_rad: Mean road-wheel angle, + = left.
         throttle, steering: The commands after the guard that led here, -1 to 1, + = forward and
-            left: in force until `t_ns`, since the sender's step before. Steering None: not told.
+            left: in force until `t_ns`, since the sender's step before. Steering None: not
+                reported.
         epoch: Of the lease the car obeys now.
         mode: `drive`, `hold` (commands late), `stop` (commands lost or city stopped), `idle`.
         lights: Names of those that are on: `head_low head_high left right tail brake reverse`.
@@ -23,7 +24,7 @@ class VehicleState(Message, kw_only=True, frozen=True):
             estimates it from the voltage. None: not known.
         command_age_ms: How old the newest command of its leaseholder is, since it arrived here;
             None: nobody else drives it, or none came yet.
-        contacts: Number of the newest `Contact` that this motion has felt; 0: it tells nothing.
+        contacts: Number of the newest `Contact` that this motion includes; 0: not reported.
     """
 
     KEY: ClassVar[str] = "v/{vehicle}/state"

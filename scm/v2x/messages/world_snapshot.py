@@ -25,8 +25,8 @@ class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True, gc=False):
             None: nobody else drives it, or none came yet.
         age_ms: How old its newest state is: 0 for hosted cars.
         alive: False from the moment its agent is known to be gone until it is taken off the map.
-        stuck: It was told to drive for seconds and stays: what it most likely pushes against, names
-            of cars, `wall`, boxes; empty: nothing that is known. None: it is not stuck.
+        stuck: It was commanded to drive for seconds and stays: what it most likely pushes against,
+            names of cars, `wall`, boxes; empty: nothing that is known. None: it is not stuck.
     """
 
     vehicle: str
