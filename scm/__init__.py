@@ -1,22 +1,26 @@
 """Smart City Manager for scaled cars.
 
 errors, clock, geometry     what everybody may use
+records     records that messages, REST, store and client share
+store       what must outlive a process, in SQLite or PostgreSQL
 maps        one city = one file: lanes, lights, tags, walls; routes through it
-recording   anybody's recordings, read through a `recording.yaml`
-v2x         messages, keys, and the bus (Zenoh, or in memory)
-part        the contract of a part: step(now, inbox) -> outbox
+recording   recordings of any source, read through a `recording.yaml`
+v2x         messages, keys, rights, and the bus (Zenoh, or in memory)
+runtime     the contract of a part: step(now, inbox) -> outbox; live, in lockstep, whole cities
 vehicles    cars: physical effects as terms, assembled into one compiled kernel; drivers; guard
 world       the shared world: cars, walls, contacts, sensors, radio, leases
-traffic     signals: the safe kernel, plans, and the monitor that doubts them
-scenery     what the city looks like, for whoever draws it through a lens
+traffic     signals and their monitor, demand, observation, misbehaviour
+scenery     what the city looks like, for everything that draws it through a lens
 eye         overhead camera: tags in frames become poses
-camera      the cars' own cameras: rendered while somebody looks
-recorder    everything on the bus into MCAP
-replay      a recording driven again by the simulator, and the error it makes
-lockstep, live, up      parts on a stepped clock, on the real bus, and the whole city
-api         REST, event stream, dashboard
+camera      the cars' own cameras, rendered while somebody subscribes
+recorder    everything on the bus into MCAP; written drives
+data_quality, replay    recordings checked and repaired; driven again by the simulator
+mismatch    what the simulator left out, found in recordings; blind trials
+ros2        the city as ROS 2 sees it
+selftest    faults injected into a running city
+api, client     REST, event stream, dashboard; the typed client of it
 fleet       scripts that spawn, route and time cars, live or in lockstep
-commands    the command line, one file a command
+commands    the command line, one file per command
 """
 
 __version__ = "0.2.0"

@@ -20,7 +20,7 @@ INTERRUPTED = 130  # what a shell reports for a command ended by Ctrl-C
 def build_parser(only: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of the whole command line, or of `only` one command's.
 
-    To import all commands is half of what a small one takes, and a city starts a dozen of them.
+    Importing all commands takes half the time of a small one, and a city starts a dozen processes.
     """
     from scm.command import Command
     from scm.registry import load, names
@@ -51,7 +51,7 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """Return what the words after `scm` ask for."""
+    """Return the parsed arguments after `scm`."""
     joined = _joined(argv)
     parser = build_parser(_command_name(joined))
     seconds = _seconds(argv)
@@ -61,7 +61,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; return 0 done, 2 bad input, 1 our fault, 130 ended by Ctrl-C."""
+    """Run one command; return 0 done, 2 bad input, 1 a bug, 130 ended by Ctrl-C."""
     arguments = parse(sys.argv[1:] if argv is None else argv)
     logging.basicConfig(
         level=arguments.log.upper(), format="%(asctime)s %(levelname)s %(name)s %(message)s"
@@ -93,7 +93,7 @@ def _joined(argv: Sequence[str]) -> list[str]:
 
 
 def _command_name(joined: Sequence[str]) -> str | None:
-    """Return the name of the command that is meant; None: it takes all of them to say."""
+    """Return the name of the requested command, or None if there is none of that name."""
     from scm.registry import names
 
     at = 2 if joined[:1] == ["--log"] else 0
@@ -102,7 +102,7 @@ def _command_name(joined: Sequence[str]) -> str | None:
 
 
 def _seconds(argv: Sequence[str]) -> list[str]:
-    """Return what may follow a first word that is no command without it; nothing: all is well."""
+    """Return the possible second words of an incomplete command; empty if it is complete."""
     from scm.registry import names
 
     known = names("scm.commands")
@@ -113,7 +113,7 @@ def _seconds(argv: Sequence[str]) -> list[str]:
 
 
 def _report(command: str, error: Exception) -> int:
-    """Tell what stopped a command in one message; return 2 for bad input, 1 for our fault."""
+    """Print why a command failed in one message; return 2 for bad input, 1 for a bug."""
     logging.getLogger(__name__).debug("%s failed", command, exc_info=error)
     place = isinstance(error, OSError) and (error.filename or error.errno == errno.ENOSPC)
     if place or isinstance(error, ScmError):
@@ -121,14 +121,14 @@ def _report(command: str, error: Exception) -> int:
         return 2
     print(
         f"scm {command}: unexpected {type(error).__name__}: {error}\n"
-        f"This is a fault of ours: `scm --log debug {command} ...` shows where it happened.",
+        f"This is a bug: `scm --log debug {command} ...` shows where it happened.",
         file=sys.stderr,
     )
     return 1
 
 
 def _forget_stdout() -> None:
-    """Let the interpreter's own last flush go nowhere: nobody reads any more."""
+    """Discard what the interpreter flushes at its end: the reader is gone."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -25,7 +25,7 @@ class Command:
         help: One line for `scm --help`.
         example: A call that works, shown by `scm <command> --help`.
         arguments: Adds the command's own arguments to its parser.
-        run: Does it; returns the exit code: 0 done, 2 bad input, 1 our fault.
+        run: Does it; returns the exit code: 0 done, 2 bad input, 1 a bug.
     """
 
     help: str
@@ -35,7 +35,7 @@ class Command:
 
 
 def credentials_argument(parser: argparse.ArgumentParser) -> None:
-    """Add who a station is, for a city that lets in nobody else."""
+    """Add the credentials of a station, for a guarded city."""
     parser.add_argument(
         "--credentials",
         type=Path,

@@ -16,7 +16,7 @@
     ├── RunError      (RuntimeError)     a city that cannot start or go on
     └── VoidError     (RuntimeError)     a measurement that something in the city made void
 
-A message says what was wrong, where (file and key), what was got and what was expected.
+A message states what was wrong, where (file and key), the value and what was expected.
 """
 
 from collections.abc import Iterator, Sequence
@@ -83,7 +83,7 @@ class RunError(ScmError, RuntimeError):
 
 
 class VoidError(ScmError, RuntimeError):
-    """A measurement that says nothing of the city: signals flashed, a part was lost, time was."""
+    """A void measurement: signals flashed, a part was lost, or the computer was too slow."""
 
 
 def nearest(name: str, valid: Sequence[str]) -> str:

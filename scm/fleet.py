@@ -400,7 +400,7 @@ def open_city(
         connect: Router of a running city; None: a city of its own, in lockstep.
         city: Name of the city on the bus.
         seed: Of all randomness in lockstep.
-        credentials: File of an operator, where the running city lets in nobody else; None: the
+        credentials: File of an operator, for a guarded city; None: the
             one that `SCM_CREDENTIALS` names, as a city sets it for the scripts that it runs.
     """
     if connect is None:

@@ -1,4 +1,4 @@
-"""How far long work is: on a terminal a line drawn anew, elsewhere a line now and then."""
+"""Progress of long work: on a terminal a line that is redrawn, elsewhere a line now and then."""
 
 import threading
 from collections.abc import Callable
@@ -18,7 +18,7 @@ def bar(share: float) -> str:
 
 
 class ProgressLine:
-    """Shows a line until it is closed, so that nobody takes long work for a program that hangs.
+    """Shows a line until it is closed, so that long work does not look like a hung program.
 
     Args:
         stream: Where to; a line that is drawn anew twice a second if it is a terminal.
@@ -68,7 +68,7 @@ class ProgressLine:
 
 
 class Progress:
-    """Shows which step long work is at, and how many of how many are done.
+    """Shows the current step of long work, and how much of it is done.
 
     Args:
         stream: Where to.
@@ -81,7 +81,7 @@ class Progress:
         self._shown = ProgressLine(stream, self.line, self.line)
 
     def step(self, what: str, done: int = 0, of: int = 0) -> None:
-        """Say what is done from now on; `done` things of `of`, where they are counted.
+        """Set the current step; `done` of `of` things, where they are counted.
 
         Only a new step is shown at once: a count may change many times a second.
         """

@@ -63,7 +63,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _written(city_map: "CityMap", out: Path) -> "CityMap":
-    """Write a map file, once it is known that a city can run on it; return what it says.
+    """Write a map file after checking that a city can run on it; return its description.
 
     Raises:
         ScmError: a city would refuse the map, or the file cannot be written.

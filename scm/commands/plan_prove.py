@@ -1,4 +1,4 @@
-"""`scm plan prove`: the exhaustive search for a plan that somebody made."""
+"""`scm plan prove`: the exhaustive proof of a signal plan."""
 
 import argparse
 import sys

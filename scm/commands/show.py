@@ -26,7 +26,7 @@ _MAP_KINDS = {
     "spawns": "spawn",
     "cameras": "camera",
 }
-_SLOPES = "its floor slopes: cars get what lets them stand on it, docs/floor.md says what\n"
+_SLOPES = "its floor has slopes: simulated cars get tyres that hold on them, see docs/floor.md\n"
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""One station that says too much: `python -m scm.selftest.flood ENDPOINT CITY RATE SECONDS`.
+"""A station that sends too much: `python -m scm.selftest.flood ENDPOINT CITY RATE SECONDS`.
 
 It talks on a key that those who drive and those who steer signals do not hear; the recorder and
 the dashboard do.

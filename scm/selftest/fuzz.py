@@ -1,4 +1,4 @@
-"""Messages that nobody should send: python -m scm.selftest.fuzz ENDPOINT CITY COUNT HZ MOST_S SEED.
+"""Sends invalid messages: python -m scm.selftest.fuzz ENDPOINT CITY COUNT HZ MOST_S SEED.
 
 Half of them are random bytes, half are real ones of the city with something broken; they go to
 every key on which the city talks, and to keys of every message class besides.

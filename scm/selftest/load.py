@@ -24,7 +24,7 @@ BACK_S = 5.0
 
 
 def fuzz(city: City, streams: StreamMonitor) -> Iterator[FaultOutcome]:
-    """Send a million broken messages on every key; nobody may die of it."""
+    """Send a million invalid messages on every key; no process may die."""
     observer = streams.observer
     before = {name: city.pid(name) for name in city.names}
     began_ns, refused = observer.clock.now_ns(), observer.bus.rejected

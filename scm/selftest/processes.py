@@ -89,7 +89,7 @@ def router(city: City, streams: StreamMonitor) -> Iterator[FaultOutcome]:
 
 
 def full_disk(city: City, streams: StreamMonitor) -> Iterator[FaultOutcome]:
-    """Let the recording's file not grow any more: the recorder says so, and takes a new one."""
+    """Stop the recording's file from growing: the recorder reports it and starts a new one."""
     recording = city.recording
     most = recording.stat().st_size + ROOM_BYTES
     began_ns = streams.observer.clock.now_ns()

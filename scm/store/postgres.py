@@ -204,7 +204,7 @@ class PostgresStore:
 
 
 def _without_password(url: str) -> str:
-    """Return where a URL points, without what must not be told.
+    """Return a URL without its secrets.
 
     Raises:
         StoreError: when it cannot be read.

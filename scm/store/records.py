@@ -61,7 +61,7 @@ class EpochRecord(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class StageRecord(msgspec.Struct, kw_only=True, frozen=True):
-    """A stage of a plan that somebody made."""
+    """A stage of a person's plan."""
 
     groups: tuple[str, ...]
     green_s: float

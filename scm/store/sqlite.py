@@ -177,7 +177,7 @@ class SqliteStore:
 
 
 def _why(cause: sqlite3.Error) -> str:
-    """Say what SQLite's complaint means for who runs a city."""
+    """Return an error that explains SQLite's message to whoever runs the city."""
     code = getattr(cause, "sqlite_errorcode", 0) & 0xFF
     meanings = {
         sqlite3.SQLITE_BUSY: "another process keeps it locked",

@@ -32,7 +32,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> 
     [
         (MapError("m.toml: bad"), 2, "scm show: m.toml: bad"),
         (PermissionError(13, "Permission denied", "out.csv"), 2, "Permission denied: 'out.csv'"),
-        (KeyError("x"), 1, "unexpected KeyError: 'x'\nThis is a fault of ours"),
+        (KeyError("x"), 1, "unexpected KeyError: 'x'\nThis is a bug"),
         (OSError(28, "No space left on device"), 2, "scm show: [Errno 28] No space left"),
         (OSError(5, "Input/output error"), 1, "unexpected OSError"),
         (KeyboardInterrupt(), 130, ""),
