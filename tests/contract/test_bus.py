@@ -178,7 +178,7 @@ def test_what_arrives_is_a_copy_with_the_time_of_arrival(city):
     assert item.call is None
 
 
-def test_a_subscription_hears_only_what_its_key_says(city):
+def test_a_subscription_receives_only_its_keys(city):
     sender, listener = city.bus("traffic"), city.bus("api")
     mailbox = subscribed(city, sender, listener, Spat, {"junction": "x2"}, spat("x2"))
     sender.publish(spat("x1", seq=1))
@@ -231,17 +231,17 @@ def test_of_a_frame_that_many_receive_a_mailbox_may_want_one_copy(city):
     for receiver in ("rsu-a", "rsu-b", "rsu-c"):
         world.publish(cam(receiver, 1))
     world.publish(cam("rsu-c", 2))
-    heard = []
+    received = []
 
     def look():
-        heard.extend(item.message.t_ns for item in once.drain())
-        return 2 in heard
+        received.extend(item.message.t_ns for item in once.drain())
+        return 2 in received
 
     settles(city, look)
-    assert [t_ns for t_ns in heard if t_ns > 0] == [1, 2]
+    assert [t_ns for t_ns in received if t_ns > 0] == [1, 2]
 
 
-def test_a_station_hears_itself_when_it_asks_to(city):
+def test_a_station_can_receive_its_own_messages(city):
     bus = city.bus("api")
     mailbox = Mailbox(10)
     bus.subscribe(Spat, {}, mailbox)
@@ -250,15 +250,15 @@ def test_a_station_hears_itself_when_it_asks_to(city):
 
 
 def test_a_late_joiner_gets_the_last_events_of_each_key_and_then_the_new_ones(city):
-    sender, heard = city.bus("world"), Mailbox(1000)
-    city.bus("eye").subscribe(CityEvent, {}, heard)
+    sender, received = city.bus("world"), Mailbox(1000)
+    city.bus("eye").subscribe(CityEvent, {}, received)
     for n in range(CityEvent.KEEP + 5):
         sender.publish(news(f"e{n}"))
     sender.publish(news("other", source="gate"))
     missing = {f"e{CityEvent.KEEP + 4}", "other"}  # till then it would join amid them
 
     def all_sent():
-        missing.difference_update(item.message.name for item in heard.drain())
+        missing.difference_update(item.message.name for item in received.drain())
         return not missing
 
     settles(city, all_sent)
@@ -273,18 +273,18 @@ def test_a_late_joiner_gets_the_last_events_of_each_key_and_then_the_new_ones(ci
 
 
 def test_of_a_state_that_is_kept_once_a_late_joiner_gets_the_newest(city):
-    sender, heard = city.bus("world"), Mailbox(10)
-    city.bus("api").subscribe(CityStop, {}, heard)
+    sender, received = city.bus("world"), Mailbox(10)
+    city.bus("api").subscribe(CityStop, {}, received)
     for engaged in (True, False, True):
         sender.publish(CityStop(t_ns=1, engaged=engaged, by=str(engaged)))
-        assert len(gather(city, heard, 1)) == 1  # else it joins amid them, and hears fewer
+        assert len(gather(city, received, 1)) == 1  # else it joins amid them, and hears fewer
     mailbox = Mailbox(10)
     city.bus("n1").subscribe(CityStop, {}, mailbox)
     assert [i.message.engaged for i in gather(city, mailbox, 1)] == [True]
     assert nothing_more(city, mailbox)
 
 
-def test_events_of_a_station_that_left_are_not_told_to_late_joiners(city):
+def test_events_of_a_station_that_left_are_not_sent_to_late_joiners(city):
     sender = city.bus("world")
     sender.publish(trip())
     sender.close()
@@ -336,7 +336,7 @@ def test_the_raw_firehose_begins_with_the_events_that_are_kept(city):
     assert decode(CityEvent, sample.body) == news("before")
 
 
-def test_who_subscribes_to_presence_hears_who_is_there_who_comes_and_who_goes(city):
+def test_a_presence_subscription_reports_present_joining_and_leaving_stations(city):
     here, watcher = city.bus("world"), city.bus("api")
     here.announce("part")
     mailbox = Mailbox(10)
@@ -395,7 +395,7 @@ def asking(city):
     return Asking(city)
 
 
-def test_a_request_is_answered_by_whoever_serves_it(city, asking):
+def test_a_request_is_answered_by_the_station_that_serves_it(city, asking):
     call, request = asking.request()
     assert request.message == plan()
     asking.server.answer(Answer(request, PlanReply(junction="x1", plan="calm")))
@@ -426,7 +426,7 @@ def test_an_answer_of_another_class_is_refused_at_the_server(city, asking):
         asking.server.answer(Answer(request, CityStop(t_ns=0, engaged=False)))
 
 
-def test_a_request_that_nobody_serves_is_refused_as_offline(city):
+def test_a_request_without_a_server_is_refused_as_offline(city):
     replies = Mailbox(10)
     city.bus("api").call(Call(plan()), replies.put)
     (reply,) = gather(city, replies, 1)
@@ -458,7 +458,7 @@ def test_an_answer_after_the_timeout_is_ignored(city, asking):
     assert nothing_more(city, asking.replies)
 
 
-def test_a_server_that_serves_one_name_does_not_hear_the_others(city):
+def test_a_server_of_one_name_receives_no_requests_for_others(city):
     asking = Asking(city, where={"junction": "x1"})
     asking.request()
     asking.ask(plan("x2"))
@@ -478,7 +478,7 @@ def both_asked(city, asking):
     return other, *asked, lambda: found(city, asking.replies, lambda item: item.call is call)
 
 
-def test_of_two_servers_the_one_that_does_not_refuse_is_heard(city, asking):
+def test_of_two_servers_the_answer_without_a_refusal_counts(city, asking):
     other, refused, taken, reply = both_asked(city, asking)
     other.answer(Answer(refused, Refused(code="not_found", detail="not mine")))
     city.pass_time(0.05)
@@ -487,7 +487,7 @@ def test_of_two_servers_the_one_that_does_not_refuse_is_heard(city, asking):
 
 
 @pytest.mark.parametrize("first", ["owned", "not_found"])
-def test_of_two_refusals_the_one_that_knows_the_thing_is_heard(city, asking, first):
+def test_of_two_refusals_the_one_that_knows_the_name_counts(city, asking, first):
     other, its, ours, reply = both_asked(city, asking)
     waiting = {"not_found": (other, its), "owned": (asking.server, ours)}
     for code in sorted(waiting, key=lambda code: code != first):
@@ -497,7 +497,7 @@ def test_of_two_refusals_the_one_that_knows_the_thing_is_heard(city, asking, fir
     assert reply().message.code == "owned"
 
 
-def test_after_it_is_closed_a_bus_says_so(city):
+def test_a_closed_bus_raises_an_error(city):
     bus = city.bus("api")
     assert bus.connected
     bus.close()
@@ -526,7 +526,7 @@ def settles(city, condition):
         city.pass_time(0.01)
 
 
-def test_what_nobody_subscribes_to_is_not_wanted(city):
+def test_messages_without_a_subscriber_are_not_wanted(city):
     sender, hearer = city.bus("a"), city.bus("b")
     assert not sender.is_wanted(CameraFrame, {})
     mailbox = Mailbox(4)
@@ -540,7 +540,7 @@ def test_what_nobody_subscribes_to_is_not_wanted(city):
     settles(city, lambda: not sender.is_wanted(CameraFrame, {}))
 
 
-def test_everything_is_not_what_must_be_asked_for_by_name(city):
+def test_a_wildcard_does_not_include_kinds_requested_by_name(city):
     sender, recorder = city.bus("a"), city.bus("b")
     everything, asked = RawMailbox(8), RawMailbox(8)
     recorder.subscribe_raw(everything)
@@ -554,7 +554,7 @@ def test_everything_is_not_what_must_be_asked_for_by_name(city):
     assert everything.drain() == []
 
 
-def test_what_must_be_asked_for_by_name_may_be_that_of_one_vehicle(city):
+def test_a_kind_requested_by_name_may_be_of_one_vehicle(city):
     sender, recorder = city.bus("a"), city.bus("b")
     asked = RawMailbox(8)
     recorder.subscribe_raw(asked, CameraFrame, {"vehicle": "n1"})

@@ -124,7 +124,7 @@ def section(kind):
     return SECTION.get(kind, kind)
 
 
-def told(kind, **numbers):
+def nigel_with(kind, **numbers):
     """Return a Nigel whose file says other numbers of its device; keys without the section."""
     return load_car("nigel").with_terms(
         (), {f"{section(kind)}.{key}": number for key, number in numbers.items()}
@@ -148,18 +148,18 @@ def read_for(kind, car, fleet, seconds, seed=0):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_sensor_keeps_the_rate_of_its_file(kind, fleet):
-    assert len(read_for(kind, told(kind, rate_hz=20.0, drop_out=0.0), fleet, 2.0)) == 40
+    assert len(read_for(kind, nigel_with(kind, rate_hz=20.0, drop_out=0.0), fleet, 2.0)) == 40
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_sensor_is_as_late_as_its_file_says(kind, fleet):
-    car = told(kind, rate_hz=20.0, drop_out=0.0, latency_s=0.03)
+def test_a_sensor_has_the_latency_in_its_file(kind, fleet):
+    car = nigel_with(kind, rate_hz=20.0, drop_out=0.0, latency_s=0.03)
     assert {late for late, _ in read_for(kind, car, fleet, 1.0)} == {30_000_000}
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_sensor_loses_the_share_that_its_file_says(kind, fleet):
-    got = len(read_for(kind, told(kind, rate_hz=50.0, drop_out=0.4), fleet, 10.0))
+def test_a_sensor_loses_the_share_in_its_file(kind, fleet):
+    got = len(read_for(kind, nigel_with(kind, rate_hz=50.0, drop_out=0.4), fleet, 10.0))
     # 500 readings: the share is known to 0.022 (one sigma).
     assert got / 500 == pytest.approx(0.6, abs=0.09)
 
@@ -168,7 +168,7 @@ def test_a_sensor_loses_the_share_that_its_file_says(kind, fleet):
 def test_every_noise_of_the_file_spreads_readings(kind, fleet):
     assert noise_keys(kind)
     for key in noise_keys(kind):
-        car = told(kind, rate_hz=50.0, **dict.fromkeys(noise_keys(kind), 0.0) | {key: 0.8})
+        car = nigel_with(kind, rate_hz=50.0, **dict.fromkeys(noise_keys(kind), 0.0) | {key: 0.8})
         got = np.array([values for _, values in read_for(kind, car, fleet, 1.0)])
         never_missed = got[:, np.isfinite(got).all(axis=0)]
         assert (np.ptp(never_missed, axis=0) > 0.5).any(), key
@@ -180,7 +180,7 @@ def test_a_file_without_noise_gives_the_truth(kind, fleet):
                               "bias_rad", "heading_bias_rad", "heading_walk_rad_sqrt_s",
                               "accel_walk_m_s2_sqrt_s", "gyro_walk_rad_s_sqrt_s")
               if f"{section(kind)}.{key}" in file_keys()]  # fmt: skip
-    car = told(kind, rate_hz=20.0, **dict.fromkeys(noise_keys(kind) + others, 0.0))
+    car = nigel_with(kind, rate_hz=20.0, **dict.fromkeys(noise_keys(kind) + others, 0.0))
     exact = sensor(kind).measure(car, fleet, np.array([0]), Surroundings(SCENE, np.array([0])))[0]
     exact = np.floor(exact) if kind == "encoders" else exact
     readings = read_for(kind, car, fleet, 1.0)
@@ -191,7 +191,7 @@ def test_a_file_without_noise_gives_the_truth(kind, fleet):
 
 
 @pytest.mark.parametrize("kind", [*KINDS, "camera"])
-def test_every_key_of_a_sensor_stands_in_its_page(kind):
+def test_every_key_of_a_sensor_is_in_its_page(kind):
     page = DOCS / ("cameras.md" if kind == "camera" else "sensors.md")
     text = page.read_text(encoding="utf-8")
     keys = [key.partition(".")[2] for key in file_keys() if key.startswith(f"{section(kind)}.")]

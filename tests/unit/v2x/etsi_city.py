@@ -1,6 +1,6 @@
-"""Everything that a small city on a stepped clock says over the radio, for the tests of codecs.
+"""Everything that a small city on a stepped clock sends over the radio, for the tests of codecs.
 
-Cars and lights are the city's own; what no part sends by itself here (map, wishes for priority,
+Cars and lights are the city's own; what no part sends by itself here (map, requests for priority,
 their answers, perception) is made of the city's own states by the functions that parts use.
 """
 
@@ -54,7 +54,7 @@ TX = {
 }
 
 
-class Said(NamedTuple):
+class SentMessage(NamedTuple):
     """One message: who sent it, when [ns], and what."""
 
     station: str
@@ -63,8 +63,8 @@ class Said(NamedTuple):
 
 
 @cache
-def city_says() -> dict[str, tuple[Said, ...]]:
-    """Return what is said in twelve seconds of the driving school, by message_type."""
+def city_messages() -> dict[str, tuple[SentMessage, ...]]:
+    """Return what is sent in twelve seconds of the driving school, by message_type."""
     city_map = load_map("driving_school")
     with Lockstep([WorldPart(city_map, 0), TrafficPart(city_map)], start_ns=START_NS) as city:
         cams, spatems = city.subscribe(Subscription(CamTx)), city.subscribe(Subscription(SpatemTx))
@@ -75,13 +75,13 @@ def city_says() -> dict[str, tuple[Said, ...]]:
         city.run_for(8.0)
         city.call(PlanRequest(junction="crossing", plan="flash", by="test"))
         city.run_for(4.0)
-        said = {
-            kind: tuple(Said(m.station, m.t_ns, m.body) for m in (i.message for i in box.drain()))
+        sent = {
+            kind: tuple(SentMessage(m.station, m.t_ns, m.body) for m in (i.message for i in box.drain()))
             for kind, box in (("cam", cams), ("spatem", spatems))
         }
-        heard = [item.message for item in states.drain()]
-    state = heard[-1]
-    return said | _made(city_map, state)
+        received = [item.message for item in states.drain()]
+    state = received[-1]
+    return sent | _made(city_map, state)
 
 
 def _made(city_map, state):
@@ -89,7 +89,7 @@ def _made(city_map, state):
     rsu, t_ns = roadside_station(junction.name), state.t_ns
     mapem = mapem_at(mapem_of(roads, junction), t_ns)
     lane = topology_of(roads, junction).lane_in(junction.groups[1].name)
-    wishes = [
+    requests = [
         PriorityRequest(
             station_id=station_id(state.vehicle),
             number=number,
@@ -106,14 +106,14 @@ def _made(city_map, state):
             [("request", "emergency"), ("update", "publicTransport"), ("cancel", "basicVehicle")]
         )
     ]
-    answers = [PriorityAnswer(wish, status) for wish in wishes for status in STATUSES]
+    answers = [PriorityAnswer(request, status) for request in requests for status in STATUSES]
     return {
-        "mapem": (Said(rsu, t_ns, mapem),),
-        "srem": tuple(Said(state.vehicle, t_ns, srem_of(wish, state)) for wish in wishes),
-        "ssem": (Said(rsu, t_ns, ssem_of(junction, answers, 3, t_ns)),),
+        "mapem": (SentMessage(rsu, t_ns, mapem),),
+        "srem": tuple(SentMessage(state.vehicle, t_ns, srem_of(request, state)) for request in requests),
+        "ssem": (SentMessage(rsu, t_ns, ssem_of(junction, answers, 3, t_ns)),),
         "denm": tuple(_warnings(state, t_ns)),
         "cpm": tuple(
-            Said(rsu, t_ns, collective_perception(tracks, rsu, t_ns).body)
+            SentMessage(rsu, t_ns, collective_perception(tracks, rsu, t_ns).body)
             for tracks in ((), (a_track(t_ns),))
         ),
     }
@@ -132,15 +132,15 @@ def _warnings(state, t_ns):
     sender, other = DenmSender(state.vehicle, first=41), DenmSender("rsu-crossing", 15)
     first = sender.trigger(accident(hit, state), t_ns)
     (new,) = sender.due(t_ns)
-    yield Said(state.vehicle, t_ns, new)
+    yield SentMessage(state.vehicle, t_ns, new)
     sender.update(first, accident(hit, state), t_ns + NS_PER_S)
-    yield Said(state.vehicle, t_ns + NS_PER_S, sender.due(t_ns + NS_PER_S)[0])
+    yield SentMessage(state.vehicle, t_ns + NS_PER_S, sender.due(t_ns + NS_PER_S)[0])
     other.negate(new, t_ns + 2 * NS_PER_S)
     other.trigger(city_stop(1.4, 0.7), t_ns + 2 * NS_PER_S)
     for body in other.due(t_ns + 2 * NS_PER_S):
-        yield Said("rsu-crossing", t_ns + 2 * NS_PER_S, body)
+        yield SentMessage("rsu-crossing", t_ns + 2 * NS_PER_S, body)
     sender.cancel(first, t_ns + 3 * NS_PER_S)
-    yield Said(state.vehicle, t_ns + 3 * NS_PER_S, sender.due(t_ns + 3 * NS_PER_S)[0])
+    yield SentMessage(state.vehicle, t_ns + 3 * NS_PER_S, sender.due(t_ns + 3 * NS_PER_S)[0])
 
 
 def a_track(t_ns):
@@ -154,15 +154,15 @@ def a_track(t_ns):
 
 
 def record_city(path, late_ns=0):
-    """Write all of it as a run that was heard a little later than it was sent; return the path."""
+    """Write all of it as a run received a little later than it was sent; return the path."""
     with RunFile(path, "city") as run:
-        for kind, said in sorted(everything(), key=lambda one: one[1].t_ns):
-            message = TX[kind](station=said.station, t_ns=said.t_ns, body=said.body)
+        for kind, sent in sorted(everything(), key=lambda one: one[1].t_ns):
+            message = TX[kind](station=sent.station, t_ns=sent.t_ns, body=sent.body)
             key, (body, _) = key_of("city", message), encode(message)
-            run.write(RawSample(key, body, None, said.t_ns + late_ns))
+            run.write(RawSample(key, body, None, sent.t_ns + late_ns))
     return path
 
 
 def everything():
-    """Return all of it as (kind, said)."""
-    return [(kind, one) for kind, all_said in city_says().items() for one in all_said]
+    """Return all of it as (kind, sent)."""
+    return [(kind, one) for kind, all_sent in city_messages().items() for one in all_sent]

@@ -12,11 +12,11 @@ ANGLE, SURE, REVISION = (0, 3601), (1, 127), (0, 127)
 DELTA, AXIS = (-131_071, 131_072), (0, 4095)
 
 
-def told(low, high, least, most):
+def with_confidence(low, high, least, most):
     return {"value": (low, high), "confidence": (least, most)}
 
 
-ALTITUDE = told(-100_000, 800_001, 0, 15)
+ALTITUDE = with_confidence(-100_000, 800_001, 0, 15)
 POSITION = {
     "latitude": LATITUDE,
     "longitude": LONGITUDE,
@@ -46,15 +46,15 @@ CAM = HEAD | {
     "basic_container": {"station_type": BYTE, "reference_position": POSITION},
     "high_frequency_container": {
         "basic_vehicle_container_high_frequency": {
-            "heading": told(0, 3601, 1, 127),
-            "speed": told(0, 16_383, 1, 127),
+            "heading": with_confidence(0, 3601, 1, 127),
+            "speed": with_confidence(0, 16_383, 1, 127),
             "drive_direction": (0, 2),
-            "vehicle_length": told(1, 1023, 0, 4),
+            "vehicle_length": with_confidence(1, 1023, 0, 4),
             "vehicle_width": (1, 62),
-            "longitudinal_acceleration": told(-160, 161, 0, 102),
-            "curvature": told(-1023, 1023, 0, 7),
+            "longitudinal_acceleration": with_confidence(-160, 161, 0, 102),
+            "curvature": with_confidence(-1023, 1023, 0, 7),
             "curvature_calculation_mode": (0, 2),
-            "yaw_rate": told(-32_766, 32_767, 0, 8),
+            "yaw_rate": with_confidence(-32_766, 32_767, 0, 8),
         }
     },
     "low_frequency_container?": {
@@ -90,8 +90,8 @@ DENM = HEAD | {
     },
     "situation_container?": {"information_quality": (0, 7), "event_type": EVENT},
     "location_container?": {
-        "event_speed?": told(0, 16_383, 1, 127),
-        "event_position_heading?": told(0, 3601, 1, 127),
+        "event_speed?": with_confidence(0, 16_383, 1, 127),
+        "event_position_heading?": with_confidence(0, 3601, 1, 127),
         "detection_zones_to_event_position?": [{"path": [POINT, 0, 40]}, 1, 7],
     },
 }
@@ -104,18 +104,18 @@ CPM = HEAD | {
         {
             "measurement_delta_time": (-2048, 2047),
             "position": dict.fromkeys(
-                ("x_coordinate", "y_coordinate"), told(-131_072, 131_071, 1, 4096)
+                ("x_coordinate", "y_coordinate"), with_confidence(-131_072, 131_071, 1, 4096)
             ),
             "object_id?": WORD,
             "velocity?": {
                 "cartesian_velocity": dict.fromkeys(
-                    ("x_velocity", "y_velocity"), told(-16_383, 16_383, 1, 127)
+                    ("x_velocity", "y_velocity"), with_confidence(-16_383, 16_383, 1, 127)
                 )
             },
-            "angles?": {"z_angle": told(0, 3601, 1, 127)},
-            "z_angular_velocity?": told(-255, 256, 0, 7),
-            "object_dimension_x?": told(1, 256, 1, 32),
-            "object_dimension_y?": told(1, 256, 1, 32),
+            "angles?": {"z_angle": with_confidence(0, 3601, 1, 127)},
+            "z_angular_velocity?": with_confidence(-255, 256, 0, 7),
+            "object_dimension_x?": with_confidence(1, 256, 1, 32),
+            "object_dimension_y?": with_confidence(1, 256, 1, 32),
             "sensor_id_list?": [BYTE, 1, 128],
             "classification?": [
                 {"object_class": {"vehicle": BYTE}, "confidence": (1, 101)}, 1, 8,

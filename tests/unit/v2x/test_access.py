@@ -86,7 +86,7 @@ def spat(seq=0):
     return Spat(junction="x1", t_ns=1, seq=seq, mode="plan", plan="calm", groups=())
 
 
-def told(source, name="told"):
+def event_from(source, name="told"):
     return CityEvent(severity="info", source=source, t_ns=1, name=name, text="a sentence")
 
 
@@ -120,7 +120,7 @@ class Guarded:
     def enter(self, credentials, name="n1"):
         return self.stack.enter_context(entering(name, self.endpoint, credentials))
 
-    def hears(self, name, kind, **where):
+    def mailbox_of(self, name, kind, **where):
         box = Mailbox(1000)
         self.bus(name).subscribe(kind, where, box)
         return box
@@ -152,7 +152,7 @@ def fenced(box, say, fence, is_fence):
 
 def heard_of(guarded, by, kind, forged, honest, honest_by):
     """Return what of a forgery anybody hears; the honest one on the same key is the fence."""
-    box = guarded.hears("api", kind)
+    box = guarded.mailbox_of("api", kind)
     sender = guarded.bus(by)
     guarded.bus(honest_by)
 
@@ -163,8 +163,8 @@ def heard_of(guarded, by, kind, forged, honest, honest_by):
     return fenced(box, forge, lambda: guarded.bus(honest_by).publish(honest), lambda m: m == honest)
 
 
-def test_a_car_is_heard_for_longer_than_the_router_takes_to_tell_who_listens(guarded):
-    box, bus = guarded.hears("api", VehicleState), guarded.bus("n1")
+def test_a_car_stays_connected_after_the_router_has_sent_the_subscriptions(guarded):
+    box, bus = guarded.mailbox_of("api", VehicleState), guarded.bus("n1")
     until(lambda: bool(messages(box)), also=lambda: bus.publish(state()))
     for i in range(1000):
         bus.publish(state(x_m=float(i)))
@@ -184,12 +184,12 @@ def test_a_car_is_heard_for_longer_than_the_router_takes_to_tell_who_listens(gua
         (DriveCommand, command("n2", 9), command("n2"), "driver"),
         (Spat, spat(666), spat(1), "traffic"),
         (CityStop, stop("n1"), stop(), "world"),
-        (CityEvent, told("traffic", "forged"), told("traffic"), "traffic"),
+        (CityEvent, event_from("traffic", "forged"), event_from("traffic"), "traffic"),
         (PartStatus, status("forged"), status(), "world"),
     ],
     ids=["state", "command", "spat", "stop", "event", "status"],
 )
-def test_a_car_cannot_say_what_others_say(guarded, kind, forged, honest, honest_by):
+def test_a_car_cannot_publish_in_the_name_of_others(guarded, kind, forged, honest, honest_by):
     assert heard_of(guarded, "n1", kind, forged, honest, honest_by) == []
 
 
@@ -210,27 +210,27 @@ def raw(guarded, name, **more):
         "world/stop",
     ],
 )  # fmt: skip
-def test_a_raw_put_of_a_car_on_a_key_that_is_not_its_own_reaches_nobody(guarded, key):
-    heard = []
+def test_a_raw_put_of_a_car_on_a_key_of_another_station_is_dropped(guarded, key):
+    received = []
     ears = raw(guarded, "viewer")
     # Both sessions are new: the first answer of the fence shows that all are connected.
     subscriber = ears.declare_subscriber(
-        "scm/@v1/city/**", zenoh.handlers.Callback(heard.append, indirect=False)
+        "scm/@v1/city/**", zenoh.handlers.Callback(received.append, indirect=False)
     )
     mouth = raw(guarded, "n1")
     fence = "scm/@v1/city/v/n1/state"
-    heard_fence = lambda: any(bytes(s.payload) == b"fence" for s in list(heard))  # noqa: E731
+    heard_fence = lambda: any(bytes(s.payload) == b"fence" for s in list(received))  # noqa: E731
     until(heard_fence, also=lambda: mouth.put(fence, b"fence"))
     mouth.put(f"scm/@v1/city/{key}", b"forged")
     mouth.delete(f"scm/@v1/city/{key}")
-    del heard[:]
+    del received[:]
     until(heard_fence, also=lambda: mouth.put(fence, b"fence"))
-    assert {bytes(s.payload) for s in heard} == {b"fence"}
+    assert {bytes(s.payload) for s in received} == {b"fence"}
     subscriber.undeclare()
 
 
 def test_a_cam_that_its_own_car_did_not_sign_is_dropped_and_counted(guarded):
-    box, world = guarded.hears("world", CamTx), guarded.bus("world")
+    box, world = guarded.mailbox_of("world", CamTx), guarded.bus("world")
     mouth, honest = raw(guarded, "n1"), guarded.bus("n1")
     plain = CamTx(station="n1", t_ns=1, body=cam_of(state(), length_m=0.3, width_m=0.2, front_m=0))
     before = world.rejected
@@ -244,10 +244,10 @@ def test_a_cam_that_its_own_car_did_not_sign_is_dropped_and_counted(guarded):
     assert all(message.signed for message in messages(box))
 
 
-def test_a_car_hears_its_own_commands_and_not_those_of_others(guarded):
-    own = guarded.hears("n1", DriveCommand, vehicle="n1")
-    others = guarded.hears("n1", DriveCommand, vehicle="n2")
-    everybody = guarded.hears("n1", DriveCommand)
+def test_a_car_receives_its_own_commands_and_not_those_of_others(guarded):
+    own = guarded.mailbox_of("n1", DriveCommand, vehicle="n1")
+    others = guarded.mailbox_of("n1", DriveCommand, vehicle="n2")
+    everybody = guarded.mailbox_of("n1", DriveCommand)
     driver = guarded.bus("driver")
 
     until(
@@ -297,7 +297,7 @@ def asked_of_world(guarded):
     worker.join()
 
 
-def test_a_car_may_take_itself_off_the_map_and_nobody_else(guarded, asked_of_world):
+def test_a_car_may_remove_itself_and_no_other(guarded, asked_of_world):
     assert asked(guarded, "n1", RemoveRequest(vehicle="n1")) == RemoveReply(vehicle="n1")
     del asked_of_world[:]
     assert isinstance(asked(guarded, "n1", RemoveRequest(vehicle="n2"), 1.0), Refused)
@@ -322,7 +322,7 @@ def test_a_car_cannot_answer_for_the_world(guarded, asked_of_world):
 
 
 def test_a_car_is_present_under_its_own_name_alone(guarded):
-    box = guarded.hears("viewer", Presence)
+    box = guarded.mailbox_of("viewer", Presence)
     forger = raw(guarded, "n1")
     tokens = [
         forger.liveliness().declare_token(f"scm/@v1/city/{key}/{forger.zid()}")
@@ -342,7 +342,7 @@ def test_a_car_is_present_under_its_own_name_alone(guarded):
         token.undeclare()
 
 
-def test_events_said_before_reach_who_comes_later_and_only_who_may_hear_them(guarded):
+def test_earlier_events_reach_late_joiners_that_may_subscribe_to_them(guarded):
     guarded.bus("n2").publish(trip("n2"))
     guarded.bus("world").publish(CityStop(t_ns=77, engaged=False))
     late = guarded.enter(guarded.credentials("n1"))
@@ -414,8 +414,8 @@ def test_a_name_without_rights_gets_in_and_nothing_comes_of_it(tmp_path):
         viewer = enter(read_credentials(fleet.credentials("viewer")))
         world = enter(read_credentials(fleet.credentials("world")))
         old, new = enter(gone), enter(again)
-        heard, leaked, key = [], [], "scm/@v1/city/v/n1/state"
-        viewer.declare_subscriber("scm/@v1/city/**", lambda s: heard.append(bytes(s.payload)))
+        received, leaked, key = [], [], "scm/@v1/city/v/n1/state"
+        viewer.declare_subscriber("scm/@v1/city/**", lambda s: received.append(bytes(s.payload)))
         # A session hears itself, whatever the router says.
         old.declare_subscriber("scm/@v1/city/v/n1/state", lambda s: leaked.append(bytes(s.payload)))
         world.declare_queryable("scm/@v1/city/v/*/lease", lambda q: q.reply(q.key_expr, b"yours"))
@@ -425,14 +425,14 @@ def test_a_name_without_rights_gets_in_and_nothing_comes_of_it(tmp_path):
             for session, name in ((old, "old"), (new, "new"))
         ]
         old.put(key, b"old")
-        until(lambda: b"new" in heard, also=lambda: new.put(key, b"new"))
+        until(lambda: b"new" in received, also=lambda: new.put(key, b"new"))
         alive = {str(r.ok.key_expr) for r in viewer.liveliness().get("scm/@v1/city/v/*/alive/*")}
         assert alive == {"scm/@v1/city/v/n1/alive/new"}
         leaked += old.liveliness().get("scm/@v1/city/v/n1/alive/new")
         assert list(old.get("scm/@v1/city/v/n1/lease", timeout=0.5)) == []
         admin = [str(r.ok.key_expr) for r in old.get("@/**", timeout=0.5)]
         assert [key for key in admin if not key.startswith(f"@/{old.zid()}/")] == []
-        assert (b"old" in heard, set(leaked)) == (False, {b"old"})
+        assert (b"old" in received, set(leaked)) == (False, {b"old"})
         for token in tokens:
             token.undeclare()
 

@@ -64,7 +64,7 @@ def test_the_same_id_of_another_class_of_requests_is_another_one():
     assert cache.check(Incoming(other, 0)) == "do"
 
 
-def test_what_could_not_be_done_just_now_may_be_done_when_asked_again():
+def test_a_request_that_failed_temporarily_may_succeed_when_repeated():
     cache, first = AnswerCache(), asked()
     cache.check(first)
     cache.complete(Answer(first, Refused(code="offline", detail="not now")))

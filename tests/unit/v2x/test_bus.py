@@ -45,7 +45,7 @@ def test_a_full_mailbox_keeps_the_newest_and_counts_the_rest():
     assert box.dropped == 3
 
 
-def test_what_is_not_wanted_takes_no_room_and_wakes_nobody():
+def test_unwanted_messages_take_no_room_and_wake_no_thread():
     wake = threading.Event()
     box = Mailbox(2, wake, keep=lambda one: one.t_ns == 7)
     for n in range(5):
@@ -122,8 +122,8 @@ def test_a_message_that_claims_to_be_from_somebody_else_is_dropped():
 def heard_by(receiver, key_of=None, **facts):
     """Return what a reader takes: the CAM of one car, as it reaches a receiver."""
     cam = cam_of(A_STATE, length_m=0.5, width_m=0.2, front_m=0.4)
-    said = CamRx(**{"receiver": receiver, "station": "n1", "t_ns": 1, "body": cam} | facts)
-    return CamRx, f"scm/@v1/city/v2x/rx/{key_of or receiver}/n1/cam", encode(said)[0], None, 5
+    copy = CamRx(**{"receiver": receiver, "station": "n1", "t_ns": 1, "body": cam} | facts)
+    return CamRx, f"scm/@v1/city/v2x/rx/{key_of or receiver}/n1/cam", encode(copy)[0], None, 5
 
 
 def test_of_copies_the_first_alone_is_read():
@@ -136,7 +136,7 @@ def test_of_copies_the_first_alone_is_read():
     assert reader.rejected == 0
 
 
-def test_a_copy_that_lies_about_its_receiver_is_rejected_as_ever():
+def test_a_copy_with_a_false_receiver_is_rejected():
     reader = Reader(StepClock())
     assert reader.read_once(*heard_by("a")) is not None
     assert reader.read_once(*heard_by("a", key_of="b")) is None
@@ -162,7 +162,7 @@ def test_old_copies_are_forgotten():
     assert reader.read_once(*heard_by("b", t_ns=0)) is not None
 
 
-def test_a_part_hears_a_frame_once_if_it_wishes():
+def test_a_subscription_can_receive_each_frame_once():
     network = MemoryNetwork(StepClock())
     with network.bus("city", "world") as world, network.bus("city", "ear") as ear:
         once, every = Mailbox(10, once=True), Mailbox(10)

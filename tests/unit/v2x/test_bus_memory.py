@@ -36,7 +36,7 @@ def test_late_joiners_get_the_kept_events_of_all_stations_in_order_of_time(clock
     assert [item.message.name for item in mailbox.drain()] == ["e0", "e1", "e2", "e3"]
 
 
-def test_cities_on_one_network_do_not_hear_each_other(network):
+def test_cities_on_one_network_are_isolated(network):
     mailbox = Mailbox(10)
     network.bus("one", "api").subscribe(CityEvent, {}, mailbox)
     network.bus("two", "world").publish(event("world", "x"))
@@ -52,7 +52,7 @@ def test_the_time_of_arrival_is_the_time_of_the_clock(clock, network):
     assert [item.t_ns for item in mailbox.drain()] == [42]
 
 
-def test_a_closed_listener_hears_nothing_more(network):
+def test_a_closed_subscription_receives_nothing_more(network):
     sender, listener = network.bus("city", "world"), network.bus("city", "api")
     mailbox = Mailbox(10)
     listener.subscribe(CityEvent, {}, mailbox)

@@ -52,7 +52,7 @@ def router(endpoint):
         yield router
 
 
-def test_without_a_router_a_station_says_where_it_looked(endpoint):
+def test_without_a_router_the_error_names_the_endpoint(endpoint):
     with pytest.raises(LinkError, match=f"no city at '{endpoint}' within 0.3 s"):
         ZenohBus("city", "n1", endpoint, connect_timeout_s=0.3)
 
@@ -78,7 +78,7 @@ def test_a_station_waits_for_a_router_that_comes_later(endpoint):
     assert opened == [True]
 
 
-def test_only_events_without_a_rate_are_asked_for_again():
+def test_only_events_without_a_rate_are_requested_again():
     assert requery_interval(CityEvent, REQUERY_ALL_EVERY) == REQUERY_ALL_EVERY
     assert requery_interval(None, REQUERY_ALL_EVERY) == REQUERY_ALL_EVERY
     assert requery_interval(Trip, REQUERY_ALL_EVERY) is None
@@ -97,7 +97,7 @@ def test_a_router_leaves_its_port_when_it_ends(endpoint):
         assert probe.connect_ex((host, int(port))) != 0
 
 
-def test_when_the_router_goes_everybody_is_told_and_streams_are_dropped(endpoint):
+def test_when_the_router_stops_all_stations_are_notified_and_streams_are_dropped(endpoint):
     with Router(endpoint) as router:
         bus = ZenohBus("city", "traffic", endpoint)
         listener = ZenohBus("city", "api", endpoint)
@@ -121,20 +121,20 @@ def test_events_published_without_a_router_arrive_when_it_is_back(endpoint):
         api = ZenohBus("city", "api", endpoint)
         names, mailbox = [], Mailbox(100)
 
-        def heard():
+        def received():
             names.extend(item.message.name for item in mailbox.drain())
             return names
 
         with world, api:
             api.subscribe(CityEvent, {}, mailbox)
             world.publish(event("before"))
-            until(lambda: heard() == ["before"])
+            until(lambda: received() == ["before"])
             router.__exit__(None, None, None)
             until(lambda: not world.connected and not api.connected)
             for name in ("one", "two", "three"):
                 world.publish(event(name))
             with Router(endpoint):
-                until(lambda: heard() == ["before", "one", "two", "three"])
+                until(lambda: received() == ["before", "one", "two", "three"])
 
 
 def test_a_call_without_a_router_is_refused_at_once(endpoint):
@@ -183,7 +183,7 @@ def test_a_request_that_cannot_be_read_is_refused_as_invalid(router):
 
 
 @pytest.mark.parametrize("key", ["**", "tl/**", "tl/*/req"])
-def test_a_question_to_everybody_at_once_is_refused_and_stops_nobody(router, key):
+def test_a_request_to_all_stations_is_refused_and_stops_no_other(router, key):
     server = ZenohBus("city", "traffic", router.listen)
     caller = ZenohBus("city", "api", router.listen)
     requests, answers = Mailbox(10), []

@@ -22,7 +22,7 @@ def test_a_frame_takes_the_preamble_and_whole_symbols():
     assert air_time("cam", 0.0) == 0.0
 
 
-def test_a_channel_that_all_hear_loses_only_what_does_not_fit():
+def test_a_channel_without_hidden_nodes_loses_only_the_excess_load():
     lost = load_loss(np.array([0.0, 0.9, 2.0]), 0.0)
     assert lost == pytest.approx([0.0, 0.0, 0.5])
 
@@ -31,7 +31,7 @@ def test_hidden_senders_collide_as_in_aloha():
     assert load_loss(np.array([0.5]), 0.4) == pytest.approx(1.0 - np.exp(-0.4))
 
 
-def test_a_busy_channel_makes_stations_speak_less_step_by_step():
+def test_a_busy_channel_reduces_the_message_rate_step_by_step():
     control = ReactiveControl(1)
     gaps = []
     for window in range(5):
@@ -40,7 +40,7 @@ def test_a_busy_channel_makes_stations_speak_less_step_by_step():
     assert gaps == [100, 200, 250, 1000, 1000]
 
 
-def test_a_quiet_channel_lets_them_speak_more_after_five_seconds():
+def test_a_quiet_channel_raises_the_message_rate_after_five_seconds():
     control = ReactiveControl(1)
     control.update(np.array([0.35]), 0)
     for window in range(1, 40):
@@ -89,14 +89,14 @@ def alone(frames_a_window, *, is_on=True, reported_ratio=None, seconds=3.0, told
     return gap
 
 
-def test_a_station_alone_speaks_less_by_what_it_hears():
+def test_without_reports_a_station_uses_the_load_it_receives():
     assert alone(0) == 50
     assert alone(100) == 100, "100 CAMs of 0.35 ms in 100 ms are 0.35"
     assert alone(130) == 200
     assert alone(130, is_on=False) == 0
 
 
-def test_what_it_is_told_goes_before_what_it_hears_while_it_is_fresh():
+def test_a_fresh_report_has_priority_over_the_received_load():
     assert alone(0, reported_ratio=0.45) == 200
     assert alone(130, reported_ratio=0.1) == 50
     assert alone(130, reported_ratio=0.1, seconds=6.0, told_until_s=2.0) == 200

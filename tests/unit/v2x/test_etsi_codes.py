@@ -216,9 +216,9 @@ def read(kind, body):
     if kind == "mapem":
         return numbers_in(advice(body, bodies()["spatem"]))
     if kind == "spatem":
-        told = advice(bodies()["mapem"], body)
+        decoded = advice(bodies()["mapem"], body)
         # who knows no end of a red is advised the limit
-        return numbers_in([colours_of(body), told and told._replace(speed_mps=None)])
+        return numbers_in([colours_of(body), decoded and decoded._replace(speed_mps=None)])
     if kind == "srem":
         return numbers_in(list(requests_of(body, NOW)))
     return numbers_in(answers_of(body, station_id("n1")))
@@ -271,7 +271,7 @@ def test_half_a_place_is_no_place(code):
     assert place_of(*code) is None
 
 
-def test_a_car_that_tells_no_size_and_no_place_has_none():
+def test_a_cam_without_size_and_position_has_none():
     body = with_value("cam", f"{FAST}.vehicle_length.value", 1023)
     assert read_cam(body).length_m is None
     assert read_cam(with_value("cam", f"{FAST}.vehicle_width", 62)).width_m is None
@@ -282,12 +282,12 @@ def test_a_car_that_tells_no_size_and_no_place_has_none():
 FAST = "high_frequency_container.basic_vehicle_container_high_frequency"
 
 
-def test_a_sender_says_out_of_range_where_the_standard_has_a_code_for_it():
+def test_a_sender_uses_the_standards_code_for_out_of_range():
     state = a_state(speed_mps=20.0, yaw_rate_radps=-9.0, accel_mps2=-3.0)
-    told = cam_of(state, length_m=9.0, width_m=2.0, front_m=0.2).motion
-    assert (told.vehicle_length.value, told.vehicle_width) == (1022, 61)
-    assert (told.speed.value, told.yaw_rate.value) == (16_382, -32_766)
-    assert told.longitudinal_acceleration.value == -160
+    decoded = cam_of(state, length_m=9.0, width_m=2.0, front_m=0.2).motion
+    assert (decoded.vehicle_length.value, decoded.vehicle_width) == (1022, 61)
+    assert (decoded.speed.value, decoded.yaw_rate.value) == (16_382, -32_766)
+    assert decoded.longitudinal_acceleration.value == -160
     view = read_cam(cam_of(state, length_m=9.0, width_m=2.0, front_m=0.2))
     assert view[4:] == (None, None, None, None)
     far = cam_of(a_state(y_m=1e6), length_m=0.3, width_m=0.2, front_m=0.2)
@@ -308,7 +308,7 @@ def test_a_speed_limit_beyond_the_field_stays_a_limit():
 
 
 @pytest.mark.parametrize("kind", [CamBody, DenmBody, MapemBody])
-def test_a_listing_of_codes_reaches_what_lies_within_lists_and_options(kind):
+def test_a_listing_of_codes_includes_lists_and_optional_fields(kind):
     assert any("[]" in path for path, _ in codes_in(kind))
     assert dict(codes_in(Altitude))["value"].out_of_range == (-100_000, 800_000)
     assert np.all([codes is not None for _, codes in codes_in(kind)])

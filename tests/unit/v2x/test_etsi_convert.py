@@ -201,10 +201,10 @@ def test_a_spatem_read_back_is_the_spat_also_across_the_hour(t_s, t_ms, to_min_m
         min_end_ns=t_ns + to_min_ms * NS_PER_MS,
         max_end_ns=t_ns + (to_min_ms + more_ms) * NS_PER_MS,
     )
-    told = ec.colours_of(ec.spatem_of(spat, JUNCTION))[2]
-    assert told.colour == colour
-    assert max(0.0, least - 0.1) <= told.min_end_s <= least
-    assert most <= told.max_end_s < most + 0.1
+    decoded = ec.colours_of(ec.spatem_of(spat, JUNCTION))[2]
+    assert decoded.colour == colour
+    assert max(0.0, least - 0.1) <= decoded.min_end_s <= least
+    assert most <= decoded.max_end_s < most + 0.1
 
 
 @given(
@@ -218,9 +218,9 @@ def test_a_likely_end_stays_between_the_two_promised_ones(t_ms, to_min_ms, likel
     likely_ns = least_ns + likely_ms * NS_PER_MS
     spat = a_spat(t_ns, min_end_ns=least_ns, max_end_ns=likely_ns + more_ms * NS_PER_MS)
     first = replace(spat.groups[0], likely_end_ns=likely_ns, likely_confidence=0.6)
-    told = ec.colours_of(ec.spatem_of(replace(spat, groups=(first,)), JUNCTION))[1]
-    assert told.min_end_s <= told.likely_end_s <= told.max_end_s
-    assert told.likely_end_s == pytest.approx((likely_ns - t_ns) / NS_PER_S, abs=0.1001)
+    decoded = ec.colours_of(ec.spatem_of(replace(spat, groups=(first,)), JUNCTION))[1]
+    assert decoded.min_end_s <= decoded.likely_end_s <= decoded.max_end_s
+    assert decoded.likely_end_s == pytest.approx((likely_ns - t_ns) / NS_PER_S, abs=0.1001)
 
 
 @pytest.mark.parametrize(
@@ -238,11 +238,11 @@ def test_confidence_is_the_class_that_promises_no_more(share, number, read):
     assert ec.colours_of(body)[1].likely_confidence == read
 
 
-def test_a_likely_end_that_is_the_earliest_one_is_so_on_the_air():
+def test_a_likely_end_equal_to_the_earliest_is_sent_as_equal():
     spat = a_spat(min_end_ns=NOW + 1_050_000_000)
     group = replace(spat.groups[0], likely_end_ns=NOW + 1_050_000_000, likely_confidence=1.0)
-    told = ec.spatem_of(replace(spat, groups=(group,)), JUNCTION).states[0]
-    assert (told.min_end_time, told.likely_time) == (1860, 1860)
+    decoded = ec.spatem_of(replace(spat, groups=(group,)), JUNCTION).states[0]
+    assert (decoded.min_end_time, decoded.likely_time) == (1860, 1860)
 
 
 def test_who_foresees_nothing_sends_no_likely_end():
@@ -259,7 +259,7 @@ def test_an_end_of_an_hour_or_so_ahead_is_far_and_read_as_unknown(ahead_s):
 
 
 @pytest.mark.parametrize("colour", ["flashing_red", "dark", "red"])
-def test_flash_promises_nothing_and_says_failure(colour):
+def test_flashing_has_no_guaranteed_end_and_is_sent_as_failure(colour):
     body = ec.spatem_of(a_spat(mode="flash", colour=colour, max_end_ns=NOW), JUNCTION)
     assert body.status == ("failureFlash",)
     assert ec.colours_of(body)[1] == (colour, None, None, None, None)

@@ -65,7 +65,7 @@ def test_two_events_of_a_station_have_two_names():
     assert names == {65_535, 0}
 
 
-def test_what_is_over_cannot_be_told_again():
+def test_an_ended_event_cannot_be_updated():
     sender = DenmSender("n1")
     action = sender.trigger(EVENT, NOW)
     sender.cancel(action, NOW + NS_PER_S)
@@ -94,7 +94,7 @@ def test_a_receiver_follows_an_event_from_beginning_to_end():
     assert watch.events(NOW + 2 * NS_PER_S) == ()
 
 
-def test_an_event_that_nobody_tells_of_again_ends_by_itself():
+def test_an_event_without_repetition_expires():
     sender, watch = DenmSender("n1"), DenmReceiver()
     sender.trigger(EVENT, NOW)
     (body,) = sender.due(NOW)
@@ -118,7 +118,7 @@ def test_another_station_may_deny_what_the_receiver_knows_and_nothing_else():
     assert watch.receive(denial, NOW + NS_PER_S) == "ended"
 
 
-def test_nobody_speaks_of_events_in_anothers_name():
+def test_a_station_cannot_update_another_stations_event():
     sender = DenmSender("n1")
     sender.trigger(EVENT, NOW)
     (body,) = sender.due(NOW)
@@ -187,12 +187,12 @@ def test_hard_braking_is_one_event_and_comfortable_braking_none():
     assert len(sent) == 20, "ten times a second while it is valid"
 
 
-def test_who_was_hit_does_not_also_say_that_it_brakes():
+def test_a_car_that_was_hit_sends_no_braking_warning():
     sent = braking([-9.0] * 20, contacts=(hit(NOW, "n2"),))
     assert {b.situation_container.event_type.cause for b in sent} == {ACCIDENT}
 
 
-def test_whoever_asks_may_know_better_whether_a_car_should_not_stand():
+def test_the_caller_decides_where_stopping_is_not_allowed():
     for is_stranded, mode in ((True, "drive"), (False, "stop")):
         car = CarWarnings("n1")
         sent = [

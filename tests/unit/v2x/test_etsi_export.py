@@ -16,7 +16,7 @@ from scm.v2x.etsi.json_form import unwrap
 from scm.v2x.exchange import RawSample
 from scm.v2x.pcap import PORTS
 from scm.v2x.uper import codec
-from tests.unit.v2x.etsi_city import city_says, everything, record_city
+from tests.unit.v2x.etsi_city import city_messages, everything, record_city
 
 LATE_NS = 2 * NS_PER_MS
 needs_tshark = pytest.mark.skipif(
@@ -51,7 +51,7 @@ def place(cam):
 
 
 def said(kind):
-    return sorted(city_says()[kind], key=lambda one: one.t_ns)
+    return sorted(city_messages()[kind], key=lambda one: one.t_ns)
 
 
 @needs_tshark
@@ -95,7 +95,7 @@ def test_wireshark_reads_lanes_and_their_groups(capture):
     ((numbers, groups, revision, width),) = decoded(
         capture, "mapem", "dsrc.laneID", "dsrc.signalGroup", "dsrc.revision", "dsrc.laneWidth"
     )
-    (junction,) = city_says()["mapem"][0].body.intersections
+    (junction,) = city_messages()["mapem"][0].body.intersections
     assert numbers == [str(lane.lane_id) for lane in junction.lane_set]
     assert groups == [
         str(way.signal_group) for x in junction.lane_set for way in x.connects_to or ()
@@ -104,7 +104,7 @@ def test_wireshark_reads_lanes_and_their_groups(capture):
 
 
 @needs_tshark
-def test_wireshark_reads_warnings_wishes_and_answers(capture):
+def test_wireshark_reads_warnings_requests_and_answers(capture):
     denms = decoded(capture, "denm", "its.originatingStationID", "its.sequenceNumber")
     actions = [one.body.management_container.action_id for one in said("denm")]
     wanted = [([str(a.originating_station_id)], [str(a.sequence_number)]) for a in actions]
@@ -114,7 +114,7 @@ def test_wireshark_reads_warnings_wishes_and_answers(capture):
         ([str(wish.request_id)], [str(wish.request_type)]) for wish in wishes
     ]
     ((statuses,),) = decoded(capture, "ssem", "dsrc.signalStatusPackage.status")
-    packages = city_says()["ssem"][0].body.status[0].sig_status
+    packages = city_messages()["ssem"][0].body.status[0].sig_status
     assert statuses == [str(package.status) for package in packages]
 
 
@@ -125,7 +125,7 @@ def test_wireshark_finds_nothing_malformed(capture):
     assert found.stdout == ""
 
 
-def test_the_capture_has_the_times_at_which_the_recorder_heard(capture):
+def test_the_capture_has_the_times_at_which_the_recorder_received(capture):
     data = capture.read_bytes()
     assert struct.unpack_from("<I", data)[0] == 0xA1B23C4D
     times, at = [], 24
@@ -154,7 +154,7 @@ def test_neither_form_is_bad_input(run, capsys):
     assert "expected --pcap FILE, --json FILE or both" in capsys.readouterr().err
 
 
-def test_a_run_in_which_nobody_spoke_is_refused(tmp_path):
+def test_a_run_without_messages_is_refused(tmp_path):
     with RunFile(tmp_path / "mute.mcap", "city") as mute:
         mute.write(RawSample("scm/@v1/city/world/snapshot", b"{}", None, 1))
     with pytest.raises(RecordingError, match="expected messages under v2x/tx/"):

@@ -9,7 +9,7 @@ import pytest
 
 from scm.errors import MessageError
 from scm.v2x.etsi.json_form import KINDS, unwrap, wrap
-from tests.unit.v2x.etsi_city import city_says
+from tests.unit.v2x.etsi_city import city_messages
 from tests.unit.v2x.etsi_facts import FACTS, schema_of
 
 SCHEMAS = os.environ.get("SCM_ITS_SCHEMAS")
@@ -17,7 +17,7 @@ every_kind = pytest.mark.parametrize("kind", KINDS)
 
 
 def envelopes(kind):
-    return [json.loads(wrap(one.body, one.station, one.t_ns)) for one in city_says()[kind]]
+    return [json.loads(wrap(one.body, one.station, one.t_ns)) for one in city_messages()[kind]]
 
 
 @every_kind
@@ -75,7 +75,7 @@ def read_schema(uri):
 
 @every_kind
 def test_an_envelope_is_read_back(kind):
-    for one in city_says()[kind]:
+    for one in city_messages()[kind]:
         read = unwrap(wrap(one.body, one.station, one.t_ns))
         assert read == (f"scm_{one.station}", one.t_ns // 1_000_000, one.body)
 
@@ -109,7 +109,7 @@ def test_a_mapem_with_a_crosswalk_and_limits_for_trucks_is_read():
     assert (read.layer_type, len(read.intersections[0].speed_limits)) == ("mixedContent", 2)
 
 
-def test_only_those_that_must_tell_their_origin_do():
+def test_only_messages_that_require_an_origin_have_one():
     told = {kind for kind in KINDS if "origin" in envelopes(kind)[0]}
     assert told == {"mapem", "spatem"}
 

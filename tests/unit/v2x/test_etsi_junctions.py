@@ -78,7 +78,7 @@ def test_a_lane_in_begins_at_its_stop_line_and_each_way_ends_on_the_lane_it_name
     assert len(topology.ways) == movements
 
 
-def test_a_way_says_whether_it_turns():
+def test_a_connection_has_its_turning_direction():
     roads = ROADS["grid:3x3"]
     junction = max(roads.city_map.junctions, key=lambda one: len(one.groups))
     (geometry,) = mapem_of(roads, junction).intersections
@@ -108,7 +108,7 @@ def a_wish(**changes):
 
 
 @pytest.mark.parametrize("verb", ["request", "update", "cancel"])
-def test_a_wish_is_read_back_by_the_junction(verb):
+def test_a_priority_request_is_read_back_by_the_junction(verb):
     wish = a_wish(verb=verb, lane_out=3)
     assert requests_of(srem_of(wish, a_state()), NOW + NS_PER_S) == (wish,)
 
@@ -121,7 +121,7 @@ def test_an_arrival_is_understood_across_the_turn_of_the_year(t_s):
     assert wish.arrives_ns == arrives
 
 
-def test_a_car_hears_its_own_answer_alone():
+def test_a_car_receives_only_its_own_answer():
     junction = ROADS["driving_school"].city_map.junctions[0]
     answers = [
         PriorityAnswer(a_wish(), "granted"),
@@ -132,7 +132,7 @@ def test_a_car_hears_its_own_answer_alone():
     assert answers_of(body, 1) == {(junction.number, 6): "rejected"}
 
 
-def test_slow_news_comes_every_half_second_and_tells_the_way_back():
+def test_the_low_frequency_container_is_sent_every_half_second_with_the_path():
     news, told = LowFrequencySender(role="emergency"), []
     for step in range(200):
         t_ns, x_m = NOW + step * 100 * NS_PER_MS, 0.026 * step

@@ -10,7 +10,7 @@ from scm.errors import MessageError
 from scm.v2x.etsi.mapem import MapemBody
 from scm.v2x.uper import codec
 from tests.unit.v2x.asn1_text import for_asn1tools, module_of
-from tests.unit.v2x.etsi_city import city_says, everything
+from tests.unit.v2x.etsi_city import city_messages, everything
 
 asn1tools = pytest.importorskip("asn1tools", reason="asn1tools is the second codec: extra dev")
 pytest.importorskip("pycrate_asn1dir", reason="UPER needs the extra v2x")
@@ -29,7 +29,7 @@ def peer():
 
 @every_kind
 def test_what_is_coded_is_read_back_equal(kind):
-    for said in city_says()[kind]:
+    for said in city_messages()[kind]:
         assert codec.decode(kind, codec.encode(said.body)) == said.body
 
 
@@ -42,7 +42,7 @@ def test_the_bytes_are_those_of_asn1tools_both_ways(kind, peer):
     standards' ASN.1. Wireshark's own copy does that, in the tests of the export.
     """
     coding = codec.CODINGS[kind]
-    for said in city_says()[kind]:
+    for said in city_messages()[kind]:
         value = for_asn1tools(coding.to_asn(said.body))
         ours = codec.encode(said.body)
         assert peer[kind].encode(coding.pdu, value) == ours
@@ -63,7 +63,7 @@ def contains(read, value):
 
 
 def test_a_cam_with_its_slow_container_is_longer_and_whole():
-    cams = [said.body for said in city_says()["cam"]]
+    cams = [said.body for said in city_messages()["cam"]]
     slow = next(cam for cam in cams if cam.slow is not None and cam.slow.path_history)
     quick = replace(slow, low_frequency_container=None)
     assert len(codec.encode(slow)) > len(codec.encode(quick))
@@ -71,7 +71,7 @@ def test_a_cam_with_its_slow_container_is_longer_and_whole():
 
 
 def test_a_node_takes_as_few_bits_as_its_offset_needs():
-    (mapem,) = codec.CODINGS["mapem"].to_asn(city_says()["mapem"][0].body)["map"]["intersections"]
+    (mapem,) = codec.CODINGS["mapem"].to_asn(city_messages()["mapem"][0].body)["map"]["intersections"]
     nodes = [node["delta"] for lane in mapem["laneSet"] for node in lane["nodeList"][1]]
     limits = {
         f"node-XY{n}": 2**bits for n, bits in zip(range(1, 7), (9, 10, 11, 12, 13, 15), strict=True)
@@ -83,18 +83,18 @@ def test_a_node_takes_as_few_bits_as_its_offset_needs():
         assert smaller not in limits or far >= limits[smaller]
 
 
-def test_a_spatem_tells_likely_ends_and_their_confidence():
+def test_a_spatem_has_likely_ends_and_their_confidence():
     timings = [
         codec.CODINGS["spatem"].to_asn(said.body)["spat"]["intersections"][0]["states"][0][
             "state-time-speed"
         ][0]["timing"]
-        for said in city_says()["spatem"]
+        for said in city_messages()["spatem"]
     ]
     assert any(t.get("likelyTime") == t["minEndTime"] and t["confidence"] == 15 for t in timings)
 
 
 def test_a_lane_that_is_none_for_vehicles_is_read_as_such_and_never_written():
-    coding, body = codec.CODINGS["mapem"], city_says()["mapem"][0].body
+    coding, body = codec.CODINGS["mapem"], city_messages()["mapem"][0].body
     value = coding.to_asn(body)
     value["map"]["intersections"][0]["laneSet"][0]["laneAttributes"]["laneType"] = (
         "crosswalk",
@@ -108,13 +108,13 @@ def test_a_lane_that_is_none_for_vehicles_is_read_as_such_and_never_written():
         coding.to_asn(read)
 
 
-def test_a_cpm_has_no_uper_and_says_so():
+def test_a_cpm_has_no_uper_and_the_error_states_it():
     with pytest.raises(MessageError, match="cpm: expected one of cam, denm, spatem"):
-        codec.encode(city_says()["cpm"][0].body)
+        codec.encode(city_messages()["cpm"][0].body)
 
 
 def test_what_the_type_does_not_allow_is_refused():
-    cam = city_says()["cam"][0].body
+    cam = city_messages()["cam"][0].body
     wrong = replace(cam, generation_delta_time=70_000)
     with pytest.raises(MessageError, match=r"cam: cannot be coded.*generationDeltaTime"):
         codec.encode(wrong)
@@ -122,7 +122,7 @@ def test_what_the_type_does_not_allow_is_refused():
 
 @every_kind
 def test_bytes_that_are_no_message_are_refused_and_the_next_one_is_read(kind):
-    body = city_says()[kind][0].body
+    body = city_messages()[kind][0].body
     good = codec.encode(body)
     for bad in (b"", b"\xff" * 12, good[: len(good) // 2]):
         with pytest.raises(MessageError, match=kind):
@@ -132,7 +132,7 @@ def test_bytes_that_are_no_message_are_refused_and_the_next_one_is_read(kind):
 
 def test_another_kinds_bytes_are_refused_by_their_header():
     with pytest.raises(MessageError, match="ssem: expected messageID 10, got 09"):
-        codec.decode("ssem", codec.encode(city_says()["srem"][0].body))
+        codec.decode("ssem", codec.encode(city_messages()["srem"][0].body))
 
 
 def test_without_the_extra_the_error_names_it(monkeypatch):
@@ -140,10 +140,10 @@ def test_without_the_extra_the_error_names_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "pycrate_asn1dir.ITS_CAM_2", None)
     try:
         with pytest.raises(MessageError, match=r"pip install 'scm\[v2x\]'"):
-            codec.encode(city_says()["cam"][0].body)
+            codec.encode(city_messages()["cam"][0].body)
     finally:
         codec._compiled.cache_clear()
 
 
-def test_all_kinds_are_said_in_the_city():
+def test_all_message_types_occur_in_the_city():
     assert {kind for kind, _ in everything()} == {*codec.CODINGS, "cpm"}

@@ -37,11 +37,11 @@ def test_without_weather_nothing_happens():
     assert Net().send() == list(range(400))
 
 
-def test_about_as_much_is_lost_as_was_said():
+def test_the_share_of_lost_messages_is_as_configured():
     assert 60 < 400 - len(Net(drop=0.25).send()) < 140
 
 
-def test_about_as_much_comes_twice_as_was_said():
+def test_the_share_of_duplicates_is_as_configured():
     came = Net(duplicate=0.25).send()
     assert set(came) == set(range(400))
     assert 60 < len(came) - 400 < 140
@@ -68,7 +68,7 @@ def test_one_seed_is_one_history_and_another_is_another():
     assert Net(3, **facts).send() == Net(3, **facts).send() != Net(4, **facts).send()
 
 
-def test_the_two_sides_of_a_partition_hear_nothing_of_each_other_until_it_ends():
+def test_the_sides_of_a_partition_receive_nothing_from_each_other_until_it_ends():
     net = Net()
     net.faults.partition(["b"])
     assert net.send(3) == []
@@ -78,7 +78,7 @@ def test_the_two_sides_of_a_partition_hear_nothing_of_each_other_until_it_ends()
     assert net.send(3) == [0, 1, 2]
 
 
-def test_a_station_always_hears_itself_and_who_is_there():
+def test_a_station_always_receives_its_own_messages_and_presence():
     net = Net(drop=1.0)
     own, presence = Mailbox(10), Mailbox(10)
     net.sender.subscribe(Spat, {}, own)

@@ -112,7 +112,7 @@ def test_a_car_cannot_take_the_name_of_a_part(fleet, name):
         add(fleet, name, "vehicle", NOW)
 
 
-def test_an_unknown_role_or_part_is_told_what_there_is():
+def test_an_unknown_role_or_part_is_refused_with_the_valid_names():
     with pytest.raises(AccessError, match=r"did you mean 'vehicle'"):
         rights_of("vehicel", "n1")
     with pytest.raises(AccessError, match=r"did you mean 'traffic'"):

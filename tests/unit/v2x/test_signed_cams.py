@@ -99,7 +99,7 @@ def test_what_is_old_or_from_the_future_is_refused(air, late_ns):
     assert "old" in refused(air, air["n1"].signed(cam(), NOW_NS), NOW_NS + late_ns)
 
 
-def test_what_was_heard_before_is_refused(air):
+def test_a_repeated_message_is_refused(air):
     first = air["n1"].signed(cam(), NOW_NS)
     second = air["n1"].signed(cam(x_m=1.0), NOW_NS + 100 * NS_PER_MS)
     for sent in (first, second):
@@ -132,7 +132,7 @@ def test_without_a_fleet_a_cam_has_the_bytes_it_always_had():
     assert list(msgspec.json.decode(encode(cam())[0])) == ["station", "t_ns", "body"]
 
 
-def test_only_who_speaks_gets_a_ticket(fleet):
+def test_only_senders_of_cams_get_a_ticket(fleet):
     held = {name: read_credentials(fleet.credentials(name)) for name in STATIONS}
     assert {name for name, one in held.items() if one.ticket} == {"n1", "n2", "world"}
     assert all(one.air_authority for one in held.values())
@@ -150,7 +150,7 @@ def test_the_city_s_own_tickets_are_renewed_before_they_end(tmp_path, days, rene
     assert (ticket(NOW + timedelta(days=days)) != before) is renewed
 
 
-def test_credentials_from_before_there_were_tickets_are_made_anew(tmp_path):
+def test_credentials_without_tickets_are_renewed(tmp_path):
     fleet = Fleet(tmp_path / "fleet.toml", "password")
     complete(fleet, {"world": "part"}, NOW)
     path = fleet.credentials("world")

@@ -42,7 +42,7 @@ def standard():
 
 
 @pytest.mark.parametrize("ticket", [AUTHORITY, TICKET], ids=["authority", "station"])
-def test_a_certificate_is_byte_for_byte_what_the_standard_says(standard, ticket):
+def test_a_certificate_equals_the_standards_encoding(standard, ticket):
     standard.Certificate.from_coer(ticket.certificate)
     values = standard.Certificate.get_val()
     assert standard.Certificate.to_coer() == ticket.certificate
@@ -53,7 +53,7 @@ def test_a_certificate_is_byte_for_byte_what_the_standard_says(standard, ticket)
 
 @pytest.mark.parametrize("place", [None, (-1, 1_800_000_001, 4096)])
 @pytest.mark.parametrize("size", [0, 41, 127, 128, 300, 70_000])
-def test_a_message_is_byte_for_byte_what_the_standard_says(standard, signer, place, size):
+def test_a_message_equals_the_standards_encoding(standard, signer, place, size):
     for _ in range(2):  # with its certificate, then with its digest
         data = signer.sign(bytes(size), DENM, NOW, place)
         kind = standard.Ieee1609Dot2Data

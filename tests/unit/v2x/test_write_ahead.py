@@ -85,7 +85,7 @@ def test_batches_are_safe_in_their_order_with_all_they_hold(kind, store):
     keeper.close()
 
 
-def test_while_the_store_fails_nothing_is_safe_and_why_is_told(kind, store):
+def test_while_the_store_fails_nothing_is_stored_and_the_reason_is_given(kind, store):
     keeper = kind(store, "world", "s1")
     store.sickness = "before"
     keeper.write(batch(1))
@@ -100,7 +100,7 @@ def test_while_the_store_fails_nothing_is_safe_and_why_is_told(kind, store):
     keeper.close()
 
 
-def test_a_commit_of_which_nobody_knows_whether_it_happened_is_not_done_twice(kind, store):
+def test_a_commit_with_an_unknown_outcome_is_not_repeated(kind, store):
     keeper = kind(store, "world", "s1")
     store.sickness = "after"
     keeper.write(batch(1))

@@ -14,7 +14,7 @@ def test_every_effect_and_fault_has_a_line():
         assert f"\n  {name} " in text
 
 
-def test_one_effect_is_told_with_its_numbers_and_neutral_values():
+def test_one_effect_is_described_with_its_parameters_and_neutral_values():
     text = describe_term("surface_patch")
     assert "surface_patch.radius_m  0.4      m     0.02 to 20" in text
     assert "floor_grip" in text
@@ -22,7 +22,7 @@ def test_one_effect_is_told_with_its_numbers_and_neutral_values():
         assert heading in text
 
 
-def test_a_fault_of_measuring_is_told_like_an_effect():
+def test_a_sensor_fault_is_described_like_an_effect():
     assert "t_measured = t + delay" in describe_term("pose_latency")
 
 

@@ -74,7 +74,7 @@ def test_a_command_before_the_loss_drives_again(guard, age_ms):
 
 
 @pytest.mark.parametrize("age_ms", [1000, 5000])
-def test_a_lost_car_refuses_its_old_epoch_even_if_nobody_looked_meanwhile(guard, age_ms):
+def test_a_lost_car_refuses_its_old_epoch_without_a_call_in_between(guard, age_ms):
     assert not guard.accept(command(seq=2), at(age_ms))
     assert guard.lost
     assert guard.output(at(age_ms)).mode == "lost"
@@ -164,7 +164,7 @@ def test_a_granted_epoch_ends_a_loss_but_does_not_drive(guard):
     assert guard.output(at(2500)).mode == "lost"
 
 
-def test_the_age_of_the_newest_command_is_told_once_there_is_one(guard):
+def test_the_age_of_the_newest_command_is_known_after_the_first(guard):
     assert Guard().command_age_ns(START_NS) is None
     assert guard.command_age_ns(at(80)) == 80 * NS_PER_MS
     guard.accept(command(seq=1, throttle=0.1), at(90))

@@ -8,7 +8,7 @@ from scm.vehicles.lights import OFF, Switches, lamps
 DARK_NS = 500 * NS_PER_MS
 
 
-def test_a_driving_car_that_was_told_nothing_shows_nothing():
+def test_a_driving_car_without_commands_shows_no_lamps():
     assert lamps(OFF, 0.5, 0.2, 0) == ()
 
 
@@ -36,12 +36,12 @@ def test_tail_lamps_go_with_the_headlights_and_high_beam_keeps_the_low_one(mode,
         (-0.5, -0.2, False),
     ],
 )
-def test_brake_lamps_tell_of_braking_and_holding(throttle, speed, lit):
+def test_brake_lamps_are_lit_when_braking_and_holding(throttle, speed, lit):
     assert ("brake" in lamps(OFF, throttle, speed, 0)) is lit
 
 
 @pytest.mark.parametrize(("speed", "lit"), [(-0.1, True), (-0.001, False), (0.1, False)])
-def test_reverse_lamps_tell_of_rolling_backwards(speed, lit):
+def test_reverse_lamps_are_lit_when_rolling_backwards(speed, lit):
     assert ("reverse" in lamps(OFF, -0.5, speed, 0)) is lit
 
 
@@ -49,7 +49,7 @@ def test_reverse_lamps_tell_of_rolling_backwards(speed, lit):
     ("mode", "sides"),
     [("off", set()), ("left", {"left"}), ("right", {"right"}), ("hazard", {"left", "right"})],
 )
-def test_indicators_show_the_sides_that_were_told(mode, sides):
+def test_indicators_show_the_commanded_sides(mode, sides):
     assert set(lamps(Switches(indicators=mode), 0.5, 0.2, 0)) == sides
 
 
@@ -59,13 +59,13 @@ def test_indicators_flash_half_a_second_each_on_the_clock_of_the_city(t_ms, lit)
     assert ("left" in lamps(Switches(indicators="left"), 0.5, 0.2, now_ns)) is lit
 
 
-def test_a_lost_car_flashes_both_sides_whatever_was_told():
+def test_a_lost_car_flashes_both_sides_with_any_command():
     shown = lamps(Switches(indicators="left"), 0.0, 0.2, 0, hazard=True)
     assert {"left", "right"} <= set(shown)
     assert "left" not in lamps(Switches(indicators="left"), 0.0, 0.2, DARK_NS, hazard=True)
 
 
-def test_a_driver_about_to_turn_indicates_unless_something_else_was_told():
+def test_a_driver_about_to_turn_indicates_unless_commanded_otherwise():
     assert "right" in lamps(OFF, 0.5, 0.2, 0, turn="right")
     assert "right" not in lamps(Switches(indicators="left"), 0.5, 0.2, 0, turn="right")
 

@@ -43,7 +43,7 @@ def speeds(car, throttle, seconds):
         {"mass_kg": 14.0, "wheelbase_m": 0.6, "top_speed_mps": 12.0, "width_m": 0.4},
     ],
 )
-def test_it_reaches_its_top_speed_and_what_its_table_says(changes):
+def test_it_reaches_its_top_speed_and_the_values_in_its_table(changes):
     car = made(**changes)
     top = figures(**changes).top_speed_mps
     assert speeds(car, 1.0, 15.0)[-1] == pytest.approx(top, rel=0.02)
@@ -95,7 +95,7 @@ def test_estimates_hold_for_cars_that_are_known(name):
     assert checked > 9
 
 
-def test_every_number_says_where_it_is_from():
+def test_every_number_has_a_source():
     text = new_car_text(figures(lidar=True, camera=True))
     numbers = [line for line in text.splitlines() if re.search(r"= \{", line)]
     assert len(numbers) > 60

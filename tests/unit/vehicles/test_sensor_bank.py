@@ -144,7 +144,7 @@ def test_a_bias_is_added_and_wanders_like_the_root_of_time():
     assert np.std(late[:, 1]) == pytest.approx(0.2 * np.sqrt(100), rel=0.15)
 
 
-def test_nobody_is_measured_that_nobody_wants_and_later_noise_is_as_if_it_had_been():
+def test_unwanted_readings_are_skipped_without_changing_later_noise():
     device = Device(10.0, noise=(0.1,), drop_out=0.2, walk=(0.1,))
     whole = {r.t_ns: r.values for _, r in run(filled(device), seconds=6)}
     bank = filled(device)
@@ -165,7 +165,7 @@ def test_becoming_wanted_waits_for_the_next_instant_of_the_schedule():
     assert run(bank, start=NS_PER_S // 2)[0][0] == NS_PER_S
 
 
-def test_readings_under_way_die_with_their_car_and_reach_no_successor():
+def test_readings_in_transit_are_dropped_with_their_car():
     bank = filled(Device(5.0, latency_s=0.04), ("ann", "bob"))
     bank.step(0)
     bank.unfit(0)

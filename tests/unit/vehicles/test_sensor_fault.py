@@ -149,7 +149,7 @@ def test_an_unknown_parameter_is_refused_with_the_nearest():
         AppliedFault(all_sensor_faults()["gyro_bias"], {"bas": 0.1})
 
 
-def test_a_fault_whose_channel_is_missing_says_which():
+def test_a_fault_without_its_channel_names_it():
     with pytest.raises(TermError, match=r"pose_point: needs the channel pose\.yaw"):
         apply_faults(
             {"pose.x": drive()["pose.x"]}, [AppliedFault(all_sensor_faults()["pose_point"], {})]

@@ -113,7 +113,7 @@ def test_a_narrow_field_of_view_begins_at_its_right_hand_end():
     assert np.isinf(ranges[135 * 4 :]).all()
 
 
-def test_noise_may_carry_a_hit_over_the_range_but_no_reading_lies_beyond_it():
+def test_a_hit_beyond_the_range_after_noise_is_a_miss():
     still = ExternalVehicles(1)
     x, _, _ = NIGEL.vector("lidar.position_m")
     bank = Bank(SENSOR, 0)

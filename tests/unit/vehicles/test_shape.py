@@ -39,7 +39,7 @@ def test_a_row_of_a_fleet_goes_by_its_own_numbers(fleet):
     fleet.parameters[0, fleet.parameter_names.index("shift")] = 0.03
 
 
-def test_the_contact_body_stands_where_the_car_stands(fleet):
+def test_the_contact_body_has_the_cars_pose(fleet):
     hull = hull_of(LADEN)
     assert hull.mass == pytest.approx(3.0)
     x, y, yaw, *_ = fleet.planar_cog(0)

@@ -100,11 +100,11 @@ def hearing(gaps_s, name="n1", cars=None, start_s=0.0):
     return cars, round(at_s * NS_PER_S)
 
 
-def test_who_hears_nobody_does_not_hear_well():
+def test_without_cams_reception_is_poor():
     assert not CamTracker().reception_is_good(0)
 
 
-def test_who_hears_a_car_every_second_hears_well_and_silence_ends_that():
+def test_one_cam_a_second_is_good_reception_until_it_stops():
     cars, now_ns = hearing([1.0] * 8)
     assert cars.reception_is_good(now_ns)
     assert cars.reception_is_good(now_ns + 2 * NS_PER_S)

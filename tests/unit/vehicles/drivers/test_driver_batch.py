@@ -188,7 +188,7 @@ def test_all_ways_behind_a_junction_are_taken(grid):
     assert taken == set(grid.successors(spawn.lane))
 
 
-def test_a_car_that_nobody_drives_keeps_its_commands(eight):
+def test_a_car_without_a_driver_keeps_its_commands(eight):
     city = City(eight, [("east_loop", 0.3)])
     city.tick()
     before = float(city.drivers.throttle[0])
@@ -207,7 +207,7 @@ def test_a_halted_car_is_not_driven_before_it_is_sent_again(eight):
     assert city.drivers.throttle[0] > 0.0
 
 
-def test_a_car_behind_another_stops_and_says_why(eight):
+def test_a_car_behind_another_stops_and_reports_why(eight):
     city = City(eight, [("east_loop", 0.3), ("east_loop", 1.2)])
     city.driven[1] = False
     for _ in range(400):
@@ -217,7 +217,7 @@ def test_a_car_behind_another_stops_and_says_why(eight):
     assert WAITING_FOR[city.drivers.waiting[0]] == "vehicle"
 
 
-def test_a_car_that_left_is_seen_by_nobody(eight):
+def test_a_removed_car_is_not_received(eight):
     city = City(eight, [("east_loop", 0.3), ("east_loop", 1.0)])
     city.driven[1] = False
     city.drivers.leave(1)
@@ -227,7 +227,7 @@ def test_a_car_that_left_is_seen_by_nobody(eight):
 
 
 @pytest.mark.parametrize(("queue", "enters"), [(7, False), (3, True)])
-def test_nobody_enters_a_junction_whose_exit_is_full_even_if_all_roll_there(grid, queue, enters):
+def test_no_car_enters_a_junction_with_a_full_exit_even_if_all_roll_there(grid, queue, enters):
     """A street full of cars that say they roll leaves no place once they have to stop."""
     line = next(line for line in grid.city_map.stop_lines if line.lane == "j0_1_e")
     way, street = "j1_1_ee", "j1_1_e"
@@ -245,7 +245,7 @@ def test_nobody_enters_a_junction_whose_exit_is_full_even_if_all_roll_there(grid
     assert bool(city.drivers.passed[0] > 0) is enters
 
 
-def test_with_all_frames_lost_nobody_is_seen(eight):
+def test_with_all_frames_lost_no_car_is_known(eight):
     city = City(eight, [("east_loop", 0.3), ("east_loop", 1.2)], radio=RadioChannel(loss=1.0))
     city.driven[1] = False
     for _ in range(300):

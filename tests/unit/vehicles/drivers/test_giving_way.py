@@ -130,7 +130,7 @@ def test_a_car_rests_half_a_second_at_a_stop_sign_and_then_goes():
     assert drive.crossed_s[0] is not None
 
 
-def test_a_car_says_that_a_sign_holds_it():
+def test_a_car_reports_that_it_waits_at_a_sign():
     drive = Drive(crossing("e stop"), [("e", "e", 0.3)])
     reasons = set()
     for _ in range(160):
@@ -140,7 +140,7 @@ def test_a_car_says_that_a_sign_holds_it():
 
 
 @pytest.mark.parametrize("kinds", [(), ("e give_way",)])
-def test_nobody_stands_where_nobody_comes(kinds):
+def test_no_car_waits_without_crossing_traffic(kinds):
     drive = Drive(crossing(*kinds), [("e", "e", 0.8)]).run(5.0)
     assert drive.stood_s[0] == 0.0
     assert drive.crossed_s[0] < 4.5
@@ -202,7 +202,7 @@ def test_a_car_with_the_right_of_way_is_remembered_while_its_cams_are_lost():
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-def test_nobody_touches_where_a_third_of_all_frames_is_lost(seed):
+def test_no_contact_with_a_third_of_all_frames_lost(seed):
     kinds = ("e stop", "n stop", "w stop", "s stop")
     cars = [("e", "e", 0.6), ("n", "w", 0.6), ("w", "s", 0.6), ("s", "s", 0.6)]
     air = RadioChannel(loss=0.3)
@@ -210,7 +210,7 @@ def test_nobody_touches_where_a_third_of_all_frames_is_lost(seed):
     assert None not in drive.crossed_s
 
 
-def test_who_knows_that_it_hears_too_little_stays_before_its_line():
+def test_with_poor_reception_a_car_waits_at_its_stop_line():
     for arm, to, goes in (("n", "n", False), ("e", "e", True)):
         drive = Drive(crossing("n give_way", "s give_way"), [(arm, to, 0.6)])
         drive.drivers.channel.numbers[POOR_RECEPTION] = 1.0
@@ -221,7 +221,7 @@ def test_who_knows_that_it_hears_too_little_stays_before_its_line():
         assert drive.crossed_s[0] is not None
 
 
-def test_a_driver_alone_on_an_air_that_loses_frames_stays_until_it_hears_somebody():
+def test_a_driver_alone_with_a_lossy_radio_waits_until_it_receives_a_cam():
     air, far = RadioChannel(loss=0.2), ("w", "w", 4.0)
     roads = crossing("n give_way", "s give_way")
     drive = Drive(roads, [("n", "n", 0.6), far], radio=air)

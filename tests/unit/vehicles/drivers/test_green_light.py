@@ -173,7 +173,7 @@ def test_a_flashing_or_accused_junction_promises_nothing():
     assert red_for(told, group, 0, place, 0) == 0.0
 
 
-def test_a_car_without_a_map_is_advised_by_what_the_air_tells():
+def test_a_car_without_a_map_is_advised_by_mapem_and_spatem():
     roads, now_ns = Roads(grid_city(3, 3)), 3 * 10**9
     advisor, junction = GreenAdvisor(NIGEL), roads.city_map.junctions[4]
     line = next(one for one in roads.city_map.stop_lines if one.junction == junction.name)

@@ -70,7 +70,7 @@ def test_the_turn_along_the_way_is_that_of_the_map(roads, lap, offset):
         assert seen == pytest.approx(expected, abs=0.02)
 
 
-def test_a_way_that_ends_in_sight_says_so(roads):
+def test_a_route_that_ends_ahead_is_marked(roads):
     lane_graph = LaneGraph(roads)
     ways, lane = lane_graph.arrays, lane_graph.numbers["east_loop"]
     ids, begins = np.zeros(32, np.int64), np.zeros(33)

@@ -199,7 +199,7 @@ def test_a_waiting_car_goes_on_green(scene):
 
 
 @pytest.mark.parametrize("distance_m", [0.01 * k for k in range(1, 31)])
-def test_nobody_passes_the_line_on_red_wherever_yellow_finds_him(scene, eight, distance_m):
+def test_no_car_passes_the_line_on_red_wherever_it_is_at_yellow(scene, eight, distance_m):
     """0.56 s of yellow is what 0.26 m/s, 0.3 s of reaction and 0.5 m/s^2 ask for."""
     run = scene(s=1.2)
     line = next(at for at, _ in eight.stop_lines if at > 1.6)
@@ -279,7 +279,7 @@ def test_an_order_to_stop_brings_the_car_to_rest_where_it_is(scene):
     assert run.driver.waiting_for == "stop"
 
 
-def test_a_wished_speed_is_kept(scene):
+def test_a_target_speed_is_kept(scene):
     assert scene(speed=0.12).run(5.0).car.speed == pytest.approx(0.12, abs=0.005)
 
 

@@ -55,7 +55,7 @@ def fault(name, junction="crossing"):
     return MonitorStatus(junction=junction, t_ns=0, fault=name, since_ns=0)
 
 
-def test_nothing_heard_is_nothing_believed(view):
+def test_without_messages_no_signal_state_is_known(view):
     assert view.colour(*AT, NOW_NS) is None
     assert not view.may_go(*AT, NOW_NS)
     assert view.time_to_change(*AT, NOW_NS) is None

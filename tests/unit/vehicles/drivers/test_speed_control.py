@@ -47,7 +47,7 @@ def test_a_standing_car_is_held_until_it_may_really_go():
     assert pedal.press(0.05, 0.0) > 0.0
 
 
-def test_a_wish_of_zero_is_no_throttle_at_once():
+def test_a_target_of_zero_cuts_the_throttle_immediately():
     pedal = Pedal(TABLE)
     pedal.press(0.25, 0.25, 100)
     assert pedal.press(0.0, 0.25) == 0.0

@@ -94,7 +94,7 @@ def test_a_car_beside_all_lanes_cannot_begin(roads):
         TripDriver("n7", roads, LIMITS, Pose2(50.0, 50.0, 0.0), 0)
 
 
-def test_a_trip_tells_what_is_left_of_it_so_that_it_can_go_on(trips, roads, view, start):
+def test_a_trip_reports_its_remaining_stops_so_that_it_can_continue(trips, roads, view, start):
     request = RouteRequest(
         vehicle="n7", via=("west_loop", "east_loop"), laps=2, speed_mps=0.1, then="circulate"
     )
@@ -129,14 +129,14 @@ def test_spread_reports_keep_to_their_own_turn(trips, start):
     assert times == [130, 500, 1000, 1500]
 
 
-def test_another_car_in_its_place_counts_its_trips_anew(trips, start):
+def test_another_car_in_its_row_restarts_the_trip_numbers(trips, start):
     trips = Trips(trips.driver.batch)
     for vehicle in ("n7", "n7", "n8"):
         trips.circulate(OWN, vehicle, start, 0)
     assert [trip.trip_id for trip in trips.reports(0)] == ["n8-1"]
 
 
-def test_the_last_word_on_a_trip_is_said_once(trips, start):
+def test_the_final_report_of_a_trip_is_sent_once(trips, start):
     trips = Trips(trips.driver.batch)
     trips.circulate(OWN, "n7", start, 0)
     trips.end(OWN, 0)
@@ -145,7 +145,7 @@ def test_the_last_word_on_a_trip_is_said_once(trips, start):
 
 
 @pytest.mark.parametrize("then", ["stop", "circulate"])
-def test_the_arrival_is_told_once_at_once(trips, view, roads, start, then):
+def test_an_arrival_is_reported_once_and_immediately(trips, view, roads, start, then):
     request = RouteRequest(
         vehicle="n7", via=("east_loop",), request_id="r1", then=then, speed_mps=0.1
     )

@@ -28,7 +28,7 @@ class Station:
         return int(self.stood[0])
 
 
-def test_a_car_stands_since_it_first_told_so():
+def test_a_car_waits_since_its_first_cam_at_standstill():
     station = Station()
     assert station.send(1.0, 4.0, 0.2) == NEVER_NS
     assert station.send(2.0, 4.3, 0.01) == 2 * NS_PER_S
@@ -42,7 +42,7 @@ def test_who_starts_and_stops_again_keeps_its_place():
     assert station.send(4.0, 4.35, 0.0) == 2 * NS_PER_S
 
 
-def test_who_moves_up_in_a_queue_stands_anew():
+def test_a_car_that_moves_up_in_a_queue_restarts_its_wait():
     station = Station()
     station.send(2.0, 4.3, 0.0)
     assert station.send(3.0, 4.5, 0.1) == NEVER_NS
