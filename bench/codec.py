@@ -14,10 +14,10 @@ ROUNDS = 300
 def main() -> None:
     """Print microseconds a message, one of each kind as a small city says it."""
     sys.path.insert(0, str(Path(__file__).parent.parent))
-    from tests.unit.v2x.etsi_city import city_says
+    from tests.unit.v2x.etsi_city import city_messages
 
     print(f"{'':8}{'JSON':>14}{'bytes':>7}{'UPER':>18}{'bytes':>7}{'asn1tools':>18}{'ratio':>12}")
-    for kind, published in city_says().items():
+    for kind, published in city_messages().items():
         longest = max(
             (one.body for one in published), key=lambda one: len(msgspec.json.encode(one))
         )

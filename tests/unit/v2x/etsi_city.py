@@ -76,7 +76,9 @@ def city_messages() -> dict[str, tuple[SentMessage, ...]]:
         city.call(PlanRequest(junction="crossing", plan="flash", by="test"))
         city.run_for(4.0)
         sent = {
-            kind: tuple(SentMessage(m.station, m.t_ns, m.body) for m in (i.message for i in box.drain()))
+            kind: tuple(
+                SentMessage(m.station, m.t_ns, m.body) for m in (i.message for i in box.drain())
+            )
             for kind, box in (("cam", cams), ("spatem", spatems))
         }
         received = [item.message for item in states.drain()]
@@ -109,7 +111,9 @@ def _made(city_map, state):
     answers = [PriorityAnswer(request, status) for request in requests for status in STATUSES]
     return {
         "mapem": (SentMessage(rsu, t_ns, mapem),),
-        "srem": tuple(SentMessage(state.vehicle, t_ns, srem_of(request, state)) for request in requests),
+        "srem": tuple(
+            SentMessage(state.vehicle, t_ns, srem_of(request, state)) for request in requests
+        ),
         "ssem": (SentMessage(rsu, t_ns, ssem_of(junction, answers, 3, t_ns)),),
         "denm": tuple(_warnings(state, t_ns)),
         "cpm": tuple(

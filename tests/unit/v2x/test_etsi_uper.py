@@ -71,7 +71,9 @@ def test_a_cam_with_its_slow_container_is_longer_and_whole():
 
 
 def test_a_node_takes_as_few_bits_as_its_offset_needs():
-    (mapem,) = codec.CODINGS["mapem"].to_asn(city_messages()["mapem"][0].body)["map"]["intersections"]
+    (mapem,) = codec.CODINGS["mapem"].to_asn(city_messages()["mapem"][0].body)["map"][
+        "intersections"
+    ]
     nodes = [node["delta"] for lane in mapem["laneSet"] for node in lane["nodeList"][1]]
     limits = {
         f"node-XY{n}": 2**bits for n, bits in zip(range(1, 7), (9, 10, 11, 12, 13, 15), strict=True)
