@@ -6,20 +6,20 @@ Holds: slow cars on one carpet.   Shows in: circles that are slower on one side.
 Source: ours, an example of an effect in a file of one's own.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lane_math import sin_cos
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def carpet_nap_damping(cos_yaw: float, sin_yaw: float, coefficient: float, along: float) -> float:
     """Force lost per speed [N*s/m]."""
     sin_along, cos_along = sin_cos(along)
     return coefficient * (1.0 - cos_yaw * cos_along - sin_yaw * sin_along)
 
 
-@law
+@kernel_function
 def carpet_nap(
     vx: float, cos_yaw: float, sin_yaw: float, coefficient: float, along: float
 ) -> float:

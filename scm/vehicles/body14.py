@@ -15,7 +15,7 @@ at 1 ms: with K the secant of the tyre curve, a step never overshoots the veloci
 
 import math
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.physics_variables import Per
 
@@ -82,7 +82,7 @@ MOTION = (
 )  # fmt: skip
 
 
-@law
+@kernel_function
 def sprung_part(
     mass: float, cog_to_rear_axle: float, wheel_mass: float, wheelbase: float
 ) -> tuple[float, float]:
@@ -91,7 +91,7 @@ def sprung_part(
     return sprung_mass, (mass * cog_to_rear_axle - 2.0 * wheel_mass * wheelbase) / sprung_mass
 
 
-@law
+@kernel_function
 def contact_velocity(
     vx: float, vy: float, roll_rate: float, pitch_rate: float, yaw_rate: float,
     wheel_x: float, wheel_y: float, cog_height: float,
@@ -103,13 +103,13 @@ def contact_velocity(
     )
 
 
-@law
-def corner_height(z: float, roll: float, pitch: float, seat_x: float, wheel_y: float) -> float:
+@kernel_function
+def corner_height(z: float, roll: float, pitch: float, spring_x: float, wheel_y: float) -> float:
     """How far (or, of rates, how fast) the body's corner is up from rest [m, m/s]."""
-    return z + wheel_y * roll - seat_x * pitch
+    return z + wheel_y * roll - spring_x * pitch
 
 
-@law
+@kernel_function
 def eliminate_hop(
     dt: float, wheel_mass: float, suspension_force: float, suspension_damping: float, load: float,
     load_damping: float,
@@ -122,7 +122,7 @@ def eliminate_hop(
     return free, follow, force, suspension_damping * (1.0 - follow)
 
 
-@law
+@kernel_function
 def eliminate_spin(
     dt: float, omega: float, inertia: float, radius: float, torque: float, torque_damping: float,
     dry_torque: float, tyre_x: float, tyre_x_damping: float,
@@ -141,7 +141,7 @@ def eliminate_spin(
     return spin, follow, tyre_x + grip * (spin - omega), tyre_x_damping * (1.0 - radius * follow)
 
 
-@law
+@kernel_function
 def turn_contact(
     cos_steer: float, sin_steer: float, force_long: float, stiff_long: float, force_lat: float,
     stiff_lat: float,
@@ -158,13 +158,13 @@ def turn_contact(
 Six = tuple[float, float, float, float, float, float]
 
 
-@law
+@kernel_function
 def body_step(
     dt: float, mass: float, sprung_mass: float, roll_inertia: float, pitch_inertia: float,
     yaw_inertia: float, cog_height: float, force_x: float, force_y: float, moment_z: float,
     force_x_damping: float, force_y_damping: float, moment_z_damping: float,
-    seat: float, seat_roll: float, seat_pitch: float, stiff: float, stiff_y: float, stiff_x: float,
-    stiff_yy: float, stiff_xy: float, stiff_xx: float,
+    spring: float, spring_roll: float, spring_pitch: float, stiff: float, stiff_y: float,
+    stiff_x: float, stiff_yy: float, stiff_xy: float, stiff_xx: float,
     contact_x: float, contact_y: float, contact_turn: float, kxx: float, kxy: float, kyy: float,
     turn_x: float, turn_y: float, turn_turn: float,
 ) -> Six:  # fmt: skip
@@ -175,7 +175,7 @@ def body_step(
     h = cog_height
     heave = 1.0 / (sprung_mass + dt * stiff)
     heave_roll, heave_pitch = dt * stiff_y, -(dt * stiff_x)
-    lift = dt * (seat - sprung_mass * GRAVITY)
+    lift = dt * (spring - sprung_mass * GRAVITY)
     roll_heave, pitch_heave = heave * heave_roll, heave * heave_pitch
     hx, hy, cross = dt * h * kxx, dt * h * kyy, dt * h * kxy
     roll = roll_inertia + h * hy + dt * stiff_yy - roll_heave * heave_roll
@@ -190,15 +190,15 @@ def body_step(
         yaw_inertia + dt * (turn_turn + moment_z_damping),
         dt * (contact_x + force_x),
         dt * (contact_y + force_y),
-        dt * (seat_roll + h * contact_y) - roll_heave * lift,
-        dt * (seat_pitch - h * contact_x) - pitch_heave * lift,
+        dt * (spring_roll + h * contact_y) - roll_heave * lift,
+        dt * (spring_pitch - h * contact_x) - pitch_heave * lift,
         dt * (contact_turn + moment_z),
     )  # fmt: skip
     dvz = heave * (lift - heave_roll * droll - heave_pitch * dpitch)
     return dvx, dvy, dvz, droll, dpitch, dyaw
 
 
-@law
+@kernel_function
 def solve_five(
     a00: float,
     a10: float, a11: float,

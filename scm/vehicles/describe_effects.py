@@ -108,7 +108,7 @@ def _lines(effects: Sequence[Effect], width: int) -> Iterator[str]:
 
 
 def _reads(term: Term) -> str:
-    functions = [f for part in flat([term]) for f in (part.law, part.damping) if f]
+    functions = [f for part in flat([term]) for f in (part.function, part.damping) if f]
     names = dict.fromkeys(name for f in functions for name in reads(f) if name in SIGNALS)
     return ", ".join(names) or "only its own numbers"
 

@@ -33,7 +33,7 @@ from scm.vehicles.fleet_rows import (
     whole_steps,
 )  # fmt: skip
 from scm.vehicles.jit import plain
-from scm.vehicles.layout import columns_of, find_column, slots_of
+from scm.vehicles.layout import columns_of, find_column, rows_of
 from scm.vehicles.physics_variables import SIGNALS
 from scm.vehicles.shape import Shape, shape_of
 from scm.vehicles.term import reads
@@ -104,7 +104,7 @@ class Fleet:
         self.car, self.capacity = car, capacity
         self.threads = 1
         self.columns = columns_of(car.terms)
-        self._offsets = slots_of(car.terms)
+        self._offsets = rows_of(car.terms)
         self._variable_offsets = offsets_of_variables(self._offsets)
         self._kernel = compile_kernel(car.terms)
         padded = -(-capacity // LANES) * LANES
@@ -454,7 +454,7 @@ class Fleet:
         Raises:
             TermError: when an effect reads a delayed command and the car has no such delay.
         """
-        delayed = {name for term in self.car.terms for name in reads(term.law)} & DELAYS.keys()
+        delayed = {name for term in self.car.terms for name in reads(term.function)} & DELAYS.keys()
         if not delayed:
             return None
         keys = {column.param.key: i for i, column in enumerate(self.columns)}

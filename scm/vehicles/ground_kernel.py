@@ -15,7 +15,7 @@ import math
 from typing import NamedTuple
 
 from scm.arrays import Bools, Floats, Ints
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 
 CLIMBS = 0.7
 RIM = 0.98  # of the radius: at the very rim the slope has no end
@@ -65,7 +65,7 @@ class Sheet(NamedTuple):
     height_frame: Floats
 
 
-@law
+@kernel_function
 def is_inside(x: float, y: float, corners: Floats, low: int, high: int) -> bool:
     """Return whether a point lies in a polygon of any shape."""
     inside = False
@@ -79,7 +79,7 @@ def is_inside(x: float, y: float, corners: Floats, low: int, high: int) -> bool:
     return inside
 
 
-@law
+@kernel_function
 def blend(picture: Floats, frame: Floats, x: float, y: float) -> tuple[float, float, float]:
     """Return value and gradient of a picture at a place, between pixels' middles, rim kept."""
     rows, columns = picture.shape
@@ -95,7 +95,7 @@ def blend(picture: Floats, frame: Floats, x: float, y: float) -> tuple[float, fl
     return value, along_x, along_y
 
 
-@law
+@kernel_function
 def over_hills(
     heights: Floats, level: Bools, frame: Floats,
     x: float, y: float, way: float, radius: float,
@@ -119,7 +119,7 @@ def over_hills(
     return best, best_x, best_y
 
 
-@law
+@kernel_function
 def over_piece(
     corners: Floats, low: int, high: int, plane: Floats,
     x: float, y: float, way: float, radius: float,
@@ -160,7 +160,7 @@ def over_piece(
     return height, rise_x, rise_y
 
 
-@law
+@kernel_function
 def cell_of(frame: Floats, columns: int, rows: int, x: float, y: float) -> int:
     """Return the number of the cell at a place; outside of all that is one more, the empty one."""
     column, row = math.floor((x - frame[0]) / frame[2]), math.floor((y - frame[1]) / frame[2])
@@ -169,7 +169,7 @@ def cell_of(frame: Floats, columns: int, rows: int, x: float, y: float) -> int:
     return int(row * columns + column)
 
 
-@law
+@kernel_function
 def painted(friction: Floats, frame: Floats, x: float, y: float) -> float:
     """Return the grey of the friction map at a place; below 0 where there is none."""
     rows, columns = friction.shape
@@ -182,7 +182,7 @@ def painted(friction: Floats, frame: Floats, x: float, y: float) -> float:
     return grey
 
 
-@law
+@kernel_function
 def is_on(
     circles: Floats, corners: Floats, i: int, low: int, high: int, x: float, y: float
 ) -> bool:

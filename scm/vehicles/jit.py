@@ -54,7 +54,7 @@ def _type_in_kernels(value: _KernelFunction, _: object) -> Any:
     return _numba.typeof(value.in_kernels)
 
 
-def law(function: Function) -> Function:
+def kernel_function(function: Function) -> Function:
     """Let a function of scalars be called from compiled kernels; plain calls work as before.
 
     It may take arrays and look into them; it makes and returns none.
@@ -65,8 +65,11 @@ def law(function: Function) -> Function:
     return cast("Function", _KernelFunction(function))
 
 
+law = kernel_function  # its name in car folders written for 0.1
+
+
 def inlined(function: Function) -> Function:
-    """As `law`, but always inlined into its caller."""
+    """As `kernel_function`, but always inlined into its caller."""
     return cast("Function", _KernelFunction(function, forceinline=True))
 
 

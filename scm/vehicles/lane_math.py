@@ -1,26 +1,26 @@
-"""Functions for laws that run over many cars at once: straight text, no library call, no branch.
+"""Functions for terms that run over many cars at once: straight text, no library call, no branch.
 
-A law may use + - * / abs min max math.sqrt math.floor math.copysign, selects (`a if c else b`) and
+A term may use + - * / abs min max math.sqrt math.floor math.copysign, selects (`a if c else b`) and
 these. Each is odd or even exactly as its namesake, and the same in every lane bit for bit.
 """
 
 import math
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 _QUARTER = 0.6366197723675814  # quarter turns in a radian
 # half pi in three parts: whole quarter turns up to 2^20 subtract without loss
 _HALF_PI, _HALF_PI_2, _HALF_PI_3 = 1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21
 
 
-@law
+@kernel_function
 def soft_sign(x: float) -> float:
     """Odd, slope 1 at 0, tends to +-1 as 1 - 1/(2 x^2): the cheap way to turn over at rest."""
     far = min(max(x, -1e8), 1e8)
     return far / math.sqrt(1.0 + far * far)
 
 
-@law
+@kernel_function
 def expm1_neg(x: float) -> float:
     """exp(-x) - 1 for x >= 0, relative error below 2e-14; below 0 as at 0, exactly 0."""
     r = min(max(x, 0.0), 40.0) * -0.0078125
@@ -43,20 +43,20 @@ def expm1_neg(x: float) -> float:
     return e * (e + 2.0)
 
 
-@law
+@kernel_function
 def exp_neg(x: float) -> float:
     """exp(-x) for x >= 0, absolute error below 1e-15; below 0 as at 0, exactly 1."""
     return 1.0 + expm1_neg(x)
 
 
-@law
+@kernel_function
 def tanh(x: float) -> float:
     """Hyperbolic tangent of any x, relative error below 2e-14."""
     e = expm1_neg(2.0 * abs(x))
     return math.copysign(e / (2.0 + e), x)
 
 
-@law
+@kernel_function
 def tan_small(x: float) -> float:
     """Tangent of |x| < 1.2, relative error below 1e-14 (the continued fraction, eight deep)."""
     z = x * x
@@ -65,7 +65,7 @@ def tan_small(x: float) -> float:
     return x * top / foot
 
 
-@law
+@kernel_function
 def atan_small(x: float) -> float:
     """Arc tangent of |x| < 0.414, error below 1e-15 (a polynomial through Chebyshev's nodes)."""
     z = x * x
@@ -77,7 +77,7 @@ def atan_small(x: float) -> float:
     return x * (1.0 + z * p)
 
 
-@law
+@kernel_function
 def atan(x: float) -> float:
     """Arc tangent of any x, error below 1e-15: turned by a quarter or an eighth first."""
     size = abs(x)
@@ -88,7 +88,7 @@ def atan(x: float) -> float:
     return math.copysign(turned + atan_small(top / foot), x)
 
 
-@law
+@kernel_function
 def sin_cos(x: float) -> tuple[float, float]:
     """Sine and cosine of |x| < 1e6, error below 1e-15."""
     turns = float(math.floor(x * _QUARTER + 0.5))

@@ -1,4 +1,4 @@
-"""Where everything of a car stands: columns of its numbers, slots of its state."""
+"""Where everything of a car stands: columns of its numbers, rows of its state."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -53,22 +53,22 @@ def find_column(columns: Sequence[Column], name: str) -> int:
     raise TermError(msg)
 
 
-def slots_of(terms: Sequence[Term]) -> dict[str, tuple[int, int]]:
+def rows_of(terms: Sequence[Term]) -> dict[str, tuple[int, int]]:
     """Return first row and width of everything in a fleet's block.
 
-    Once a car, then once a wheel; each time inputs, states with what terms keep, results: so what
-    a call loads stands together, and so does what it stores.
+    Once a car, then once a wheel; each time inputs, states with those of terms, results: so what a
+    call loads stands together, and so does what it stores.
     """
-    slots: dict[str, tuple[int, int]] = {}
+    rows: dict[str, tuple[int, int]] = {}
     offset = 0
     for per, width in ((Per.BODY, 1), (Per.WHEEL, 4)):
         for name in [*body14.INPUTS[per], *states_of(terms, per), *body14.OUTPUTS[per]]:
-            slots[name] = (offset, width)
+            rows[name] = (offset, width)
             offset += width
-    return slots
+    return rows
 
 
 def states_of(terms: Sequence[Term], per: Per) -> tuple[str, ...]:
     """Return what outlives a call: the skeleton's states, and what the terms keep."""
-    kept = {term.target for term in terms if term.keeps is not None and term.per is per}
-    return (*body14.STATES[per], *sorted(kept - set(body14.STATES[per])))
+    from_terms = {term.target for term in terms if term.keeps is not None and term.per is per}
+    return (*body14.STATES[per], *sorted(from_terms - set(body14.STATES[per])))

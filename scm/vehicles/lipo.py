@@ -6,12 +6,12 @@ Piecewise linear between the points of the usual 1C rest chart (3.27 V empty, 3.
 
 import numpy as np
 
-from scm.vehicles.jit import law, plain
+from scm.vehicles.jit import kernel_function, plain
 
 _BENDS = (0.0, 0.05, 0.1, 0.3, 0.5, 0.8, 1.0)
 
 
-@law
+@kernel_function
 def cell_voltage(charge: float) -> float:
     """Voltage of one cell at rest by its state of charge 0..1 [V]."""
     steep = 6.8 * min(max(charge, 0.0), 0.05) + 1.6 * min(max(charge - 0.05, 0.0), 0.05)
@@ -20,13 +20,13 @@ def cell_voltage(charge: float) -> float:
     return 3.27 + (steep + flat + full)
 
 
-@law
+@kernel_function
 def pack_voltage(drawn: float, cells: float, capacity: float, start_charge: float) -> float:
     """Voltage of a pack without load, after `drawn` ampere-seconds of `capacity` ampere-hours."""
     return cells * cell_voltage(start_charge - drawn * (1.0 / (3600.0 * capacity)))
 
 
-@law
+@kernel_function
 def loaded_voltage(
     open_circuit: float, resistance: float, throttle: float, turn: float,
     motor_current: float, idle_current: float, nominal: float,
@@ -42,7 +42,7 @@ def loaded_voltage(
     return max(0.0, min(idle, (idle + pull * turn) / (1.0 + pull * throttle * (1.0 / nominal))))
 
 
-@law
+@kernel_function
 def pack_current(
     voltage: float, throttle: float, turn: float, motor_current: float, idle_current: float,
     nominal: float,

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scm.arrays import Floats, Ints
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 
 Keys = NDArray[np.uint64]
 
@@ -64,7 +64,7 @@ def normals(bases: Keys, count: int) -> Floats:
     return out[:, :count]
 
 
-@law
+@kernel_function
 def mix(bits: np.uint64) -> np.uint64:
     """Scramble 64 bits: each input bit changes each output bit half of the time."""
     bits = (bits ^ (bits >> _S30)) * _M1

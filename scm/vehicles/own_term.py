@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from scm.errors import ScmError, TermError, nearest, reading
-from scm.vehicles.compiler.inline import law_problems
+from scm.vehicles.compiler.inline import function_problems
 from scm.vehicles.term import Term, flat
 
 SUFFIX = ".py"
@@ -21,7 +21,7 @@ def load_own_term(folder: Path, name: str) -> Term:
 
     Raises:
         TermError: when it is elsewhere, is not there, does not run, holds no effect of its name, or
-            laws that cannot be laid into a kernel.
+            functions that cannot be inlined into a kernel.
     """
     path = (folder / name).resolve()
     if Path(name).name != name:
@@ -36,16 +36,17 @@ def load_own_term(folder: Path, name: str) -> Term:
         msg = f"{name}: expected TERM = Term(...), got {term!r}"
         raise TermError(msg)
     if term.name != path.stem:
-        msg = f"{name}: expected a law named {path.stem!r} like its file, got {term.name!r}"
+        msg = f"{name}: expected a function named {path.stem!r} like its file, got {term.name!r}"
         raise TermError(msg)
-    laws = [law for part in flat([term]) for law in (part.law, part.damping) if law is not None]
-    if problems := list(dict.fromkeys(law_problems(laws))):
+    pairs = ((part.function, part.damping) for part in flat([term]))
+    functions = [function for pair in pairs for function in pair if function is not None]
+    if problems := list(dict.fromkeys(function_problems(functions))):
         raise TermError("; ".join(problems))
     return term
 
 
 def _module(path: Path) -> object:
-    """Run the file once for each state it is in; compiled laws stay with the state they saw."""
+    """Run the file once for each version; compiled functions stay with the version they are of."""
     with reading(path, "a Python file", TermError):
         state = hashlib.sha256(f"{path}\0{path.read_text(encoding='utf-8')}".encode()).hexdigest()
     name = f"scm_own_{path.stem}_{state[:12]}"

@@ -24,7 +24,7 @@ class Param:
     """One number that an effect reads.
 
     Attributes:
-        name: The law's argument name, without the unit.
+        name: The function's argument name, without the unit.
         default: Value if a car file has none, in `unit`.
         unit: SI, such as `N*m*s`; "1": none.
         key: `section.key` in a car file; two effects with the same key share the number.

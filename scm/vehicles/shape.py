@@ -40,6 +40,6 @@ def shape_of(car: Car, number: Callable[[str], float] | None = None) -> Shape:
     for term in car.terms:
         if SIGNALS[term.target].role is Role.SHAPE:
             keys = {param.name: param.key for param in term.params}
-            more = plain(term.law)(*(value(keys[name]) for name in reads(term.law)))
+            more = plain(term.function)(*(value(keys[name]) for name in reads(term.function)))
             totals[_ADDED[term.target]] += more
     return Shape(*totals.values())

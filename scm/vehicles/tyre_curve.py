@@ -6,10 +6,10 @@
 so F(0) = 0, F''(0) = 0, F'(s_e) = 0, F'(s_a) = 0; beyond s_a the force stays F_a.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 
-@law
+@kernel_function
 def curve_over_slip(
     slip: float,
     slip_extremum: float,

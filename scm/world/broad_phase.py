@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 from scm.world.sweep import is_any_fast, share_moves
 
 LEEWAY_M = 0.025
@@ -200,7 +200,7 @@ def list_pairs(
     return count
 
 
-@law
+@kernel_function
 def gap_to_box(x: float, y: float, box: Floats) -> float:
     """Return the distance of a point to a box, squared [m^2]."""
     dx, dy = x - box[0], y - box[1]
@@ -238,7 +238,7 @@ def list_walls(walls: Ints, motion: Floats, reach: Floats, obstacles: Obstacles)
     return count
 
 
-@law
+@kernel_function
 def is_apart(
     x: float, y: float, c: float, s: float, length: float, width: float,
     other_length: float, other_width: float,
@@ -253,7 +253,7 @@ def is_apart(
     )
 
 
-@law
+@kernel_function
 def do_overlap(motion: Floats, outlines: Floats, i: int, j: int) -> bool:
     """Return whether two bodies' boxes overlap."""
     dx, dy = motion[j, 0] - motion[i, 0], motion[j, 1] - motion[i, 1]
@@ -268,7 +268,7 @@ def do_overlap(motion: Floats, outlines: Floats, i: int, j: int) -> bool:
     return not is_apart(x, y, c, s, outlines[j, 2], outlines[j, 3], outlines[i, 2], outlines[i, 3])
 
 
-@law
+@kernel_function
 def does_meet(motion: Floats, outlines: Floats, i: int, box: Floats) -> bool:
     """Return whether a body's box overlaps an obstacle."""
     far = outlines[i, 4] + TOUCH_M
@@ -282,7 +282,7 @@ def does_meet(motion: Floats, outlines: Floats, i: int, box: Floats) -> bool:
     return not is_apart(x, y, c, s, outlines[i, 2], outlines[i, 3], box[4], box[5])
 
 
-@law
+@kernel_function
 def is_moving(motion: Floats, i: int) -> bool:
     """Return whether a body has any velocity."""
     return bool(motion[i, 3] != 0.0 or motion[i, 4] != 0.0 or motion[i, 5] != 0.0)

@@ -16,7 +16,7 @@ Source: conservative advancement (Mirtich, Impulse-based dynamic simulation, 199
 import math
 
 from scm.arrays import Bools, Floats, Ints
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 
 MAX_OVERLAP = 0.25  # of the smallest half side; pymunk parts bodies the wrong way from 1 on
 DEEP = 2.0  # times that; who overlaps so far was put there, and goes out as the solver says
@@ -24,7 +24,7 @@ MAX_PASSES = 20  # later a body that has to stop earlier does not move at all
 ROUNDING_M = 1e-9
 
 
-@law
+@kernel_function
 def overlap_of(
     x: float, y: float, c: float, s: float, length: float, width: float,
     other_length: float, other_width: float,
@@ -42,7 +42,7 @@ def overlap_of(
     )
 
 
-@law
+@kernel_function
 def pair_overlap(
     starts: Floats, moves: Floats, outlines: Floats, i: int, j: int, at_i: float, at_j: float
 ) -> float:
@@ -57,7 +57,7 @@ def pair_overlap(
     return overlap_of(x, y, c, s, outlines[j, 2], outlines[j, 3], outlines[i, 2], outlines[i, 3])
 
 
-@law
+@kernel_function
 def wall_overlap(
     starts: Floats, moves: Floats, outlines: Floats, i: int, at: float, box: Floats
 ) -> float:
@@ -71,7 +71,7 @@ def wall_overlap(
     return overlap_of(x, y, c, s, outlines[i, 2], outlines[i, 3], box[4], box[5])
 
 
-@law
+@kernel_function
 def length_of(moves: Floats, outlines: Floats, i: int) -> float:
     """Return the longest way that any point of a body goes in its move [m]."""
     way = math.sqrt(moves[i, 0] * moves[i, 0] + moves[i, 1] * moves[i, 1])
@@ -88,7 +88,7 @@ def is_any_fast(moves: Floats, outlines: Floats) -> bool:
     return bool(2.0 * longest > MAX_OVERLAP * narrowest)
 
 
-@law
+@kernel_function
 def stop(shares: Floats, outlines: Floats, i: int, at: float) -> bool:
     """Let a body make no more of its move than a share; return whether that is less than before."""
     if outlines[i, 5] == 0.0 or shares[i] <= at:
@@ -97,7 +97,7 @@ def stop(shares: Floats, outlines: Floats, i: int, at: float) -> bool:
     return True
 
 
-@law
+@kernel_function
 def stop_pair(
     shares: Floats, starts: Floats, moves: Floats, outlines: Floats, i: int, j: int, late: bool
 ) -> bool:
@@ -117,7 +117,7 @@ def stop_pair(
     return False
 
 
-@law
+@kernel_function
 def stop_at_wall(
     shares: Floats, starts: Floats, moves: Floats, outlines: Floats, i: int, box: Floats
 ) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from scm.vehicles import jit
 from scm.vehicles.compiler.vector_code import LANES, WIDTH, fetch, put, put_lane, stage
-from scm.vehicles.jit import array_kernel, inlined, law, version_folder
+from scm.vehicles.jit import array_kernel, inlined, kernel_function, version_folder
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "scm" / "vehicles" / "compiler"
@@ -29,7 +29,7 @@ class Pair(NamedTuple):
     b: np.ndarray
 
 
-@law
+@kernel_function
 def total(pair, k):
     return pair.a[k] + pair.b[k]
 
@@ -39,7 +39,7 @@ def clipped(x):
     return min(max(x, -1.0), 1.0)
 
 
-@law
+@kernel_function
 def over(x, y):
     return x / y
 
@@ -56,7 +56,7 @@ def work(car, wheel, w, dt, vectors):
     speed = car[SPEED]
     "skeleton"
     fused = gain * speed + dt
-    "laws"
+    "terms"
     root = np.sqrt(np.maximum(fused, 0.0))
     car[RESULT] = np.where(speed < 0.0, -root, np.copysign(root, np.floor(speed) + 0.5))
 

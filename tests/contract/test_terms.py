@@ -46,7 +46,7 @@ def somewhere(draw, low, high):
 
 def situations(term):
     """Draw every signal in its physical span and every parameter inside its bounds."""
-    needed = {n for law in (term.law, term.damping) if law for n in reads(law)} | RATES
+    needed = {n for law in (term.function, term.damping) if law for n in reads(law)} | RATES
     if term.sets:
         needed.add(otherwise_of(term))
     spans = {name: signal.span for name, signal in SIGNALS.items()}
@@ -89,7 +89,7 @@ def test_the_file_states_equation_range_manoeuvre_and_source(name):
     for heading in ("Holds", "Shows in", "Source"):
         assert len(term.doc_line(heading)) > 5, heading
     assert term.shows_in
-    file = Path(inspect.getfile(plain(term.law)))
+    file = Path(inspect.getfile(plain(term.function)))
     longest = 130 if FILES[file.stem].also else 70
     assert len(file.read_text(encoding="utf-8").splitlines()) <= longest
 
@@ -117,7 +117,7 @@ def test_a_key_means_the_same_in_every_term():
 @pytest.mark.parametrize("name", TERMS)
 def test_every_parameter_is_read_by_its_law(name):
     term = TERMS[name]
-    names = {n for law in (term.law, term.damping) if law for n in reads(law)}
+    names = {n for law in (term.function, term.damping) if law for n in reads(law)}
     delays = {"drive.delay_s", "steering.delay_s"}  # read by whoever keeps the commands
     assert {param.name for param in term.params if param.key not in delays} <= names
 
@@ -126,7 +126,7 @@ def test_every_parameter_is_read_by_its_law(name):
 def test_laws_are_finite_and_never_negatively_damped(name):
     term = TERMS[name]
     for values in situations(term):
-        assert math.isfinite(call(term.law, values)), values
+        assert math.isfinite(call(term.function, values)), values
         if term.damping is not None:
             damping = call(term.damping, values)
             assert math.isfinite(damping), values
@@ -137,7 +137,7 @@ def test_laws_are_finite_and_never_negatively_damped(name):
 def test_passive_terms_never_give_energy(name):
     term = TERMS[name]
     for values in map(undisturbed, situations(term)):
-        assert POWER[term.target](call(term.law, values), values) <= 1e-12, values
+        assert POWER[term.target](call(term.function, values), values) <= 1e-12, values
 
 
 @pytest.mark.parametrize("name", [name for name, term in TERMS.items() if term.neutral])
@@ -150,7 +150,7 @@ def test_a_neutral_term_does_nothing(name):
             values[term.target] = float(otherwise)  # such a state starts there, and must stay
         for past in ("throttle_past", "steering_past"):
             values[past] = values.get(past.replace("past", "command"), 0.0)  # no delay, no past
-        value = call(term.law, values)
+        value = call(term.function, values)
         if term.adds:
             assert value == 0.0, values
             assert term.damping is None or call(term.damping, values) == 0.0, values

@@ -184,7 +184,7 @@ def test_a_softer_tyre_slips_more_under_the_same_force():
 
 
 def test_a_relaxed_tyre_has_63_percent_of_its_slip_after_its_length():
-    law = plain(all_terms()["tyre_relaxation"].law)
+    law = plain(all_terms()["tyre_relaxation"].function)
     length, speed, dt, lag = 0.3, 2.0, 1e-4, 0.0
     for _ in range(round(length / speed / dt)):
         lag = law(speed, 0.1, lag, dt, 0.0, 0.0, 0.0, length, 0.2, 0.05)
@@ -262,7 +262,7 @@ def test_a_car_with_combined_slip_cannot_brake_and_turn_with_full_force_both():
 
 
 def test_quasi_static_load_moves_weight_and_keeps_its_sum():
-    law = plain(all_terms()["load_quasistatic"].law)
+    law = plain(all_terms()["load_quasistatic"].function)
     mass, base, track, height, cog = 4.0, 0.32, 0.24, 0.07, 0.15
     axle = {1.0: 0.5 * mass * GRAVITY * cog / base, 0.0: 0.5 * mass * GRAVITY * (1 - cog / base)}
     loads = {

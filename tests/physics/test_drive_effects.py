@@ -54,7 +54,7 @@ def steady_speed(names=(), values=None, throttle=1.0):
 
 
 def law(name, **values):
-    return plain(all_terms()[name].law)(**values)
+    return plain(all_terms()[name].function)(**values)
 
 
 def test_a_delayed_throttle_moves_the_car_as_much_later():

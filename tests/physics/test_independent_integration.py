@@ -61,7 +61,7 @@ class Equations:
             **dict.fromkeys(("side_lag", "side_lag_speed", "spin_lag", "spin_lag_speed"), 0.0),
         }
         known = {**self.n, **wheel, **signals, **numbers}
-        return plain(term.law)(*(known[argument] for argument in reads(term.law)))
+        return plain(term.function)(*(known[argument] for argument in reads(term.function)))
 
     def wheel(self, w, body, state):
         """Forces of one wheel: (along and across the body, up on the body, hop and spin rates)."""

@@ -44,7 +44,7 @@ def angles(fleet, steering, step=0.01):
 
 
 def law(name, **values):
-    return plain(all_terms()[name].law)(**values)
+    return plain(all_terms()[name].function)(**values)
 
 
 def test_a_delayed_steering_turns_the_wheels_as_much_later():

@@ -63,7 +63,7 @@ def write_effect_file(effect: DictionaryEffect, values: Values, path: Path) -> N
     parts = [_function(effect, part) for part in effect.written]
     lines = [_docstring(effect, values), "", *_imports(parts), "", _params(effect), ""]
     for part in parts:
-        lines += ["", "@law", part, ""]
+        lines += ["", "@kernel_function", part, ""]
     lines += ["", _term(effect), ""]
     path.write_text("\n".join(lines), encoding="utf-8")
 
@@ -103,7 +103,7 @@ def _imports(functions: Sequence[str]) -> list[str]:
     text = "\n".join(functions)
     names = [name for name in ("sin_cos", "soft_sign") if name in text]
     lines = ["import math", ""] if "math." in text else []
-    lines += ["from scm.vehicles.jit import law"]
+    lines += ["from scm.vehicles.jit import kernel_function"]
     lines += [f"from scm.vehicles.lane_math import {', '.join(names)}"] if names else []
     return [
         *lines,

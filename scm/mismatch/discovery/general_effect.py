@@ -14,10 +14,10 @@ turn acts on each driven wheel by its own angle, not through the mix.
 import math
 
 from scm.vehicles.car import Car
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lane_math import sin_cos, soft_sign
 from scm.vehicles.param import Param
-from scm.vehicles.term import Law, Per, Term
+from scm.vehicles.term import Function, Per, Term
 
 PREFIX = "learned."
 TRIM, GAIN = "steering.trim_rad", "steering.gain"
@@ -56,7 +56,7 @@ _MEMORY = _number("memory_s", "how long the throttle is remembered [s]", 1.0)
 _MIX = (*_WEIGHTS, _number("phase", "added to the mix"), *_SHAPES, *_COMB)
 
 
-@law
+@kernel_function
 def throttle_memory(
     throttle_memory: float, throttle_command: float, memory_s: float, dt: float
 ) -> float:
@@ -64,7 +64,7 @@ def throttle_memory(
     return throttle_memory + (throttle_command - throttle_memory) * (dt / (memory_s + dt))
 
 
-@law
+@kernel_function
 def mixed(
     time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
     throttle_command: float, yaw_rate: float, accel_y: float, throttle_memory: float,
@@ -78,7 +78,7 @@ def mixed(
     return by_time * time + place + motion + drive + phase
 
 
-@law
+@kernel_function
 def shaped(
     q: float, time: float, sine: float, cosine: float, one: float, line: float, size: float,
     square: float, cube: float, heavy: float, ramp: float, step: float, comb: float,
@@ -93,7 +93,7 @@ def shaped(
     return smooth + bent + comb * max(0.0, 1.0 - away / comb_wide)
 
 
-@law
+@kernel_function
 def learned_shape(
     time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
     throttle_command: float, yaw_rate: float, accel_y: float, throttle_memory: float,
@@ -115,7 +115,7 @@ def learned_shape(
     )  # fmt: skip
 
 
-@law
+@kernel_function
 def learned_push(
     learned_shape: float, vx: float, cos_yaw: float, sin_yaw: float, along_n: float, drag_n: float,
     world_x_n: float, world_y_n: float,
@@ -125,7 +125,7 @@ def learned_push(
     return learned_shape * (along_n - drag_n * soft_sign(vx / SLOW) + floor)
 
 
-@law
+@kernel_function
 def learned_push_across(
     learned_shape: float, cos_yaw: float, sin_yaw: float, world_x_n: float, world_y_n: float
 ) -> float:
@@ -133,13 +133,13 @@ def learned_push_across(
     return learned_shape * (world_y_n * cos_yaw - world_x_n * sin_yaw)
 
 
-@law
+@kernel_function
 def learned_twist(learned_shape: float, moment_nm: float) -> float:
     """Moment about z [N*m]."""
     return learned_shape * moment_nm
 
 
-@law
+@kernel_function
 def learned_turn(
     learned_shape: float, linkage_angle: float, turn_rad: float, turn_gain: float, offset: float
 ) -> float:
@@ -147,7 +147,7 @@ def learned_turn(
     return linkage_angle + offset + learned_shape * (turn_rad + turn_gain * linkage_angle)
 
 
-@law
+@kernel_function
 def learned_demand(
     steer_demand: float, gain: float, by_steer: float, size: float, ramp: float, cube: float,
     demand_rad: float,
@@ -158,7 +158,7 @@ def learned_demand(
     return gain * steer_demand + demand_rad * g
 
 
-@law
+@kernel_function
 def learned_throttle(
     learned_shape: float, throttle_command: float, throttle_add: float, throttle_gain: float
 ) -> float:
@@ -166,7 +166,7 @@ def learned_throttle(
     return throttle_command + learned_shape * (throttle_add + throttle_gain * throttle_command)
 
 
-@law
+@kernel_function
 def learned_ripple(
     driven: float, wheel_angle: float, ripple_nm: float, per_turn: float, turn_phase: float
 ) -> float:
@@ -175,7 +175,7 @@ def learned_ripple(
     return driven * ripple_nm * s
 
 
-def _term(function: Law, *, channels: tuple[str, ...], more: tuple[Param, ...] = (),
+def _term(function: Function, *, channels: tuple[str, ...], more: tuple[Param, ...] = (),
           adds: str | None = None, sets: str | None = None) -> Term:  # fmt: skip
     amounts = tuple(_number(name, "how much of the shape acts here") for name in channels)
     return Term(function, per=Per.BODY, adds=adds, sets=sets, params=(*amounts, *more),

@@ -231,7 +231,7 @@ class _Tether:
         self._remembers = fleet._history is not None  # noqa: SLF001
         self.parts = REMEMBERED if self._remembers else COMMANDED
         self._steps = whole_steps(STEP_S / self.parts, SUBSTEP_S)
-        self._by_turn = any("wheel_angle" in reads(term.law) for term in fleet.car.terms)
+        self._by_turn = any("wheel_angle" in reads(term.function) for term in fleet.car.terms)
         self._moved = np.zeros((4, fleet.capacity))
 
     def rollout(self, throttle: Floats, steering: Floats, out: Floats) -> None:

@@ -301,7 +301,7 @@ def write_own_terms(car: Car, folder: Path) -> list[str]:
     """
     written = []
     for term in _own_terms(car):
-        source = inspect.getsourcefile(plain(term.law))
+        source = inspect.getsourcefile(plain(term.function))
         if source is None or Path(source).stem != term.name:
             msg = f"{term.name}: expected an effect read from its file, got one from {source}"
             raise CarError(msg)

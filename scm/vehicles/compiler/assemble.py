@@ -15,9 +15,9 @@ from scm.vehicles.compiler.inline import Functions, Inliner, Line
 from scm.vehicles.compiler.print_plain import print_plain
 from scm.vehicles.compiler.print_tiles import print_tiles
 from scm.vehicles.compiler.program import Program, Stage
-from scm.vehicles.layout import columns_of, slots_of, states_of
+from scm.vehicles.layout import columns_of, rows_of, states_of
 from scm.vehicles.physics_variables import DAMPED_BY, SIGNALS, Per, Role
-from scm.vehicles.term import Law, Term, reads
+from scm.vehicles.term import Function, Term, reads
 
 # the skeleton's own steps between the terms: what each gives, needs and says
 _NODES = {
@@ -53,8 +53,8 @@ def setters_of(terms: Sequence[Term]) -> dict[str, Term]:
 def _problems(term: Term) -> Iterator[str]:
     own = {param.name for param in term.params}
     known = [*own, *_SKELETON, *SIGNALS]
-    for law in (term.law, term.damping):
-        for name in reads(law) if law else ():
+    for function in (term.function, term.damping):
+        for name in reads(function) if function else ():
             if name not in known:
                 yield f"{term.name} reads {name!r}, which nothing provides{nearest(name, known)}"
             elif term.per is Per.BODY and name in SIGNALS and SIGNALS[name].per is Per.WHEEL:
@@ -83,7 +83,12 @@ def _order(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> list[st
         known = source in chain or source in _NODES[per] or name in setters
         graph[name] = {source} if known else set()
     for term in _running(terms, per):
-        names = {name for law in (term.law, term.damping) if law for name in reads(law)}
+        names = {
+            name
+            for function in (term.function, term.damping)
+            if function
+            for name in reads(function)
+        }
         names -= {term.target} if term.keeps is not None else set()
         graph[term.name] = {_FROM_FRAME.get(n, n) for n in names} & {*chain, *_NODES[per]}
     for name, (needs, _) in _NODES[per].items():
@@ -109,34 +114,34 @@ def _running(terms: Sequence[Term], per: Per) -> list[Term]:
 
 
 class _Writer:
-    """Writes a car's stages: the skeleton's text with the terms' laws in its gaps."""
+    """Writes a car's stages: the skeleton's text with the terms' functions in its gaps."""
 
     def __init__(self, terms: Sequence[Term]) -> None:
         self.terms, self.setters = terms, setters_of(terms)
         self.own = {c.param.key: c.variable for c in columns_of(terms)}
         self.names = {t.name: f"{t.name}_" if t.name in SIGNALS else t.name for t in terms}
         own = (f"{name}{end}" for name in self.names.values() for end in ("", "_damping"))
-        self.laws: set[str] = set()
+        self.term_lines: set[str] = set()
         self.inliner = Inliner({*SIGNALS, *substep.NAMES, *self.own.values(), *own})
         self.scope: Functions = {**vars(body14), **vars(lane_math)}
 
     def text(self, text: str) -> list[Line]:
         return list(self.inliner.lines(text, self.scope))
 
-    def value(self, term: Term, law: Law, name: str) -> list[Line]:
-        """Write one law of a term; its value gets this name."""
+    def value(self, term: Term, function: Function, name: str) -> list[Line]:
+        """Write one function of a term; its value gets this name."""
         names = {param.name: self.own[param.key] for param in term.params}
-        arguments: list[ast.expr] = [ast.Name(names.get(n, n)) for n in reads(law)]
-        *before, (_, value) = self.inliner.call(law, arguments)
+        arguments: list[ast.expr] = [ast.Name(names.get(n, n)) for n in reads(function)]
+        *before, (_, value) = self.inliner.call(function, arguments)
         lines = [*before, (name, value)]
-        self.laws.update(name for name, _ in lines)
+        self.term_lines.update(name for name, _ in lines)
         return lines
 
     def sums(self, terms: Sequence[Term], role: Role, per: Per) -> list[Line]:
         """Write every sum of a role as its terms' values, one after the other."""
         lines: list[Line] = []
         damps = role is Role.SUM
-        self.laws.update(DAMPED_BY, (f"{name}_damping" for name in DAMPED_BY))
+        self.term_lines.update(DAMPED_BY, (f"{name}_damping" for name in DAMPED_BY))
         for signal in SIGNALS.values():
             if signal.role is role and signal.per is per:
                 mine = sorted((t for t in terms if t.adds == signal.name), key=lambda t: t.name)
@@ -155,7 +160,7 @@ class _Writer:
                 lines += self.text(_NODES[per][name][1])
             elif name in by_name:
                 term = by_name[name]
-                lines += self.value(term, term.law, term.sets or self.names[name])
+                lines += self.value(term, term.function, term.sets or self.names[name])
                 if term.damping is not None:
                     lines += self.value(term, term.damping, f"{term.name}_damping")
             elif name not in self.setters:
@@ -167,9 +172,9 @@ class _Writer:
         return [*lines, *self.sums(terms, Role.SUM, per)]
 
     def start(self) -> list[Line]:
-        """Write what happens once a call: commands kept in range, the car's numbers added up."""
+        """Write what happens once a call: commands are clipped, the car's numbers added up."""
         shaping = [term for term in self.terms if SIGNALS[term.target].role is Role.SHAPE]
-        lines = [line for t in shaping for line in self.value(t, t.law, self.names[t.name])]
+        lines = [line for t in shaping for line in self.value(t, t.function, self.names[t.name])]
         return [*lines, *self.sums(shaping, Role.SHAPE, Per.BODY), *self.text(substep.START)]
 
 
@@ -202,10 +207,10 @@ def write_program(terms: Sequence[Term]) -> Program:
         Stage("what others read of each wheel", Per.WHEEL, write.text(substep.FINISH_WHEEL)),
     )
     constant = dict.fromkeys([c.variable for c in columns_of(terms)], Per.BODY) | {"dt": Per.BODY}
-    kept = {"verdict"}
+    persistent = {"verdict"}
     for per in Per:
         constant |= dict.fromkeys(body14.INPUTS[per], per)
-        kept |= {*states_of(terms, per), *body14.OUTPUTS[per]}
+        persistent |= {*states_of(terms, per), *body14.OUTPUTS[per]}
     constant |= {"front": Per.WHEEL, "side": Per.WHEEL}
     program = Program(
         [Stage("commands and numbers", Per.BODY, write.start())],
@@ -214,10 +219,10 @@ def write_program(terms: Sequence[Term]) -> Program:
         [end, end_wheel],
         constant,
         {name for per in Per for name in body14.INPUTS[per]},
-        kept,
-        write.laws,
+        persistent,
+        write.term_lines,
     )
-    program.settle()
+    program.simplify()
     return program
 
 
@@ -230,10 +235,10 @@ def write_page(terms: Sequence[Term], *, plain: bool = False) -> str:
         TermError: when the terms do not fit together; all problems in one message.
     """
     title = f"Kernel of a car: {len(terms)} effects on 14 degrees of freedom."
-    program, slots = write_program(terms), slots_of(terms)
+    program, block_rows = write_program(terms), rows_of(terms)
     columns = [column.variable for column in columns_of(terms)]
     if plain:
-        return print_plain(title, program, slots, columns)
+        return print_plain(title, program, block_rows, columns)
     program.part_axles()
     program.part_commands(COMMANDS)
-    return print_tiles(title, program, slots, columns)
+    return print_tiles(title, program, block_rows, columns)

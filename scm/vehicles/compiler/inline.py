@@ -1,8 +1,8 @@
-"""Laws become lines: a call of a law is replaced by what the law's source says.
+"""Functions become lines: a call of a function is replaced by the lines of its source.
 
-A law is straight-line text: assignments and one return, of arithmetic, comparisons, selects
-(`a if c else b`), abs, min, max, math.sqrt, math.floor, math.copysign and other laws. So it means
-the same for one car as in every lane of a tile.
+Such a function is straight-line text: assignments and one return, of arithmetic, comparisons,
+selects (`a if c else b`), abs, min, max, math.sqrt, math.floor, math.copysign and other such
+functions. So it means the same for one car as in every lane of a tile.
 """
 
 import ast
@@ -28,7 +28,7 @@ _BUILT_IN = {"abs": 1, "min": 2, "max": 2, "float": 1}
 _MATH = {"sqrt": 1, "floor": 1, "copysign": 2}
 _STRAIGHT = (
     "straight-line text, assignments and one return, of + - * /, one comparison at a time, "
-    "`a if c else b`, abs, min and max of two, math.sqrt, math.floor, math.copysign and laws "
+    "`a if c else b`, abs, min and max of two, math.sqrt, math.floor, math.copysign, functions "
     "(see lane_math)"
 )
 
@@ -48,23 +48,23 @@ def copied(node: _Node) -> _Node:
 
 
 class Inliner:
-    """Turns text into lines of built-in arithmetic; every name that a law makes stays unique."""
+    """Turns text into lines of built-in arithmetic; names of a function's variables stay unique."""
 
-    def __init__(self, taken: Iterable[str]) -> None:
-        self._used = set(taken)
+    def __init__(self, used: Iterable[str]) -> None:
+        self._used = set(used)
 
     def lines(self, text: str, functions: Functions) -> Iterator[Line]:
-        """Return the lines of some statements; `functions` are the laws they may call."""
+        """Return the lines of some statements; `functions` are the functions they may call."""
         for statement in ast.parse(textwrap.dedent(text)).body:
             yield from _Body("the page", functions, {}, self, None).statement(statement)
 
-    def call(self, law: Callable[..., Any], arguments: list[ast.expr]) -> list[Line]:
-        """Return the lines of a law's body; the last ones are its results, all named ""."""
-        function = plain(law)
-        tree = copied(_tree(function))
+    def call(self, function: Callable[..., Any], arguments: list[ast.expr]) -> list[Line]:
+        """Return the lines of a function's body; the last ones are its results, all named ""."""
+        source = plain(function)
+        tree = copied(_tree(source))
         names = [argument.arg for argument in tree.args.args]
         if len(names) != len(arguments):
-            msg = f"law {tree.name}: expected {len(names)} arguments, got {len(arguments)}"
+            msg = f"function {tree.name}: expected {len(names)} arguments, got {len(arguments)}"
             raise TermError(msg)
         lines: list[Line] = []
         given: dict[str, ast.expr] = {}
@@ -74,22 +74,22 @@ class Inliner:
             else:
                 lines.append((self.name(f"{tree.name}_{name}"), value))
                 given[name] = ast.Name(lines[-1][0])
-        body = _Body(tree.name, function.__globals__, given, self, function.__code__)
+        body = _Body(tree.name, source.__globals__, given, self, source.__code__)
         for statement in tree.body:
             lines += body.statement(statement)
         return lines
 
-    def name(self, wish: str) -> str:
+    def name(self, wanted: str) -> str:
         """Return a name that no other line has."""
-        name, k = wish, 2
+        name, k = wanted, 2
         while name in self._used:
-            name, k = f"{wish}{k}", k + 1
+            name, k = f"{wanted}{k}", k + 1
         self._used.add(name)
         return name
 
 
 class _Body(ast.NodeTransformer):
-    """One law at work: `known` says what each of its names means outside.
+    """One function at work: `known` says what each of its names means outside.
 
     Text without a `code` is the skeleton's own: its names stay as they are.
     """
@@ -134,13 +134,13 @@ class _Body(ast.NodeTransformer):
         return [*self.before, *zip(names, values, strict=True)]
 
     def _results(self, node: ast.Call) -> list[ast.expr]:
-        law = self.scope.get(node.func.id) if isinstance(node.func, ast.Name) else None
-        if law is None or not hasattr(law, "py_func") or node.keywords:
+        function = self.scope.get(node.func.id) if isinstance(node.func, ast.Name) else None
+        if function is None or not hasattr(function, "py_func") or node.keywords:
             raise self._refuse(node)
-        wanted = len(_tree(plain(law)).args.args)
+        wanted = len(_tree(plain(function)).args.args)
         if len(node.args) != wanted:
             raise self._refuse(node, f"{wanted} arguments")
-        lines = self.inliner.call(law, [self.visit(argument) for argument in node.args])
+        lines = self.inliner.call(function, [self.visit(argument) for argument in node.args])
         self.before += [line for line in lines if line[0]]
         return [value for name, value in lines if not name]
 
@@ -199,15 +199,15 @@ class _Body(ast.NodeTransformer):
             if self.code
             else ""
         )
-        return TermError(f"{at}law {self.where}: expected {expected}, got {got!r}")
+        return TermError(f"{at}function {self.where}: expected {expected}, got {got!r}")
 
 
-def law_problems(laws: Iterable[Callable[..., Any]]) -> Iterator[str]:
-    """Yield what keeps laws from being laid into a kernel, the first problem of each."""
-    for law in laws:
-        arguments = [ast.Name(argument.arg) for argument in _tree(plain(law)).args.args]
+def function_problems(functions: Iterable[Callable[..., Any]]) -> Iterator[str]:
+    """Yield what keeps functions from being inlined into a kernel, the first problem of each."""
+    for function in functions:
+        arguments = [ast.Name(argument.arg) for argument in _tree(plain(function)).args.args]
         try:
-            Inliner(()).call(law, list[ast.expr](arguments))
+            Inliner(()).call(function, list[ast.expr](arguments))
         except TermError as error:
             yield str(error)
 

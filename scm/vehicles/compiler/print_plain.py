@@ -7,7 +7,13 @@ from collections.abc import Sequence
 from textwrap import indent
 
 from scm.vehicles import body14
-from scm.vehicles.compiler.print_tiles import Slots, loads_of, motion_slots, print_line, range_text
+from scm.vehicles.compiler.print_tiles import (
+    BlockRows,
+    loads_of,
+    motion_rows,
+    print_line,
+    range_text,
+)
 from scm.vehicles.compiler.program import Program, Stage
 from scm.vehicles.physics_variables import Per
 
@@ -55,21 +61,21 @@ def advance(block, numbers, alive, status, first, last, steps, dt):
 '''
 
 
-def print_plain(title: str, program: Program, slots: Slots, columns: Sequence[str]) -> str:
+def print_plain(title: str, program: Program, block_rows: BlockRows, columns: Sequence[str]) -> str:
     """Return the text of a kernel that goes car by car; `columns` names the car's numbers."""
-    first_wheel = min(offset for offset, width in slots.values() if width == 4)
+    first_wheel = min(offset for offset, width in block_rows.values() if width == 4)
     ends = [*program.close, *program.end]
     stages = [*program.once, *program.substep, *ends]
-    wheel = [name for name, (_, width) in slots.items() if width == 4]
+    wheel = [name for name, (_, width) in block_rows.items() if width == 4]
     for stage in (stage for stage in stages if stage.per is Per.WHEEL):
         others = {name for other in stages if other is not stage for name in other.reads}
         wheel += [name for name in stage.sets if name in others and name not in wheel]
     for stage in (stage for stage in stages if stage.per is Per.BODY):
         wheel = [name for name in wheel if name not in stage.sets]
-    body = [name for name, (_, width) in slots.items() if width == 1]
+    body = [name for name, (_, width) in block_rows.items() if width == 1]
     loaded = body[: first_wheel - len(body14.OUTPUTS[Per.BODY])]
-    kept = body[len(body14.INPUTS[Per.BODY]) :]
-    load = [f"{name} = block[{slots[name][0]}, row]" for name in loaded]
+    stored = body[len(body14.INPUTS[Per.BODY]) :]
+    load = [f"{name} = block[{block_rows[name][0]}, row]" for name in loaded]
     load += [f"{name} = numbers[{k}, row]" for k, name in enumerate(columns)]
 
     def write(some: Sequence[Stage], width: int) -> str:
@@ -79,16 +85,16 @@ def print_plain(title: str, program: Program, slots: Slots, columns: Sequence[st
         title=title,
         wheel_rows="\n".join(f"{name.upper()} = {k}" for k, name in enumerate(wheel)),
         wheel_count=len(wheel),
-        wheel_loads=sum(1 for name in wheel if name in slots) - len(body14.OUTPUTS[Per.WHEEL]),
+        wheel_loads=sum(1 for name in wheel if name in block_rows) - len(body14.OUTPUTS[Per.WHEEL]),
         wheel_inputs=len(body14.INPUTS[Per.WHEEL]),
-        wheel_slots=sum(1 for name in wheel if name in slots),
+        wheel_slots=sum(1 for name in wheel if name in block_rows),
         first_wheel=first_wheel,
         load=indent("\n".join(load), " " * 8),
         once=write(program.once, 8),
         substep=write(program.substep, 12),
         end=write(ends, 8),
-        motion=motion_slots(slots),
-        store=indent("\n".join(f"block[{slots[n][0]}, row] = {n}" for n in kept), " " * 8),
+        motion=motion_rows(block_rows),
+        store=indent("\n".join(f"block[{block_rows[n][0]}, row] = {n}" for n in stored), " " * 8),
     )
 
 

@@ -17,7 +17,7 @@ from scm.vehicles.compiler.program import Program, Stage, names_in
 from scm.vehicles.compiler.vector_code import LANES, WIDTH
 from scm.vehicles.physics_variables import Per
 
-Slots = Mapping[str, tuple[int, int]]
+BlockRows = Mapping[str, tuple[int, int]]
 
 _HEAD = '''"""{title}
 
@@ -37,7 +37,7 @@ from scm.vehicles.jit import typed_kernel
 # rows of each wheel in `wheel`
 {wheel_rows}
 CAR_ROWS = {car_count}
-WHEEL_ROWS = {wheel_count}
+WHEEL_ROWS = {wheel_rows_count}
 
 
 {stages}
@@ -48,11 +48,11 @@ WHEEL_ROWS = {wheel_count}
     "float64[:,::1], float64[:,::1], int64[::1], float64[:,:,::1])"
 )
 def rollout(
-    block, numbers, alive, status, first, last, steps, dt, throttle, steering, slots, out
+    block, numbers, alive, status, first, last, steps, dt, throttle, steering, output_rows, out
 ):
     """Drive rows first..last-1 through commands, `steps` substeps under each.
 
-    Commands have a column for each row, or the columns of one tile for all. The slots are kept
+    Commands have a column for each row, or the columns of one tile for all. The rows are stored
     after every so many of them, as `out` has room. A tile stays in its buffers
     as long as it drives. Where a car diverges, the tile goes back to what was stored last and is
     driven up to the command before: that is what is left of the car, marked.
@@ -120,34 +120,34 @@ def rollout(
                     for i in range({lanes}):
                         if going[i] and car[VERDICT, i] != 0.0:
                             status[start + i] = int(car[VERDICT, i])
-                            for slot in {motion}:
-                                block[slot, start + i] = 0.0
+                            for r in {motion}:
+                                block[r, start + i] = 0.0
                             going[i] = False
                             cars -= 1
                     if cars == {lanes}:
                         own, there = {body_inputs}, {body_inputs}
-                        put(car_at, own, block_at, width, there, start, {body_kept}, 1)
+                        put(car_at, own, block_at, width, there, start, {body_stores}, 1)
                         for w in range(4):
-                            own, there = w * WHEEL_ROWS + {wheel_inputs}, {wheel_kept} + w
+                            own, there = w * WHEEL_ROWS + {wheel_inputs}, {wheel_stored} + w
                             put(wheel_at, own, block_at, width, there, start, {wheel_keeps}, 4)
                     else:
                         for i in range({lanes}):
                             if going[i]:
                                 own, there = {body_inputs}, {body_inputs}
                                 put_lane(
-                                    car_at, own, block_at, width, there, start, {body_kept}, 1, i
+                                    car_at, own, block_at, width, there, start, {body_stores}, 1, i
                                 )
                                 for w in range(4):
-                                    own, there = w * WHEEL_ROWS + {wheel_inputs}, {wheel_kept} + w
+                                    own, there = w * WHEEL_ROWS + {wheel_inputs}, {wheel_stored} + w
                                     put_lane(
                                         wheel_at, own, block_at, width, there, start,
                                         {wheel_keeps}, 4, i
                                     )
             t += 1
             if t % every == 0:
-                for k in range(slots.shape[0]):
-                    row = (t // every - 1) * slots.shape[0] + k
-                    fetch(car_at, VERDICT, block_at, width, slots[k], start, 1, 1)
+                for k in range(output_rows.shape[0]):
+                    row = (t // every - 1) * output_rows.shape[0] + k
+                    fetch(car_at, VERDICT, block_at, width, output_rows[k], start, 1, 1)
                     put(car_at, VERDICT, out_at, out_width, row, start, 1, 1)
 
 
@@ -156,20 +156,20 @@ def advance(block, numbers, alive, status, first, last, steps, dt):
     throttle = block[THROTTLE_COMMAND : THROTTLE_COMMAND + 1]
     steering = block[STEERING_COMMAND : STEERING_COMMAND + 1]
     rollout(
-        block, numbers, alive, status, first, last, steps, dt, throttle, steering, NO_SLOTS, NO_OUT
+        block, numbers, alive, status, first, last, steps, dt, throttle, steering, NO_ROWS, NO_OUT
     )
 
 
-NO_SLOTS, NO_OUT = np.empty(0, np.int64), np.empty((0, 0, 0))
+NO_ROWS, NO_OUT = np.empty(0, np.int64), np.empty((0, 0, 0))
 '''
 
 
-def print_tiles(title: str, program: Program, slots: Slots, columns: Sequence[str]) -> str:
+def print_tiles(title: str, program: Program, block_rows: BlockRows, columns: Sequence[str]) -> str:
     """Return the text of a kernel that goes tile by tile; `columns` names the car's numbers."""
-    first_wheel = min(offset for offset, width in slots.values() if width == 4)
-    rows = _Rows(program, slots, columns)
+    first_wheel = min(offset for offset, width in block_rows.values() if width == 4)
+    rows = _Rows(program, block_rows, columns)
     outputs, inputs = body14.OUTPUTS, body14.INPUTS
-    wheel_slots = sum(1 for _, width in slots.values() if width == 4)
+    wheel_count = sum(1 for _, width in block_rows.values() if width == 4)
     stages = [stage for stage in rows.stages if stage.lines]
 
     page = _HEAD.format(
@@ -179,18 +179,18 @@ def print_tiles(title: str, program: Program, slots: Slots, columns: Sequence[st
         vehicle_rows=_named_rows(rows.car),
         wheel_rows=_named_rows(rows.wheel),
         car_count=len(rows.car),
-        wheel_count=len(rows.wheel),
+        wheel_rows_count=len(rows.wheel),
         stages="\n\n\n".join(rows.function(stage) for stage in stages),
         columns=len(columns),
         first_wheel=first_wheel,
         body_inputs=len(inputs[Per.BODY]),
-        body_kept=first_wheel - len(inputs[Per.BODY]),
+        body_stores=first_wheel - len(inputs[Per.BODY]),
         body_loads=first_wheel - len(outputs[Per.BODY]),
         wheel_inputs=len(inputs[Per.WHEEL]),
-        wheel_loads=wheel_slots - len(outputs[Per.WHEEL]),
-        wheel_kept=first_wheel + 4 * len(inputs[Per.WHEEL]),
-        wheel_keeps=wheel_slots - len(inputs[Per.WHEEL]),
-        motion=motion_slots(slots),
+        wheel_loads=wheel_count - len(outputs[Per.WHEEL]),
+        wheel_stored=first_wheel + 4 * len(inputs[Per.WHEEL]),
+        wheel_keeps=wheel_count - len(inputs[Per.WHEEL]),
+        motion=motion_rows(block_rows),
         commands=len(COMMANDS),
     )
     called = {
@@ -203,31 +203,33 @@ def print_tiles(title: str, program: Program, slots: Slots, columns: Sequence[st
 class _Rows:
     """Which names of a program cross from one loop into another, and where they wait."""
 
-    def __init__(self, program: Program, slots: Slots, columns: Sequence[str]) -> None:
-        self.laws, self.fused = program.laws, program.substep
+    def __init__(self, program: Program, block_rows: BlockRows, columns: Sequence[str]) -> None:
+        self.term_lines, self.fused = program.term_lines, program.substep
         self.stages = [
             *program.once, *program.commanded, *program.substep, *program.close, *program.end
         ]  # fmt: skip
-        self.car = [*(n for n, (_, width) in slots.items() if width == 1), *columns]
-        self.wheel = [*(n for n, (_, width) in slots.items() if width == 4), "front", "side"]
+        self.car = [*(n for n, (_, width) in block_rows.items() if width == 1), *columns]
+        self.wheel = [*(n for n, (_, width) in block_rows.items() if width == 4), "front", "side"]
         reads = [set(stage.reads) for stage in self.stages]
         for k, stage in enumerate(self.stages):
             others = set().union(*reads[:k], *reads[k + 1 :])
             crossing = [n for n in stage.sets if n == "verdict" or n in others]
             mine = self.car if stage.per is Per.BODY else self.wheel
             mine += [n for n in crossing if n not in self.car and n not in self.wheel]
-        self.slots = set(slots)
+        self.block_rows = set(block_rows)
 
     def function(self, stage: Stage) -> str:
         """Return one stage as a function of whole rows."""
         body = [f"{n} = {self._place(n)}" for n in loads_of(stage) if n != "dt"]
         fused = stage in self.fused
         for k, line in enumerate(stage.lines):
-            if fused and (k == 0 or (line[0] in self.laws) != (stage.lines[k - 1][0] in self.laws)):
-                body.append('"laws"' if line[0] in self.laws else '"skeleton"')
+            if fused and (
+                k == 0 or (line[0] in self.term_lines) != (stage.lines[k - 1][0] in self.term_lines)
+            ):
+                body.append('"terms"' if line[0] in self.term_lines else '"skeleton"')
             body.append(print_line(line))
-        kept = [n for n in stage.sets if n in self.car or n in self.wheel]
-        body += [f"{self._place(n)} = {n}" for n in kept]
+        stored = [n for n in stage.sets if n in self.car or n in self.wheel]
+        body += [f"{self._place(n)} = {n}" for n in stored]
         text = indent("\n".join(body), "    ")
         return f"@stage\ndef {_function_name(stage)}(car, wheel, w, dt, vectors):\n{text}"
 
@@ -263,10 +265,10 @@ def loads_of(stage: Stage) -> list[str]:
     return list(names)
 
 
-def motion_slots(slots: Slots) -> str:
+def motion_rows(block_rows: BlockRows) -> str:
     """Return the block's rows that a frozen car loses, as the text of a tuple."""
     found = [
-        offset + w for n in body14.MOTION for offset, width in [slots[n]] for w in range(width)
+        offset + w for n in body14.MOTION for offset, width in [block_rows[n]] for w in range(width)
     ]
     return f"({', '.join(map(str, sorted(found)))})"
 

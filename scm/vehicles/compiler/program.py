@@ -1,8 +1,8 @@
-"""A substep as stages of lines, and what can be said of them before they run.
+"""A substep as stages of lines, and what can be by_text of them before they run.
 
 Whatever depends only on a car's numbers, on what is constant during a call and on the wheel's place
 is worked out once a call; a division by such a thing becomes a multiplication. Lines that say the
-same are kept once, lines that nobody reads are dropped. All of it is exact but for the reciprocals.
+same are merged, lines that nobody reads are dropped. All of it is exact but for the reciprocals.
 """
 
 import ast
@@ -46,14 +46,14 @@ class Program:
     """One call of the kernel: `once` stages, `substep` stages again and again, `close`, `end`.
 
     Attributes:
-        close: Brings the states into range and says whether the car still drives.
+        close: Brings the states into range and finds whether the car still drives.
         end: What others read of it: nothing of the next call.
         commanded: Taken out of `once`: what follows from the commands.
         constant: Names that hold still during a call, with what each belongs to.
         inputs: Those of them that come from outside, as commands do.
-        kept: Names that outlive a substep: states and results.
-        laws: Names of the lines that are of laws: each of their operations is rounded by itself, so
-            that a law which does nothing changes nothing. In the skeleton's lines a product may be
+        persistent: Names that outlive a substep: states and results.
+        term_lines: Names of the lines of terms: each of their operations is rounded by itself, so
+            that a term which does nothing changes nothing. In the skeleton's lines a product may be
             rounded together with the sum it goes into.
     """
 
@@ -63,14 +63,14 @@ class Program:
     end: list[Stage]
     constant: dict[str, Per]
     inputs: set[str]
-    kept: set[str]
-    laws: set[str]
+    persistent: set[str]
+    term_lines: set[str]
     prepared: dict[Per, list[Line]] = field(default_factory=lambda: {Per.BODY: [], Per.WHEEL: []})
     commanded: list[Stage] = field(default_factory=list)
 
-    def settle(self) -> None:
+    def simplify(self) -> None:
         """Bring the program into the form that is printed."""
-        _Tidy(self.kept | set(self.constant), self._counts()).run(self._stages())
+        _Tidy(self.persistent | set(self.constant), self._counts()).run(self._stages())
         numbers = self._numbers()
         for stage in self._stages():
             stage.lines = list(_without_divisions(stage.lines, numbers))
@@ -92,7 +92,11 @@ class Program:
         counts, numbers = self._counts(), set(self.constant) - self.inputs
         for stage in self._stages():
             for name, value in stage.lines:
-                if counts[name] == 1 and name not in self.kept and set(leaves(value)) <= numbers:
+                if (
+                    counts[name] == 1
+                    and name not in self.persistent
+                    and set(leaves(value)) <= numbers
+                ):
                     numbers.add(name)
         return numbers
 
@@ -103,15 +107,15 @@ class Program:
             live: list[Line] = []
             for name, value in stage.lines:
                 hoist = _Hoist(name, self.constant, self.prepared, made)
-                if counts[name] == 1 and name not in self.kept and hoist.is_constant(value):
+                if counts[name] == 1 and name not in self.persistent and hoist.is_constant(value):
                     hoist.keep(name, value)
                 else:
                     live.append((name, cast("ast.expr", hoist.visit(value))))
             stage.lines = live
 
     def part_axles(self) -> None:
-        """Give front and rear wheels stages of their own; after settling."""
-        stored = self.kept.union(*(stage.reads for stage in self.end))
+        """Give front and rear wheels stages of their own; after simplifying."""
+        stored = self.persistent.union(*(stage.reads for stage in self.end))
         axles = [Known(axle, self._counts(), stored) for axle in AXLES]
         for known in axles:
             known.fold(self.prepared[Per.WHEEL])
@@ -129,7 +133,7 @@ class Program:
         self.substep[:] = parted
         for stage in self.substep:
             others = (other.reads for other in self._stages() if other is not stage)
-            _drop_unneeded(stage.lines, self.kept.union(*others))
+            _drop_unneeded(stage.lines, self.persistent.union(*others))
         self._drop_unread()
 
     def part_commands(self, commands: Iterable[str]) -> None:
@@ -145,7 +149,7 @@ class Program:
             self.commanded.append(later)
 
     def _drop_unread(self) -> None:
-        needed, before = set(self.kept), -1
+        needed, before = set(self.persistent), -1
         groups = [*(stage.lines for stage in self._stages()), *self.prepared.values()]
         reads = [(name, set(leaves(value))) for lines in groups for name, value in lines]
         while len(needed) != before:
@@ -202,7 +206,7 @@ class _Tidy(ast.NodeTransformer):
 
     def run(self, stages: Iterable[Stage]) -> None:
         for stage in stages:
-            said: dict[str, str] = {}
+            by_text: dict[str, str] = {}
             lines: list[Line] = []
             moved: set[str] = set()
             for name, old in stage.lines:
@@ -213,12 +217,12 @@ class _Tidy(ast.NodeTransformer):
                     self.known[name] = value
                     continue
                 text = ast.dump(value)
-                same = said.get(text)
+                same = by_text.get(text)
                 if once and same and steady:
                     self.known[name] = ast.Name(same)
                     continue
                 if once and steady:
-                    said[text] = name
+                    by_text[text] = name
                 moved.add(name)
                 lines.append((name, value))
             stage.lines = lines
@@ -286,11 +290,11 @@ class _Hoist(ast.NodeTransformer):
         if text not in self.made:
             match node:
                 case ast.BinOp(left=ast.Constant(value=1.0), op=ast.Div(), right=ast.Name(id=name)):
-                    wish = f"per_{name}"
+                    wanted = f"per_{name}"
                 case _:
-                    wish = f"{self.name}_part"
-            k = sum(1 for name in self.constant if name.rstrip("0123456789") == wish)
-            self.made[text] = f"{wish}{k + 1}" if k else wish
+                    wanted = f"{self.name}_part"
+            k = sum(1 for name in self.constant if name.rstrip("0123456789") == wanted)
+            self.made[text] = f"{wanted}{k + 1}" if k else wanted
             self.keep(self.made[text], node)
         return self.made[text]
 

@@ -40,9 +40,9 @@ class Rows:
 
     def __init__(
         self, builder: Any, bases: Mapping[str, Any], rows: Mapping[str, int],
-        strides: Mapping[str, Any], scalars: Mapping[str, Any],
+        offsets: Mapping[str, Any], scalars: Mapping[str, Any],
     ) -> None:  # fmt: skip
-        self.builder, self.bases, self.rows, self.strides = builder, bases, rows, strides
+        self.builder, self.bases, self.rows, self.offsets = builder, bases, rows, offsets
         self.flags: tuple[str, ...] = ()
         self.names: dict[str, Any] = {name: self._splat(v) for name, v in scalars.items()}
 
@@ -115,7 +115,7 @@ class Rows:
                 offset = _number(LANES * (wheel * self.rows["WHEEL_ROWS"] + self.rows[row]))
             case ast.Tuple(elts=[ast.Name(id="w"), ast.Name(id=row)]):
                 own = _number(LANES * self.rows[row])
-                offset = self.builder.add(own, self.strides["w"])
+                offset = self.builder.add(own, self.offsets["w"])
             case _:
                 msg = f"{ast.unparse(place)!r} is not a row"
                 raise TermError(msg)

@@ -37,7 +37,7 @@ from scm.vehicles.drivers.received_cams import (
     cell_number,
     estimate_for,
 )
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 REACH = 2.0  # beyond the front bumper [m]
 MARGIN = 0.01  # on both sides of the corridor [m]
@@ -76,7 +76,7 @@ def new_scratch() -> Scratch:
     )
 
 
-@law
+@kernel_function
 def find_cars_ahead(
     segments: Floats,
     received: ReceivedCams,
@@ -136,14 +136,14 @@ def find_cars_ahead(
     return found
 
 
-@law
+@kernel_function
 def is_outside(window: Floats, at: Floats) -> bool:
     """Return whether a car's centre lies outside a rectangle, so that it cannot be on the route."""
     x, y = at[AT_X], at[AT_Y]
     return bool(x < window[LEFT] or x > window[RIGHT] or y < window[LOW] or y > window[HIGH])
 
 
-@law
+@kernel_function
 def span(
     segments: Floats,
     ids: Ints,
@@ -171,7 +171,7 @@ def span(
         window[LOW], window[HIGH] = min(window[LOW], south), max(window[HIGH], north)
 
 
-@law
+@kernel_function
 def first_overlap(
     segments: Floats,
     ids: Ints,
@@ -218,7 +218,7 @@ def first_overlap(
     return False, 0.0, 0.0
 
 
-@law
+@kernel_function
 def is_beside(row: Floats, x: float, y: float, wide: float) -> bool:
     """Return whether a point is more than `wide` [m] beside the line of a segment."""
     dx, dy = x - row[X], y - row[Y]
@@ -233,7 +233,7 @@ def is_beside(row: Floats, x: float, y: float, wide: float) -> bool:
     return bool(is_inside or squared > spread * (2.0 + spread))
 
 
-@law
+@kernel_function
 def rear_end(
     row: Floats,
     x: float,
@@ -253,7 +253,7 @@ def rear_end(
     return along - half_width * across
 
 
-@law
+@kernel_function
 def insert(ahead: Floats, found: int, rear: float, speed: float, length: float) -> int:
     """Insert a car in order and drop the farthest if there are too many; return the count."""
     at = found

@@ -18,7 +18,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats
 from scm.records.city_map import RadioChannel
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 
 WORDS = 4294967296.0  # number of values of a 32-bit word
 NEAREST_M = 0.01
@@ -79,7 +79,7 @@ def history_length(given: RadioChannel) -> int:
     return HISTORY_WHEN_LOSSY + math.ceil((given.delay_ms + given.jitter_ms) / MIN_CAM_INTERVAL_MS)
 
 
-@law
+@kernel_function
 def pcg_hash(a: int, b: int) -> int:
     """Return a 32-bit hash of two numbers (PCG, O'Neill 2014)."""
     state = ((a & 0xFFFFFFFF) * 747796405 + (b & 0xFFFFFFFF) * 277803737 + 2891336453) & 0xFFFFFFFF
@@ -87,13 +87,13 @@ def pcg_hash(a: int, b: int) -> int:
     return (word >> 22) ^ word
 
 
-@law
+@kernel_function
 def sides(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Return the side of the line from a to b on which a point lies, + = left."""
     return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
 
 
-@law
+@kernel_function
 def walls_between(walls: Floats, x0: float, y0: float, x1: float, y1: float) -> int:
     """Return the number of walls that a straight line crosses."""
     count = 0
@@ -105,7 +105,7 @@ def walls_between(walls: Floats, x0: float, y0: float, x1: float, y1: float) -> 
     return count
 
 
-@law
+@kernel_function
 def link_loss(numbers: Floats, walls: Floats, x0: float, y0: float, x1: float, y1: float) -> float:
     """Return the share of frames lost between two places."""
     distance = math.sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
@@ -119,7 +119,7 @@ def link_loss(numbers: Floats, walls: Floats, x0: float, y0: float, x1: float, y
     return 0.5 * math.erfc(margin / (numbers[FADING] * math.sqrt(2.0)))
 
 
-@law
+@kernel_function
 def has_arrived(
     channel: Channel,
     seed: int,

@@ -66,7 +66,7 @@ from scm.vehicles.drivers.stop_lines import (
     next_line,
     obey_signal,
 )
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 
 TIME_GAP = 0.8  # to the car ahead [s]
 ARRIVED_WITHIN = 0.02  # of the end of the route [m]
@@ -143,7 +143,7 @@ def decide(
         ints[ARRIVED] = has_arrived(lanes.length, ints, lane_window, floats[S])
 
 
-@law
+@kernel_function
 def limit_for_line(
     lanes: LaneArrays,
     state: DriverState,
@@ -187,7 +187,7 @@ def limit_for_line(
     return target, reason
 
 
-@law
+@kernel_function
 def what_holds(
     lanes: LaneArrays,
     state: DriverState,
@@ -249,7 +249,7 @@ def what_holds(
     return VEHICLE
 
 
-@law
+@kernel_function
 def open_road_speed(
     segments: Floats,
     ids: Ints,
@@ -280,14 +280,14 @@ def open_road_speed(
     return target, reason
 
 
-@law
+@kernel_function
 def may_reroute(now_ns: int, passed: float) -> bool:
     """Return whether a blocked car may try another branch now: every REROUTE_EVERY_NS."""
     before_ns = now_ns - int(1e9 * max(0.0, passed))
     return now_ns // REROUTE_EVERY_NS != before_ns // REROUTE_EVERY_NS
 
 
-@law
+@kernel_function
 def has_arrived(length: Floats, ints: Ints, lane_window: Ints, s: float) -> int:
     """Return 1 if a car's route is done, else 0."""
     if ints[INDEX] != ints[GOAL]:

@@ -60,7 +60,7 @@ from scm.vehicles.drivers.waiting_order import (
     has_turn,
     is_earlier,
 )
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 AT_LINE = 0.12  # a front bumper closer to its line than this waits at it [m]
 MAX_OFFSET = 0.11  # from a path's centre line for a car to be on it [m]
@@ -80,7 +80,7 @@ NOWHERE = -1e9
 LEFT, LOW, RIGHT, HIGH = range(4)
 
 
-@law
+@kernel_function
 def gives_way(
     lanes: LaneArrays,
     state: DriverState,
@@ -134,7 +134,7 @@ def gives_way(
     return SIGN if held else VEHICLE
 
 
-@law
+@kernel_function
 def gives_way_to_any(rules: Rules, way: int, all_stop: bool) -> bool:
     """Return whether a path has to give way to any other."""
     if all_stop:
@@ -145,7 +145,7 @@ def gives_way_to_any(rules: Rules, way: int, all_stop: bool) -> bool:
     return False
 
 
-@law
+@kernel_function
 def waits(
     ints: Ints,
     order: int,
@@ -190,7 +190,7 @@ def waits(
     return bool(now_ns - since_ns < patience_ns + later_ns)
 
 
-@law
+@kernel_function
 def way_over_junction(rules: Rules, lane_window: Ints, line: int, at: int) -> int:
     """Return the path over the junction that a car follows from a line, or -1."""
     for way in range(rules.way_first[line], rules.way_first[line + 1]):
@@ -200,7 +200,7 @@ def way_over_junction(rules: Rules, lane_window: Ints, line: int, at: int) -> in
     return -1
 
 
-@law
+@kernel_function
 def fastest(rules: Rules, kind: Floats, signals: float, line: int) -> float:
     """Return the speed that a car is sure to reach across a junction [m/s]."""
     cruise = min(rules.limit[line], signals)
@@ -210,7 +210,7 @@ def fastest(rules: Rules, kind: Floats, signals: float, line: int) -> float:
     return float(0.9 * cruise)
 
 
-@law
+@kernel_function
 def time_for(distance: float, speed: float, v_most: float, accel: float) -> float:
     """Return the time for a distance at full acceleration up to a speed [s]."""
     if distance <= 0.0:
@@ -224,7 +224,7 @@ def time_for(distance: float, speed: float, v_most: float, accel: float) -> floa
     return (v_most - speed) / accel + (distance - run_up) / v_most
 
 
-@law
+@kernel_function
 def classify_all(
     rules: Rules,
     segments: Floats,
@@ -276,7 +276,7 @@ def classify_all(
     return around
 
 
-@law
+@kernel_function
 def classify_car(
     rules: Rules,
     segments: Floats,
@@ -332,7 +332,7 @@ def classify_car(
     return found
 
 
-@law
+@kernel_function
 def classify_approaching(
     rules: Rules,
     kind: Floats,
@@ -371,7 +371,7 @@ def classify_approaching(
     return INSIDE if v >= STANDSTILL_SPEED else NOBODY
 
 
-@law
+@kernel_function
 def classify_waiting(
     rules: Rules,
     line: int,
@@ -393,7 +393,7 @@ def classify_waiting(
     return found
 
 
-@law
+@kernel_function
 def along(
     segments: Floats,
     ids: Ints,
@@ -418,7 +418,7 @@ def along(
     return NOWHERE
 
 
-@law
+@kernel_function
 def has_conflict(rules: Rules, way: int, peer: int, all_stop: bool) -> bool:
     """Return whether a path gives way to a car at another line; all-way stop: crosses its path."""
     for pair in range(rules.pair_first[way], rules.pair_first[way + 1]):
@@ -429,7 +429,7 @@ def has_conflict(rules: Rules, way: int, peer: int, all_stop: bool) -> bool:
     return False
 
 
-@law
+@kernel_function
 def is_in_way(
     rules: Rules,
     kind: Floats,

@@ -20,7 +20,7 @@ from scm.vehicles.drivers.lane_graph import GROUP, JUNCTION, LaneArrays
 from scm.vehicles.drivers.signal_table import RED, ReceivedSignals, frame_for
 from scm.vehicles.drivers.speed_control import END_RATE
 from scm.vehicles.drivers.stop_lines import SHORT_OF_LINE
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 HORIZON = 4.0  # distance to a line from which speed is advised [m]
 MIN_SPEED_SHARE = 0.3  # lowest advised speed, of the limit
@@ -29,7 +29,7 @@ MAX_SLOWDOWN = 0.25  # [m/s^2]
 MAX_GUARANTEE_NS = 60_000_000_000  # age after which a frame is ignored
 
 
-@law
+@kernel_function
 def arriving_speed(distance: float, wait: float, decel: float) -> float:
     """Return the speed at which braking for a stop begins only after a time [m/s].
 
@@ -42,7 +42,7 @@ def arriving_speed(distance: float, wait: float, decel: float) -> float:
     return decel * (math.sqrt(drawn * drawn + 2.0 * max(0.0, distance) / decel) - drawn)
 
 
-@law
+@kernel_function
 def advised_speed(
     distance: float, wait: float, decel: float, allowed: float, min_speed: float
 ) -> float:
@@ -61,7 +61,7 @@ def advised_speed(
     return min(allowed, max(min_speed, speed))
 
 
-@law
+@kernel_function
 def red_for(signals: ReceivedSignals, group: int, junction: int, place: int, now_ns: int) -> float:
     """Return the minimum time that a group stays red by a frame [s]; 0 or less: unknown."""
     if place < 0 or signals.fault[junction] or signals.flashing[place, junction]:
@@ -73,7 +73,7 @@ def red_for(signals: ReceivedSignals, group: int, junction: int, place: int, now
     return float(left)
 
 
-@law
+@kernel_function
 def is_clear(
     lanes: LaneArrays, lane_window: Ints, s: float, rear: float, at: int, line: int
 ) -> bool:
@@ -91,7 +91,7 @@ def is_clear(
     return True
 
 
-@law
+@kernel_function
 def advised_approach(
     lanes: LaneArrays,
     signals: ReceivedSignals,

@@ -15,7 +15,7 @@ from scm.v2x.etsi.convert import place_of
 from scm.v2x.etsi.denm import ActionId, DenmBody
 from scm.v2x.etsi.events import DenmReceiver
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 MAX_HAZARDS = 32
 MAX_DISTANCE_M = 1.5
@@ -90,7 +90,7 @@ class HazardTable:
             hazards.ends_ns[row] = now_ns + left_s * NS_PER_S
 
 
-@law
+@kernel_function
 def has_received(hazards: Hazards, place: int, car: int, now_ns: int, seed: int) -> bool:
     """Return whether any of a hazard's newest frames has reached a car."""
     if hazards.channel.numbers[IDEAL] > 0.0:
@@ -104,7 +104,7 @@ def has_received(hazards: Hazards, place: int, car: int, now_ns: int, seed: int)
     return False
 
 
-@law
+@kernel_function
 def speed_share(
     hazards: Hazards, car: int, x: float, y: float, yaw: float, now_ns: int, seed: int
 ) -> float:

@@ -23,13 +23,13 @@ from scm.vehicles.drivers.lane_graph import JUNCTION, LIMIT, LaneArrays
 from scm.vehicles.drivers.lane_tracking import list_segments
 from scm.vehicles.drivers.received_cams import ReceivedCams
 from scm.vehicles.drivers.stop_lines import SHORT_OF_LINE, next_line
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 ROLLING_SHARE = 0.7  # of its present speed that a car ahead is assumed to hold
 MAX_CLEAR_M = 9.0  # how far behind the junction cars are counted
 
 
-@law
+@kernel_function
 def has_room(
     lanes: LaneArrays,
     received: ReceivedCams,
@@ -90,7 +90,7 @@ def has_room(
     return bool(place - kind[FRONT] >= clear_of)
 
 
-@law
+@kernel_function
 def last_place(ahead: Floats, found: int, time: float) -> float:
     """Return where a front bumper could stop behind all cars ahead, after a time [s], in [m].
 
@@ -104,7 +104,7 @@ def last_place(ahead: Floats, found: int, time: float) -> float:
     return free
 
 
-@law
+@kernel_function
 def distance_to_leave(lanes: LaneArrays, lane_window: Ints, s: float, at: int, line: int) -> float:
     """Return the distance from the rear axle to the end of the junction behind a line [m].
 

@@ -26,13 +26,13 @@ from scm.vehicles.drivers.driver_state import (
     S,
 )
 from scm.vehicles.drivers.lane_graph import AT, COS, CURVATURE, LENGTH, SIN, LaneArrays, X, Y
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 
 TURN = 2.0 * math.pi
 MAX_STEPS = 16  # segments that one call moves on; a car passes fewer between decisions
 
 
-@law
+@kernel_function
 def lane_at(lanes: LaneArrays, state: DriverState, car: int, index: int, before: int) -> int:
     """Return lane number `index` of a car's route, given the one before it; -1 beyond the end."""
     ints = state.ints[car]
@@ -63,7 +63,7 @@ def fill_window(lanes: LaneArrays, state: DriverState, car: int, lane: int) -> N
         lane_window[ahead] = lane_at(lanes, state, car, index, lane_window[ahead - 1])
 
 
-@law
+@kernel_function
 def choose_other_branch(lanes: LaneArrays, state: DriverState, car: int) -> None:
     """Choose other branches after the current lane for a circulating car; fixed routes stay."""
     ints, lane_window = state.ints[car], state.lane_window[car]
@@ -73,7 +73,7 @@ def choose_other_branch(lanes: LaneArrays, state: DriverState, car: int) -> None
         lane_window[ahead] = lane_at(lanes, state, car, index, lane_window[ahead - 1])
 
 
-@law
+@kernel_function
 def advance_window(lanes: LaneArrays, state: DriverState, car: int) -> None:
     """Advance a car's lane window by one lane."""
     lane_window = state.lane_window[car]
@@ -84,7 +84,7 @@ def advance_window(lanes: LaneArrays, state: DriverState, car: int) -> None:
     lane_window[WINDOW_SIZE - 1] = lane_at(lanes, state, car, index, lane_window[WINDOW_SIZE - 2])
 
 
-@law
+@kernel_function
 def step_back_window(state: DriverState, car: int) -> None:
     """Move a car's lane window back by one lane."""
     lane_window = state.lane_window[car]
@@ -94,7 +94,7 @@ def step_back_window(state: DriverState, car: int) -> None:
     state.ints[car, INDEX] -= 1
 
 
-@law
+@kernel_function
 def segment_at(first: Ints, segments: Floats, lane: int, s: float) -> int:
     """Return the segment at a distance along a lane."""
     segment = first[lane]
@@ -104,7 +104,7 @@ def segment_at(first: Ints, segments: Floats, lane: int, s: float) -> int:
     return int(segment)
 
 
-@law
+@kernel_function
 def project(row: Floats, x: float, y: float, near: float) -> tuple[float, float, float, float]:
     """Project a point on a segment: distance along it, offset to the left, direction there.
 
@@ -128,7 +128,7 @@ def project(row: Floats, x: float, y: float, near: float) -> tuple[float, float,
     )
 
 
-@law
+@kernel_function
 def update_position(lanes: LaneArrays, state: DriverState, car: int, x: float, y: float) -> None:
     """Update a car's place on its route from its last one, and the distance driven."""
     lane_window, floats = state.lane_window[car], state.floats[car]
@@ -165,7 +165,7 @@ def update_position(lanes: LaneArrays, state: DriverState, car: int, x: float, y
     floats[DONE] += moved + s
 
 
-@law
+@kernel_function
 def list_segments(
     first: Ints,
     segments: Floats,
@@ -213,7 +213,7 @@ def list_segments(
     return count, min(here, count - 1), ends
 
 
-@law
+@kernel_function
 def first_segment_behind(
     first: Ints, segments: Floats, lane_window: Ints, s: float, back: float
 ) -> tuple[int, int, float, int]:
@@ -239,7 +239,7 @@ def first_segment_behind(
     return at, segment, float(begin), here
 
 
-@law
+@kernel_function
 def heading_change(
     segments: Floats, ids: Ints, begins: Floats, count: int, here: int, offset: float
 ) -> float:

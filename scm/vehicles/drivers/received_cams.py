@@ -14,7 +14,7 @@ from scm.arrays import Floats, Ints
 from scm.clock import NS_PER_S
 from scm.records.city_map import CityMap
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 
 MAX_CAM_AGE_NS = 3 * NS_PER_S  # every station sends at least once a second
 MAX_CAM_AGE_LOSSY_NS = 16 * NS_PER_S
@@ -80,7 +80,7 @@ def no_cams(city_map: CityMap, capacity: int, history: int, channel: Channel) ->
     )
 
 
-@law
+@kernel_function
 def extrapolate(cam: Floats, age: float, length: float) -> tuple[float, float, float, float, float]:
     """Return (x, y, cos, sin, speed) of a car's centre, some time [s] after its CAM."""
     age = min(max(age, 0.0), MAX_EXTRAPOLATION_S)
@@ -92,7 +92,7 @@ def extrapolate(cam: Floats, age: float, length: float) -> tuple[float, float, f
     return x, y, math.cos(yaw), math.sin(yaw), cam[CAM_SPEED]
 
 
-@law
+@kernel_function
 def cell_number(floor: Floats, x: float, low: int, cells: int) -> int:
     """Return the row or column of cells at a coordinate, clamped to the grid."""
     at = (x - floor[low]) / CELL_M
@@ -136,7 +136,7 @@ def update_cells(received: ReceivedCams, now_ns: int) -> None:
     first[-1] = total
 
 
-@law
+@kernel_function
 def estimate_for(
     received: ReceivedCams, station: int, receiver: int, now_ns: int, seed: int
 ) -> tuple[bool, float, float, float, float, float]:

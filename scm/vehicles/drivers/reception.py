@@ -22,14 +22,14 @@ from scm.vehicles.drivers.received_cams import (
     ReceivedCams,
     cell_number,
 )
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 MIN_MEAN_CAMS = 5  # of the last 16 of each station
 MAX_NEWEST_AGE_NS = 5 * NS_PER_S // 2
 LEFT, LOW, RIGHT, HIGH = range(4)
 
 
-@law
+@kernel_function
 def arrived_of(
     received: ReceivedCams, station: int, receiver: int, now_ns: int, seed: int
 ) -> tuple[int, bool]:
@@ -49,7 +49,7 @@ def arrived_of(
     return count, is_fresh
 
 
-@law
+@kernel_function
 def reception_is_good(
     received: ReceivedCams, window: Floats, car: int, now_ns: int, seed: int
 ) -> bool:
@@ -80,7 +80,7 @@ def reception_is_good(
     return arrived >= MIN_MEAN_CAMS * known
 
 
-@law
+@kernel_function
 def receives_any_station_well(received: ReceivedCams, car: int, now_ns: int, seed: int) -> bool:
     """Return whether a car receives at least one station well."""
     for station in range(len(received.newest)):

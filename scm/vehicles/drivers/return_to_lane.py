@@ -32,7 +32,7 @@ from scm.vehicles.drivers.lane_graph import CURVATURE, YAW, LaneArrays
 from scm.vehicles.drivers.lane_tracking import list_segments, update_position
 from scm.vehicles.drivers.speed_control import START_SPEED, free_speed
 from scm.vehicles.drivers.steering import MIN_PREVIEW, steer
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 
 MAX_RETURN_M = 4.0  # in which the flattest approach brings a car 1 m nearer to its lane
 STEP_M = 0.02
@@ -42,7 +42,7 @@ REACH_M = 1.0  # preview for speed and steering
 NO_WALL = -1.0
 
 
-@law
+@kernel_function
 def depth_of(
     wall: Floats, x: float, y: float, cos: float, sin: float, ahead: float, half_length: float,
     half_width: float,
@@ -65,7 +65,7 @@ def depth_of(
     return float(min(along, across, through))
 
 
-@law
+@kernel_function
 def deepest(walls: Floats, kind: Floats, x: float, y: float, yaw: float) -> float:
     """Return how deep any wall reaches into a car's outline [m]; below 0: no contact."""
     cos, sin, found = math.cos(yaw), math.sin(yaw), -math.inf

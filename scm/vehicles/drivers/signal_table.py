@@ -18,7 +18,7 @@ from scm.v2x.etsi.cam_spatem import SpatemBody
 from scm.v2x.etsi.convert import REVISIONS, colours_of
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived, ideal
-from scm.vehicles.jit import law, plain
+from scm.vehicles.jit import kernel_function, plain
 
 MAX_AGE_NS = NS_PER_S  # SPATEMs come at 10 Hz
 RESOLUTION_S = 0.1  # of a SPATEM's times
@@ -144,7 +144,7 @@ class SignalTable:
         return max(0.0, min_end - 1e-9 * int(now_ns - received.arrived_ns[place, at]))
 
 
-@law
+@kernel_function
 def frame_for(
     received: ReceivedSignals, junction: int, receiver: int, now_ns: int, seed: int
 ) -> int:
@@ -165,7 +165,7 @@ def frame_for(
     return -1
 
 
-@law
+@kernel_function
 def usable_colour(
     received: ReceivedSignals, group: int, junction: int, place: int, now_ns: int
 ) -> int:

@@ -16,7 +16,7 @@ from scm.vehicles.drivers.driver_state import (
     STEPS,
 )
 from scm.vehicles.drivers.lane_graph import CURVATURE, LIMIT
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 END_RATE = 5.0  # of the exponential end of a stop [1/s]
 STANDSTILL = 0.02  # a slower car stands [m/s]
@@ -26,14 +26,14 @@ MAX_STEP_S = 0.1  # a longer pause between decisions counts as this
 MAX_INTEGRAL = 0.3  # throttle that the integral part may add
 
 
-@law
+@kernel_function
 def stopping_speed(distance: float, decel: float) -> float:
     """Return the highest speed from which the car stops comfortably within a distance [m/s]."""
     soft = decel / END_RATE
     return math.sqrt(soft * soft + 2.0 * decel * max(0.0, distance)) - soft
 
 
-@law
+@kernel_function
 def free_speed(
     segments: Floats,
     ids: Ints,
@@ -55,7 +55,7 @@ def free_speed(
     return math.sqrt(slowest)
 
 
-@law
+@kernel_function
 def throttle(kind: Floats, floats: Floats, target: float, speed: float, passed: float) -> float:
     """Return the throttle that brings a car smoothly to a target speed, -1 to 1.
 
@@ -89,7 +89,7 @@ def throttle(kind: Floats, floats: Floats, target: float, speed: float, passed: 
     return float(bounded)
 
 
-@law
+@kernel_function
 def steady(kind: Floats, speed: float) -> float:
     """Return the throttle that holds a speed [m/s], by the car's table; 0 without one."""
     steps, below = int(kind[STEPS]), 0.0
@@ -101,7 +101,7 @@ def steady(kind: Floats, speed: float) -> float:
     return 1.0 if steps else 0.0
 
 
-@law
+@kernel_function
 def braking(speed: float, decel: float, reaction: float) -> float:
     """Return the stopping distance of a car, reaction time included [m]."""
     return speed * reaction + speed * speed / (2.0 * decel)

@@ -27,7 +27,7 @@ from scm.vehicles.drivers.driver_state import (
 )
 from scm.vehicles.drivers.lane_graph import CURVATURE, YAW
 from scm.vehicles.drivers.lane_tracking import heading_change
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 STIFFNESS = 8.0  # w [1/m]
 DAMPING = 0.8  # z
@@ -35,7 +35,7 @@ LATERAL_LIMIT = 0.05  # larger lateral errors count as this [m]
 MIN_PREVIEW = 0.02  # half the distance of the means [m]
 
 
-@law
+@kernel_function
 def steer(
     segments: Floats,
     ids: Ints,
@@ -80,7 +80,7 @@ def steer(
     return float(floats[STEER] / limit)
 
 
-@law
+@kernel_function
 def feedback(
     kind: Floats, floats: Floats, yaw: float, path_curvature: float, speed: float
 ) -> float:

@@ -26,7 +26,7 @@ from scm.vehicles.drivers.signal_table import (
     frame_for,
     usable_colour,
 )
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 
 SHORT_OF_LINE = 0.04  # where the front bumper stops before the line [m]
 STOP_MARGIN = 0.02  # of distance for a stop that counts as comfortable [m]
@@ -34,7 +34,7 @@ REACTION = 0.1  # [s]
 LOOK_AHEAD = 0.5  # beyond the stopping distance [m]
 
 
-@law
+@kernel_function
 def next_line(
     length: Floats,
     line_first: Ints,
@@ -63,7 +63,7 @@ def next_line(
     return -1, HERE, -1.0
 
 
-@law
+@kernel_function
 def obey_signal(
     signals: ReceivedSignals,
     links: Ints,

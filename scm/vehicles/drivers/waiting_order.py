@@ -13,7 +13,7 @@ for it, and repeats after a pause that differs from line to line.
 from scm.arrays import Floats, Ints
 from scm.vehicles.drivers.driver_state import NEVER_NS
 from scm.vehicles.drivers.received_cams import CAM_SPEED, CAM_X, CAM_Y, ReceivedCams
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 
 STANDSTILL_SPEED = 0.03  # a slower car stands [m/s]
 SAME_PLACE = 0.1  # a car that moves less still stands [m]
@@ -41,7 +41,7 @@ def note_standing(stood: Ints, stood_at: Floats, stations: Ints, now_ns: int, ca
             stood_at[station, 0], stood_at[station, 1] = x, y
 
 
-@law
+@kernel_function
 def announced_since(
     stood: Ints, received: ReceivedCams, car: int, rest_ns: int, now_ns: int
 ) -> int:
@@ -56,7 +56,7 @@ def announced_since(
     return int(stood[car]) if stood[car] != NEVER_NS else now_ns
 
 
-@law
+@kernel_function
 def has_turn(since_ns: int, order: int, now_ns: int) -> bool:
     """Return whether it is the turn of a car that has been standing at its line since then."""
     if since_ns == NEVER_NS or now_ns - since_ns < LONG_WAIT_NS:
@@ -66,7 +66,7 @@ def has_turn(since_ns: int, order: int, now_ns: int) -> bool:
     )
 
 
-@law
+@kernel_function
 def is_earlier(theirs_ns: int, their_order: int, mine_ns: int, my_order: int) -> bool:
     """Return whether another car stopped at its line before the own car did."""
     if theirs_ns == NEVER_NS:

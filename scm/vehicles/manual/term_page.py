@@ -14,8 +14,8 @@ from scm.vehicles.term import Term, flat, reads
 
 def term_page(term: Term) -> str:
     """Return one effect's page."""
-    lines = [f"# {term.name}", "", term.about, "", "```", *equations(term.law), "```", ""]
-    text = story(term.law)
+    lines = [f"# {term.name}", "", term.about, "", "```", *equations(term.function), "```", ""]
+    text = story(term.function)
     lines += [text, ""] if text else []
     lines += [f"![{term.name}: with and without]({term.name}.svg)", "", _caption(term), ""]
     lines += list(parameter_table(params_of(term), neutral_of(term)))
@@ -64,7 +64,7 @@ def _reads(term: Term) -> str:
     names = dict.fromkeys(
         name
         for part in flat([term])
-        for function in (part.law, part.damping)
+        for function in (part.function, part.damping)
         if function
         for name in reads(function)
         if name in SIGNALS

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scm.arrays import Floats
-from scm.vehicles.jit import array_kernel, law
+from scm.vehicles.jit import array_kernel, kernel_function
 
 Numbers = NDArray[np.int32]
 
@@ -128,7 +128,7 @@ def _list(edges: Floats, faces: int, window: Window, places: Numbers, items: Num
                 places[cell] += 1
 
 
-@law
+@kernel_function
 def _span(edges: Floats, first: int, last: int, axis: int, size: float) -> tuple[int, int]:
     """Return the first and the last column (or row) that some faces reach into."""
     low = high = edges[first, axis]
@@ -138,7 +138,7 @@ def _span(edges: Floats, first: int, last: int, axis: int, size: float) -> tuple
     return math.floor(low / size - SLACK), math.floor(high / size + SLACK)
 
 
-@law
+@kernel_function
 def _within(edge: Floats, left: float, right: float, size: float) -> tuple[int, int]:
     """Return the rows that a face crosses between two abscissas."""
     x0, y0, x1, y1 = edge

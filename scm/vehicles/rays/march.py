@@ -46,7 +46,7 @@ def march(
     """
     first, step, beams = bearings
     ago: Floats = np.arange(beams - 1.0, -1.0, -1.0) * (step / (2.0 * math.pi) * period_s)
-    places = taken_back(scanners, motion, ago)
+    places = past_poses(scanners, motion, ago)
     places[:, :, 2] += first + step * np.arange(beams)
     ranges: Floats = np.full((len(scanners), beams), np.inf)
     for some in near_each_other(scanners[:, :2], farthest):
@@ -60,7 +60,7 @@ def march(
     return ranges
 
 
-def taken_back(scanners: Floats, motion: Floats, ago: Floats) -> Floats:
+def past_poses(scanners: Floats, motion: Floats, ago: Floats) -> Floats:
     """Return where scanners (k, 3) were some times ago (b,), (k, b, 3), in steady motion."""
     steady = np.clip(np.nan_to_num(motion), -FASTEST, FASTEST)
     along, across, rate = (column[:, None] for column in steady.T)
@@ -91,10 +91,10 @@ def _march(
             to_j, a_cell_j = _to_border(y, uy, j, walls.size)
             gone, nearest = 0.0, farthest
             while gone <= nearest:
-                begin, end = _listed(walls, wall_starts, i, j)
+                begin, end = _items_of_cell(walls, wall_starts, i, j)
                 for n in range(begin, end):
                     nearest = min(nearest, _meet(x, y, ux, uy, edges, wall_items[n]))
-                begin, end = _listed(bodies, body_starts, i, j)
+                begin, end = _items_of_cell(bodies, body_starts, i, j)
                 for n in range(begin, end):
                     m = body_items[n]
                     if owners[m] < 0 or owners[m] != own[k]:
@@ -126,7 +126,7 @@ def _to_border(x: float, u: float, cell: int, size: float) -> tuple[float, float
 
 
 @inlined
-def _listed(window: Window, starts: Numbers, i: int, j: int) -> tuple[int, int]:
+def _items_of_cell(window: Window, starts: Numbers, i: int, j: int) -> tuple[int, int]:
     """Return where the items of a cell begin and end."""
     a, b = i - window.i0, j - window.j0
     if a < 0 or a >= window.ni or b < 0 or b >= window.nj:

@@ -50,9 +50,9 @@ def order_of(size: float, farthest: float) -> Order:
     i, j = (grid.ravel() for grid in np.meshgrid(steps, steps, indexing="ij"))
     gap_i, gap_j = (np.maximum(np.abs(step) - 1, 0) * size for step in (i, j))
     near = np.hypot(gap_i, gap_j)
-    kept = np.flatnonzero(near <= farthest)
-    kept = kept[np.argsort(near[kept], kind="stable")]
-    i, j, near = i[kept], j[kept], near[kept]
+    near_cells = np.flatnonzero(near <= farthest)
+    near_cells = near_cells[np.argsort(near[near_cells], kind="stable")]
+    i, j, near = i[near_cells], j[near_cells], near[near_cells]
     centre = np.arctan2(j, i)
     # from any point of one cell to any point of the other: a square of twice the edge
     corners = np.stack([np.arctan2(j + b, i + a) for a in (-1, 1) for b in (-1, 1)])

@@ -6,11 +6,11 @@ Holds: perfect linkage, front axle only; + is left, where the left wheel (side =
 Shows in: tight circles.   Source: geometry; the paper prints the opposite sign.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def ackermann(
     road_slope: float, front: float, side: float, wheelbase: float, track: float
 ) -> float:

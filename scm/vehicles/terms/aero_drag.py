@@ -10,7 +10,7 @@ Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 4; coefficie
 import math
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
@@ -20,7 +20,7 @@ _PARAMS = (
 )  # fmt: skip
 
 
-@law
+@kernel_function
 def aero_drag_damping(
     vx: float, vy: float, air_x: float, air_y: float, cos_yaw: float, sin_yaw: float,
     coefficient: float,
@@ -31,7 +31,7 @@ def aero_drag_damping(
     return coefficient * math.sqrt(along * along + across * across)
 
 
-@law
+@kernel_function
 def aero_drag(
     vx: float, vy: float, air_x: float, air_y: float, cos_yaw: float, sin_yaw: float,
     coefficient: float,
@@ -41,7 +41,7 @@ def aero_drag(
     return -secant * (vx - (cos_yaw * air_x + sin_yaw * air_y))
 
 
-@law
+@kernel_function
 def aero_drag_across(
     vx: float, vy: float, air_x: float, air_y: float, cos_yaw: float, sin_yaw: float,
     coefficient: float,

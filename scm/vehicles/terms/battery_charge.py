@@ -8,13 +8,13 @@ motor's power, stall torque times no-load speed over nominal voltage.   Shows in
 Source: DC motor behind a chopper (Fitzgerald, Electric Machinery); state of charge by counting.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lipo import loaded_voltage, pack_current, pack_voltage
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def battery_charge(
     charge_drawn: float, throttle: float, drive_omega: float, front_driven: float,
     rear_driven: float, no_load_speed: float, battery_nominal: float, cells: float,

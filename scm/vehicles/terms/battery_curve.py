@@ -8,13 +8,13 @@ Holds: rested cells at room temperature, +-20 mV a cell.   Shows in: top speed o
 Source: the rest-voltage chart of LiPo cells printed by their makers.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lipo import pack_voltage
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def battery_curve(charge_drawn: float, cells: float, capacity: float, start_charge: float) -> float:
     """Voltage without load [V]."""
     return pack_voltage(charge_drawn, cells, capacity, start_charge)

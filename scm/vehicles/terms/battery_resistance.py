@@ -8,13 +8,13 @@ Holds: one ohmic resistance, choppers that give nothing back.   Shows in: hard l
 Source: Thevenin's equivalent of a cell (Plett, Battery Management Systems, volume 1).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lipo import loaded_voltage
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def battery_resistance(
     open_circuit_voltage: float, throttle: float, drive_omega: float, front_driven: float,
     rear_driven: float, no_load_speed: float, battery_nominal: float, resistance: float,

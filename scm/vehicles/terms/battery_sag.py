@@ -8,12 +8,12 @@ Source: first order of a discharge at constant current; definition ours.
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def battery_sag(terminal_voltage: float, time: float, fraction_per_min: float) -> float:
     """Voltage that the motors get [V]."""
     return terminal_voltage * max(0.0, 1.0 - fraction_per_min * time * (1.0 / 60.0))

@@ -8,13 +8,13 @@ Shows in: coast-down.   Source: Lorenzo-Lyons/DART, vehicle model (rolling frict
 
 import math
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lane_math import tanh
 from scm.vehicles.param import LogNormal, Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def body_friction(
     vx: float, static: float, sharpness: float, linear: float, quadratic: float
 ) -> float:
@@ -24,7 +24,7 @@ def body_friction(
     return -math.copysign(max(0.0, force), vx)
 
 
-@law
+@kernel_function
 def body_friction_damping(
     vx: float, static: float, sharpness: float, linear: float, quadratic: float
 ) -> float:

@@ -5,18 +5,18 @@
 Holds: hard rubber.   Shows in: landings, kerbs.   Source: ours, ten times a stiff spring.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def bump_stop(compression: float, travel: float, stop_stiffness: float) -> float:
     """Force on the body, + up [N]."""
     return stop_stiffness * (compression - min(max(compression, -travel), travel))
 
 
-@law
+@kernel_function
 def bump_stop_damping(compression: float, travel: float, stop_stiffness: float, dt: float) -> float:
     """Force gained per compression rate within one substep, while at the stop [N*s/m]."""
     return stop_stiffness * dt if abs(compression) > travel else 0.0

@@ -9,12 +9,12 @@ Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 6.
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def com_shift(shift: float) -> float:
     """Centre of gravity ahead of where the car file puts it [m]."""
     return shift

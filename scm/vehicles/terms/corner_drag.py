@@ -8,18 +8,18 @@ Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 6 (cornering
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def corner_drag(vx: float, yaw_rate: float, mass: float, coefficient: float) -> float:
     """Force against the motion [N]."""
     return -coefficient * mass * abs(yaw_rate) * vx
 
 
-@law
+@kernel_function
 def corner_drag_damping(yaw_rate: float, mass: float, coefficient: float) -> float:
     """Force lost per speed [N*s/m]."""
     return coefficient * mass * abs(yaw_rate)

@@ -7,12 +7,12 @@ coasting to a sudden stop.
 Source: textbook Coulomb friction; the real Nigel needs about 0.2 throttle to move.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def coulomb_friction(driven: float, torque: float) -> float:
     """Torque that dry friction can hold, never negative [N*m]."""
     return driven * torque

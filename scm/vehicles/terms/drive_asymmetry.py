@@ -7,12 +7,12 @@ Source: geometry of unequal motors; + makes the left side stronger and the car t
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def drive_asymmetry(throttle: float, side: float, difference: float) -> float:
     """Throttle of this side's motor, + forward."""
     return throttle * (1.0 + side * difference)

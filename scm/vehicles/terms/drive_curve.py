@@ -9,12 +9,12 @@ Source: CPM Lab's vehicle model has sign(f) |f|^p with p = 1.3 to 1.6 for it; th
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def drive_curve(throttle_live: float, curvature: float) -> float:
     """Throttle after the controller's curve, + forward; exactly the throttle without curvature."""
     return throttle_live * (1.0 - curvature + curvature * abs(throttle_live))

@@ -7,12 +7,12 @@ Source: textbook dead zone; the real Nigel needs about 0.2 throttle to move.
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def drive_deadband(throttle_limited: float, threshold: float) -> float:
     """Throttle that is left, + forward."""
     return throttle_limited - min(max(throttle_limited, -threshold), threshold)

@@ -7,12 +7,12 @@ Source: textbook dead time; radio, bus and controller cycle together.
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def drive_delay(throttle_past: float) -> float:
     """Throttle that arrives now, + forward."""
     return throttle_past

@@ -8,12 +8,12 @@ Source: a motor controller's scale (voltage, pulse width); the definition is our
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def drive_gain(throttle_curved: float, gain: float) -> float:
     """Throttle as the controller takes it, + forward."""
     return gain * throttle_curved

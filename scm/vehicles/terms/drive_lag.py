@@ -7,12 +7,12 @@ Source: Lorenzo-Lyons/DART, vehicle model (throttle time constant).
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def drive_lag(throttle_scaled: float, throttle: float, time_constant: float, dt: float) -> float:
     """Throttle at the substep's end, + forward; exactly the command without lag."""
     share = dt / (time_constant + dt)

@@ -7,12 +7,12 @@ Holds: a limit in software, or a power stage at its end.   Shows in: full thrott
 Source: clipping by definition; an F1TENTH asked for 5 m/s and held to 1.3 (FrictionMaps, DS3).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def drive_saturation(throttle_received: float, forward: float, reverse: float) -> float:
     """Throttle within the limits, + forward."""
     return min(max(throttle_received, -reverse), forward)

@@ -12,7 +12,7 @@ Shows in: throttle held in several headings, rolling from rest.   Source: static
 import math
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lane_math import sin_cos
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -25,20 +25,20 @@ _PARAMS = (
 )  # fmt: skip
 
 
-@law
+@kernel_function
 def downhill(mass: float, slope: float) -> float:
     """Gravity's pull along the plane [N]."""
     return mass * _GRAVITY * slope / math.sqrt(1.0 + slope * slope)
 
 
-@law
+@kernel_function
 def grade(mass: float, cos_yaw: float, sin_yaw: float, slope: float, uphill: float) -> float:
     """Force along the body, + forward [N]."""
     sin_up, cos_up = sin_cos(uphill)
     return -downhill(mass, slope) * (cos_up * cos_yaw + sin_up * sin_yaw)
 
 
-@law
+@kernel_function
 def grade_across(mass: float, cos_yaw: float, sin_yaw: float, slope: float, uphill: float) -> float:
     """Force across the body, + to its left [N]."""
     sin_up, cos_up = sin_cos(uphill)

@@ -11,14 +11,14 @@ Shows in: fast lane changes of a car whose suspension is not known.
 Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapters 1 and 6.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Param
 from scm.vehicles.term import Per, Term
 
 _GRAVITY = 9.80665
 
 
-@law
+@kernel_function
 def load_quasistatic(
     load: float, rest_load: float, accel_x: float, accel_y: float, front: float, side: float,
     mass: float, wheelbase: float, track: float, cog_height: float, rigidity: float,

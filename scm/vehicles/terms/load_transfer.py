@@ -8,12 +8,12 @@ Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapters 1 and 6.
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def load_transfer(height: float) -> float:
     """Centre of gravity above where the car file puts it [m]."""
     return height

@@ -8,13 +8,13 @@ none of the 95 recordings published with it has a throttle below zero.
 Shows in: throttle steps and ramps.   Source: Lorenzo-Lyons/DART, vehicle model (motor curve).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lane_math import tanh
 from scm.vehicles.param import LogNormal, Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def motor_curve(
     motor_throttle: float, fade_strength: float, motor_strength: float, vx: float, driven: float,
     front_driven: float, rear_driven: float, wheel_radius: float, force: float,

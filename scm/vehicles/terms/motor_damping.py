@@ -6,18 +6,18 @@ Holds: fitted below no-load speed.   Shows in: top speed below the motor line.
 Source: fitted to the AutoDRIVE simulator's throttle-speed table.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def motor_damping(omega: float, driven: float, damping_quadratic: float) -> float:
     """Torque on the wheel, against its spin [N*m]."""
     return -driven * damping_quadratic * omega * abs(omega)
 
 
-@law
+@kernel_function
 def motor_damping_damping(omega: float, driven: float, damping_quadratic: float) -> float:
     """Torque lost per wheel speed, the secant [N*m*s]."""
     return driven * damping_quadratic * abs(omega)

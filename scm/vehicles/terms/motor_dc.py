@@ -11,12 +11,12 @@ Holds: brushed motors on a stiff supply, current settled within a millisecond.
 Shows in: throttle steps, top speed.   Source: AutoDRIVE paper, actuators; values see the car file.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def motor_dc(
     motor_throttle: float, fade_strength: float, supply_voltage: float, motor_strength: float,
     omega: float, axle_omega: float, driven: float, stall_torque: float, no_load_speed: float,
@@ -28,7 +28,7 @@ def motor_dc(
     return driven * stall_torque * motor_strength * (u - felt / no_load_speed)
 
 
-@law
+@kernel_function
 def motor_dc_damping(
     motor_strength: float, driven: float, stall_torque: float, no_load_speed: float,
     axle_lock: float,

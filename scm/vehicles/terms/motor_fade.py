@@ -10,12 +10,12 @@ Source: first-order warming (Fitzgerald, Electric Machinery); the strength's for
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def motor_fade(
     fade_strength: float, motor_throttle: float, fraction: float, warm_time: float, dt: float
 ) -> float:

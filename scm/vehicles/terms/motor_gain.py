@@ -8,12 +8,12 @@ Source: DC motor with other resistance (Fitzgerald, Electric Machinery); definit
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def motor_gain(warm_strength: float, gain: float) -> float:
     """Torque over the nominal one."""
     return gain * warm_strength

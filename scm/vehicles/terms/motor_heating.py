@@ -8,12 +8,12 @@ Holds: one thermal mass; |load| up to 1 is stall.   Shows in: long climbs, pushi
 Source: lumped thermal model of a motor (Fitzgerald, Electric Machinery).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def motor_heating(
     motor_heat: float, motor_throttle: float, fade_strength: float, supply_voltage: float,
     axle_omega: float, driven: float, no_load_speed: float, battery_nominal: float,

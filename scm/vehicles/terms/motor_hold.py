@@ -6,12 +6,12 @@ Holds: motor controllers that short or hold an idle motor.   Shows in: stop afte
 Source: AutoDRIVE paper, actuators (idle torque).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def motor_hold(throttle: float, driven: float, hold_torque: float, hold_below: float) -> float:
     """Torque that the idle motor can hold, never negative [N*m]."""
     return driven * hold_torque if abs(throttle) < hold_below else 0.0

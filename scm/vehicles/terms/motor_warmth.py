@@ -6,12 +6,12 @@ Holds: brushed motor at given voltage; magnets' own loss adds 0.001 to 0.002 to 
 Shows in: long drives, with `motor_heating`.   Source: copper, IEC 60028.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def motor_warmth(motor_heat: float, weakening: float) -> float:
     """Torque of the warm motor over its nominal one."""
     return 1.0 / (1.0 + weakening * max(motor_heat, 0.0))

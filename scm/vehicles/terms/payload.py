@@ -9,12 +9,12 @@ Shows in: throttle steps, ramps.   Source: Newton's second law.
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def payload(mass: float) -> float:
     """Mass beyond the car file's [kg]."""
     return mass

@@ -6,12 +6,12 @@ Holds: stiff gear without play.   Shows in: throttle steps, impacts.
 Source: Fitzgerald, Electric Machinery: rotor inertia times gear ratio squared.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def reflected_inertia(driven: float, inertia: float) -> float:
     """Inertia beside the wheel's own [kg*m^2]."""
     return driven * inertia

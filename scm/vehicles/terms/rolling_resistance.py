@@ -9,12 +9,12 @@ Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 4.
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def rolling_resistance(
     load: float, rolling: float, wheel_radius: float, coefficient: float
 ) -> float:

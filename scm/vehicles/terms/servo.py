@@ -8,12 +8,12 @@ Source: AutoDRIVE paper, steering (rate limit).
 
 import math
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def servo(
     steer_target: float, servo_angle: float, servo_pace: float, rate: float, dt: float
 ) -> float:

@@ -7,12 +7,12 @@ Holds: speed falls in a line with torque; the load is the side force, scrub at r
 Shows in: fast slaloms.   Source: DC servo line; front force from Newton and Euler in the plane.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def servo_torque(
     accel_y: float, yaw_accel: float, mass: float, cog_to_rear_axle: float, yaw_inertia: float,
     wheelbase: float, trail: float, stall: float,

@@ -9,12 +9,12 @@ Holds: a controller that knows its wheels' speed, not the floor's; no offset lef
 Shows in: speed steps.   Source: VESC speed mode as the F1TENTH driver uses it; first order, ours.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def speed_control(
     motor_throttle: float, motor_strength: float, axle_omega: float, driven: float,
     front_driven: float, rear_driven: float, mass: float, wheel_radius: float, full_speed: float,
@@ -23,11 +23,11 @@ def speed_control(
     """Torque on the wheel, + forward [N*m]."""
     share = driven / max(2.0 * (front_driven + rear_driven), 1.0)
     limit = acceleration * motor_strength
-    asked = (motor_throttle * full_speed - wheel_radius * axle_omega) / response_time
-    return share * mass * wheel_radius * min(max(asked, -limit), limit)
+    wanted = (motor_throttle * full_speed - wheel_radius * axle_omega) / response_time
+    return share * mass * wheel_radius * min(max(wanted, -limit), limit)
 
 
-@law
+@kernel_function
 def speed_control_damping(
     motor_throttle: float, motor_strength: float, axle_omega: float, driven: float,
     front_driven: float, rear_driven: float, mass: float, wheel_radius: float, full_speed: float,
@@ -35,9 +35,9 @@ def speed_control_damping(
 ) -> float:  # fmt: skip
     """Torque lost per own wheel speed, none while the controller gives all it has [N*m*s]."""
     share = driven / max(2.0 * (front_driven + rear_driven), 1.0)
-    asked = (motor_throttle * full_speed - wheel_radius * axle_omega) / response_time
+    wanted = (motor_throttle * full_speed - wheel_radius * axle_omega) / response_time
     stiff = 0.5 * share * mass * wheel_radius * wheel_radius / response_time
-    return stiff if abs(asked) < acceleration * motor_strength else 0.0
+    return stiff if abs(wanted) < acceleration * motor_strength else 0.0
 
 
 TERM = Term(
@@ -49,7 +49,7 @@ TERM = Term(
     shows_in=("throttle_step", "steady_speed"),
     params=(
         Param("full_speed", 10.0, "m/s", "drive.full_speed_m_s", (0.1, 100.0),
-              "speed that a throttle of 1 asks for", fit=False),
+              "speed that a throttle of 1 commands", fit=False),
         Param("response_time", 0.05, "s", "drive.response_time_s", (0.005, 2.0),
               "63 % of a small change of speed", LogNormal(0.05, 0.7)),
         Param("acceleration", 0.0, "m/s^2", "drive.acceleration_m_s2", (0.0, 50.0),

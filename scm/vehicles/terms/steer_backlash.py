@@ -7,12 +7,12 @@ Source: play operator (Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def steer_backlash(servo_angle: float, linkage_angle: float, width: float) -> float:
     """Angle behind the play at the substep's end, + left [rad]."""
     return min(max(linkage_angle, servo_angle - 0.5 * width), servo_angle + 0.5 * width)

@@ -13,7 +13,7 @@ Source: Milliken, Race Car Vehicle Dynamics (1995), chapter 23: lateral force co
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
@@ -22,7 +22,7 @@ _FRONT = 8.0  # weights a radian; cars have 3 to 10, and twice as much does not 
 _SLOW = 2.0  # m/s; ours, it brings substeps of 1 ms nearest to those of 0.25 ms
 
 
-@law
+@kernel_function
 def steer_compliance(
     steer_trimmed: float, steer_before: float, steer_yielded: float, accel_y: float,
     yaw_accel: float, vx: float, mass: float, cog_to_rear_axle: float, yaw_inertia: float,
@@ -37,7 +37,7 @@ def steer_compliance(
     return steer_yielded + share * (give + more * turned - steer_yielded)
 
 
-@law
+@kernel_function
 def steer_compliance_angle(steer_trimmed: float, steer_yielded: float) -> float:
     """Mean road-wheel angle, + left [rad]."""
     return steer_trimmed - steer_yielded

@@ -7,12 +7,12 @@ Source: textbook dead time; radio, bus and the servo's 20 ms frame together.
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def steer_delay(steering_past: float) -> float:
     """Steering command that arrives now, + left."""
     return steering_past

@@ -7,12 +7,12 @@ Source: linkage geometry, first order; at speed `understeer` looks alike, slow c
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def steer_gain(steer_demand: float, gain: float) -> float:
     """Mean road-wheel angle meant, + left [rad]."""
     return gain * steer_demand

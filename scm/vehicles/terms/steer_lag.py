@@ -7,12 +7,12 @@ Source: Lorenzo-Lyons/DART, vehicle model (steering time constant).
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def steer_lag(steer_scaled: float, steer_target: float, time_constant: float, dt: float) -> float:
     """Angle that the servo is asked for at the substep's end, + left [rad]."""
     share = dt / (time_constant + dt)

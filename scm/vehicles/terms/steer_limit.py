@@ -5,12 +5,12 @@
 Holds: linear linkage.   Shows in: circles at any steering.   Source: AutoDRIVE paper, steering.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def steer_limit(steering: float, limit: float) -> float:
     """Mean road-wheel angle that the command means, + left [rad]."""
     return limit * min(max(steering, -1.0), 1.0)

@@ -7,13 +7,13 @@ Holds: commands in [-1, 1].   Shows in: slow circles, both ways.
 Source: Lorenzo-Lyons/DART, vehicle model (steering curve).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lane_math import tanh
 from scm.vehicles.param import LogNormal, Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def steer_map_tanh(
     steering: float, left: float, left_slope: float, right: float, right_slope: float, offset: float
 ) -> float:

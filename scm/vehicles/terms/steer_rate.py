@@ -7,12 +7,12 @@ Source: servo data sheets give the speed at one voltage; it goes with the supply
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def steer_rate(servo_load_pace: float, scale: float) -> float:
     """Servo speed over the nominal one."""
     return scale * servo_load_pace

@@ -7,12 +7,12 @@ Source: geometry; both numbers are shares of full command, + both, 1 where nothi
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def steer_saturation(steering_received: float, left: float, right: float) -> float:
     """Command within the stops, + left."""
     return min(max(steering_received, -right), left)

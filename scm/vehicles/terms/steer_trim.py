@@ -6,12 +6,12 @@ Holds: bent or badly set rod.   Shows in: straight drives.   Source: geometry; +
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def steer_trim(linkage_angle: float, offset: float) -> float:
     """Mean road-wheel angle, + left [rad]."""
     return linkage_angle + offset

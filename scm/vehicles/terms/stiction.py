@@ -7,13 +7,13 @@ throttle ramps from rest.   Source: Armstrong-Helouvry, Control of Machines with
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lane_math import exp_neg
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def stiction(omega: float, driven: float, torque: float, fade_speed: float) -> float:
     """Torque that dry friction can hold, never negative [N*m]."""
     turn = omega * (1.0 / fade_speed)

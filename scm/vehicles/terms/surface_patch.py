@@ -11,7 +11,7 @@ Source: ours; carpets, tape and spills in the DART recordings.
 import math
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
@@ -27,14 +27,14 @@ _ROLLING = Param("patch_rolling", 0.0, "1", "surface_patch.rolling", (0.0, 0.5),
                  "added coefficient", LogNormal(0.03, 1.0), report="rolling")  # fmt: skip
 
 
-@law
+@kernel_function
 def inside(x_wheel: float, y_wheel: float, x: float, y: float, radius: float) -> float:
     """How much of the contact patch lies on the spot, 0 to 1."""
     away_x, away_y = x_wheel - x, y_wheel - y
     return min(max(0.5 + 50.0 * (radius - math.sqrt(away_x * away_x + away_y * away_y)), 0.0), 1.0)
 
 
-@law
+@kernel_function
 def surface_patch(
     x_wheel: float, y_wheel: float, floor_grip: float, x: float, y: float, radius: float,
     patch_grip: float,
@@ -43,7 +43,7 @@ def surface_patch(
     return floor_grip * (1.0 + (patch_grip - 1.0) * inside(x_wheel, y_wheel, x, y, radius))
 
 
-@law
+@kernel_function
 def surface_patch_rolling(
     x_wheel: float, y_wheel: float, floor_rolling: float, x: float, y: float, radius: float,
     patch_rolling: float,

@@ -6,18 +6,18 @@ Holds: linear oil damper.   Shows in: pitch that swings after braking.
 Source: AutoDRIVE paper, suspension (spring and damper at each corner).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def suspension_damper(compression_rate: float, damper: float) -> float:
     """Force on the body, + up [N]."""
     return damper * compression_rate
 
 
-@law
+@kernel_function
 def suspension_damper_damping(damper: float) -> float:
     """Force gained per compression rate [N*s/m]."""
     return damper

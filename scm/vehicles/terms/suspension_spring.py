@@ -6,18 +6,18 @@ Holds: linear within its travel.   Shows in: roll in circles, pitch when braking
 Source: AutoDRIVE paper, suspension (spring and damper at each corner).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def suspension_spring(compression: float, rest_spring_force: float, spring: float) -> float:
     """Force on the body, + up [N]."""
     return rest_spring_force + spring * compression
 
 
-@law
+@kernel_function
 def suspension_spring_damping(spring: float, dt: float) -> float:
     """Force gained per compression rate within one substep [N*s/m]."""
     return spring * dt

@@ -11,7 +11,7 @@ Source: Pacejka, Tire and Vehicle Dynamics, combined slip by normalised slips.
 
 import math
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 from scm.vehicles.tyre_curve import curve_over_slip
@@ -42,7 +42,7 @@ _ACROSS = (
 )  # fmt: skip
 
 
-@law
+@kernel_function
 def both_slips(
     slide: float, v_long: float, v_lat: float, slip_scale: float, side_lag: float,
     side_lag_speed: float, spin_lag_speed: float, low_speed: float, slip_extremum: float,
@@ -55,7 +55,7 @@ def both_slips(
     return math.sqrt(p * p + q * q)
 
 
-@law
+@kernel_function
 def tyre_combined_damping(
     omega: float, v_long: float, v_lat: float, grip_load: float, grip: float, wheel_radius: float,
     slip_scale: float, side_lag: float, side_lag_speed: float, spin_lag: float,
@@ -72,7 +72,7 @@ def tyre_combined_damping(
     return grip_load * grip / max(abs(v_long) + spin_lag_speed, low_speed) * curve
 
 
-@law
+@kernel_function
 def tyre_combined(
     omega: float, v_long: float, v_lat: float, grip_load: float, grip: float, wheel_radius: float,
     slip_scale: float, side_lag: float, side_lag_speed: float, spin_lag: float,
@@ -87,7 +87,7 @@ def tyre_combined(
     )  # fmt: skip
 
 
-@law
+@kernel_function
 def tyre_combined_across_damping(
     omega: float, v_long: float, v_lat: float, grip_load: float, grip: float, wheel_radius: float,
     slip_scale: float, side_lag: float, side_lag_speed: float, spin_lag: float,
@@ -105,7 +105,7 @@ def tyre_combined_across_damping(
     return grip_load * grip * slip_scale / max(abs(v_long) + side_lag_speed, low_speed) * curve
 
 
-@law
+@kernel_function
 def tyre_combined_across(
     omega: float, v_long: float, v_lat: float, grip_load: float, grip: float, wheel_radius: float,
     slip_scale: float, side_lag: float, side_lag_speed: float, spin_lag: float,

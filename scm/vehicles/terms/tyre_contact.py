@@ -8,12 +8,12 @@ Holds: small deflections.   Shows in: bumps, wheel lift.
 Source: quarter-car model, any textbook (Jazar, Vehicle Dynamics); stiffness ours.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def tyre_contact(
     tyre_deflection: float, tyre_deflection_rate: float, rest_load: float,
     stiffness: float, contact_damping: float,
@@ -23,7 +23,7 @@ def tyre_contact(
     return max(0.0, rest_load + force)
 
 
-@law
+@kernel_function
 def tyre_contact_damping(
     tyre_deflection: float, tyre_deflection_rate: float, rest_load: float,
     stiffness: float, contact_damping: float, dt: float,

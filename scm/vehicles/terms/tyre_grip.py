@@ -8,12 +8,12 @@ Source: Coulomb friction; Pacejka, Tire and Vehicle Dynamics (scaling of peak fr
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def tyre_grip(grip_here: float, scale: float) -> float:
     """Factor of floor and tyre on the tyre's friction."""
     return scale * grip_here

@@ -9,13 +9,13 @@ Holds: dry floor; independent of longitudinal slip, as in the paper; no rise of 
 Shows in: fast circles, lane changes.   Source: AutoDRIVE paper, tyre model (two cubics).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 from scm.vehicles.tyre_curve import curve_over_slip
 
 
-@law
+@kernel_function
 def tyre_lateral(
     v_long: float, v_lat: float, grip_load: float, grip: float, slip_scale: float, side_lag: float,
     side_lag_speed: float, slip_extremum: float, force_extremum: float, slip_asymptote: float,
@@ -29,7 +29,7 @@ def tyre_lateral(
     )  # fmt: skip
 
 
-@law
+@kernel_function
 def tyre_lateral_damping(
     v_long: float, v_lat: float, grip_load: float, grip: float, slip_scale: float, side_lag: float,
     side_lag_speed: float, slip_extremum: float, force_extremum: float, slip_asymptote: float,

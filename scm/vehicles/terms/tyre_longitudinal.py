@@ -10,13 +10,13 @@ Holds: dry floor; independent of lateral slip, as in the paper; no rise of grip 
 Shows in: launch, hard braking.   Source: AutoDRIVE paper, tyre model (two cubics).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 from scm.vehicles.tyre_curve import curve_over_slip
 
 
-@law
+@kernel_function
 def tyre_longitudinal(
     omega: float, v_long: float, grip_load: float, grip: float, spin_lag: float,
     spin_lag_speed: float, wheel_radius: float, slip_extremum: float, force_extremum: float,
@@ -30,7 +30,7 @@ def tyre_longitudinal(
     )  # fmt: skip
 
 
-@law
+@kernel_function
 def tyre_longitudinal_damping(
     omega: float, v_long: float, grip_load: float, grip: float, spin_lag: float,
     spin_lag_speed: float, wheel_radius: float, slip_extremum: float, force_extremum: float,

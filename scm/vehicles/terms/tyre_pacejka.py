@@ -6,13 +6,13 @@ Holds: steady slip; fitted on one floor.   Shows in: fast circles until the tyre
 Source: Pacejka, Tire and Vehicle Dynamics; values of Lorenzo-Lyons/DART.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.lane_math import atan, sin_cos
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def tyre_pacejka_damping(
     v_long: float, v_lat: float, grip_load: float, grip: float, slip_scale: float, side_lag: float,
     side_lag_speed: float, front: float, low_speed: float, front_d: float, front_c: float,
@@ -29,7 +29,7 @@ def tyre_pacejka_damping(
     return grip_load * grip * slip_scale / speed * d * secant
 
 
-@law
+@kernel_function
 def tyre_pacejka(
     v_long: float, v_lat: float, grip_load: float, grip: float, slip_scale: float, side_lag: float,
     side_lag_speed: float, front: float, low_speed: float, front_d: float, front_c: float,

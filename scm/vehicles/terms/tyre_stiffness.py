@@ -9,12 +9,12 @@ Source: Pacejka, Tire and Vehicle Dynamics (similarity method, scaling of slip s
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def tyre_stiffness(scale: float) -> float:
     """Factor on side slip."""
     return scale

@@ -10,7 +10,7 @@ Holds: lengths above 1 mm at 1 ms substeps.   Shows in: launch, standing on a sl
 Source: Pacejka, Tire and Vehicle Dynamics, single contact point transient model.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
@@ -22,7 +22,7 @@ _LOW_SPEED = Param("low_speed", 0.05, "m/s", "tyre.low_speed_m_s", (0.01, 1.0),
 _RUBBER = 0.01  # s, how long rubber at rest resists; ours, it ends the swing in some tenths
 
 
-@law
+@kernel_function
 def tyre_windup(
     omega: float, v_long: float, wheel_radius: float, spin_lag: float, dt: float, length: float,
     slip_extremum: float, low_speed: float,
@@ -35,7 +35,7 @@ def tyre_windup(
     return min(max(carried, -most), most) if length > 0.0 else 0.0
 
 
-@law
+@kernel_function
 def tyre_windup_speed(v_long: float, dt: float, length: float, low_speed: float) -> float:
     """How much of the carried slip the tyre feels beside the new one [m/s]."""
     rubber = _RUBBER * (1.0 - abs(v_long) * (0.5 / low_speed))

@@ -9,12 +9,12 @@ Source: Gillespie, Fundamentals of Vehicle Dynamics (1992), chapter 6 (understee
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def understeer(steer_angle: float, vx: float, yaw_rate: float, gradient: float) -> float:
     """Mean angle at which the front wheels meet the floor, + left [rad]."""
     return steer_angle - gradient * vx * yaw_rate

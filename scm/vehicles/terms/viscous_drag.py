@@ -6,7 +6,7 @@ Holds: slow air, cables, grease.   Shows in: coast-down.   Source: AutoDRIVE pap
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
@@ -16,19 +16,19 @@ _PARAMS = (
 )  # fmt: skip
 
 
-@law
+@kernel_function
 def viscous_drag(vx: float, coefficient: float) -> float:
     """Force along the body, + forward [N]."""
     return -coefficient * vx
 
 
-@law
+@kernel_function
 def viscous_drag_across(vy: float, coefficient: float) -> float:
     """Force across the body, + to its left [N]."""
     return -coefficient * vy
 
 
-@law
+@kernel_function
 def viscous_drag_damping(coefficient: float) -> float:
     """Force lost per speed [N*s/m]."""
     return coefficient

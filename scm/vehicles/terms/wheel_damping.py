@@ -6,18 +6,18 @@ Holds: greased bearings.   Shows in: coast-down, top speed.
 Source: AutoDRIVE paper, wheels (wheel rotations are damped).
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def wheel_damping(omega: float, damping_linear: float) -> float:
     """Torque on the wheel, against its spin [N*m]."""
     return -damping_linear * omega
 
 
-@law
+@kernel_function
 def wheel_damping_damping(damping_linear: float) -> float:
     """Torque lost per wheel speed [N*m*s]."""
     return damping_linear

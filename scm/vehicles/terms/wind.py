@@ -9,7 +9,7 @@ Shows in: throttle held in several headings, coasting.   Source: Newton's second
 """
 
 from scm.vehicles.identification import Identification
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
 
@@ -22,13 +22,13 @@ _PARAMS = (
 _NEUTRAL = {"push_x": 0.0, "push_y": 0.0}
 
 
-@law
+@kernel_function
 def wind(cos_yaw: float, sin_yaw: float, push_x: float, push_y: float) -> float:
     """Force along the body, + forward [N]."""
     return push_x * cos_yaw + push_y * sin_yaw
 
 
-@law
+@kernel_function
 def wind_across(cos_yaw: float, sin_yaw: float, push_x: float, push_y: float) -> float:
     """Force across the body, + to its left [N]."""
     return push_y * cos_yaw - push_x * sin_yaw

@@ -6,18 +6,18 @@ Holds: slow air, cables.   Shows in: turns that end too soon.
 Source: AutoDRIVE paper, rigid body angular drag.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def yaw_drag(yaw_rate: float, coefficient: float) -> float:
     """Moment against the turning [N*m]."""
     return -coefficient * yaw_rate
 
 
-@law
+@kernel_function
 def yaw_drag_damping(coefficient: float) -> float:
     """Moment lost per yaw rate [N*m*s]."""
     return coefficient

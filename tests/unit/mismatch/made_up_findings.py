@@ -34,12 +34,12 @@ OWN_LAW = '''"""Drive force against heading: something pulls the car one way, mo
 Holds: this floor.   Shows in: circles.   Source: found by scm mismatch.
 """
 
-from scm.vehicles.jit import law
+from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Param
 from scm.vehicles.term import Per, Term
 
 
-@law
+@kernel_function
 def drive_force_against_heading(cos_yaw: float, sin_yaw: float, strength: float) -> float:
     """Force along the car [N]."""
     return -strength * 2.0 * sin_yaw * cos_yaw

@@ -114,7 +114,9 @@ def test_a_law_that_is_not_straight_line_text_is_refused_with_what_may_stand_the
             return 1.0
         return 0.0
 
-    with pytest.raises(TermError, match=r"\.py:\d+: law jumpy: expected straight.*'if vx > 0.0:'"):
+    with pytest.raises(
+        TermError, match=r"\.py:\d+: function jumpy: expected straight.*'if vx > 0.0:'"
+    ):
         write_page([*STANDARD, of(jumpy, adds="force_x")])
 
 
@@ -124,7 +126,7 @@ def test_a_law_may_not_use_what_a_lane_cannot(line, tmp_path, monkeypatch):
     (tmp_path / f"{name}.py").write_text(f"def odd(vx, vy):\n    return {line}\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     odd = importlib.import_module(name).odd
-    with pytest.raises(TermError, match=r":2: law odd: expected straight-line text"):
+    with pytest.raises(TermError, match=r":2: function odd: expected straight-line text"):
         write_page([*STANDARD, of(odd, adds="force_x")])
 
 
@@ -137,8 +139,8 @@ def test_what_holds_still_during_a_call_is_worked_out_once():
 
 def test_a_term_of_somebody_else_joins_by_its_argument_names(tmp_path, monkeypatch):
     (tmp_path / "side_wind.py").write_text(
-        "from scm.vehicles.jit import law\n\n\n"
-        "@law\ndef side_wind(strength: float) -> float:\n    return strength\n",
+        "from scm.vehicles.jit import kernel_function\n\n\n"
+        "@kernel_function\ndef side_wind(strength: float) -> float:\n    return strength\n",
         encoding="utf-8",
     )
     monkeypatch.syspath_prepend(tmp_path)

@@ -8,10 +8,13 @@ from tests.unit.vehicles.fresh import Compiling, small_kernel
 
 pytestmark = pytest.mark.slow  # each run compiles in a process of its own
 
-CURVE = "from scm.vehicles.jit import law\n\n\n@law\ndef curve(vx):\n    return {slope} * vx\n"
+CURVE = (
+    "from scm.vehicles.jit import kernel_function\n\n\n"
+    "@kernel_function\ndef curve(vx):\n    return {slope} * vx\n"
+)
 LAW = (
-    "from curve import curve\nfrom scm.vehicles.jit import law\n\n\n"
-    "@law\ndef calm(vx):\n    return {sign}curve(vx)\n"
+    "from curve import curve\nfrom scm.vehicles.jit import kernel_function\n\n\n"
+    "@kernel_function\ndef calm(vx):\n    return {sign}curve(vx)\n"
 )
 
 

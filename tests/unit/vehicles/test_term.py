@@ -11,7 +11,7 @@ def pull(vx: float, strength: float) -> float:
 
 def test_argument_names_are_the_wiring():
     assert reads(pull) == ("vx", "strength")
-    assert reads(all_terms()["yaw_drag"].law) == ("yaw_rate", "coefficient")
+    assert reads(all_terms()["yaw_drag"].function) == ("yaw_rate", "coefficient")
 
 
 def test_a_term_that_adds_and_sets_is_refused():

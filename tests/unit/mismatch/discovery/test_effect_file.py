@@ -35,8 +35,8 @@ def general(law, values):
     defaults = {p.name: p.default for term in TERMS for p in term.params}
     numbers = {k.removeprefix(PREFIX): v for k, v in law.numbers(values).items()}
     given = defaults | HERE | numbers
-    given["learned_shape"] = value(SHAPE.law, given)
-    return {term.target: value(term.law, given) for term in TERMS}
+    given["learned_shape"] = value(SHAPE.function, given)
+    return {term.target: value(term.function, given) for term in TERMS}
 
 
 @pytest.mark.parametrize("law", dictionary(), ids=lambda law: f"{law.name}, {law.curve.name}")
@@ -45,7 +45,7 @@ def test_a_written_law_does_what_the_general_effect_did(law, tmp_path):
     term, numbers = as_term(law, values, tmp_path)
     given = HERE | {key.partition(".")[2]: v for key, v in numbers.items()}
     for part in flat([term]):
-        np.testing.assert_allclose(value(part.law, given), general(law, values)[part.target])
+        np.testing.assert_allclose(value(part.function, given), general(law, values)[part.target])
 
 
 def test_a_car_takes_a_written_law(tmp_path):

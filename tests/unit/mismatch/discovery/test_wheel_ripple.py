@@ -54,7 +54,7 @@ def test_its_curve_over_a_turn_runs_through_the_bands_of_all_waves():
 
 
 def test_only_driven_wheels_ripple():
-    ripple = plain(RIPPLE.law)
+    ripple = plain(RIPPLE.function)
     assert ripple(0.0, 1.0, 0.5, 2.0, 0.3) == 0.0
     np.testing.assert_allclose(ripple(1.0, 1.0, 0.5, 2.0, 0.3), 0.5 * np.sin(2.3))
 
