@@ -12,7 +12,7 @@ GLOSSARY = ROOT / "docs" / "glossary.md"
 TWIN_MEANS_CITY_TWIN = {"twin", "twins"}  # a car's versioned file; only effects may not be twins
 RECORDS = ("Struct", "BaseModel", "Message", "Record")
 STANDARD = {
-    "law",  # of `scm.vehicles.jit`: car folders with effects of their own import it by its name of 0.1
+    "law",  # of `scm.vehicles.jit`: users' own effects import it by its name of 0.1
     "tell",  # of files
     "wait_for_calm",  # of `scm.fleet.City`: scripts of users call it by its name of 0.1
     "__slots__",  # Python's own name

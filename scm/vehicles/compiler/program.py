@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import cast
 
-from scm.vehicles.compiler.axles import AXLES, Known, fold_body
+from scm.vehicles.compiler.axles import AXLES, Known, fold_body, number_of
 from scm.vehicles.compiler.inline import Line
 from scm.vehicles.physics_variables import Per
 
@@ -242,12 +242,12 @@ class _Tidy(ast.NodeTransformer):
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
         self.generic_visit(node)
-        number = _number(node.operand)
+        number = number_of(node.operand)
         return node if number is None else ast.Constant(-number)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)
-        left, right = _number(node.left), _number(node.right)
+        left, right = number_of(node.left), number_of(node.right)
         match node.op:
             case ast.Add() if left == 0.0:
                 return node.right
@@ -344,7 +344,3 @@ class _Products(ast.NodeTransformer):
 
 def _reciprocal(value: ast.expr) -> ast.expr:
     return ast.BinOp(ast.Constant(1.0), ast.Div(), value)
-
-
-def _number(node: ast.expr) -> float | None:
-    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, float) else None

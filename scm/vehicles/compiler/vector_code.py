@@ -207,8 +207,10 @@ def _copying(*, into_block: bool, one: bool = False) -> Any:
             target, source = reversed(ends) if into_block else ends
             if one:
                 builder.store(builder.load(source), target)
-            else:
-                _copy_lanes(builder, target, source)
+                return
+            for at in ([_number(k)] for k in range(0, LANES, WIDTH)):
+                vector = builder.load(_pointer(builder, source, at), align=8)
+                builder.store(vector, _pointer(builder, target, at), align=8)
 
         _loop(builder, count, one_row)
         return _number(0)
@@ -231,13 +233,6 @@ def _loop(builder: Any, count: Any, write: Callable[[Any], None]) -> None:
     index.add_incoming(builder.add(index, _number(1)), builder.block)
     builder.branch(head)
     builder.position_at_end(after)
-
-
-def _copy_lanes(builder: Any, target: Any, source: Any) -> None:
-    for k in range(LANES // WIDTH):
-        at = [_number(k * WIDTH)]
-        vector = builder.load(_pointer(builder, source, at), align=8)
-        builder.store(vector, _pointer(builder, target, at), align=8)
 
 
 def _number(value: int) -> Any:
