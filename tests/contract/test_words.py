@@ -20,7 +20,7 @@ STANDARD = {
     "calm",  # the public name of a signal plan
 }
 PENDING = (
-    "scm/maps", "scm/traffic", "scm/vehicles", "scm/world",
+    "scm/vehicles",
 )  # fmt: skip
 """Where old names still stand; this list only gets shorter."""
 PUBLISHED = ("scm/client/nouns",)  # written from the interface: methods carry its operation ids
