@@ -41,7 +41,7 @@ class Parameter:
         name: As it is reported; `key` of the car file that it moves, times `per_unit`.
         neutral: Where the effect does nothing.
         step: A change that shows, for derivatives.
-        given: What the car file says of the key; an effect is told as what is added to it.
+        given: What the car file says of the key; an effect is reported as what is added to it.
         ties: Other keys that move with it, and how much for one unit.
     """
 
@@ -80,7 +80,7 @@ class Candidate:
 
     @property
     def is_placed(self) -> bool:
-        """Whether a knob says where or which way, and not how much."""
+        """Whether a parameter is a place or direction rather than an amount."""
         return not self.amounts.all()
 
     @property

@@ -1,6 +1,7 @@
-"""Laws that the library does not hold, learned from recordings.
+"""Effects outside the catalogue, discovered from a dictionary of shapes.
 
-`learned` is the one general effect that the simulator carries to try them; `cells` asks what each
-moment's force, angle or throttle would explain, `dictionary` lays shapes over what drives them,
-`seek` refits the best by free run. `writing` turns a law into an effect's file, `curves` draws it.
+`general_effect` is the one effect that a simulator carries to try them; `impulse_response` computes
+what each moment's force, angle or throttle would explain, `dictionary` lists shapes over what may
+drive them, `try_dictionary` refits the best by free run and `decide` compares them with the
+catalogue. `effect_file` writes one as an effect's file, `curves` draws it.
 """

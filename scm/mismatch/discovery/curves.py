@@ -1,7 +1,7 @@
-"""A law's curve beside the law: what each bin of what it depends on asks for, with a band.
+"""A discovered effect's curve, and beside it what each bin would explain, with a band.
 
-The bins are pushes in the same channel, fitted together and free of any form; a law that is right
-runs through their bands.
+The bins are pushes in the same channel, fitted together and free of any form; an effect that is
+right runs through their bands.
 """
 
 import math
@@ -12,7 +12,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, Values
 from scm.mismatch.discovery.impulse_response import Cells, respond
-from scm.mismatch.discovery.pushes import amount, shape, variable
+from scm.mismatch.discovery.screen import amount, shape, variable
 from scm.mismatch.discovery.try_dictionary import Tried
 from scm.mismatch.discovery.wheel_ripple import WAVES, by_turn, waves_response
 from scm.mismatch.evidence import Curve
@@ -33,7 +33,7 @@ _UNITS = {"along_n": "N", "turn_rad": "rad", "throttle_add": "1", "moment_nm": "
 
 
 def discovered_curves(fitted: Hypothesis, tried: Tried) -> tuple[Curve, ...]:
-    """Return a model's law as the recordings show it in bins, and as it was fitted."""
+    """Return a discovered effect as the recordings show it in bins, and as it was fitted."""
     first = 0
     for effect in fitted.effects:
         if isinstance(effect, DictionaryEffect):
@@ -73,7 +73,7 @@ def _curves(
 def _round_a_turn(
     effect: DictionaryEffect, mine: slice, fitted: Hypothesis, tried: Tried
 ) -> tuple[Curve, Curve]:
-    """Return a torque over a wheel's turn as the sum of all waves asked, and as it was fitted."""
+    """Return a torque over a wheel's turn as the sum of all waves, and as it was fitted."""
     torque, waves, phase = (float(v) for v in fitted.values[mine])
     own = np.arange(len(fitted.z) + mine.start, len(fitted.z) + mine.stop)
     held = replace(fitted, jacobian=np.delete(fitted.jacobian, own, axis=1))
@@ -99,7 +99,7 @@ def _round_a_turn(
 def _left_over(
     effect: DictionaryEffect, mine: slice, fitted: Hypothesis, tried: Tried, courses: Floats
 ) -> tuple[Floats, Floats]:
-    """Return what each course asks for beyond the law, and how sure, the law's numbers as found."""
+    """Return what each course explains beyond the effect as found, and how sure that is."""
     own = np.arange(len(fitted.z) + mine.start, len(fitted.z) + mine.stop)
     held = replace(fitted, jacobian=np.delete(fitted.jacobian, own, axis=1))
     fitter = Fitter(fitted.model, tried.part)
@@ -111,7 +111,7 @@ def _left_over(
 
 
 def axis_of(effect: DictionaryEffect, values: Values, cells: Cells) -> tuple[Floats, str, str]:
-    """Return what a law depends on at each moment; waves and turns are laid over each other."""
+    """Return what an effect depends on at each moment; waves and turns are laid over each other."""
     known = dict(zip((k.name for k in effect.curve.parameters), values, strict=True))
     if effect.curve.word == "position":
         way = known.get("way_rad", 0.0)

@@ -86,7 +86,7 @@ def explain(context: Context, unseen: Floats, found: Selection) -> Explanation:
     """Return whether a discovered effect leaves nothing that known effects could explain.
 
     Then no further ones need be searched for: it is better than the best hypothesis by far, on
-    unseen data too, and no known effect beside it pays its penalty. It is asked once.
+    unseen data too, and no known effect beside it pays its penalty. It is computed once.
 
     Args:
         context: Of the selection.

@@ -1,4 +1,4 @@
-"""A law: how much of what kind of push, against what it depends on; a hypothesis like any other."""
+"""An effect of the dictionary: how much of what kind of push, against what it depends on."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,16 +14,16 @@ ToNumbers = Callable[[Values], Mapping[str, float]]
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """Where a law acts.
+    """Where an effect acts.
 
     Attributes:
         word: As in `drive force against heading`.
         response: The general effect's number whose comb asks the same of each moment.
         parameters: How much; the first is the amount.
-        numbers: Of the general effect, from the knobs' values.
-        sentence: The sentence's beginning; braces take the knobs.
-        formula: Of the law; braces take the knobs, `{g}` the curve.
-        text: Of the written law, by the sum or signal it acts on; `g` is the curve.
+        numbers: Of the general effect, from the parameters' values.
+        sentence: The sentence's beginning; braces take the parameters.
+        formula: Of the effect; braces take the parameters, `{g}` the curve.
+        text: Of the written effect, by the sum or signal it acts on; `g` is the curve.
     """
 
     word: str
@@ -38,7 +38,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """One law function to write.
+    """One function to write.
 
     Attributes:
         target: `adds force_x` or `sets steer_trimmed`.
@@ -61,12 +61,12 @@ class Written:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """What a law depends on, and how.
+    """What an effect depends on, and how.
 
     Attributes:
         word: What it depends on, as reported.
-        numbers: Of the general effect, from the knobs' values.
-        text: Line that gives `g` from `signals` and the knobs.
+        numbers: Of the general effect, from the parameters' values.
+        text: Line that gives `g` from `signals` and the parameters.
         rare: What it must gain beyond others: it looks like something simpler.
         also: A signal that it reads and no car has.
     """
@@ -86,10 +86,10 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DictionaryEffect(Candidate):
-    """A law outside the library, as a candidate like the library's.
+    """An effect outside the catalogue, a candidate like those in it.
 
     Attributes:
-        channel: Where it acts; `curve`: what it depends on. Their knobs follow each other.
+        channel: Where it acts; `curve`: what it depends on. Their parameters follow each other.
     """
 
     channel: Channel
@@ -101,13 +101,13 @@ class DictionaryEffect(Candidate):
         return (*self.channel.text, *filter(None, (self.curve.also,)))
 
     def numbers(self, values: Values) -> dict[str, float]:
-        """Return the general effect's numbers, by key, at these values of the knobs."""
+        """Return the general effect's numbers, by key, at these values of the parameters."""
         n = len(self.channel.parameters)
         found = {**self.curve.numbers(values[n:]), **self.channel.numbers(values[:n])}
         return {PREFIX + name: value for name, value in found.items()}
 
     def formula(self, values: Values) -> str:
-        """Return the law with its numbers and units."""
+        """Return the formula with its numbers and units."""
         words = {
             parameter.name: f"{value:.3g}" + ("" if parameter.unit == "1" else f" {parameter.unit}")
             for parameter, value in zip(self.parameters, values, strict=True)
@@ -117,7 +117,7 @@ class DictionaryEffect(Candidate):
 
 
 def dictionary_effect(channel: Channel, curve: Curve) -> DictionaryEffect:
-    """Return the law that a channel and a curve make."""
+    """Return the effect that a channel and a curve make."""
     return DictionaryEffect(
         name=f"{channel.word} against {curve.word}",
         equation=curve.equation or channel.equation,

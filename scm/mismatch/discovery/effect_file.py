@@ -1,7 +1,7 @@
-"""A law as a file of its own: what `terms = [..., "my_law.py"]` of a car file loads.
+"""A discovered effect as a file of its own, which `terms = [..., "my_effect.py"]` loads.
 
-The file is an effect like any other: straight-line laws, parameters with units, its equation in the
-docstring. Its numbers stand in the car file.
+The file is an effect like any other: straight-line functions, parameters with units, its
+equation in the docstring. Its numbers stand in the car file.
 """
 
 import ast
@@ -22,16 +22,16 @@ _WITH = {
     "sets steer_trimmed": ("offset", f'0.0, "rad", "{TRIM}", (-0.3, 0.3), "trim, + left"'),
     "sets steer_scaled": ("gain", f'1.0, "1", "{GAIN}", (0.2, 2.0), "gain of the steering"'),
 }
-"""What a signal's own effect does, by target: the law that takes its place does it too."""
+"""What a signal's own effect does, by target: the function that takes its place does it too."""
 
 
 def file_name(effect: DictionaryEffect) -> str:
-    """Return the name of a law's file, which is its effect's: `drive_force_against_heading`."""
+    """Return the name of an effect's file: `drive_force_against_heading`."""
     return re.sub(r"\W+", "_", effect.name)
 
 
 def number_keys(effect: DictionaryEffect) -> dict[str, str]:
-    """Return the car file's key of each of a law's knobs."""
+    """Return the car file's key of each parameter of an effect."""
     return {
         parameter.name: f"{file_name(effect)}.{parameter.name}" for parameter in effect.parameters
     }
@@ -40,7 +40,7 @@ def number_keys(effect: DictionaryEffect) -> dict[str, str]:
 def as_term(
     effect: DictionaryEffect, values: Values, folder: Path
 ) -> tuple[Term, dict[str, float]]:
-    """Write a law's file, and return the effect it holds and the car file's numbers for it.
+    """Write an effect's file, and return the effect it holds and the car file's numbers for it.
 
     Raises:
         TermError: when what was written does not load; then it is our fault.
@@ -52,13 +52,13 @@ def as_term(
 
 
 def write_effect_file(effect: DictionaryEffect, values: Values, path: Path) -> None:
-    """Write the file of a law; `values` of its knobs are the defaults' place in its docstring.
+    """Write an effect's file, with `values` of its parameters in its docstring.
 
     Raises:
-        TermError: when the file is not named like the law.
+        TermError: when the file is not named like the effect.
     """
     if path.name != file_name(effect) + SUFFIX:
-        msg = f"{path.name}: expected {file_name(effect) + SUFFIX}, the law's own name"
+        msg = f"{path.name}: expected {file_name(effect) + SUFFIX}, the effect's own name"
         raise TermError(msg)
     parts = [_function(effect, part) for part in effect.written]
     lines = [_docstring(effect, values), "", *_imports(parts), "", _params(effect), ""]
@@ -144,7 +144,7 @@ def _function(effect: DictionaryEffect, part: Written) -> str:
 
 
 class _Straight(ast.NodeTransformer):
-    """Takes sines and cosines out of expressions: a law calls `sin_cos`, which gives both."""
+    """Takes sines and cosines out of expressions: an effect calls `sin_cos`, which gives both."""
 
     def __init__(self) -> None:
         self.before: list[str] = []

@@ -6,8 +6,8 @@
         + heavy * |q|^3 + ramp * max(q, 0)
         + step * (0 below q = -0.5, 1 above 0.5, straight between) + comb
 
-One compiled car so serves every law that may be tried: a law is a set of numbers. The comb is a
-hat of time that returns: it asks what a push at each moment would explain. Torque over a wheel's
+One compiled car so serves every effect of the dictionary: each is a set of numbers. The comb is a
+hat of time that returns: it shows what a push at each moment would explain. Torque over a wheel's
 turn acts on each driven wheel by its own angle, not through the mix.
 """
 
@@ -60,7 +60,7 @@ _MIX = (*_WEIGHTS, _number("phase", "added to the mix"), *_SHAPES, *_COMB)
 def throttle_memory(
     throttle_memory: float, throttle_command: float, memory_s: float, dt: float
 ) -> float:
-    """Mean of what was asked for over the last `memory_s`, which fades, + forward."""
+    """Mean throttle command over the last `memory_s`, which fades, + forward."""
     return throttle_memory + (throttle_command - throttle_memory) * (dt / (memory_s + dt))
 
 
@@ -152,7 +152,7 @@ def learned_demand(
     steer_demand: float, gain: float, by_steer: float, size: float, ramp: float, cube: float,
     demand_rad: float,
 ) -> float:  # fmt: skip
-    """Mean road-wheel angle meant, + left [rad]: the shape over the angle asked of the servo."""
+    """Mean road-wheel angle meant, + left [rad]: the shape over the angle commanded."""
     q = by_steer * steer_demand
     g = abs(q) * size + ramp * max(q, 0.0) + cube * q * q * q
     return gain * steer_demand + demand_rad * g
@@ -200,7 +200,7 @@ _MEANT = Param("gain", 1.0, "1", GAIN, (0.2, 2.0), "angle over the angle meant",
 _BY_STEER = [p for p in _MIX if p.key.removeprefix(PREFIX) in ("by_steer", "size", "ramp", "cube")]
 DEMAND = Term(
     learned_demand, per=Per.BODY, sets="steer_scaled", neutral={"demand_rad": 0.0},
-    params=(*_BY_STEER, _number("demand_rad", "how much of the shape is asked for"), _MEANT),
+    params=(*_BY_STEER, _number("demand_rad", "how much of the shape is commanded"), _MEANT),
 )  # fmt: skip
 THROTTLE = _term(
     learned_throttle, channels=("throttle_add", "throttle_gain"), sets="throttle_received"

@@ -1,18 +1,133 @@
-"""Which laws would explain most, by linear algebra over moments; no rollout is made here."""
+"""Which dictionary effects would explain most, by linear algebra, without a rollout."""
 
-from collections.abc import Mapping, Sequence
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Floats, Ints
+from scm.mismatch.discovery.dictionary import TILES, WAVE
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, Values
-from scm.mismatch.discovery.grids import grid_of
+from scm.mismatch.discovery.general_effect import SLOW, WEIGHTS
 from scm.mismatch.discovery.impulse_response import Cells, Response
-from scm.mismatch.discovery.pushes import pushes
-from scm.mismatch.discovery.shapes import TILES, WAVE
+from scm.vehicles.jit import array_kernel
 
-MAX_STARTS = 3  # starts of each law that are followed
+
+def pushes(effect: DictionaryEffect, cells: Cells, values: Values) -> Floats:
+    """Return an effect's force, angle, throttle or moment at each moment, (cells,)."""
+    n = len(effect.channel.parameters)
+    curve, channel = effect.curve.numbers(values[n:]), effect.channel.numbers(values[:n])
+    return shape(curve, cells) * amount(channel, cells)
+
+
+def shape(curve: Mapping[str, float], cells: Cells) -> Floats:
+    """Return a curve at each moment, as `learned` has it, (cells,)."""
+    q = np.full(len(cells), curve.get("phase", 0.0))
+    for name in WEIGHTS:
+        if f"by_{name}" in curve:
+            q += curve[f"by_{name}"] * variable(name, curve, cells)
+    parts = (curve[name] * part(q) for name, part in _SHAPES.items() if name in curve)
+    return sum(parts, np.zeros(len(cells)))
+
+
+def variable(name: str, curve: Mapping[str, float], cells: Cells) -> Floats:
+    """Return one of `learned.WEIGHTS`' variables at each moment, (cells,)."""
+    if name != "memory":
+        return cells.driven[name]
+    share = -math.expm1(-cells.wide / curve["memory_s"])
+    return remembered(cells.driven["throttle"], cells.drive, share)
+
+
+@array_kernel
+def remembered(values: Floats, drive: Ints, share: float) -> Floats:
+    """Return what is remembered of values, of which each takes a share; a drive begins with 0."""
+    found = np.zeros(len(values))
+    for i in range(1, len(values)):
+        before = found[i - 1] if drive[i] == drive[i - 1] else 0.0
+        found[i] = before + share * (values[i - 1] - before)
+    return found
+
+
+def amount(channel: Mapping[str, float], cells: Cells) -> Floats:
+    """Return what the shape is multiplied with at each moment, (cells,)."""
+    parts = (channel[name] * _FACTORS[name](cells.driven) for name in channel)
+    return sum(parts, np.zeros(len(cells)))
+
+
+def _ones(driven: Mapping[str, Floats]) -> Floats:
+    return np.ones_like(driven["speed"])
+
+
+def _drag(driven: Mapping[str, Floats]) -> Floats:
+    speed = driven["speed"] / SLOW
+    return -speed / np.sqrt(1.0 + speed * speed)
+
+
+_SHAPES: Mapping[str, Callable[[Floats], Floats]] = {
+    "sine": np.sin, "cosine": np.cos, "one": np.ones_like, "line": lambda q: q, "size": np.abs,
+    "square": lambda q: q * q, "cube": lambda q: q * q * q, "heavy": lambda q: np.abs(q) * q * q,
+    "ramp": lambda q: np.maximum(q, 0.0), "step": lambda q: np.clip(q + 0.5, 0.0, 1.0),
+}  # fmt: skip
+_FACTORS: Mapping[str, Callable[[Mapping[str, Floats]], Floats]] = {
+    "along_n": _ones, "drag_n": _drag, "world_x_n": lambda d: np.cos(d["yaw"]),
+    "world_y_n": lambda d: np.sin(d["yaw"]), "turn_rad": _ones, "demand_rad": _ones,
+    "turn_gain": lambda d: d["steer"], "throttle_gain": lambda d: d["throttle"],
+    "moment_nm": _ones,
+}  # fmt: skip
+
+
+FASTEST_HZ = 1.0
+SHORTEST = 2.2  # cells in a wave
+
+
+def grid_of(effect: DictionaryEffect, cells: Cells) -> Iterator[Values]:
+    """Yield values of an effect's parameters except its amount, which is 1; a wave's phase is 0."""
+    names = [parameter.name for parameter in effect.parameters][1:]
+    if "length_m" in names:
+        yield from ((1.0, length, way, 0.0) for length, way in _vectors(cells))
+        return
+    grids = _grids(cells)
+    sizes = [grids[name] for name in names]
+    for row in itertools.product(*sizes):
+        yield (1.0, *map(float, row))
+
+
+def _grids(cells: Cells) -> Mapping[str, Floats]:
+    t, speed = cells.driven["time"], cells.driven["speed"]
+    x, y = cells.driven["x"], cells.driven["y"]
+    span, size = float(t.max()), float(np.hypot(x, y).max())
+    slowest, fastest = 0.7 / span, min(FASTEST_HZ, 1.0 / (SHORTEST * cells.wide))
+    centre_at = np.linspace(-0.8, 0.8, 25) * size
+    return {
+        "toward_rad": np.linspace(0.0, np.pi, 6, endpoint=False),
+        "period_s": 1.0 / np.arange(slowest, fastest, 0.4 / span),
+        "phase_rad": np.zeros(1),
+        "from_s": np.linspace(0.05, 0.95, 37) * span,
+        "against_rad": np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False),
+        "way_rad": np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False),
+        "beyond_m": centre_at,
+        "memory_s": np.geomspace(0.5, 0.7 * span, 12),
+        "above_mps": np.percentile(speed, [5, 20, 35, 50, 65, 80, 90]),
+    }
+
+
+def _vectors(cells: Cells) -> Iterator[tuple[float, float]]:
+    """Yield (length, direction) of waves over the floor, no two alike where the car drove."""
+    width, height = (max(float(np.ptp(cells.driven[k])), 0.1) for k in ("x", "y"))
+    pace = float(np.percentile(cells.driven["speed"], 90)) * cells.wide
+    most = 2.0 * np.pi / max(SHORTEST * pace, 0.06)
+    kx = np.arange(0.0, most, 2.5 / width)
+    ky = np.arange(-most, most, 2.5 / height)
+    for a in kx:
+        for b in ky:
+            size = float(np.hypot(a, b))
+            if 0.9 * 2.0 * np.pi / max(width, height) < size < most and (a > 0.0 or b > 0.0):
+                yield 2.0 * np.pi / size, float(np.arctan2(b, a))
+
+
+MAX_STARTS = 3  # starts of each effect that are followed
 SAME_ABOVE = 0.9  # correlation above which two starts are one
 MAX_WAVES = 60  # waves that may be stripes
 HALVINGS, FIRST_STEP = 6, 2.0
@@ -21,7 +136,7 @@ _PHASES = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """A law at values of its knobs, and what it would explain of the objective there."""
+    """An effect at values of its parameters, and what it would explain of the objective there."""
 
     effect: DictionaryEffect
     values: Values
@@ -31,7 +146,7 @@ class Start:
 def screen(
     effects: Sequence[DictionaryEffect], cells: Cells, responses: Mapping[str, Response]
 ) -> list[list[Start]]:
-    """Return the best starts of each law, best first, from all that a drive could show."""
+    """Return the best starts of each effect, best first, from all that a drive could show."""
     waves, found = dict[str, list[Start]](), list[list[Start]]()
     for effect in sorted(effects, key=lambda effect: effect.curve is TILES):
         word = effect.channel.response
@@ -97,7 +212,7 @@ def _waves(
 
 
 def polished(start: Start, cells: Cells, response: Response) -> Start:
-    """Return a start with all its knobs but the amount moved to where it explains most nearby."""
+    """Return a start with its parameters, but not the amount, moved to where it explains most."""
     parameters = start.effect.parameters[1:]
     values, gain = np.array(start.values[1:]), start.gain
     steps_now = np.array([FIRST_STEP * parameter.step for parameter in parameters])

@@ -10,9 +10,8 @@ from functools import cache
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.discovery.dictionary import dictionary
+from scm.mismatch.discovery.dictionary import PHASE, dictionary
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, Values
-from scm.mismatch.discovery.shapes import PHASE
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 

@@ -15,14 +15,14 @@ from scm.mismatch.fit.hypothesis import Hypothesis, numbers_of
 from scm.mismatch.fit.likelihood import Likelihood
 
 ROUNDS = 5
-SMALL = 0.1  # a derivative's step of an ordinary number, in standard deviations
+SMALL = 0.1  # a derivative's step of a nominal parameter, in standard deviations
 SHORTER = (0.5, 0.2, 0.05)
 DAMPINGS = (0.03, 0.3)
 FEW = 2  # fits whose trials leave room in a tile
 ENOUGH = 0.5
 SPOTS = 3  # places that an effect of some place is begun at
 TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild moments prove nothing
-FARTHEST = 2.0  # beyond twice its scatter a number is no longer ordinary
+FARTHEST = 2.0  # prior stds: beyond, it is no longer the number of the file
 OF_OWN: Mapping[str, str] = {
     "payload.mass_kg": "body.mass_kg",
     "com_shift.shift_m": "body.cog_to_rear_axle_m",

@@ -101,7 +101,7 @@ def _system(drive: Drive, noise: Noise) -> _System:
 
 
 class _Events:
-    """What a drive's innovations are, whatever is believed of noise.
+    """What a drive's innovations are, whatever the noise model.
 
     Attributes:
         order: Of the streams' samples, one stream after the other, by their time.
@@ -132,12 +132,12 @@ class _Events:
 
 
 class Whitener:
-    """Weighs residuals of one drive under one belief about noise.
+    """Weighs residuals of one drive under one noise model.
 
     Attributes:
         t: Time of each innovation, (events,) [s]; `stream`: the number of its stream.
-        log_size: Logarithms of the innovations' variances, (events,); NaN where a belief is beyond
-            what numbers can hold: nobody may hold it.
+        log_size: Logarithms of the innovations' variances, (events,); NaN where a noise model
+            is beyond what numbers can hold.
     """
 
     def __init__(self, drive: Drive, noise: Noise, events: _Events | None = None) -> None:
@@ -161,7 +161,7 @@ class Whitener:
         self.log_size = np.log(np.where(self._variance > 0.0, self._variance, np.nan))
 
     def under(self, noise: Noise) -> "Whitener":
-        """Return what weighs residuals of the same drive under another belief about noise."""
+        """Return what weighs residuals of the same drive under another noise model."""
         return Whitener(self.drive, noise, self._events)
 
     def _leaps(self, noise: Noise, size: int) -> Floats:

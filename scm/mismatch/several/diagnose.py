@@ -16,9 +16,8 @@ from scm.mismatch.findings import Effect, Undecided, Verdict
 from scm.mismatch.pipeline import diagnose_car, write
 from scm.mismatch.report.cars_page import write_several
 from scm.mismatch.select.round import Notify
-from scm.mismatch.several.findings import Agreement, Common
+from scm.mismatch.several.findings import Agreement, Common, all_alike
 from scm.mismatch.several.shared_effects import compared
-from scm.mismatch.several.verdict import all_alike
 from scm.mismatch.validate.conclude import Result, conclude
 from scm.mismatch.validate.explain import sentence_of
 from scm.recorder.drives import SUFFIX, recordings_of

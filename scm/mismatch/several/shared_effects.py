@@ -18,11 +18,11 @@ from scm.mismatch.findings import Equation, Estimate
 from scm.mismatch.select.round import Notify, penalty
 from scm.mismatch.select.selected import Selected
 from scm.mismatch.several.effect_in_car import LOOSE, EffectInCar, Quadratic, is_same
-from scm.mismatch.several.findings import Agreement, CarAgreement, Cause, Common
-from scm.mismatch.several.verdict import conclusion
+from scm.mismatch.several.findings import Agreement, CarAgreement, Cause, Common, conclusion
 from scm.mismatch.validate.explain import EQUATION_ERROR, NINETY, WIDER, sentence_of
 
-UNLIKELY = (10.8, 13.8, 16.3, 18.5)  # chi-square that one agreement in a thousand exceeds, by knobs
+# Chi-square that one agreement in a thousand exceeds, by the number of parameters.
+UNLIKELY = (10.8, 13.8, 16.3, 18.5)
 STEPS, ENOUGH = 3, 0.5
 LIKELY_SHARE, MAX_LIKELY = 0.4, 2
 

@@ -1,7 +1,7 @@
 """An effect as a curve: what it does to the car against what it depends on, with a 90 % band.
 
 What a car does with the effect and without it, from the same measured motion and for a few tenths
-of a second, is told as the force along the body or the angle of the wheels that would do the same.
+of a second, is reported as the force along the body or the wheels' angle that would do the same.
 """
 
 from collections.abc import Callable, Mapping

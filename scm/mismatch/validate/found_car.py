@@ -37,7 +37,7 @@ CLOCKS = "clock."  # numbers of a recording's stamps, not of the car
 class CarFiles:
     """Writes cars that a search finds into a folder of its own, and reads them back.
 
-    The folder lives as long as this object: effects outside the library are files in it.
+    The folder lives as long as this object: effects outside the catalogue are files in it.
     """
 
     def __init__(self, car: Car, recordings: tuple[str, ...]) -> None:
@@ -116,16 +116,16 @@ def on(base: Car, car: Car) -> Car:
 def patched(car: Car, fitted: Hypothesis, folder: Path, own: Bools | None = None) -> Car:
     """Return the given car with effects found and with its own numbers refitted.
 
-    A sensor's law outside the library has no place in a car file, but for the lens of a camera.
+    A discovered error of a sensor has no place in a car file, except the lens of a camera.
 
     Args:
         car: As given.
         fitted: What was found.
-        folder: Gets the files of laws outside the library; the car needs them while it is used.
+        folder: Gets the files of discovered effects; the car needs them while it is used.
         own: Which of the car's own numbers are refitted; None: all.
 
     Raises:
-        ScmError: when a law's file cannot be written.
+        ScmError: when an effect's file cannot be written.
     """
     nominal = fitted.model.nominal
     which = [True] * len(nominal) if own is None else list(own)

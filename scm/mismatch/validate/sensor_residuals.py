@@ -1,8 +1,8 @@
 """What sensors read beyond what they should, along a drive: a sensor's fault, drawn.
 
 The car that was found is driven again; its sensors once without the faults found and once with
-them. What is left of the measurements, smoothed over half a second, is told as a rate: a pose and
-an encoder's count drift apart from a prediction, and only how fast says something of a moment.
+them. What is left of the measurements, smoothed over half a second, is reported as a rate: poses
+and encoder counts drift apart from a prediction, and only how fast shows anything of a moment.
 """
 
 from collections.abc import Iterator, Sequence, Set

@@ -13,8 +13,14 @@ from scm.commands import mismatch
 from scm.mismatch.findings import Estimate, Undecided, Verdict
 from scm.mismatch.report.cars_page import several_html, several_summary, write_several
 from scm.mismatch.several.diagnose import _is_decided, cars_of
-from scm.mismatch.several.findings import Agreement, CarAgreement, Cause, Common
-from scm.mismatch.several.verdict import all_alike, conclusion
+from scm.mismatch.several.findings import (
+    Agreement,
+    CarAgreement,
+    Cause,
+    Common,
+    all_alike,
+    conclusion,
+)
 from scm.vehicles.car import load_car
 from tests.reality.several_cars import write_cars
 from tests.unit.mismatch import made_up_findings as made_up
