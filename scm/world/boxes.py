@@ -54,7 +54,7 @@ class Boxes:
             self.motion[i] = box.x_m, box.y_m, box.yaw_rad, 0.0, 0.0, 0.0
 
     def slide(self, dt: float) -> None:
-        """Let those that move go on for a time [s]."""
+        """Move the boxes that slide for a time [s]."""
         self.motion[:, :3] += dt * self.motion[:, 3:]
         self.motion[:, 2] = math.pi - np.mod(math.pi - self.motion[:, 2], 2.0 * math.pi)
 

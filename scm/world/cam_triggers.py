@@ -25,7 +25,7 @@ class CamTriggers:
         self._x, self._y, self._yaw, self._speed = (np.zeros(capacity) for _ in range(4))
 
     def forget(self, index: int) -> None:
-        """Let the next car in a slot begin anew."""
+        """Reset an index for its next car."""
         self._sent_ns[index], self._interval_ns[index], self._quiet[index] = _NEVER_NS, T_MAX_NS, 0
 
     def due(

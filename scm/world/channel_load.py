@@ -34,7 +34,7 @@ class ChannelLoad:
         self._others: dict[str, tuple[float, float]] = {}
 
     def note(self, kind: str, x: Floats, y: Floats) -> None:
-        """Take frames of a kind that go on the air from places (k,)."""
+        """Add frames of a kind that are sent from places (k,)."""
         if self.is_measured:
             air_s = np.full(len(x), air_time(kind, self._radio.data_rate_mbps))
             self._frames.append((np.array(x), np.array(y), air_s))

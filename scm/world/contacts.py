@@ -98,7 +98,7 @@ class Contacts:
         self._ring.known[key] = hull
 
     def remove(self, index: int) -> None:
-        """Take a car's body away."""
+        """Remove a car's body."""
         self._ring.forget(index + len(self.boxes))
 
     def is_free(self, hull: Hull, pose: Pose2) -> bool:
@@ -223,7 +223,7 @@ class _Ring:
         self._space.add(*solids(self._space.static_body, city_map))
 
     def forget(self, key: int) -> None:
-        """Take a car out for good."""
+        """Remove a car permanently."""
         del self.known[key]
         if key in self._left:
             self._leave([key])
@@ -281,7 +281,7 @@ class _Ring:
         return pairs, floats[:, :2], depths
 
     def _let_in(self, keys: list[int], poses: list[list[float]]) -> None:
-        """Take in who touches something; let go who has not for long.
+        """Add bodies that touch something; remove those that have not for long.
 
         Each comes in at its place: where all came in at one, the space would pair all with all.
         """

@@ -58,7 +58,7 @@ def hand_over(world: World, car: HostedCar, lease: rules.Lease, now_ns: int) -> 
 
 
 def send(world: World, car: HostedCar, request: RouteRequest, now_ns: int) -> RouteReply:
-    """Let a car's own driver take it along a route, from the lane it stands on.
+    """Send a car with its own driver along a route, from the lane it stands on.
 
     Raises:
         ScmError: when the lanes do not allow the route, or the car stands on none.
@@ -71,7 +71,7 @@ def send(world: World, car: HostedCar, request: RouteRequest, now_ns: int) -> Ro
 
 
 def _stand(world: World, *, stop: bool) -> None:
-    """Let go of the pedals of those that nobody drives; their wheels stay as they are steered."""
+    """Set zero throttle for cars that nobody drives; their steering stays as it is."""
     vehicles = world.vehicles
     standing = vehicles.hosted & ~vehicles.driven
     vehicles.throttle[standing] = 0.0
@@ -99,7 +99,7 @@ def _obey(world: World, car: HostedCar, now_ns: int, *, stop: bool) -> None:
 
 
 def _drive(world: World, now_ns: int, *, stop: bool) -> None:
-    """Let the drivers decide, and note who has arrived."""
+    """Apply the drivers' decisions, and note which cars have arrived."""
     vehicles, drivers = world.vehicles, world.drivers
     driven = vehicles.driven
     if not driven.any():

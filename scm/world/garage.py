@@ -99,7 +99,7 @@ class Garage:
         return fleet, row
 
     def scrap(self, name: str, row: int) -> None:
-        """Take a car off the floor."""
+        """Remove a car from the floor."""
         self.fleets[name].remove(row)
         others = self._rows[name] != row
         self._rows[name], self._indices[name] = (
@@ -116,27 +116,27 @@ class Garage:
         return self._indices.get(name, _NOBODY)
 
     def use_threads(self, count: int) -> None:
-        """Let fleets advance on several threads, those of today and those to come."""
+        """Advance fleets on several threads, existing and future ones."""
         self._threads = count
         for fleet in self.fleets.values():
             fleet.threads = count
 
     def command(self, indices: VehicleArrays) -> None:
-        """Tell all motors and servos what stands in the slots."""
+        """Command all motors and servos."""
         for name, rows in self._rows.items():
             fleet, own = self.fleets[name], self._indices[name]
             fleet.throttle[rows] = indices.throttle[own]
             fleet.steering[rows] = indices.steering[own]
 
     def advance(self, ground: Ground, t_ns: int, duration: float) -> None:
-        """Let all cars move for a time [s] on the floor and in the wind of an instant."""
+        """Move all cars for a time [s] on the floor and in the wind of an instant."""
         for name, rows in self._rows.items():
             if len(rows):
                 ground.feel(self.fleets[name], t_ns)
                 self.fleets[name].advance(duration)
 
     def drain(self, duration: float) -> None:
-        """Take out of all batteries what the cars draw over a time [s]."""
+        """Discharge all batteries by what the cars draw over a time [s]."""
         for name, rows in self._rows.items():
             self._packs[name].drain(rows, duration)
 

@@ -44,7 +44,7 @@ def grant(home: str, epoch: int = 1) -> Lease:
 
 
 def acquire(lease: Lease, owner: str, ttl_ms: int, now_ns: int) -> Lease:
-    """Take a car that is at home; asking again for one's own lease only renews it.
+    """Lease a car that is at home; requesting one's own lease again only renews it.
 
     The home owner that asks gets a newer epoch: what it commanded before is void.
 
@@ -80,7 +80,7 @@ def release(lease: Lease, owner: str, epoch: int) -> Lease:
 
 
 def steal(lease: Lease, owner: str, ttl_ms: int, reason: str, now_ns: int) -> Lease:
-    """Take a car from whoever holds it.
+    """Lease a car although somebody else holds it.
 
     Raises:
         LeaseError: when no reason is given.

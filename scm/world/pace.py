@@ -63,7 +63,7 @@ class Pace:
 
 
 class Every:
-    """Says when something that happens at a fixed rate is due; never twice for one moment.
+    """Tells when something at a fixed rate is due; never twice for one moment.
 
     Attributes:
         period_ns: Between two due moments.

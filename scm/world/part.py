@@ -80,7 +80,7 @@ class WorldPart(BasePart):
         return [*first, *sent]
 
     def attach(self, is_wanted: IsWanted) -> None:
-        """Ask the bus from now on before making what is dear."""
+        """Check for subscribers before making costly messages."""
         self.world.subscribers.attach(is_wanted)
 
     def _open(self, now_ns: int) -> list[Outgoing]:

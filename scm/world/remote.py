@@ -127,7 +127,7 @@ class RemoteCar:
         return max(0, now_ns - self.received_ns)
 
     def follow(self, state: VehicleState, now_ns: int) -> bool:
-        """Take a report; return whether it was newer than the last one."""
+        """Apply a report; return whether it was newer than the last one."""
         if self.dead or (self.state is not None and state.seq <= self.state.seq):
             return False
         if self.state is not None:
@@ -139,7 +139,7 @@ class RemoteCar:
         return True
 
     def _make_up(self, felt: Echo, now_ns: int) -> None:
-        """Tell the agent to make up for the way it went on before it felt a push.
+        """Correct the agent for the distance it drove before it applied a push.
 
         Its report comes one step after it felt it: that much of the way is in the report.
         """

@@ -81,7 +81,7 @@ def _restore_car(world: World, name: str, record: CarRecord, now_ns: int) -> lis
 
 
 def _lease_again(world: World, car: HostedCar, record: CarRecord, now_ns: int) -> list[Outgoing]:
-    """Let the holder go on; until a command of its own comes the car stands."""
+    """Renew the leaseholder's lease; the car stands until its first command."""
     before = record.epoch - 1
     car.lease = Lease(record.home, record.home, before)
     expires_ns = now_ns + record.ttl_ms * NS_PER_MS

@@ -23,12 +23,12 @@ class Subscribers:
         self._any: dict[type[Message], bool] = {}
 
     def attach(self, is_wanted: IsWanted) -> None:
-        """Take the bus's word from now on."""
+        """Use the bus from now on."""
         self._is_wanted = is_wanted
         self._any.clear()
 
     def begin_tick(self) -> None:
-        """Let a tick pass: answers grow old."""
+        """Count a tick: known answers expire."""
         self._tick += 1
         if self._tick % REFRESH_CLASSES_EVERY_TICKS == 0:
             self._any.clear()

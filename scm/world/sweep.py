@@ -90,7 +90,7 @@ def is_any_fast(moves: Floats, outlines: Floats) -> bool:
 
 @kernel_function
 def stop(shares: Floats, outlines: Floats, i: int, at: float) -> bool:
-    """Let a body make no more of its move than a share; return whether that is less than before."""
+    """Limit a body's move to a share; return whether that is less than before."""
     if outlines[i, 5] == 0.0 or shares[i] <= at:
         return False
     shares[i] = at

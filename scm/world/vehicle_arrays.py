@@ -41,7 +41,7 @@ class Numbers:
         return number
 
     def release(self, number: int) -> None:
-        """Let a number be taken again."""
+        """Release a number for reuse."""
         self._used.discard(number)
         if number >= self._first:
             self._lowest = min(self._lowest, number)
@@ -95,11 +95,11 @@ class VehicleArrays:
         return index
 
     def put(self, index: int, pose: Pose2) -> None:
-        """Say where a car is."""
+        """Set the pose of a car."""
         self.x[index], self.y[index], self.yaw[index] = pose
 
     def remove(self, index: int) -> None:
-        """Take a slot back and forget what its car was doing."""
+        """Release an index and reset what its car was doing."""
         self.names[index] = ""
         for flags in (
             self.used, self.hosted, self.driven, self.arrived, self.hazard, self.diverged,

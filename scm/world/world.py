@@ -206,7 +206,7 @@ class World:
         return self.hosted.get(name) or self.remote.get(name)
 
     def use_threads(self, count: int) -> None:
-        """Let dynamics and drivers use several threads: for lockstep, on cores that would idle.
+        """Use several threads for dynamics and drivers: for lockstep, on otherwise idle cores.
 
         It changes no number. Live, with the processors shared, threads wait for each other: there
         one is better.
@@ -288,7 +288,7 @@ class World:
         now_ns: int,
         tag_id: int | None = None,
     ) -> RemoteCar:
-        """Take a car with dynamics of its own into the city; `tag_id`: that it wears, if any.
+        """Add a car with its own dynamics to the city; `tag_id` is the tag on its roof, if any.
 
         Raises:
             CarError: when there is no such car file.
@@ -324,7 +324,7 @@ class World:
         return [city_event("warning", "other_tag", text, now_ns, car.name), lease_record(car)]
 
     def remove(self, name: str) -> list[Outgoing]:
-        """Take a car off the map, if there is one of that name; return what must be stored."""
+        """Remove a car from the map, if there is one of that name; return what must be stored."""
         if name in self.hosted:
             car = self.hosted.pop(name)
             self.leased.pop(name, None)

@@ -96,7 +96,7 @@ class DemandPart(BasePart):
         self._counts = {"wanted": 0, "entered": 0, "arrived": 0, "refused": 0}
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Take answers and arrivals, let in who has room, tell how it goes."""
+        """Handle replies and arrivals, spawn cars that have room, publish the status."""
         if self._start_ns is None:
             self._open(now_ns)
         outbox: list[Outgoing] = []
@@ -114,7 +114,7 @@ class DemandPart(BasePart):
         return outbox
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Take its cars along."""
+        """Remove its cars."""
         cars = [*self._under_way]
         self._under_way.clear()
         return [*(_removal(name, "the demand ends") for name in cars), self._current_status(now_ns)]
@@ -179,7 +179,7 @@ class DemandPart(BasePart):
         return [_warn(departure.vehicle, reply, now_ns)]
 
     def _receive_trip(self, trip: Trip, now_ns: int) -> list[Outgoing]:
-        """Take a car off the map whose trip has ended."""
+        """Remove a car whose trip has ended."""
         if trip.arrived_ns is None or trip.vehicle not in self._under_way:
             return []
         if not trip.trip_id.startswith(f"demand-{trip.vehicle}-"):

@@ -96,7 +96,7 @@ class Attacker:
         self._part.attach(is_wanted)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Let the part act, and change what its liars say."""
+        """Step the part, and change what its attackers send."""
         for item in inbox:
             if isinstance(item.message, CamRx):
                 self._overhear(item.message)
@@ -118,7 +118,7 @@ class Attacker:
         return outbox
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Let the part leave."""
+        """Finish the part."""
         for name, record in self._records.items():
             found = "never reported" if record.since_ns is None else "reported"
             sums = f"{record.cams} CAMs, {record.lies} of them lies, {found}"
@@ -144,7 +144,7 @@ class Attacker:
             heapq.heappush(self._later, (frame.t_ns, next(self._count), changed))
 
     def _is_reported(self, report: MisbehaviourReport) -> None:
-        """Say it once for each suspicion, not at every repetition."""
+        """Print each suspicion once, not at every repetition."""
         record = self._records[report.suspect]
         if record.since_ns == report.since_ns:
             return

@@ -50,7 +50,7 @@ class Strayed:
         self.last_m = self.sum_m = self.over_s = self.variance_m2 = 0.0
 
     def add(self, now: Claim, before: Claim, dt_s: float, front_share: float) -> None:
-        """Take the way from one claim to the next; begin anew where a heading or speed lacks."""
+        """Add the path between two claims; restart where a heading or speed is missing."""
         (x1, y1), (x0, y0) = now.rear(front_share), before.rear(front_share)
         yaw0, yaw1, v0, v1 = before.yaw_rad, now.yaw_rad, before.speed_mps, now.speed_mps
         if yaw0 is None or yaw1 is None or v0 is None or v1 is None:

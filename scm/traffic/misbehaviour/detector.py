@@ -72,7 +72,7 @@ class Detector:
         limits_of: Callable[[str], Limits] | None = None,
         checks: Sequence[Check] | None = None,
     ) -> None:
-        """Take the map's knowledge, what cars can do by car file, and the checks.
+        """Use the map's knowledge, the limits of cars by car file, and the checks.
 
         Args:
             ground: The map's knowledge.
@@ -98,7 +98,7 @@ class Detector:
         self._received_ns = 0
 
     def see(self, track: EyeTrack) -> None:
-        """Take a track of the Eye."""
+        """Add a track of the Eye."""
         who = self._number(track.vehicle)
         self._tracks[who] = track
         if not track.stale and BAD_FLAGS.isdisjoint(track.flags):

@@ -39,7 +39,7 @@ class Ground:
     """
 
     def __init__(self, city_map: CityMap, sees: Sees | None = None) -> None:
-        """Take the map; `sees` says what the Eye overlooks, the map's cameras if it is None."""
+        """Use a map; `sees` is what the Eye overlooks, the map's cameras if it is None."""
         roads = Roads(city_map)
         self.range_m = city_map.radio_range_m
         self.receivers = {

@@ -50,7 +50,7 @@ class MisbehaviourPart(BasePart):
     period_ns = PERIOD_NS
 
     def __init__(self, city_map: CityMap, sees: Sees | None = None) -> None:
-        """Take the map; `sees` says what the Eye overlooks, the map's cameras if it is None."""
+        """Use a map; `sees` is what the Eye overlooks, the map's cameras if it is None."""
         self.name = NAME
         units = [roadside_station(junction.name) for junction in city_map.junctions]
         at_units = (Subscription(CamRx, {"receiver": unit}, once=True) for unit in units)
@@ -126,7 +126,7 @@ class MisbehaviourPart(BasePart):
         ]
 
     def _report_unseen(self, now_ns: int) -> list[Message]:
-        """Say once of each car that the Eye cannot see its tag; that is no accusation."""
+        """Report once for each car that the Eye cannot see its tag; that is no accusation."""
         unseen = {one.station for one in self.detector.histories.values() if one.is_tag_unseen}
         news = [
             CityEvent(

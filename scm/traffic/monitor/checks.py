@@ -102,7 +102,7 @@ class Monitor:
         self._latch(fault, "latched before the monitor was started again", now_ns)
 
     def tick(self, now_ns: int) -> None:
-        """Look at the time: has the controller fallen silent?"""
+        """Check whether the controller has fallen silent."""
         if now_ns - self._ticked_ns > ASLEEP_NS:
             # Who slept cannot call others silent: its own link may just be coming back.
             self._received_ns = max(self._received_ns, now_ns)
@@ -113,7 +113,7 @@ class Monitor:
             self._judge_silence(silent_ns, now_ns)
 
     def _judge_silence(self, silent_ns: int, now_ns: int) -> None:
-        """Tell a controller that froze from a computer on which nobody gets a processor in time."""
+        """Distinguish a frozen controller from an overloaded computer."""
         detail = f"no signal phase for {silent_ns // NS_PER_MS} ms"
         waited_ns = self._waited_ns() - self._waited_before_ns
         is_busy = self.fault == OVERLOAD or waited_ns >= WAITED_SHARE * silent_ns

@@ -44,7 +44,7 @@ class CarEstimates:
         self._self: dict[str, tuple[CarEstimate, int]] = {}
 
     def add(self, message: EyeTrack | VehicleState, arrived_ns: int) -> None:
-        """Take a message in, unless no car can be where it says, or move so."""
+        """Add a message, unless its position or motion is impossible."""
         if isinstance(message, EyeTrack):
             estimate, table = _of_track(message), self._eye
             if message.stale:

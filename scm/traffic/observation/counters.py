@@ -85,7 +85,7 @@ class Counters:
         self._next_sample_ns = 0
 
     def see(self, estimate: CarEstimate, followed: Followed | None) -> None:
-        """Take where a car is now."""
+        """Add where a car is now."""
         if followed is None:
             self.forget(estimate.vehicle)
             return

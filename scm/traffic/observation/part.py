@@ -50,7 +50,7 @@ class ObserverPart(BasePart):
         self.counters = Counters(roads, lines)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Take what came, look at every car, tell what is due."""
+        """Process arrivals, check every car, return what is due."""
         violations = []
         for item in inbox:
             message = item.message
@@ -72,7 +72,7 @@ class ObserverPart(BasePart):
         return outbox
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Tell the last counts."""
+        """Publish the last counts."""
         return [self.counters.counts(now_ns)]
 
     def _look(self, now_ns: int) -> list[Violation]:

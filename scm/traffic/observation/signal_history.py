@@ -26,7 +26,7 @@ class SignalHistory:
         self._rows: dict[tuple[str, str], deque[tuple[int, SignalGroup]]] = {}
 
     def receive(self, spat: Spat) -> None:
-        """Take what a junction shows."""
+        """Add what a junction shows."""
         for group in spat.groups:
             row = self._rows.setdefault((spat.junction, group.group), deque(maxlen=DEPTH))
             if row and spat.t_ns < row[-1][0]:

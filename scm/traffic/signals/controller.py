@@ -1,10 +1,10 @@
-"""One junction's controller: kernel, policy and wishes in force, and what is told of all of them.
+"""One junction's controller: kernel, policy and overrides in force, and their SPaT.
 
-It starts all red. Under a timetable it runs cycles of a plan and takes another plan, or another
-policy, when a cycle ends and no red has a promised end any more; from any other policy it goes back
-to the timetable through a clearance. Between policy and kernel stands the gate: no wish begins or
-ends a colour against what Spat has promised. As long as anybody has a reason for flash it flashes
-red; then it starts again through all red.
+It starts all red. Under a timetable it runs cycles of a plan and changes to another plan, or
+another policy, when a cycle ends and no red has a guaranteed end any more; from any other policy it
+returns to the timetable through a clearance. A gate between policy and kernel ensures that no
+request begins or ends a colour against a time guaranteed in SPaT. While there is a reason to flash
+it flashes red; then it restarts through all red.
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -201,7 +201,7 @@ class Controller:
         return self._timetables.outlook(now_ns) if self.policy == FIXED else self._outlook.coming
 
     def apply_override(self, request: SignalRequest, now_ns: int) -> None:
-        """Take a wish of an operator or a script.
+        """Apply an override of an operator or a script.
 
         Raises:
             PlanError: saying in words why it cannot be taken.
@@ -367,7 +367,7 @@ class Controller:
         )
 
     def _foresee(self, now_ns: int, observations: Observations) -> None:
-        """Ask timetable or policy when the present colours will likely end."""
+        """Update when the present colours will likely end, by timetable or policy."""
         self._outlook.updated_ns = now_ns
         self._outlook.ends, self._outlook.coming = {}, ()
         if self.mode == FLASH:

@@ -172,7 +172,7 @@ class JunctionDetectors:
         self._extended_ns: dict[str, int | None] = dict.fromkeys(self._coming)
 
     def add(self, seen: Seen, arrived_ns: int) -> None:
-        """Take a car as heard or seen; what is older than what is known of it is ignored."""
+        """Add a car as received or seen; data older than the known one is ignored."""
         self.received_ns = arrived_ns
         known = self._cars.get(seen.who)
         if known is not None and seen.t_ns <= known.seen.t_ns:

@@ -1,4 +1,4 @@
-"""When a colour will end: promises for SPaT that are kept whatever anybody asks for.
+"""Guaranteed times of SPaT: when a colour will end, whatever is requested.
 
 Under a timetable a plan only ever changes at the end of a cycle. So inside a cycle every end is
 known; and of the first red end beyond it, only that some plan's cycle begins there: the earliest

@@ -1,4 +1,4 @@
-"""One junction of the traffic part: its controller, its detectors, and what is still to be told."""
+"""One junction of the traffic part: its controller, its detectors, and pending messages."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -50,7 +50,7 @@ Severity = Literal["info", "warning"]
 
 
 class JunctionSignals:
-    """Steps one controller; hears the monitor, people and vehicles for it."""
+    """Steps one controller; handles the monitor, operators and vehicles for it."""
 
     def __init__(
         self,
@@ -91,7 +91,7 @@ class JunctionSignals:
         )
 
     def restore(self, record: PlanRecord) -> None:
-        """Take what was asked for in an earlier run, as if it were asked now.
+        """Apply what was requested in an earlier run, as if it were requested now.
 
         Raises:
             PlanError: when there is no such plan any more.
@@ -104,7 +104,7 @@ class JunctionSignals:
             self.serve_plan(replace(request, plan=FLASH))
 
     def serve_plan(self, request: PlanRequest) -> PlanReply:
-        """Take a wish for a plan, or for flash; `record` is what should outlive the process.
+        """Apply a request for a plan, or for flash; `record` is what should outlive the process.
 
         Raises:
             PlanError: when there is no such plan, or one that came with it is not as it must be.
@@ -133,7 +133,7 @@ class JunctionSignals:
         return self._runs()
 
     def serve_override(self, request: SignalRequest, now_ns: int) -> SignalReply:
-        """Take a wish for groups, or for a policy.
+        """Apply an override of groups, or of the policy.
 
         Raises:
             PlanError: saying why it cannot be taken.
@@ -216,7 +216,7 @@ class JunctionSignals:
         return sent
 
     def _report_expired(self, now_ns: int) -> None:
-        """Tell wishes that ended by themselves."""
+        """Report overrides that expired."""
         active = self.controller.overrides
         if active == self._known_overrides:
             return
@@ -227,7 +227,7 @@ class JunctionSignals:
         self._known_overrides = active
 
     def _report_changes(self, now_ns: int) -> None:
-        """Tell what changed since this was last asked."""
+        """Report what changed since the last call."""
         controller = self.controller
         (mode, running, failure), now = self._reported, (
             controller.mode,
@@ -255,7 +255,7 @@ class JunctionSignals:
             self._log_event("info", "signals_preempted", "is pre-empted", now_ns)
 
     def _why_runs(self) -> str:
-        """Say who wants what runs now: whoever asked for it, or a wish that a plan cannot grant."""
+        """Return the reason for what runs now: its request, or overrides that need rings."""
         if self.controller.policy == FIXED:
             return self._plan_reason
         overrides = [one for one in self.controller.overrides if one.verb in NEED_RINGS]

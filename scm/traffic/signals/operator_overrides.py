@@ -1,7 +1,7 @@
-"""Wishes of operators and scripts while they are in force: taken, refused in words, lapsing.
+"""Overrides of operators and scripts: accepted or refused with a reason, in force, expiring.
 
-A call is done when its group turns green, a force-off when its group's green has ended; everything
-ends when it is taken back or its time is up.
+A call is done when its group turns green, a force-off when its group's green has ended; every
+override ends when it is cleared or expires.
 """
 
 from collections.abc import Collection, Sequence
@@ -18,7 +18,7 @@ NEED_RINGS = ("hold", "force_off", "omit", "preempt")
 
 
 class Override(NamedTuple):
-    """One wish in force, until `until_ns` at the latest."""
+    """One override in force, until `until_ns` at the latest."""
 
     verb: Verb
     groups: tuple[str, ...]

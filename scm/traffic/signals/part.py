@@ -1,11 +1,10 @@
-"""The traffic part: every junction of the map under its controller, and what the city hears of it.
+"""The traffic part: controls every junction of the map and publishes what it shows.
 
-It serves wishes and hears the monitor. A fault that the monitor reports, or a monitor that was
-there and fell silent, makes the junction flash red until the monitor says that all is well. What
-the controller shows goes out as `Spat` at every step, and over the roadside station's antenna as
-SPATEM twice a second and at once when a colour changes, with the lanes as MAPEM once a second.
-Under a policy that needs detectors it listens to the CAMs that the roadside unit hears, and to what
-the overhead cameras see.
+It answers requests and subscribes to the monitor. A fault that the monitor reports, or a monitor
+that falls silent, makes the junction flash red until the monitor reports no fault. What the
+controller shows is published as `Spat` at every step, and sent by the roadside station as SPATEM
+twice a second and at every change, with the lanes as MAPEM once a second. A policy that needs
+detectors also uses the CAMs that the roadside unit receives, and the overhead cameras' tracks.
 """
 
 import logging
@@ -120,7 +119,7 @@ class TrafficPart(BasePart):
         return (Subscription(MonitorStatus), Subscription(SremRx), *listening, *tracks)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Hear wishes, cars and the monitor, step every junction, tell what it shows."""
+        """Handle requests, cars and the monitor, step every junction, publish what it shows."""
         outbox: list[Outgoing] = []
         for item in inbox:
             message = item.message

@@ -49,7 +49,7 @@ class PriorityRequests:
         self.ignored = 0
 
     def receive(self, message: SremRx, now_ns: int) -> None:
-        """Take the requests of an SREM that are for this junction."""
+        """Add the requests of an SREM that are for this junction."""
         for request in requests_of(message.body, now_ns):
             if request.junction != self._junction.number:
                 continue

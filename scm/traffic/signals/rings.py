@@ -266,7 +266,7 @@ def _is_ready(layout: Layout, ring: Ring, inputs: Inputs) -> bool:
 
 
 def _go_on(layout: Layout, state: Rings, inputs: Inputs, called: frozenset[int]) -> Rings:
-    """Let rings advance, or all of them cross the barrier."""
+    """Advance rings, or move all of them across the barrier."""
     here = {i for ring in layout.sections[state.section] for i in ring}
     others = called - here
     ready = [_is_ready(layout, ring, inputs) for ring in state.rings]

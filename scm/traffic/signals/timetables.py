@@ -46,13 +46,13 @@ class Timetables:
         return None if self.plan in self._own_tables else self._tables[self.plan]
 
     def request(self, plan: str) -> None:
-        """Let a plan come with the next cycle, or stay."""
+        """Make a plan pending for the next cycle, or let it stay."""
         self.pending = "" if plan == self.plan and self._committed_plan in ("", plan) else plan
         if plan == self.plan:
             self._entering_plans.pop(plan, None)
 
     def offer_custom_plan(self, custom_plan: Timetable, wave: Wave | None) -> None:
-        """Take a plan that somebody made, and let it come; one of its name makes room for it."""
+        """Add a custom plan and make it pending; it replaces one of the same name."""
         self._entering_plans = {custom_plan.plan: (custom_plan, wave)}
         self.pending = custom_plan.plan
 
@@ -62,7 +62,7 @@ class Timetables:
         self._begin(Cycle(None, now_ns, until_ns))
 
     def put_off(self, by_ns: int) -> None:
-        """Let the cycle be later, as if time had stood still."""
+        """Delay the cycle, as if time had stood still."""
         cycle = self.cycle
         self._set(Cycle(cycle.timetable, cycle.began_ns + by_ns, cycle.ends_ns + by_ns))
 
@@ -134,7 +134,7 @@ class Timetables:
         return self._committed_plan or (self.pending if is_ready else self.plan)
 
     def _change_custom_plans(self) -> None:
-        """Let guests in, and those go that nobody wants; call it where nothing is promised."""
+        """Add entering custom plans and drop unused ones; only where no time is guaranteed."""
         if self.pending == self.plan and self.pending not in self._entering_plans:
             self.pending = ""
         entering, self._entering_plans = self._entering_plans, {}

@@ -50,7 +50,7 @@ def start(site: Site) -> Memory:
 
 
 def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer]:
-    """Let the rings go on."""
+    """Step the rings."""
     memory = ride(site, memory, view, inputs_of(site, memory, view))
     mode: Mode = "preempt" if groups_of(view.overrides, "preempt") else "adaptive"
     return memory, Answer(named(site, rings.requested(memory.rings)), mode=mode)

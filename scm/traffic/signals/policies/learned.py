@@ -56,7 +56,7 @@ def start(site: Site) -> Memory:
 
 
 def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer]:
-    """Ask the callable.
+    """Call the callable.
 
     Raises:
         PlanError: when there is none, or its answer is none or lets somebody starve.

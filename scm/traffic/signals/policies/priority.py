@@ -50,7 +50,7 @@ def start(site: Site) -> Memory:
 
 
 def step(site: Site, memory: Memory, view: JunctionView) -> tuple[Memory, Answer]:
-    """Let the rings go on, told of those who ask."""
+    """Step the rings, with the priority requests among their inputs."""
     ring_inputs = inputs_of(site, memory.actuated, view)
     near = [one for one in view.priority if _is_due(one, view.now_ns)]
     urgent = _of_role(near, "emergency", site)
