@@ -76,7 +76,7 @@ def test_a_damaged_picture_is_said_and_the_next_one_is_shown(folder):
     assert source.read(100 * NS_PER_MS, None) is None
     assert source.trouble.startswith(f"{path / '1.jpg'}: expected a whole JPEG, got one truncated")
     assert source.read(200 * NS_PER_MS, None)
-    assert "cut short" in source.trouble  # long enough for a status that is told twice a second
+    assert "truncated" in source.trouble  # long enough for a status that is told twice a second
     assert source.read(1_100 * NS_PER_MS, None)
     assert source.trouble is None
 
