@@ -30,7 +30,7 @@ MOST_SHOWN_BYTES = 16 * 2**20
 
 
 class _Cars(msgspec.Struct):
-    text: str
+    said: str
     conclusions: tuple[str, ...] = ()
 
 
@@ -55,7 +55,7 @@ class _Title(msgspec.Struct):
 
 
 class _Drawn(msgspec.Struct):
-    text: str
+    said: str
     vehicle: str = ""
     recordings: tuple[str, ...] = ()
     effects: tuple[_Title, ...] = ()

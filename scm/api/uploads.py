@@ -42,11 +42,11 @@ _RUN = ".mcap"
 _ENTRY = b"PK\x01\x02"  # begins each entry of a zip's list of contents
 
 
-def store(folder: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Upload:
+def store(reports: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Upload:
     """Unpack a recording below `shelf` and return what it is.
 
     Args:
-        folder: Of reports: uploads lie in a folder of it.
+        reports: Folder of reports: uploads lie in a folder of it.
         body: The zip, wherever it was read to.
         name: What the sender calls it: the id begins with it.
         cars: Names of the car files that it may ask for.
@@ -56,7 +56,7 @@ def store(folder: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Upl
     """
     stem = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40] or "upload"
     upload = f"{stem}-{secrets.token_hex(4)}"
-    folder = folder / FOLDER / upload
+    folder = reports / FOLDER / upload
     folder.mkdir(parents=True)
     try:
         size = _unpack(body, folder)
@@ -65,7 +65,7 @@ def store(folder: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Upl
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
-    _forget(folder / FOLDER)
+    _forget(reports / FOLDER)
     files = sum(path.is_file() for path in folder.rglob("*"))
     return Upload(upload=upload, files=files, size_bytes=size, vehicles=vehicles)
 

@@ -97,7 +97,7 @@ class _Disk:
         was_good, self._is_good = self._is_good, least >= LEAST_FREE_BYTES
         if was_good and not self._is_good:
             mib = least // 2**20
-            event(_log, "disk_short", level=logging.WARNING, kind=kind, at=folder, free_mib=mib)
+            event(_log, "disk_short", level=logging.WARNING, shelf=kind, at=folder, free_mib=mib)
         detail = (
             f"where {kind} are kept {least // 2**20} MiB are free, "
             f"expected {LEAST_FREE_BYTES // 2**20} or more"

@@ -10,7 +10,7 @@ from scm.api.audit_trail import newest_first
 from scm.api.deeds import Words
 from scm.api.trace import HEADER, Traced, trace_id, trace_id_of, traced
 from scm.clock import StepClock
-from scm.runtime.part import Service
+from scm.runtime.part import BasePart, Service
 from scm.runtime.station import Station
 from scm.store.memory import MemoryStore
 from scm.v2x.bus_memory import MemoryNetwork
@@ -68,7 +68,7 @@ def test_what_is_asked_of_the_city_carries_it(view, fake_city, city_map, client_
     assert traced(StopRequest(engaged=False, by="ada")).trace_id == "", "nothing is answered here"
 
 
-class Button:
+class Button(BasePart):
     """A part with nothing but a red button."""
 
     name, role, period_ns, subscriptions = "world", "part", 1, ()
