@@ -5,8 +5,6 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 GLOSSARY = ROOT / "docs" / "glossary.md"
 TWIN_MEANS_CITY_TWIN = {"twin", "twins"}  # a car's versioned file; only effects may not be twins
@@ -19,10 +17,6 @@ STANDARD = {
     "_slots_",  # of ctypes structures
     "calm",  # the public name of a signal plan
 }
-PENDING = (
-    "scm/vehicles",
-)  # fmt: skip
-"""Where old names still stand; this list only gets shorter."""
 PUBLISHED = ("scm/client/nouns",)  # written from the interface: methods carry its operation ids
 
 
@@ -81,22 +75,16 @@ def modules(of: str) -> list[Path]:
     return [place] if place.is_file() else sorted(place.rglob("*.py"))
 
 
-def is_pending(place: Path) -> bool:
-    """Say whether a module still awaits its new names."""
+def is_published(place: Path) -> bool:
+    """Return whether a module has the names of a published interface."""
     path = place.relative_to(ROOT).as_posix()
-    return any(path == each or path.startswith(each + "/") for each in (*PENDING, *PUBLISHED))
+    return any(path == each or path.startswith(each + "/") for each in PUBLISHED)
 
 
 def test_no_identifier_is_made_of_a_retired_word() -> None:
-    """Everywhere but where the old names still await their change."""
-    places = [p for top in ("scm", "vehicle_agent") for p in modules(top) if not is_pending(p)]
+    """Everywhere but where an interface has published the old names."""
+    places = [p for top in ("scm", "vehicle_agent") for p in modules(top) if not is_published(p)]
     assert [fault for place in places for fault in faults(place)] == []
-
-
-@pytest.mark.parametrize("of", PENDING)
-def test_a_pending_place_still_has_a_retired_word(of: str) -> None:
-    """A place that is done leaves the list, so that it stays done."""
-    assert any(faults(place) for place in modules(of)), f"{of} is done: remove it from PENDING"
 
 
 def test_words_of_an_identifier() -> None:
