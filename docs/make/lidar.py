@@ -16,7 +16,7 @@ from drawing import plt
 from scm.vehicles.car import load_car
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
-from scm.vehicles.sensor import Sight
+from scm.vehicles.sensor import Surroundings
 from scm.vehicles.sensors.lidar import scan
 from tests.physics import tiny_town
 
@@ -32,7 +32,7 @@ def main() -> None:
     walls = tiny_town.walls_of(drive.hits(learn, drive.scanners(learn, lag)))
     scanners = drive.scanners(rest, lag)
     scene = Scene(WallGrid(walls), np.zeros((0, 4)), np.zeros(0, np.int64))
-    ours = scan(load_car("nigel"), scanners, Sight(scene, np.full(len(scanners), -1)))
+    ours = scan(load_car("nigel"), scanners, Surroundings(scene, np.full(len(scanners), -1)))
     off = np.abs(ours - drive.ranges[rest]).ravel()
     figure, (plan, share) = plt.subplots(1, 2, figsize=(11, 5.5), width_ratios=(3, 2))
     for x0, y0, x1, y1 in walls:

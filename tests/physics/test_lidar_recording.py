@@ -9,7 +9,7 @@ import pytest
 from scm.vehicles.car import load_car
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
-from scm.vehicles.sensor import Sight
+from scm.vehicles.sensor import Surroundings
 from scm.vehicles.sensors.lidar import scan
 from tests.physics import tiny_town
 
@@ -29,7 +29,7 @@ def errors(drive, lag_s, mount_m=tiny_town.MOUNT_M):
     walls = tiny_town.walls_of(drive.hits(learn, drive.scanners(learn, lag_s, mount_m)))
     scene = Scene(WallGrid(walls), np.zeros((0, 4)), np.zeros(0, np.int64))
     scanners = drive.scanners(held_out, lag_s, mount_m)
-    seen = scan(load_car("nigel"), scanners, Sight(scene, np.full(len(scanners), -1)))
+    seen = scan(load_car("nigel"), scanners, Surroundings(scene, np.full(len(scanners), -1)))
     return np.abs(seen - drive.ranges[held_out])
 
 

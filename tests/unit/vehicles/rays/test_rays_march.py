@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from scm.vehicles.rays.cast import cast
 from scm.vehicles.rays.grid import WallGrid
-from scm.vehicles.rays.march import march, taken_back
+from scm.vehicles.rays.march import march, past_poses
 from scm.vehicles.rays.scene import Scene
 from tests.unit.vehicles.rays.scenes import CIRCLE, brute_force, clutter, eyes_of
 
@@ -29,7 +29,7 @@ def test_in_motion_it_equals_brute_force_from_each_beams_own_place():
     got = march(scene, scanners[:20], motion, own, CIRCLE, 6.0, 0.2)
     first, step, beams = CIRCLE
     eyes = eyes_of(scanners[:20], CIRCLE)
-    past = taken_back(scanners[:20], motion, (beams - 1 - np.arange(beams)) * 0.2 / beams)
+    past = past_poses(scanners[:20], motion, (beams - 1 - np.arange(beams)) * 0.2 / beams)
     eyes = past + (0.0, 0.0, 1.0) * (first + step * np.arange(beams))[None, :, None]
     expected = brute_force(scene, eyes, own, 6.0)
     assert_array_equal(np.isinf(got), np.isinf(expected))
@@ -47,7 +47,7 @@ def test_driving_at_a_wall_the_first_beam_saw_it_farther_off_than_the_last():
 
 
 def test_the_past_of_a_steady_turn_is_on_its_circle():
-    back = taken_back(np.array([[1.0, 2.0, 0.5]]), np.array([[0.6, 0.0, 1.2]]), AGO)[0]
+    back = past_poses(np.array([[1.0, 2.0, 0.5]]), np.array([[0.6, 0.0, 1.2]]), AGO)[0]
     centre = np.array([1.0, 2.0]) + 0.5 * np.array([-np.sin(0.5), np.cos(0.5)])
     assert_allclose(np.hypot(*(back[:, :2] - centre).T), 0.5)
     assert_allclose(back[:, 2], 0.5 - 1.2 * AGO)
@@ -55,6 +55,6 @@ def test_the_past_of_a_steady_turn_is_on_its_circle():
 
 
 def test_without_turning_the_past_is_a_straight_line():
-    back = taken_back(np.array([[0.0, 0.0, np.pi / 2]]), np.array([[1.0, 0.5, 0.0]]), AGO)[0]
+    back = past_poses(np.array([[0.0, 0.0, np.pi / 2]]), np.array([[1.0, 0.5, 0.0]]), AGO)[0]
     assert_allclose(back[:, 0], 0.5 * AGO, atol=1e-15)
     assert_allclose(back[:, 1], -AGO)
