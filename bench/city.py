@@ -110,7 +110,7 @@ def run(city_map: CityMap, cars: int, stages: Stages, *, lidar: bool = False) ->
         city.run_for(WARM_S)
         stages.clear()
         if scans is not None:
-            scans.take()
+            scans.drain()
         began, used = time.perf_counter(), time.process_time()
         city.run_for(SPAN_S)
         took, busy = time.perf_counter() - began, time.process_time() - used
@@ -122,7 +122,7 @@ def run(city_map: CityMap, cars: int, stages: Stages, *, lidar: bool = False) ->
         "world_us_a_car": sum(stages.spent_s.values()) / TICKS / cars * 1e6,
         "kib_a_car": held_kib,
         "junctions": len(city_map.junctions),
-        "scans": len(scans.take()) / SPAN_S if scans is not None else 0.0,
+        "scans": len(scans.drain()) / SPAN_S if scans is not None else 0.0,
         "speed": float(part.world.vehicles.speed[part.world.vehicles.hosted].mean()),
     }
 

@@ -1,7 +1,6 @@
 """`scm world`: one part of the city, on its own."""
 
 import argparse
-from functools import partial
 
 from scm.command import Command, part_arguments, run_part, state_argument, state_of
 
@@ -30,12 +29,10 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.load import load_map
     from scm.maps.radio import with_radio
     from scm.vehicles.car import car_names
-    from scm.vehicles.cold_start import compile_later, is_first_start
     from scm.world.part import WorldPart
     from scm.world.restore import read_restored
 
     hosted = tuple((f"n{i + 1}", arguments.car) for i in range(arguments.hosted))
-    is_first = is_first_start()
     with state_of(arguments) as state:
         part = WorldPart(
             with_radio(load_map(arguments.map), arguments.radio),
@@ -43,13 +40,9 @@ def _run(arguments: argparse.Namespace) -> int:
             hosted,
             restored=None if state is None else read_restored(state),
         )
-        # Compiled when its first car comes, a car file would stop the city for 2.5 s.
-        others = {car: partial(part.world.garage.prepare, car) for car in car_names()}
-        if is_first:
-            compile_later(others)
-        else:
-            for load in others.values():
-                load()
+        # Loaded when its first car comes, a kernel would stop the city for a moment.
+        for car in car_names():
+            part.world.garage.prepare(car)
         return run_part(part, arguments, state)
 
 

@@ -8,7 +8,6 @@ import contextlib
 import gc
 import logging
 import multiprocessing
-import os
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -21,8 +20,7 @@ from scm.vehicles.jit import version_folder
 
 Job = Callable[[], object]
 
-_BACKGROUND_NICENESS = 10
-_TYPICAL_S = 15  # on two idle cores
+_TYPICAL_S = 40  # on two idle cores of a slow computer
 _LOG = logging.getLogger(__name__)
 
 
@@ -52,30 +50,6 @@ def compile_together(jobs: Mapping[str, Job]) -> None:
         longest()
     with contextlib.suppress(OSError):
         _marker().touch()
-
-
-def compile_later(jobs: Mapping[str, Job]) -> threading.Thread:
-    """Compile in a fork of low priority, then load in a thread of this process, which is returned.
-
-    Call it while this process has one thread. Loading delays a few steps.
-    """
-
-    def compile_all() -> None:
-        os.nice(_BACKGROUND_NICENESS)
-        for job in jobs.values():
-            job()
-
-    process = _fork(compile_all)
-
-    def load() -> None:
-        if process is not None:
-            process.join()
-        for job in jobs.values():
-            job()
-
-    thread = threading.Thread(target=load, name="compile_later", daemon=True)
-    thread.start()
-    return thread
 
 
 def _marker() -> Path:

@@ -478,8 +478,7 @@ class Fleet:
 
     def _nominal_battery(self, row: int) -> float:
         key = "drive.battery_nominal_v"
-        known = "battery_nominal" in self.parameter_names
-        if known:
+        if "battery_nominal" in self.parameter_names:
             return self._parameter(row, "battery_nominal")
         return self.car.value(key) if self.car.has(key) else 0.0
 

@@ -42,8 +42,8 @@ class _KernelFunction:
     def _from_python(self) -> Callable[..., Any]:
         return cast("Callable[..., Any]", _numba.njit(**_OPTIONS)(self.py_func))
 
-    def __call__(self, *arguments: Any) -> Any:
-        return self._from_python(*arguments)
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return self._from_python(*arguments, **named)
 
     def __reduce__(self) -> str:
         return self.py_func.__qualname__

@@ -23,7 +23,8 @@ from scm.v2x.exchange import Keep, Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
-from scm.vehicles.cold_start import compile_together
+from scm.vehicles.car import car_names as all_car_names
+from scm.vehicles.cold_start import compile_together, is_first_start
 from scm.vehicles.drivers.channel import RANGE
 from scm.vehicles.drivers.driver_batch import DriverBatch
 from scm.vehicles.drivers.lane_graph import lane_graph_of
@@ -342,7 +343,8 @@ class World:
 
     def _compile(self, car_names: Iterable[str], scanner: Sensor, walls: WallGrid) -> None:
         """Compile or load now all that a tick calls, so that no car waits for it later."""
-        names = tuple(car_names)
+        others = all_car_names() if is_first_start() else ()
+        names = tuple(dict.fromkeys((*car_names, *others)))
         for name in (DEFAULT_CAR, *names):
             self.garage.car(name)  # read once, and not in each process
         compile_together(

@@ -243,7 +243,7 @@ from scm.clock import WallClock
 from scm.runtime.supervisor import Job, Supervisor
 toy, endpoint = sys.argv[1:]
 command = [sys.executable, toy, "orphan", endpoint]
-Supervisor([Job("orphan", "part", "", lambda: command)], WallClock(), print).look()
+Supervisor([Job("orphan", "part", "", lambda: command)], WallClock(), print).poll()
 threading.Event().wait()
 """
 

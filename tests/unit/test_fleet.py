@@ -149,7 +149,7 @@ def test_a_live_script_loses_no_arrival_among_other_cars_reports(live: Router) -
         others, heard = Mailbox(10_000), 0
         bus.subscribe(Trip, {"vehicle": "other"}, others)
         other = trip("other", "other-1")
-        assert link.run_until(lambda: n.publish(other) or bool(others.take()), 60.0)
+        assert link.run_until(lambda: n.publish(other) or bool(others.drain()), 60.0)
         for journey in journeys:
             n.publish(trip(journey.vehicle, journey.trip_id, arrived_ns=3_000_000_000))
         for _ in range(1200):
@@ -157,7 +157,7 @@ def test_a_live_script_loses_no_arrival_among_other_cars_reports(live: Router) -
 
         def all_heard() -> bool:
             nonlocal heard
-            heard += len(others.take())
+            heard += len(others.drain())
             return heard >= 1200
 
         assert link.run_until(all_heard, 60.0)

@@ -113,7 +113,8 @@ def _path(room: Frame, residual: Residual, values: Floats, bound: float) -> Iter
     first = int(np.argmax(known))
     across, up = room.across.at(float(x[first])), room.up.at(float(y[first]))
     yield element("circle", cx=f"{across:.1f}", cy=f"{up:.1f}", r="4", class_="start")
-    yield text(across + 7, up - 6, "start")
+    left_half = across < 0.5 * (room.left + room.right)
+    yield text(across + (7 if left_half else -7), up - 6, "start", "start" if left_half else "end")
 
 
 def _runs(kinds: Ints, joined: Bools, kind: int) -> Iterator[tuple[int, int]]:

@@ -356,15 +356,9 @@ class Controller:
 
     def _view(self, now_ns: int, dt_ns: int, observations: Observations) -> JunctionView:
         return JunctionView(
-            now_ns,
-            dt_ns,
-            self._state,
-            observations.detectors,
-            observations.sees,
-            self.overrides,
-            observations.priority,
-            self._timetables.requested(now_ns),
-        )
+            now_ns, dt_ns, self._state, observations.detectors, observations.sees, self.overrides,
+            observations.priority, self._timetables.requested(now_ns),
+        )  # fmt: skip
 
     def _foresee(self, now_ns: int, observations: Observations) -> None:
         """Update when the present colours will likely end, by timetable or policy."""

@@ -109,15 +109,9 @@ def decide(
         back = max(MIN_PREVIEW, 0.5 * rolling * kind[SWING])
         front = kind[FRONT]
         count, here, ends = list_segments(
-            lanes.segment_first,
-            lanes.segments,
-            lane_window,
-            floats[S],
-            back,
-            front + REACH,
-            ids,
-            begins,
-        )
+            lanes.segment_first, lanes.segments, lane_window, floats[S], back, front + REACH,
+            ids, begins,
+        )  # fmt: skip
         found = find_cars_ahead(
             lanes.segments, received, scratch, kind, car, count, REACH, now_ns, seed
         )

@@ -120,7 +120,7 @@ class Line:
         while self._now_ns < now_ns:
             self._now_ns += LINE_NS
             frames = self.host.receive(self._back, self._now_ns)
-            frames += self.host.on_progress(self.wish, self._now_ns)
+            frames += self.host.frames_due(self.wish, self._now_ns)
             if said := self.host.commanded:
                 self._written.append(Written(self._now_ns, said.throttle, said.steering))
             self._back = self.board.step(self._now_ns, b"".join(frames))

@@ -25,6 +25,7 @@ def test_the_sample_s_steering_trim_is_found_and_its_report_is_true(
     confirm = found.fit.confirm
     assert confirm.after["position_m"] < 0.1 * confirm.before["position_m"]
     write(searched, tmp_path)
-    figures = check_report(tmp_path, list(searched.searched.recordings))
+    assert searched.selected is not None
+    figures = check_report(tmp_path, searched.selected.recordings)
     assert figures
     assert [figure for figure in figures if not figure.agrees] == []

@@ -70,11 +70,6 @@ def test_an_error_of_a_job_is_raised_here_and_the_start_stays_the_first(log):
     assert cold_start.is_first_start()
 
 
-def test_jobs_for_later_are_compiled_in_a_fork_and_then_loaded_in_a_thread(log):
-    cold_start.compile_later({"a": log.job("a")}).join(10.0)
-    assert log.lines() == ["a fork", "a here"]
-
-
 def test_what_is_compiled_is_logged(log, caplog):
     with caplog.at_level("INFO"):
         cold_start.compile_together({"drivers": log.job("a"), "LIDAR": log.job("b")})
