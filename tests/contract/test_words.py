@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -20,6 +21,7 @@ STANDARD = {
 PUBLISHED = ("scm/client/nouns",)  # written from the interface: methods carry its operation ids
 
 
+@cache
 def retired() -> set[str]:
     """Return the words of the first column of the glossary's table."""
     table = GLOSSARY.read_text(encoding="utf-8").split("## Retired words")[1]
