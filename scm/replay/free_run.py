@@ -192,8 +192,8 @@ def free_run(
     after = at - replay.drive.edges[begun[0]][:, None]
     yaw = np.unwrap(runs["yaw"], axis=0)
     x, y, psi, speed = (
-        np.stack([at_times(signal, after[None, :, k])[0] for k in range(len(t_s))], axis=1)[ok]
-        for signal in (runs["x"], runs["y"], yaw, runs["speed"])
+        np.stack([at_times(variable, after[None, :, k])[0] for k in range(len(t_s))], axis=1)[ok]
+        for variable in (runs["x"], runs["y"], yaw, runs["speed"])
     )
     measured = replay.camera.motion(at[ok].ravel())
     return FreeRun(

@@ -17,7 +17,7 @@ NEUTRAL: Mapping[str, float] = {
     "measure.accel_bias_x_m_s2": 0.0, "measure.accel_bias_y_m_s2": 0.0,
     "measure.imu_angle_rad": 0.0,
 }  # fmt: skip
-SIGNALS = (
+MOTION_VARIABLES = (
     "speed", "lateral_speed", "yaw_rate", "accel_x", "accel_y", "steer_angle",
     "wheel_angle.fl", "wheel_angle.fr", "wheel_angle.rl", "wheel_angle.rr",
 )  # fmt: skip

@@ -15,7 +15,7 @@ from scm.replay.camera import Camera, Moved
 from scm.replay.drive import RUN_IN_S, STEP_S, Drive
 from scm.replay.numbers import (
     COMMAND_CLOCK,
-    SIGNALS,
+    MOTION_VARIABLES,
     STEERING_DELAY,
     TETHER_STEPS,
     THROTTLE_CLOCK,
@@ -26,7 +26,7 @@ from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet, VehicleStatus
 
 BEYOND_STEPS = 3  # behind the last edge, for which commands hold
-RECORDED_STATES = ("x", "y", *SIGNALS, "yaw")
+RECORDED_STATES = ("x", "y", *MOTION_VARIABLES, "yaw")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,15 +50,15 @@ class Runs:
     """What the sides did in their windows.
 
     Attributes:
-        signals: (steps + 1, sides, windows).
+        variables: (steps + 1, sides, windows).
         ok: Whether the car stayed within physical bounds, (sides, windows).
     """
 
-    signals: Mapping[str, Floats]
+    variables: Mapping[str, Floats]
     ok: Bools
 
     def __getitem__(self, name: str) -> Floats:
-        return self.signals[name]
+        return self.variables[name]
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,14 +201,14 @@ class Windows:
             wide[:, :, rows] = command[:, run_in + at[i]]
         first = {name: _signal(fleet, name)[leaders:] for name in RECORDED_STATES}
         got = self._rolled(fleet, wide, starts.ravel(), leaders)
-        signals = {
+        variables = {
             name: np.concatenate((first[name][None], got[name][:, leaders:])).reshape(
                 steps + 1, sides, windows
             )
             for name in RECORDED_STATES
         }
         ok = fleet.status[leaders:].reshape(sides, windows) == VehicleStatus.OK
-        return Runs(signals, ok)
+        return Runs(variables, ok)
 
     def _rolled(self, fleet: Fleet, wide: Floats, starts: Ints, leaders: int) -> dict[str, Floats]:
         """Drive all windows through their commands, at the voltage measured meanwhile."""
@@ -223,12 +223,12 @@ class Windows:
         return {name: np.concatenate([part[name] for part in parts]) for name in RECORDED_STATES}
 
 
-def at_times(signal: Floats, since: Floats) -> Floats:
-    """Return signals (steps + 1, sides, windows) at times since the start, (sides, windows)."""
+def at_times(variable: Floats, since: Floats) -> Floats:
+    """Return variables (steps + 1, sides, windows) at times since the start, (sides, windows)."""
     at = since / STEP_S
-    row = np.clip(at.astype(np.int64), 0, len(signal) - 2)
-    low = np.take_along_axis(signal, row[None], axis=0)[0]
-    high = np.take_along_axis(signal, row[None] + 1, axis=0)[0]
+    row = np.clip(at.astype(np.int64), 0, len(variable) - 2)
+    low = np.take_along_axis(variable, row[None], axis=0)[0]
+    high = np.take_along_axis(variable, row[None] + 1, axis=0)[0]
     return np.asarray(low + (at - row) * (high - low))
 
 
@@ -239,7 +239,7 @@ def _place(fleet: Fleet, row: int, moved: Moved, i: int) -> None:
 
 
 def _signal(fleet: Fleet, name: str) -> Floats:
-    """Return a copy of a signal as it is now, (capacity,)."""
+    """Return a copy of a variable as it is now, (capacity,)."""
     if "." not in name:
         return np.array(getattr(fleet, name))
     whole, wheel = name.split(".")

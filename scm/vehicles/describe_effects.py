@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from scm.errors import TermError, nearest
 from scm.vehicles.car import all_terms
 from scm.vehicles.param import Param
-from scm.vehicles.physics_variables import SIGNALS
+from scm.vehicles.physics_variables import VARIABLES
 from scm.vehicles.sensor_fault import SensorFault, all_sensor_faults
 from scm.vehicles.term import Term, flat, reads
 
@@ -109,12 +109,12 @@ def _lines(effects: Sequence[Effect], width: int) -> Iterator[str]:
 
 def _reads(term: Term) -> str:
     functions = [f for part in flat([term]) for f in (part.function, part.damping) if f]
-    names = dict.fromkeys(name for f in functions for name in reads(f) if name in SIGNALS)
+    names = dict.fromkeys(name for f in functions for name in reads(f) if name in VARIABLES)
     return ", ".join(names) or "only its own numbers"
 
 
 def _acts_on(term: Term) -> str:
-    return "; ".join(f"{t.target} ({SIGNALS[t.target].about})" for t in flat([term]))
+    return "; ".join(f"{t.target} ({VARIABLES[t.target].about})" for t in flat([term]))
 
 
 def _table(params: Sequence[Param], neutral: dict[str, float]) -> Iterator[str]:

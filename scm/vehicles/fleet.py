@@ -34,7 +34,7 @@ from scm.vehicles.fleet_rows import (
 )  # fmt: skip
 from scm.vehicles.jit import plain
 from scm.vehicles.layout import columns_of, find_column, rows_of
-from scm.vehicles.physics_variables import SIGNALS
+from scm.vehicles.physics_variables import VARIABLES
 from scm.vehicles.shape import Shape, shape_of
 from scm.vehicles.term import reads
 
@@ -234,7 +234,7 @@ class Fleet:
         at_rest = {"steer": steer_angle, "throttle": throttle}
         for term in self.car.terms:
             if term.keeps is not None:
-                start = at_rest.get(SIGNALS[term.target].starts_at)
+                start = at_rest.get(VARIABLES[term.target].starts_at)
                 self._set(row, term.target, start or term.keeps)
         self._set(row, "steer_angle", steer_angle or 0.0)
         for name in actuators if keep_actuators else ():
@@ -331,7 +331,7 @@ class Fleet:
         throttle: Floats,
         steering: Floats,
         step_s: float,
-        signals: Sequence[str] = ("x", "y", "yaw", "speed"),
+        variables: Sequence[str] = ("x", "y", "yaw", "speed"),
         substep: float = SUBSTEP_S,
     ) -> dict[str, Floats]:
         """Simulate all cars with recorded commands in one call, each with its own numbers.
@@ -340,11 +340,11 @@ class Fleet:
             throttle: Commands at the start of each step, (T,), or (T, capacity) for each car.
             steering: Likewise.
             step_s: Length of one step of the recording [s], in whole substeps.
-            signals: Names of the results; one wheel as `wheel_angle.rl`.
+            variables: Names of the results; one wheel as `wheel_angle.rl`.
             substep: Length of a substep [s].
 
         Returns:
-            Each signal after every step, (T, capacity).
+            Each variable after every step, (T, capacity).
 
         Raises:
             RunError: when shapes or steps do not fit, or a name is unknown.
@@ -353,7 +353,7 @@ class Fleet:
         if len(commands[0]) != len(commands[1]):
             msg = f"{len(commands[0])} throttles and {len(commands[1])} steerings: expected as many"
             raise RunError(msg)
-        offsets = np.array([self._offset_of(name) for name in signals], dtype=np.int64)
+        offsets = np.array([self._offset_of(name) for name in variables], dtype=np.int64)
         out = np.zeros((len(commands[0]), len(offsets), self._alive.size))
         steps = steps_of(step_s, substep)
         if self._history is None:
@@ -367,7 +367,7 @@ class Fleet:
                 self.throttle[:], self.steering[:] = now
                 self._run(0, self.capacity, steps, substep)
                 out[t] = self._block[offsets]
-        return {name: out[:, k, : self.capacity] for k, name in enumerate(signals)}
+        return {name: out[:, k, : self.capacity] for k, name in enumerate(variables)}
 
     def pose(self, row: int) -> Pose2:
         """Return the rear axle's pose in the world."""
@@ -469,7 +469,7 @@ class Fleet:
     def _offset_of(self, name: str) -> int:
         if name not in self._variable_offsets:
             hint = nearest(name, sorted(self._variable_offsets))
-            msg = f"rollout: {name!r} is no signal of each car{hint}"
+            msg = f"rollout: {name!r} is no variable of each car{hint}"
             raise RunError(msg)
         return self._variable_offsets[name]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from scm.errors import TermError, nearest
 from scm.vehicles import body14
 from scm.vehicles.param import Param
-from scm.vehicles.physics_variables import SIGNALS, Per
+from scm.vehicles.physics_variables import VARIABLES, Per
 from scm.vehicles.term import Term
 
 
@@ -32,7 +32,7 @@ def columns_of(terms: Sequence[Term]) -> tuple[Column, ...]:
         for param in term.params:
             found.setdefault(param.key, (term.name, param))
     uses = Counter(param.name for _, param in found.values())
-    uses.update(SIGNALS.keys())
+    uses.update(VARIABLES.keys())
     return tuple(
         Column(f"{term}.{param.name}" if term and uses[param.name] > 1 else param.name, term, param)
         for term, param in found.values()

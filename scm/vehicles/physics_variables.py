@@ -27,7 +27,7 @@ class Role(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Signal:
+class Variable:
     """One variable.
 
     Attributes:
@@ -46,12 +46,12 @@ class Signal:
     starts_at: str = ""
 
 
-def _body(name: str, unit: str, role: Role, about: str, **more: object) -> Signal:
-    return Signal(name, unit, Per.BODY, role, about, **more)  # type: ignore[arg-type]
+def _body(name: str, unit: str, role: Role, about: str, **more: object) -> Variable:
+    return Variable(name, unit, Per.BODY, role, about, **more)  # type: ignore[arg-type]
 
 
-def _wheel(name: str, unit: str, role: Role, about: str, **more: object) -> Signal:
-    return Signal(name, unit, Per.WHEEL, role, about, **more)  # type: ignore[arg-type]
+def _wheel(name: str, unit: str, role: Role, about: str, **more: object) -> Variable:
+    return Variable(name, unit, Per.WHEEL, role, about, **more)  # type: ignore[arg-type]
 
 
 _ALL = (
@@ -484,7 +484,7 @@ _ALL = (
     _wheel("extra_inertia", "kg*m^2", Role.SUM, "turns with the wheel, beside the wheel itself"),
 )
 
-SIGNALS: dict[str, Signal] = {signal.name: signal for signal in _ALL}
+VARIABLES: dict[str, Variable] = {variable.name: variable for variable in _ALL}
 
 # What a term that `damps` is implicit in: its target falls by the damping times this rate.
 DAMPED_BY: dict[str, str] = {

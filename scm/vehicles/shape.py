@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from scm.vehicles.car import Car
 from scm.vehicles.jit import plain
-from scm.vehicles.physics_variables import SIGNALS, Role
+from scm.vehicles.physics_variables import VARIABLES, Role
 from scm.vehicles.term import reads
 
 _ADDED = {
@@ -38,7 +38,7 @@ def shape_of(car: Car, number: Callable[[str], float] | None = None) -> Shape:
     value = number or car.value
     totals = {key: value(key) for key in _ADDED.values()}
     for term in car.terms:
-        if SIGNALS[term.target].role is Role.SHAPE:
+        if VARIABLES[term.target].role is Role.SHAPE:
             keys = {param.name: param.key for param in term.params}
             more = plain(term.function)(*(value(keys[name]) for name in reads(term.function)))
             totals[_ADDED[term.target]] += more

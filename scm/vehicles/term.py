@@ -36,7 +36,7 @@ class Term:
         function: Pure function of floats, named like its file.
         per: Once a body or once a wheel.
         adds: The sum that its value is added to; exactly one of `adds` and `sets` is given.
-        sets: The signal whose value the function gives; a car has one setter for a signal.
+        sets: The variable whose value the function gives; a car has one setter for a variable.
         damping: How fast its value falls with its own rate (`DAMPED_BY`), >= 0, named
             `<function>_damping`. The skeleton is implicit in it, so stiff effects rest at 1 ms.
         keeps: The function reads the last value of what it sets: a state, this its start value.
@@ -63,7 +63,9 @@ class Term:
 
     def __post_init__(self) -> None:
         if (self.adds is None) == (self.sets is None):
-            msg = f"{self.name}: a term either adds to a sum or sets a signal, exactly one of both"
+            msg = (
+                f"{self.name}: a term either adds to a sum or sets a variable, exactly one of both"
+            )
             raise TermError(msg)
         # further functions of a file may share the first one's: air drag falls alike both ways
         stem, suffix, _ = (self.damping or self.function).__name__.partition("_damping")
@@ -78,7 +80,7 @@ class Term:
 
     @property
     def target(self) -> str:
-        """The sum or signal that the function gives a value."""
+        """The sum or variable that the function gives a value."""
         return self.adds or self.sets or ""
 
     @property

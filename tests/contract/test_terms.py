@@ -11,7 +11,7 @@ from scm.vehicles import body14
 from scm.vehicles.car import all_terms
 from scm.vehicles.jit import plain
 from scm.vehicles.layout import columns_of
-from scm.vehicles.physics_variables import SIGNALS
+from scm.vehicles.physics_variables import VARIABLES
 from scm.vehicles.term import flat, reads
 
 FILES = all_terms()
@@ -45,11 +45,11 @@ def somewhere(draw, low, high):
 
 
 def situations(term):
-    """Draw every signal in its physical span and every parameter inside its bounds."""
+    """Draw every variable in its physical span and every parameter inside its bounds."""
     needed = {n for law in (term.function, term.damping) if law for n in reads(law)} | RATES
     if term.sets:
         needed.add(otherwise_of(term))
-    spans = {name: signal.span for name, signal in SIGNALS.items()}
+    spans = {name: variable.span for name, variable in VARIABLES.items()}
     spans |= {param.name: param.bounds for param in (*body14.PARAMS, *term.params)}
     spans |= {name: (float(name), float(name)) for name in ("0.0", "1.0")}
     draw = random.Random(term.name)
@@ -58,8 +58,8 @@ def situations(term):
 
 
 def otherwise_of(term):
-    """What the term's signal would be without it: a signal, else a number, else itself."""
-    return SIGNALS[term.target].otherwise or term.target
+    """What the term's variable would be without it: a variable, else a number, else itself."""
+    return VARIABLES[term.target].otherwise or term.target
 
 
 def undisturbed(values):
@@ -171,4 +171,4 @@ def test_all_terms_together_have_one_column_for_each_key():
     columns = columns_of(list(TERMS.values()))
     assert len({column.name for column in columns}) == len(columns)
     assert len({column.variable for column in columns}) == len(columns)
-    assert not {column.variable for column in columns} & set(SIGNALS)
+    assert not {column.variable for column in columns} & set(VARIABLES)

@@ -23,7 +23,7 @@ class Channel:
         numbers: Of the general effect, from the parameters' values.
         sentence: The sentence's beginning; braces take the parameters.
         formula: Of the effect; braces take the parameters, `{g}` the curve.
-        text: Of the written effect, by the sum or signal it acts on; `g` is the curve.
+        text: Of the written effect, by the sum or variable it acts on; `g` is the curve.
     """
 
     word: str
@@ -42,16 +42,16 @@ class Written:
 
     Attributes:
         target: `adds force_x` or `sets steer_trimmed`.
-        signals: It reads, beside the curve's.
+        variables: It reads, beside the curve's.
         returns: The expression.
         about: What it returns.
         suffix: Of the function's name.
         per: Once a body or once a wheel.
-        keeps: Where the signal starts that it sets from its own last value; None: it has no past.
+        keeps: Where the variable starts that it sets from its own last value; None: it has no past.
     """
 
     target: str
-    signals: tuple[str, ...]
+    variables: tuple[str, ...]
     returns: str
     about: str
     suffix: str = ""
@@ -66,9 +66,9 @@ class Curve:
     Attributes:
         word: What it depends on, as reported.
         numbers: Of the general effect, from the parameters' values.
-        text: Line that gives `g` from `signals` and the parameters.
+        text: Line that gives `g` from `variables` and the parameters.
         rare: What it must gain beyond others: it looks like something simpler.
-        also: A signal that it reads and no car has.
+        also: A variable that it reads and no car has.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Curve:
     numbers: ToNumbers
     sentence: str
     formula: str
-    signals: tuple[str, ...]
+    variables: tuple[str, ...]
     text: str
     equation: Equation | None = None
     rare: float = 0.0

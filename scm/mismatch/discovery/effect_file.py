@@ -22,7 +22,7 @@ _WITH = {
     "sets steer_trimmed": ("offset", f'0.0, "rad", "{TRIM}", (-0.3, 0.3), "trim, + left"'),
     "sets steer_scaled": ("gain", f'1.0, "1", "{GAIN}", (0.2, 2.0), "gain of the steering"'),
 }
-"""What a signal's own effect does, by target: the function that takes its place does it too."""
+"""What a variable's own effect does, by target: the function that takes its place does it too."""
 
 
 def file_name(effect: DictionaryEffect) -> str:
@@ -131,8 +131,8 @@ def _param(effect: DictionaryEffect, p: Parameter) -> str:
 def _function(effect: DictionaryEffect, part: Written) -> str:
     curve = f"{effect.curve.text}\n" if part.keeps is None else ""
     body, names = _straight(f"{curve}result = {part.returns}")
-    signals = [s for s in dict.fromkeys((*part.signals, *effect.curve.signals)) if s in names]
-    arguments = [*signals, *(k.name for k in effect.parameters if k.name in names)]
+    variables = [s for s in dict.fromkeys((*part.variables, *effect.curve.variables)) if s in names]
+    arguments = [*variables, *(k.name for k in effect.parameters if k.name in names)]
     arguments += [_WITH[part.target][0]] if part.target in _WITH else []
     wrapped = textwrap.wrap(", ".join(f"{a}: float" for a in arguments) + ",", _WIDE - 4)
     *lines, last = body

@@ -15,7 +15,7 @@ from scm.arrays import Bools, Floats, Ints
 from scm.geometry import Pose2
 from scm.replay.drive import RUN_IN_S, STEP_S, Drive
 from scm.replay.numbers import (
-    SIGNALS,
+    MOTION_VARIABLES,
     STEERING_DELAY,
     TETHER_STEPS,
     THROTTLE_CLOCK,
@@ -45,17 +45,17 @@ class Motions:
         ok: Whether the car stayed within physical bounds, (sets,).
     """
 
-    signals: Mapping[str, Floats]
+    variables: Mapping[str, Floats]
     ok: Bools
 
     def __getitem__(self, name: str) -> Floats:
-        return self.signals[name]
+        return self.variables[name]
 
     def of(self, columns: Sequence[int]) -> "Motions":
         """Return the motions in these columns, each as often as it is named."""
         if list(columns) == list(range(len(self.ok))):
             return self
-        some = {name: signal[:, columns] for name, signal in self.signals.items()}
+        some = {name: variable[:, columns] for name, variable in self.variables.items()}
         return Motions(some, self.ok[columns])
 
 
@@ -114,7 +114,9 @@ class Rollouts:
         """Drive all parameter sets; each is nominal but for the numbers it names by key."""
         parts = self.each(sets, lambda motions, which: (motions, which))
         back = np.argsort(np.concatenate([which for _, which in parts]))
-        together = {n: np.concatenate([p[n] for p, _ in parts], axis=1)[:, back] for n in SIGNALS}
+        together = {
+            n: np.concatenate([p[n] for p, _ in parts], axis=1)[:, back] for n in MOTION_VARIABLES
+        }
         return Motions(together, np.concatenate([p.ok for p, _ in parts])[back])
 
     def each(
@@ -163,8 +165,8 @@ class Rollouts:
         parts = tether.parts
         self._begin(fleet, n, delays, parts)
         changes = np.linspace(edges[0], edges[-1], parts * (len(edges) - 1) + 1)
-        out, first = np.empty((len(edges), len(SIGNALS), fleet.capacity)), _now(fleet)
-        for k, name in enumerate(SIGNALS):
+        out, first = np.empty((len(edges), len(MOTION_VARIABLES), fleet.capacity)), _now(fleet)
+        for k, name in enumerate(MOTION_VARIABLES):
             out[0, k] = first[name]
         tether.roll(n, out[:0], self._turned[0])
         for a in range(0, len(edges) - 1, TETHER_STEPS):
@@ -177,7 +179,7 @@ class Rollouts:
                 tether.carry(n, self._x[b], self._y[b], self._yaw[b])
             tether.roll(n, out[a + 1 : b + 1], self._turned[b])
         ok = fleet.status[:n] == VehicleStatus.OK
-        return Motions({name: out[:, k, :n] for k, name in enumerate(SIGNALS)}, ok)
+        return Motions({name: out[:, k, :n] for k, name in enumerate(MOTION_VARIABLES)}, ok)
 
     def _set(self, fleet: Fleet, columns: Mapping[str, int], sets: Sequence[Numbers]) -> Floats:
         """Give each row its numbers; return the commands' delays, (2, rows)."""
@@ -227,7 +229,7 @@ class _Tether:
         self._kernel, places = fleet._kernel, fleet._offsets  # noqa: SLF001 its innermost loop
         self._state = (fleet._block, fleet._numbers, fleet._alive, fleet._status)  # noqa: SLF001
         self._cog = np.array([places[n][0] for n in (*COG, "x", "y")], dtype=np.int64)
-        self._saved = np.array([fleet._offset_of(n) for n in SIGNALS])  # noqa: SLF001
+        self._saved = np.array([fleet._offset_of(n) for n in MOTION_VARIABLES])  # noqa: SLF001
         self._remembers = fleet._history is not None  # noqa: SLF001
         self.parts = REMEMBERED if self._remembers else COMMANDED
         self._steps = whole_steps(STEP_S / self.parts, SUBSTEP_S)
@@ -235,10 +237,10 @@ class _Tether:
         self._moved = np.zeros((4, fleet.capacity))
 
     def rollout(self, throttle: Floats, steering: Floats, out: Floats) -> None:
-        """Drive all rows through commands, (parts, rows); write steps' signals."""
+        """Drive all rows through commands, (parts, rows); write steps' variables."""
         if self._remembers:
-            got = self._fleet.rollout(throttle, steering, STEP_S / self.parts, SIGNALS)
-            for k, name in enumerate(SIGNALS):
+            got = self._fleet.rollout(throttle, steering, STEP_S / self.parts, MOTION_VARIABLES)
+            for k, name in enumerate(MOTION_VARIABLES):
                 out[:, k] = got[name][self.parts - 1 :: self.parts]
             return
         self._kernel.rollout(
@@ -255,7 +257,7 @@ class _Tether:
     def roll(self, n: int, out: Floats, turned: Floats) -> None:
         """Turn the first rows' wheels as far as measured, left and right [rad].
 
-        Only where an effect depends on it. Steps' signals, `out`, go on as if nothing had been.
+        Only where an effect depends on it. Steps' variables, `out`, go on as if nothing had been.
         """
         if not self._by_turn:
             return
@@ -288,6 +290,6 @@ def _carry(
 
 
 def _now(fleet: Fleet) -> dict[str, Floats]:
-    """Return every signal of a fleet's cars as they are."""
+    """Return every variable of a fleet's cars as they are."""
     wheel = dict(zip(WHEELS, fleet.wheel_angle.T, strict=True))
-    return {s: wheel[s[-2:]] if "." in s else getattr(fleet, s) for s in SIGNALS}
+    return {s: wheel[s[-2:]] if "." in s else getattr(fleet, s) for s in MOTION_VARIABLES}

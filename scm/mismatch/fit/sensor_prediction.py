@@ -21,18 +21,18 @@ _POSE = (*_LATE, "measure.clock_rate", "measure.pose_scale", "measure.camera_til
 
 
 class _Taps:
-    """Takes signals given on a grid at a stream's sample times, by straight lines between."""
+    """Takes variables given on a grid at a stream's sample times, by straight lines between."""
 
     def __init__(self, stream: Stream, edges: Floats) -> None:
         self._at = (stream.taps - edges[0]) / STEP_S
 
-    def __call__(self, signal: Floats, late_s: Floats) -> Floats:
-        """Return means over the taps of a signal (edges, sets): (samples, sets).
+    def __call__(self, variable: Floats, late_s: Floats) -> Floats:
+        """Return means over the taps of a variable (edges, sets): (samples, sets).
 
         `late_s` says by how much each set's car does everything later, (sets,).
         """
         sampled = np.empty((len(self._at), len(late_s)))
-        _tapped(self._at, late_s / STEP_S, signal, sampled)
+        _tapped(self._at, late_s / STEP_S, variable, sampled)
         return sampled
 
 
@@ -57,8 +57,8 @@ class Prediction:
         for stream in self.drive.streams:
             predicted = path.get(stream.name)
             if predicted is None:
-                signal = self.sensor(stream.name, motions, now)
-                predicted = self._taps[stream.name](signal, now[COMMAND_CLOCK])
+                variable = self.sensor(stream.name, motions, now)
+                predicted = self._taps[stream.name](variable, now[COMMAND_CLOCK])
             found.append(stream.values[:, None] - predicted)
         return found
 
@@ -84,10 +84,10 @@ class Prediction:
             np.zeros((3, len(late))), way,
         )  # fmt: skip
         found = {}
-        for name, signal in zip(POSES, way, strict=True):
+        for name, variable in zip(POSES, way, strict=True):
             t = drive.stream(name).t
             found[name] = np.empty((len(t), len(late)))
-            _seen_late(edges, t, late, rate, faulty, signal, found[name])
+            _seen_late(edges, t, late, rate, faulty, variable, found[name])
         return found
 
     def sensor(self, name: str, motions: Motions, now: Mapping[str, Floats]) -> Floats:
@@ -107,21 +107,21 @@ class Prediction:
         if name.startswith("wheel_speed."):
             return counted * np.gradient(motions[f"wheel_angle.{name[-2:]}"], STEP_S, axis=0)
         plain = {"speed": "speed", "velocity.x": "speed", "velocity.y": "lateral_speed"}
-        signal = motions[plain.get(name, "yaw_rate")]
-        return now["measure.speed_scale"] * signal if name == "speed" else signal
+        variable = motions[plain.get(name, "yaw_rate")]
+        return now["measure.speed_scale"] * variable if name == "speed" else variable
 
 
 @array_kernel
-def _tapped(at: Floats, late: Floats, signal: Floats, out: Floats) -> None:
-    """Take a signal (edges, sets) at places between its edges, each set as many steps late."""
-    last = len(signal) - 2
+def _tapped(at: Floats, late: Floats, variable: Floats, out: Floats) -> None:
+    """Take a variable (edges, sets) at places between its edges, each set as many steps late."""
+    last = len(variable) - 2
     for k in range(len(at)):
         for b in range(len(late)):
             total = 0.0
             for j in range(at.shape[1]):
                 place = at[k, j] - late[b]
                 i = min(max(int(place), 0), last)
-                total += signal[i, b] + (place - i) * (signal[i + 1, b] - signal[i, b])
+                total += variable[i, b] + (place - i) * (variable[i + 1, b] - variable[i, b])
             out[k, b] = total / at.shape[1]
 
 
@@ -188,10 +188,10 @@ def _measured(stamp: float, i: int, t: Floats, values: Floats, rates: Floats, ou
 
 @array_kernel
 def _seen_late(
-    edges: Floats, t: Floats, late: Floats, rate: Floats, faulty: Bools, signal: Floats,
+    edges: Floats, t: Floats, late: Floats, rate: Floats, faulty: Bools, variable: Floats,
     out: Floats,
 ) -> None:  # fmt: skip
-    """Take a signal (edges, sets) at stamps `t` of cameras with clocks of their own."""
+    """Take a variable (edges, sets) at stamps `t` of cameras with clocks of their own."""
     first, final = edges[0], edges[len(edges) - 1]
     step = edges[1] - edges[0]
     for k in range(len(t)):
@@ -201,4 +201,4 @@ def _seen_late(
                 true = min(max(true, first), final)
             at = (true - first) / step
             i = min(max(int(at), 0), len(edges) - 2)
-            out[k, b] = signal[i, b] + (at - i) * (signal[i + 1, b] - signal[i, b])
+            out[k, b] = variable[i, b] + (at - i) * (variable[i + 1, b] - variable[i, b])

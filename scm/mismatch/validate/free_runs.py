@@ -39,9 +39,9 @@ def sensor_errors(
     car file states are part of what it predicts.
     """
     prediction, radius = Prediction(drive), drive.car.value("wheel.radius_m")
-    shape = (len(next(iter(runs.signals.values()))), -1)
+    shape = (len(next(iter(runs.variables.values()))), -1)
     motions = Motions(
-        {k: v.reshape(shape) for k, v in runs.signals.items()}, runs.ok.ravel().astype(np.float64)
+        {k: v.reshape(shape) for k, v in runs.variables.items()}, runs.ok.ravel().astype(np.float64)
     )
     faults = {
         key: np.full(starts.size, drive.car.value(key) if drive.car.has(key) else neutral)
@@ -51,17 +51,17 @@ def sensor_errors(
     for stream in drive.streams:
         if stream.name.startswith("pose."):
             continue
-        signal = prediction.sensor(stream.name, motions, faults).reshape(-1, *starts.shape)
+        variable = prediction.sensor(stream.name, motions, faults).reshape(-1, *starts.shape)
         name, per_unit, kind = _channel(stream.name, drive, radius)
         first = since[1] - END_S if kind == "end" else since[0]
         length = since[1] - first
         seen = _sums(stream, begin + first, begin + since[1], kind)
         if kind == "count":
-            meant = at_times(signal, since[1]) - at_times(signal, first)
+            meant = at_times(variable, since[1]) - at_times(variable, first)
             variance = 2.0 * stream.std**2
         else:
-            total = np.zeros_like(signal)
-            np.cumsum(0.5 * STEP_S * (signal[1:] + signal[:-1]), axis=0, out=total[1:])
+            total = np.zeros_like(variable)
+            np.cumsum(0.5 * STEP_S * (variable[1:] + variable[:-1]), axis=0, out=total[1:])
             meant = at_times(total, since[1]) - at_times(total, first)
             pace = float(np.median(np.diff(stream.t)))
             variance = stream.std**2 * pace * float(length.mean())
@@ -269,13 +269,15 @@ def _driven(replay: Replay, starts: Floats, t_s: Floats, cameras: Sequence[Camer
     at = replay.true_times((starts[:, None] + t_s).ravel()).reshape(len(starts), -1)
     edges = replay.drive.edges[begun[0]]
     seen = [camera.motion(at.ravel()) for camera in (replay.camera, *cameras)]
-    signals = {"x": runs["x"], "y": runs["y"], "yaw": np.unwrap(runs["yaw"], axis=0)}
+    variables = {"x": runs["x"], "y": runs["y"], "yaw": np.unwrap(runs["yaw"], axis=0)}
     apart, sides = dict[str, Floats](), len(seen)
-    for name, signal in signals.items():
-        driven = np.stack([at_times(signal, np.tile(t - edges, (sides, 1))) for t in at.T], axis=2)
+    for name, variable in variables.items():
+        driven = np.stack(
+            [at_times(variable, np.tile(t - edges, (sides, 1))) for t in at.T], axis=2
+        )
         real = np.stack([getattr(moved, name).reshape(at.shape) for moved in seen])
         apart[name] = driven - real
-    measured = {name: getattr(seen[0], name).reshape(at.shape) for name in signals}
+    measured = {name: getattr(seen[0], name).reshape(at.shape) for name in variables}
     since = (np.tile(at[:, 0] - edges, (sides, 1)), np.tile(at[:, -1] - edges, (sides, 1)))
     ok: Bools = np.asarray(runs.ok.all(axis=0), dtype=np.bool_)
     found = list(sensor_errors(replay.drive, runs, begun, since))

@@ -16,7 +16,7 @@ from scm.vehicles.compiler.print_plain import print_plain
 from scm.vehicles.compiler.print_tiles import print_tiles
 from scm.vehicles.compiler.program import Program, Stage
 from scm.vehicles.layout import columns_of, rows_of, states_of
-from scm.vehicles.physics_variables import DAMPED_BY, SIGNALS, Per, Role
+from scm.vehicles.physics_variables import DAMPED_BY, VARIABLES, Per, Role
 from scm.vehicles.term import Function, Term, reads
 
 # the skeleton's own steps between the terms: what each gives, needs and says
@@ -29,7 +29,7 @@ _SKELETON = {param.name for param in body14.PARAMS}
 
 
 def setters_of(terms: Sequence[Term]) -> dict[str, Term]:
-    """Return which term sets which signal.
+    """Return which term sets which variable.
 
     Raises:
         TermError: naming every unknown name, double setter and missing setter at once.
@@ -42,9 +42,9 @@ def setters_of(terms: Sequence[Term]) -> dict[str, Term]:
             first = setters.setdefault(term.sets, term)
             if first is not term:
                 problems.append(f"{first.name} and {term.name} both set {term.sets}")
-    for signal in SIGNALS.values():
-        if signal.role is Role.CHAIN and not signal.otherwise and signal.name not in setters:
-            problems.append(f"no term sets {signal.name} ({signal.about})")
+    for variable in VARIABLES.values():
+        if variable.role is Role.CHAIN and not variable.otherwise and variable.name not in setters:
+            problems.append(f"no term sets {variable.name} ({variable.about})")
     if problems:
         raise TermError("; ".join(problems))
     return setters
@@ -52,21 +52,21 @@ def setters_of(terms: Sequence[Term]) -> dict[str, Term]:
 
 def _problems(term: Term) -> Iterator[str]:
     own = {param.name for param in term.params}
-    known = [*own, *_SKELETON, *SIGNALS]
+    known = [*own, *_SKELETON, *VARIABLES]
     for function in (term.function, term.damping):
         for name in reads(function) if function else ():
             if name not in known:
                 yield f"{term.name} reads {name!r}, which nothing provides{nearest(name, known)}"
-            elif term.per is Per.BODY and name in SIGNALS and SIGNALS[name].per is Per.WHEEL:
+            elif term.per is Per.BODY and name in VARIABLES and VARIABLES[name].per is Per.WHEEL:
                 yield f"{term.name} is once a body and cannot read {name}, which each wheel has"
-    target = SIGNALS.get(term.target)
+    target = VARIABLES.get(term.target)
     wanted = (Role.SUM, Role.SHAPE) if term.adds else (Role.CHAIN,)
     if target is None or target.role not in wanted or target.per is not term.per:
         names = [
-            signal.name
+            variable.name
             for role in wanted
-            for signal in SIGNALS.values()
-            if signal.role is role and signal.per is term.per
+            for variable in VARIABLES.values()
+            if variable.role is role and variable.per is term.per
         ]
         yield f"{term.name}: {term.target!r} is no such {wanted[0].value} of each {term.per.value}"
         yield f"expected one of {', '.join(names)}"
@@ -75,11 +75,11 @@ def _problems(term: Term) -> Iterator[str]:
 
 
 def _order(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> list[str]:
-    """Return a stage's terms, chain signals and own steps in an order that can be computed."""
+    """Return a stage's terms, chain variables and own steps in an order that can be computed."""
     graph: dict[str, set[str]] = {}
-    chain = {s.name: s for s in SIGNALS.values() if s.role is Role.CHAIN and s.per is per}
-    for name, signal in chain.items():
-        source = setters[name].name if name in setters else signal.otherwise or ""
+    chain = {s.name: s for s in VARIABLES.values() if s.role is Role.CHAIN and s.per is per}
+    for name, variable in chain.items():
+        source = setters[name].name if name in setters else variable.otherwise or ""
         known = source in chain or source in _NODES[per] or name in setters
         graph[name] = {source} if known else set()
     for term in _running(terms, per):
@@ -109,7 +109,7 @@ def _order(terms: Sequence[Term], per: Per, setters: dict[str, Term]) -> list[st
 
 def _running(terms: Sequence[Term], per: Per) -> list[Term]:
     """Return the terms of a stage that act in every substep."""
-    shapes = {signal.name for signal in SIGNALS.values() if signal.role is Role.SHAPE}
+    shapes = {variable.name for variable in VARIABLES.values() if variable.role is Role.SHAPE}
     return [term for term in terms if term.per is per and term.target not in shapes]
 
 
@@ -119,10 +119,10 @@ class _Writer:
     def __init__(self, terms: Sequence[Term]) -> None:
         self.terms, self.setters = terms, setters_of(terms)
         self.own = {c.param.key: c.variable for c in columns_of(terms)}
-        self.names = {t.name: f"{t.name}_" if t.name in SIGNALS else t.name for t in terms}
+        self.names = {t.name: f"{t.name}_" if t.name in VARIABLES else t.name for t in terms}
         own = (f"{name}{end}" for name in self.names.values() for end in ("", "_damping"))
         self.term_lines: set[str] = set()
-        self.inliner = Inliner({*SIGNALS, *substep.NAMES, *self.own.values(), *own})
+        self.inliner = Inliner({*VARIABLES, *substep.NAMES, *self.own.values(), *own})
         self.scope: Functions = {**vars(body14), **vars(lane_math)}
 
     def text(self, text: str) -> list[Line]:
@@ -142,12 +142,12 @@ class _Writer:
         lines: list[Line] = []
         damps = role is Role.SUM
         self.term_lines.update(DAMPED_BY, (f"{name}_damping" for name in DAMPED_BY))
-        for signal in SIGNALS.values():
-            if signal.role is role and signal.per is per:
-                mine = sorted((t for t in terms if t.adds == signal.name), key=lambda t: t.name)
+        for variable in VARIABLES.values():
+            if variable.role is role and variable.per is per:
+                mine = sorted((t for t in terms if t.adds == variable.name), key=lambda t: t.name)
                 damped = [f"{term.name}_damping" for term in mine if term.damping]
-                lines += self.text(f"{signal.name} = {_sum([self.names[t.name] for t in mine])}")
-                lines += self.text(f"{signal.name}_damping = {_sum(damped)}" if damps else "")
+                lines += self.text(f"{variable.name} = {_sum([self.names[t.name] for t in mine])}")
+                lines += self.text(f"{variable.name}_damping = {_sum(damped)}" if damps else "")
         return lines
 
     def stage(self, per: Per) -> list[Line]:
@@ -164,8 +164,8 @@ class _Writer:
                 if term.damping is not None:
                     lines += self.value(term, term.damping, f"{term.name}_damping")
             elif name not in self.setters:
-                lines += self.text(f"{name} = {SIGNALS[name].otherwise}")
-        for name in (n for n in DAMPED_BY if n in self.setters and SIGNALS[n].per is per):
+                lines += self.text(f"{name} = {VARIABLES[name].otherwise}")
+        for name in (n for n in DAMPED_BY if n in self.setters and VARIABLES[n].per is per):
             damped = self.setters[name].damping is not None
             value = f"{self.setters[name].name}_damping" if damped else "0.0"
             lines += self.text(f"{name}_damping = {value}")
@@ -173,7 +173,7 @@ class _Writer:
 
     def start(self) -> list[Line]:
         """Write what happens once a call: commands are clipped, the car's numbers added up."""
-        shaping = [term for term in self.terms if SIGNALS[term.target].role is Role.SHAPE]
+        shaping = [term for term in self.terms if VARIABLES[term.target].role is Role.SHAPE]
         lines = [line for t in shaping for line in self.value(t, t.function, self.names[t.name])]
         return [*lines, *self.sums(shaping, Role.SHAPE, Per.BODY), *self.text(substep.START)]
 

@@ -8,7 +8,7 @@ from scm.vehicles.manual.manoeuvres import MANOEUVRES
 from scm.vehicles.manual.page_parts import equations, headings, parameter_table, story
 from scm.vehicles.manual.picture import PLOTS
 from scm.vehicles.manual.shown import DROPPED, Shown, shown_of
-from scm.vehicles.physics_variables import SIGNALS
+from scm.vehicles.physics_variables import VARIABLES
 from scm.vehicles.term import Term, flat, reads
 
 
@@ -52,11 +52,11 @@ def _other(shown: Shown) -> str:
 def _acts_on(term: Term) -> str:
     parts = []
     for part in flat([term]):
-        signal = SIGNALS[part.target]
+        variable = VARIABLES[part.target]
         verb = "adds to" if part.adds else "sets"
-        where = "each wheel" if signal.per.value == "wheel" else "body"
-        unit = "" if signal.unit == "1" else f" [{signal.unit}]"
-        parts.append(f"{verb} `{part.target}`{unit} of the {where}: {signal.about}")
+        where = "each wheel" if variable.per.value == "wheel" else "body"
+        unit = "" if variable.unit == "1" else f" [{variable.unit}]"
+        parts.append(f"{verb} `{part.target}`{unit} of the {where}: {variable.about}")
     return "; ".join(parts).replace("of the each", "of each") + "."
 
 
@@ -67,7 +67,7 @@ def _reads(term: Term) -> str:
         for function in (part.function, part.damping)
         if function
         for name in reads(function)
-        if name in SIGNALS
+        if name in VARIABLES
     )
     return ", ".join(f"`{name}`" for name in names) or "only its own numbers"
 

@@ -10,7 +10,7 @@ from scm.vehicles.compiler.assemble import setters_of, write_page
 from scm.vehicles.compiler.kernel_file import compile_kernel
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.param import Param
-from scm.vehicles.physics_variables import SIGNALS, Per, Role
+from scm.vehicles.physics_variables import VARIABLES, Per, Role
 from scm.vehicles.term import Term
 from tests.unit.vehicles.fresh import Compiling, nigel_after_a_second
 
@@ -94,7 +94,7 @@ def test_a_term_left_out_leaves_no_trace():
 def test_the_order_of_the_list_does_not_change_the_order_of_sums():
     def sums(terms):
         lines = [line.strip() for line in write_page(terms).splitlines()]
-        totals = {name for name, signal in SIGNALS.items() if signal.role is Role.SUM}
+        totals = {name for name, variable in VARIABLES.items() if variable.role is Role.SUM}
         return [line for line in lines if line.split(" = ")[0] in totals and " + " in line]
 
     assert sums(STANDARD) == sums(STANDARD[::-1])

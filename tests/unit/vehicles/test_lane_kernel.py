@@ -104,7 +104,7 @@ def test_a_rollout_refuses_what_does_not_fit():
     fleet = driving(3)
     with pytest.raises(RunError, match=r"commands of shape \(5, 2\): expected \(T,\) or \(T, 3\)"):
         fleet.rollout(np.zeros((5, 2)), np.zeros(5), 0.02)
-    with pytest.raises(RunError, match=r"'sped' is no signal of each car.* 'speed'"):
+    with pytest.raises(RunError, match=r"'sped' is no variable of each car.* 'speed'"):
         fleet.rollout(np.zeros(5), np.zeros(5), 0.02, ("sped",))
     with pytest.raises(RunError, match="5 throttles and 4 steerings"):
         fleet.rollout(np.zeros(5), np.zeros(4), 0.02)
