@@ -18,8 +18,7 @@ from bench.mismatch_free_run import gaussian_pushes, position_error, sindy_pushe
 from bench.mismatch_peers import Gaussian, Sindy, calibrated
 from bench.mismatch_residuals import residuals
 from scm.mismatch.trial import labels
-from scm.mismatch.trial.blind import answer_all, by_engine, stored_answers
-from scm.mismatch.trial.reality import CaseRequest, make_cases
+from scm.mismatch.trial.run import CaseRequest, answer_all, by_engine, make_cases, stored_answers
 from scm.mismatch.trial.score import score
 from scm.recording.read import read_recordings
 from scm.vehicles.car import load_car

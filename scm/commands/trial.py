@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    from scm.mismatch.trial.reality import ENGINES, KINDS
+    from scm.mismatch.trial.run import ENGINES, KINDS
 
     parser.add_argument("--seed", type=int, default=0, help="of all randomness (%(default)s)")
     parser.add_argument("--cases", type=int, default=40, help="how many (%(default)s)")
@@ -61,8 +61,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _table(arguments: argparse.Namespace, out: Path, progress: "Progress") -> list[str]:
     from scm.mismatch.trial import run
-    from scm.mismatch.trial.blind import by_engine
-    from scm.mismatch.trial.reality import CaseRequest
+    from scm.mismatch.trial.run import CaseRequest, by_engine
 
     workers, report = arguments.workers, progress.step
     if arguments.kept:

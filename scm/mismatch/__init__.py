@@ -1,7 +1,7 @@
 """Where a simulation and a recording differ: what the simulator left out, in words and in numbers.
 
-`drive` holds a recording, `doubt` its sensors against each other; `rollouts` drive it again in
-batches of parameter sets, `predict` turns them into measurements, `whiten` weighs the rest.
-`listed` knows the effects, `search` tries them, `judge` holds them against unseen parts.
-`findings` is what comes out, `report` shows it.
+`pipeline` is the whole diagnosis: `usable_data` checks recordings, `fit/` drives them again in
+batches and fits the car's own numbers, `select/` tries the effects of `effect_catalogue`,
+`discovery/` those of no catalogue, `validate/` judges what was found by free runs. `findings` and
+`evidence` are what comes out, `report/` shows it.
 """

@@ -178,25 +178,24 @@ def terms_needed(car: Car) -> list[str]:
 
 
 @cache
-def _params(name: str) -> tuple[dict[str, Param], Mapping[str, float]]:
-    """Return the parameters that may be fitted, by reported name, and where they do nothing."""
-    if name in all_sensor_faults():
-        fault = all_sensor_faults()[name]
-        return {p.reported: p for p in fault.params}, fault.neutral
-    parts = flat([all_terms()[name]])
-    neutral = {key: value for part in parts for key, value in part.neutral.items()}
-    params = {p.reported: p for part in parts for p in part.params if p.fit}
-    return params, neutral
+def params_of(name: str) -> tuple[Mapping[str, Param], Mapping[str, float]]:
+    """Return an effect's parameters and where they do nothing, by reported name; {}: unknown."""
+    every: dict[str, Term | SensorFault] = {**all_terms(), **all_sensor_faults()}
+    one = every.get(name)
+    parts = () if one is None else (one,) if isinstance(one, SensorFault) else flat([one])
+    params = {p.reported: p for part in parts for p in part.params}
+    at_rest = {key: value for part in parts for key, value in (part.neutral or {}).items()}
+    return params, {n: at_rest.get(p.name, p.default) for n, p in params.items()}
 
 
 def candidates(car: Car) -> tuple[Candidate, ...]:
     """Return every candidate that makes sense for a car."""
     found = list[Candidate]()
     for name, how in identifications().items():
-        params, neutral = _params(name)
-        wanted = [p for n, p in params.items() if n in (how.parameters or params)]
+        params, neutral = params_of(name)
+        wanted = [p for n, p in params.items() if p.fit and n in (how.parameters or params)]
         parameters = tuple(
-            _parameter(car, name, how, param, neutral.get(param.name, param.default), step)
+            _parameter(car, name, how, param, neutral[param.reported], step)
             for param, step in zip(wanted, how.steps, strict=True)
         )
         equation = Equation(how.equation)

@@ -3,5 +3,5 @@
 `general_effect` is the one effect that a simulator carries to try them; `impulse_response` computes
 what each moment's force, angle or throttle would explain, `dictionary` lists shapes over what may
 drive them, `try_dictionary` refits the best by free run and `decide` compares them with the
-catalogue. `effect_file` writes one as an effect's file, `curves` draws it.
+catalogue. `dictionary_effect` writes one as an effect's file.
 """

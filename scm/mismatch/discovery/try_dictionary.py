@@ -14,10 +14,17 @@ from scm.arrays import Floats
 from scm.mismatch.discovery.dictionary import dictionary
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect
 from scm.mismatch.discovery.general_effect import THROTTLE
-from scm.mismatch.discovery.impulse_response import AMOUNTS, Cells, cells_of, respond
+from scm.mismatch.discovery.impulse_response import (
+    AMOUNTS,
+    Cells,
+    beside,
+    by_turn,
+    cells_of,
+    respond,
+    ripples,
+)
 from scm.mismatch.discovery.screen import Start, polished, screen
 from scm.mismatch.discovery.sensor_effects import SensorEffect, sensor_effects, signatures_of
-from scm.mismatch.discovery.wheel_ripple import beside, by_turn, ripples
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis

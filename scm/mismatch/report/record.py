@@ -20,7 +20,7 @@ from scm.mismatch.report.sentences import (
     other_problems_sentence,
     verdict_sentence,
 )
-from scm.mismatch.validate.residual_forces import APART_S
+from scm.mismatch.validate.residuals import APART_S
 from scm.vehicles.car import Car
 
 _MAX_READABLE_S = 1e5  # a larger time is a date, not a stop watch

@@ -19,7 +19,7 @@ from scm.mismatch.findings import Equation
 from scm.mismatch.fit.fitter import FARTHEST, OF_OWN, SPOTS, Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.fit.noise_fit import fit_noise
+from scm.mismatch.fit.noise import fit_noise
 
 MAX_REFITTED, MAX_REFITTED_FROM_NOMINAL, MAX_OTHER_STARTS = 16, 10, 6
 LAST_ROUNDS = 5, 8  # of fits that are compared: of all starts, then of the near ones

@@ -1,18 +1,31 @@
-"""Selects effects one at a time: each round adds the best one, and takes back needless ones."""
+"""Selects effects: each round adds the best one, and takes back needless ones.
+
+A car that nobody has measured differs in more ways than one, and its residuals are no noise with
+one effect in it. It is judged by residual windows, and each round adds every effect that pays
+beside those before it.
+"""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from scm.arrays import Floats
 from scm.mismatch.budget import Question
-from scm.mismatch.effect_catalogue import Candidate
+from scm.mismatch.effect_catalogue import Candidate, Parameter
+from scm.mismatch.findings import Equation
+from scm.mismatch.fit.data_split import Parts, split
 from scm.mismatch.fit.hypothesis import Hypothesis
-from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.fit.noise import Noise, lowered
-from scm.mismatch.select.confirm import prune
+from scm.mismatch.fit.likelihood import Likelihood, Simulator
+from scm.mismatch.fit.noise import Noise, lowered, usual_noise
+from scm.mismatch.fit.residual_windows import WindowedLikelihood, fit_sizes
+from scm.mismatch.select.confirm import prune, without_each
 from scm.mismatch.select.round import Context, Round, extend, fit_with_noise
+from scm.replay.drive import Drive, is_led
+from scm.vehicles.car import Car
 
 if TYPE_CHECKING:
     from scm.mismatch.discovery.decide import Discovery
@@ -21,6 +34,18 @@ MAX_EFFECTS = 4
 MAX_LOW_NOISE_TRIALS = 3
 DOUBTFUL = 60.0  # gain beyond its penalty below which an effect may be something else
 HALF_AT_LIMIT = 4.0  # of `AT_LIMIT`, where an effect is compared not with another but with none
+MAX_EFFECTS_BY_WINDOWS, MAX_PER_ROUND = 10, 4
+COMPARED_WITHIN = 25.0  # criterion within which the two best effects are compared in full
+MARGIN = 10.0  # gain beyond its penalty of each effect beside the first of a round
+MANY_DOUBLINGS, FAR_DOUBLINGS = 9.0, 16.0  # of the least noise, summed over its kinds
+TIMES_FITTED_FAR = 2
+SPEED_LIMIT = Candidate(
+    "drive_saturation", Equation.DRIVE, ("throttle",),
+    (Parameter("forward", "drive.limit_forward", "1", (0.02, 1.0), 1.0, 0.02),),
+    ((0.7,), (0.4,), (0.15,)),
+    "Whatever is commanded, the drive takes no more than {forward} of full throttle.",
+)  # fmt: skip
+"""A commanded speed may be more than a car is allowed to drive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,3 +179,181 @@ def _under_low_noise(context: Context, found: Selection, learned: Noise) -> Sele
     if best is found.best:
         return found
     return replace(found, best=best, rounds=(*found.rounds[:-1], tried))
+
+
+def strays(model: Likelihood) -> bool:
+    """Return whether a car differs in so many ways that what its best model leaves is no noise.
+
+    That is so where the least disturbances had to be doubled very often to explain it.
+    """
+    return doublings(model) >= MANY_DOUBLINGS
+
+
+def is_far(retuned: Hypothesis) -> bool:
+    """Return whether a re-tuned car is so far off that one effect at a time would not do."""
+    return doublings(retuned.model) >= FAR_DOUBLINGS
+
+
+def doublings(model: Likelihood) -> float:
+    """Return how often the least disturbances were doubled, summed over their kinds."""
+    now, least = model.noise, usual_noise(model.drives)
+    kinds = ("speed", "side", "yaw_rate", "launch", "turn")
+    return float(sum(np.log2(getattr(now, k) / getattr(least, k)) for k in kinds))
+
+
+@dataclass(frozen=True, slots=True)
+class ByWindows:
+    """A car judged by residual windows, its own numbers fitted."""
+
+    context: Context
+    parts: Parts
+    retuned: Hypothesis
+
+
+def by_windows(context: Context, drives: Sequence[Drive], car: Car) -> ByWindows:
+    """Return a car judged by residual windows, and what selects its effects.
+
+    Where the measured speed drives the car, neither drive nor tyres are proposed. No effect is
+    begun as strong as suits it best: it would take what belongs to the others.
+
+    Args:
+        context: Of the selection of one effect at a time.
+        drives: The recordings.
+        car: With every effect at rest.
+    """
+    context.notify("judging by windows: the car differs in many ways")
+    catalogue, have = context.catalogue, {term.name for term in car.terms}
+    if any(is_led(drive) for drive in drives):
+        known = (Equation.STEERING, Equation.SENSOR)
+        catalogue = tuple(c for c in catalogue if c.equation in known)
+    elif "speed_control" in have and SPEED_LIMIT.name not in have:
+        car, catalogue = car.with_terms([SPEED_LIMIT.name]), (*catalogue, SPEED_LIMIT)
+    model = WindowedLikelihood(Simulator(drives, car, budget=context.budget))
+    parts = split(model)
+    mine = replace(
+        context, part=parts.fit.weight + parts.choose.weight, catalogue=catalogue,
+        fit_noise=fit_sizes, times_fitted=1, amplifies=False, keeps_derivatives=True,
+        share_confirmed=0.0, by_windows=True,
+    )  # fmt: skip
+    return ByWindows(mine, parts, retune(mine, model))
+
+
+def select_many(context: Context, retuned: Hypothesis) -> Selection:
+    """Return the hypothesis that explains the recordings best, with several effects a round."""
+    found = Selection(retuned, retuned)
+    while len(found.best.effects) < MAX_EFFECTS_BY_WINDOWS:
+        question = question_beside(found.best)
+        more = context.budget.attempt(question, partial(_round_of_many, context, found))
+        if more is None or set(more.best.names) <= set(found.best.names):
+            break
+        found = more
+    return found
+
+
+def _round_of_many(context: Context, found: Selection) -> Selection:
+    """Return the selection after one round more; the same where no effect pays."""
+    best = found.best
+    tried = _beside_each_other(context, _compared(context, extend(context, best)))
+    if not tried:
+        return found
+    more = _joined(best, [one.alternatives[0] for one in tried])
+    more = prune(context, fit_with_noise(context, more), found.retuned)
+    found = replace(found, best=more, rounds=(*found.rounds, *tried))
+    new = [effect for effect in more.effects if effect.rare and effect.name not in best.names]
+    for rare in new:
+        found = without_rare(context, found, rare)
+    return found
+
+
+def without_rare(context: Context, found: Selection, rare: Candidate) -> Selection:
+    """Return the selection with usual effects in place of a rare one, if these explain more.
+
+    A rare effect may do alone what two usual ones do together: added one by one it comes first,
+    and beside it neither of them pays. Compared are hypotheses with the noise that each leaves.
+    """
+    best = found.best
+    if rare not in best.effects:
+        return found
+    base = without_each(context, best, found.retuned)[best.effects.index(rare)]
+    context.notify(f"looking for usual effects in place of {rare.name}")
+    usual = replace(context, catalogue=tuple(c for c in context.catalogue if not c.rare))
+    tried = _beside_each_other(usual, _compared(usual, extend(usual, base)))
+    if not tried:
+        return found
+    other = _joined(base, [one.alternatives[0] for one in tried])
+    other = prune(context, fit_with_noise(context, other), found.retuned)
+    if context.cost(other) >= context.cost(best):
+        return found
+    return replace(found, best=other, rounds=(*found.rounds, *tried))
+
+
+def _compared(context: Context, tried: Round) -> Round:
+    """Return a round whose two best effects, if close, stand as their settled fits do."""
+    two = tried.alternatives[:2]
+    close = len(two) > 1 and tried.criteria[1] < tried.criteria[0] + COMPARED_WITHIN
+    if not close or tried.criteria[1] > context.criterion(tried.base):
+        return tried
+    costs = list[float]()
+    for one in two:
+        context.notify(f"comparing {two[0].names[-1]} and {two[1].names[-1]}")
+        costs.append(context.cost(fit_with_noise(context, one)))
+    if costs[0] <= costs[1]:
+        return tried
+    return Round(tried.base, (*two[::-1], *tried.alternatives[2:]), tried.criteria)
+
+
+def _beside_each_other(context: Context, tried: Round) -> list[Round]:
+    """Return a round for each effect that pays beside those before it, best first.
+
+    The first was refitted; what another adds to it is a linear guess from its derivatives.
+    """
+    base, first = tried.base, tried.alternatives[0]
+    if tried.criteria[0] > context.criterion(base):
+        return []
+    rounds, known = [tried], len(base.z) + len(base.values)
+    e, columns = first.innovations, first.jacobian
+    while len(rounds) < min(MAX_PER_ROUND, MAX_EFFECTS_BY_WINDOWS - len(base.effects)):
+        there = {one.alternatives[0].names[-1] for one in rounds}
+        left = [f for f in tried.alternatives if f.names[-1] not in there]
+        beside = [np.hstack((columns, f.jacobian[:, known:])) for f in left]
+        costs = [
+            context.penalty(f.effects[-1:]) - _gain(context, base, e, both)
+            for f, both in zip(left, beside, strict=True)
+        ]
+        order = sorted(range(len(left)), key=costs.__getitem__)
+        if not order or costs[order[0]] > -MARGIN:
+            break
+        columns = beside[order[0]]
+        e = e + columns @ _move(context, base, e, columns)
+        criteria = tuple(context.criterion(base) + costs[k] for k in order)
+        rounds.append(Round(base, tuple(left[k] for k in order), criteria))
+    return rounds
+
+
+def _gain(context: Context, base: Hypothesis, e: Floats, columns: Floats) -> float:
+    """Return how much less the loss would be, were everything linear."""
+    weights = context.fitter(base.model).weights(e)
+    moved = e + columns @ _move(context, base, e, columns)
+    return float(weights @ (e * e - moved * moved))
+
+
+def _move(context: Context, base: Hypothesis, e: Floats, columns: Floats) -> Floats:
+    """Return the least-squares move of all numbers; the car's own are held a little."""
+    weights = context.fitter(base.model).weights(e)
+    rooted = columns * np.sqrt(weights)[:, None]
+    prior = np.full(columns.shape[1], 1e-6)
+    prior[: len(base.z)] = 1.0
+    normal = rooted.T @ rooted + np.diag(prior)
+    return np.asarray(-np.linalg.solve(normal, columns.T @ (weights * e)))
+
+
+def _joined(base: Hypothesis, found: Sequence[Hypothesis]) -> Hypothesis:
+    """Return one hypothesis with the last effect of each of several, not refitted yet."""
+    first, known = found[0], len(base.values)
+    values = np.concatenate((first.values[:known], *(f.values[known:] for f in found)))
+    return replace(
+        first,
+        effects=(*base.effects, *(f.effects[-1] for f in found)),
+        values=values,
+        jacobian=np.zeros((len(first.innovations), len(base.z) + len(values))),
+    )

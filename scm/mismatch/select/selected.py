@@ -15,15 +15,18 @@ from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.rollouts import Tiles
 from scm.mismatch.select.confirm import confirmed
-from scm.mismatch.select.many_effects import (
+from scm.mismatch.select.round import Context, Notify
+from scm.mismatch.select.search import (
     TIMES_FITTED_FAR,
+    Explanation,
+    Selection,
     by_windows,
     is_far,
+    retune,
+    select,
     select_many,
     strays,
 )
-from scm.mismatch.select.round import Context, Notify
-from scm.mismatch.select.search import Explanation, Selection, retune, select
 from scm.recording.read import Recording
 from scm.replay.drive import Drive
 from scm.vehicles.car import Car

@@ -15,7 +15,7 @@ from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.fit.fitter import FARTHEST
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.fit.noise_fit import fit_noise
+from scm.mismatch.fit.noise import fit_noise
 from scm.mismatch.fit.residual_windows import independent_share
 from scm.mismatch.select.selected import Selected
 

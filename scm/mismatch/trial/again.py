@@ -14,8 +14,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.errors import ScmError
 from scm.geometry import Pose2
-from scm.mismatch.effect_catalogue import terms_needed
-from scm.mismatch.trial.known import is_measure, parameters_of
+from scm.mismatch.effect_catalogue import identifications, params_of, terms_needed
 from scm.mismatch.trial.labels import Case, Label
 from scm.mismatch.validate.found_car import on
 from scm.recording.motion import Motion, Poses
@@ -24,6 +23,7 @@ from scm.replay.commands import Commands
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.sensor_correction import without_faults
+from scm.vehicles.sensor_fault import all_sensor_faults
 
 STEP_S = 0.005
 EVERY_S = 0.1
@@ -31,8 +31,6 @@ RUN_IN_S = 3.0
 COUNTS, ENCODERS = "encoder.counts_per_revolution", ("encoder.left", "encoder.right")
 SHIFT, POINT = "com_shift.shift_m", "measure.pose_point_x_m"
 SHOWS = 1.2  # where the nominal car's error is below this times the true car's, nothing is to gain
-# Effects whose number stands beside one that ordinary cars have already.
-ADDED = {"rolling_resistance", "viscous_drag", "aero_drag"}
 
 
 def position_error(recording: Recording, car: Car, horizon_s: float = 3.0) -> float:
@@ -157,22 +155,25 @@ def true_cars(base: Car, label: Label) -> list[Car]:
 
     Two where a shifted centre of gravity may have taken the measured point with it.
     """
-    if label.kind == "unlisted" or not all(map(parameters_of, label.names)):
+    if label.kind == "unlisted" or not all(params_of(name)[0] for name in label.names):
         return []
     values = dict(label.nominal)
     values |= {"drive.axle_lock": 1.0} if base.has("drive.axle_lock") else {}
-    faults: dict[str, float] = {}
+    known, faults = identifications(), dict[str, float]()
     for name, parameters in zip(label.names, label.parameters, strict=True):
-        numbers = {parameters_of(name)[key].key: value for key, value in parameters.items()}
+        params, _ = params_of(name)
+        numbers = {params[key].key: value for key, value in parameters.items()}
         if name == "wheel_radius":
             values["wheel.radius_m"] = base.value("wheel.radius_m") * parameters["scale"]
-        elif is_measure(name):
+        elif name in all_sensor_faults():
             faults |= numbers
-        elif name in ADDED:
+        elif name in known and known[name].adds:
             values |= {key: base.value(key) + more for key, more in numbers.items()}
         else:
             values |= numbers
-    measures = [name for name in label.names if is_measure(name) and name != "wheel_radius"]
+    measures = [
+        name for name in label.names if name in all_sensor_faults() and name != "wheel_radius"
+    ]
     try:
         car = base.with_terms([], values)
         car = car.with_measures(measures, faults) if measures else car

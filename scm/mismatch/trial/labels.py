@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scm.errors import RecordingError
-from scm.mismatch.trial.known import parameters_of
+from scm.mismatch.effect_catalogue import params_of
 
 SEALED = "sealed.txt"
 CONTROLS = ("shuffled", "other_car")
@@ -129,7 +129,7 @@ def _shared_out(
     if len(names) < 2:
         return (given,) if names else ()
     return tuple(
-        {key: value for key, value in given.items() if key in parameters_of(name)} for name in names
+        {key: value for key, value in given.items() if key in params_of(name)[0]} for name in names
     )
 
 

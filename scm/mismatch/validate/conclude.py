@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scm.errors import RecordingError, ScmError
-from scm.mismatch.discovery.curves import discovered_curves
 from scm.mismatch.discovery.decide import is_discovered
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns
 from scm.mismatch.experiment.suggest import Suggestion
@@ -16,12 +15,12 @@ from scm.mismatch.select.confirm import without_one
 from scm.mismatch.select.round import Context, Notify
 from scm.mismatch.select.selected import Selected
 from scm.mismatch.usable_data import titles_of
-from scm.mismatch.validate.curves import curve
+from scm.mismatch.validate.curves import curve, discovered_curves
 from scm.mismatch.validate.explain import effect_of, refitted, undecided_of, widened_of
 from scm.mismatch.validate.found_car import CarFiles, as_written, on
 from scm.mismatch.validate.free_runs import judge, nothing_got_worse
 from scm.mismatch.validate.locate import locate, strayed
-from scm.mismatch.validate.residual_forces import on_one_axis
+from scm.mismatch.validate.residuals import on_one_axis
 from scm.vehicles.car import Car
 
 POSE = ("position_m", "yaw_rad")

@@ -16,8 +16,7 @@ from msgspec import structs
 
 from scm.arrays import Bools
 from scm.errors import ScmError
-from scm.mismatch.discovery.dictionary_effect import DictionaryEffect
-from scm.mismatch.discovery.effect_file import as_term, number_keys
+from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, as_term, number_keys
 from scm.mismatch.discovery.sensor_effects import LENS, PREFIX, SensorEffect
 from scm.mismatch.evidence import Evidence, RefittedParameter
 from scm.mismatch.findings import Diagnosis, Effect, Verdict

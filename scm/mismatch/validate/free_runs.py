@@ -17,7 +17,7 @@ from scm.mismatch.findings import Fit, PartErrors
 from scm.mismatch.fit.data_split import NAMES, Parts
 from scm.mismatch.fit.rollouts import Motions
 from scm.mismatch.fit.sensor_prediction import Prediction
-from scm.mismatch.validate.residual_forces import on_one_axis
+from scm.mismatch.validate.residuals import on_one_axis
 from scm.recording.motion import Poses
 from scm.replay.camera import Camera
 from scm.replay.drive import STEP_S, Drive, Stream

@@ -18,8 +18,7 @@ from scm.mismatch.findings import Equation, Fit, Located, Place
 from scm.mismatch.fit.fitter import TAIL, Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.validate.residual_forces import on_one_axis, residual_forces
-from scm.mismatch.validate.sensor_residuals import sensor_residuals
+from scm.mismatch.validate.residuals import on_one_axis, residual_forces, sensor_residuals
 from scm.replay.numbers import NEUTRAL
 
 BLOCK_S = 2.5

@@ -14,7 +14,7 @@ from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.likelihood import Likelihood, Simulator
 from scm.mismatch.pipeline import diagnose_car
 from scm.mismatch.report.panels import panels_of
-from scm.mismatch.select import many_effects, selected
+from scm.mismatch.select import search, selected
 from scm.mismatch.select.round import Context
 from scm.mismatch.select.search import Explanation, Selection, retune, select
 from scm.records.mismatch import BUDGET_S
@@ -219,8 +219,8 @@ def test_a_round_of_several_effects_that_is_cut_leaves_no_trace(monkeypatch):
         budget.left = 0
         base.model([{}])
 
-    monkeypatch.setattr(many_effects, "extend", cut)
-    found = many_effects.select_many(context, retuned)
+    monkeypatch.setattr(search, "extend", cut)
+    found = search.select_many(context, retuned)
     assert found == Selection(retuned, retuned)
     assert names(budget.unanswered) == ["effects"]
 

@@ -8,8 +8,7 @@ import pytest
 from scm.mismatch.effect_catalogue import by_name, candidates
 from scm.mismatch.fit.fitter import Fitter, _bounded
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.fit.noise import usual_noise
-from scm.mismatch.fit.noise_fit import fit_noise
+from scm.mismatch.fit.noise import fit_noise, usual_noise
 from scm.mismatch.fit.rollouts import Rollouts, _shares
 from scm.mismatch.fit.whitening import Whitener, _Events
 from scm.mismatch.select.round import Context, extend

@@ -9,7 +9,7 @@ from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.validate.curves import curve
 from scm.mismatch.validate.free_runs import judge
 from scm.mismatch.validate.locate import chance, locate
-from scm.mismatch.validate.residual_forces import honest, on_one_axis, residual_forces
+from scm.mismatch.validate.residuals import honest, on_one_axis, residual_forces
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch.made_drive import big_nigel, driven
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from scm.mismatch.fit.hypothesis import Hypothesis
-from scm.mismatch.select import many_effects
-from scm.mismatch.select.many_effects import select_many, without_rare
+from scm.mismatch.select import search
 from scm.mismatch.select.round import Context, Round
-from scm.mismatch.select.search import Selection
+from scm.mismatch.select.search import Selection, select_many, without_rare
 from tests.unit.mismatch.made_fit import candidate
 
 NONE = np.zeros(0)
@@ -45,7 +44,7 @@ def scripted(monkeypatch):
         ("_beside_each_other", at_once), ("fit_with_noise", lambda _, fitted: fitted),
         ("prune", lambda _, fitted, __: fitted), ("without_each", fewer),
     ):  # fmt: skip
-        monkeypatch.setattr(many_effects, name, fake)
+        monkeypatch.setattr(search, name, fake)
     monkeypatch.setattr(Context, "cost", lambda _, fitted: costs[fitted.names])
     catalogue = tuple(candidate(name) for name in (*SLOPE, *USUAL))
     return Context(np.ones(1), catalogue), costs

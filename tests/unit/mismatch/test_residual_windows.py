@@ -9,8 +9,8 @@ from scm.mismatch.fit.data_split import split
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import usual_noise
 from scm.mismatch.fit.residual_windows import LENGTH_S, WindowedLikelihood, fit_sizes, least_sizes
-from scm.mismatch.select.many_effects import by_windows, doublings, select_many
 from scm.mismatch.select.round import Context
+from scm.mismatch.select.search import by_windows, doublings, select_many
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 

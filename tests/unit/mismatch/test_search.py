@@ -10,12 +10,10 @@ from scipy.stats import chi2
 from scm.mismatch.fit.fitter import FARTHEST
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.fit.noise import MAX_LOW_NOISE, lowered, usual_noise
-from scm.mismatch.fit.noise_fit import fit_noise
+from scm.mismatch.fit.noise import MAX_LOW_NOISE, fit_noise, lowered, usual_noise
 from scm.mismatch.select import confirm
 from scm.mismatch.select import round as rounds
 from scm.mismatch.select.confirm import ENOUGH_UNSEEN, REMAINDER, confirmed
-from scm.mismatch.select.many_effects import TIMES_FITTED_FAR
 from scm.mismatch.select.round import (
     AT_LIMIT,
     FALSE_ALARMS,
@@ -30,7 +28,7 @@ from scm.mismatch.select.round import (
     next_starts,
     penalty,
 )
-from scm.mismatch.select.search import Explanation, _margin, select
+from scm.mismatch.select.search import TIMES_FITTED_FAR, Explanation, _margin, select
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 

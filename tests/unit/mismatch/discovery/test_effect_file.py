@@ -9,7 +9,7 @@ import pytest
 from scm.errors import TermError
 from scm.geometry import Pose2
 from scm.mismatch.discovery.dictionary import dictionary
-from scm.mismatch.discovery.effect_file import as_term, file_name, write_effect_file
+from scm.mismatch.discovery.dictionary_effect import as_term, file_name, write_effect_file
 from scm.mismatch.discovery.general_effect import PREFIX, SHAPE, TERMS
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet

@@ -4,9 +4,9 @@ from functools import cache
 
 import numpy as np
 
-from scm.mismatch.discovery.curves import discovered_curves
 from scm.mismatch.discovery.decide import is_discovered
 from scm.mismatch.discovery.try_dictionary import criterion
+from scm.mismatch.validate.curves import discovered_curves
 from scm.mismatch.validate.explain import effect_of
 from tests.unit.mismatch.discovery import made_effect
 

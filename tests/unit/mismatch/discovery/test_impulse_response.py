@@ -4,12 +4,12 @@ from functools import cache
 
 import numpy as np
 
-from scm.mismatch.discovery.curves import axis_of
 from scm.mismatch.discovery.general_effect import PREFIX
 from scm.mismatch.discovery.impulse_response import Cells, Response, cells_of, respond
 from scm.mismatch.discovery.screen import polished, pushes, remembered, screen
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.validate.curves import axis_of
 from tests.unit.mismatch.discovery import made_effect
 
 

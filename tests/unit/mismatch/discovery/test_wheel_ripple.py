@@ -4,13 +4,13 @@ from functools import cache
 
 import numpy as np
 
-from scm.mismatch.discovery.curves import discovered_curves
 from scm.mismatch.discovery.general_effect import RIPPLE
+from scm.mismatch.discovery.impulse_response import WAVES, by_turn, ripples
 from scm.mismatch.discovery.try_dictionary import try_dictionary
-from scm.mismatch.discovery.wheel_ripple import WAVES, by_turn, ripples
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.rollouts import Rollouts
+from scm.mismatch.validate.curves import discovered_curves
 from scm.replay.drive import Drive
 from scm.vehicles.jit import plain
 from tests.unit.mismatch.discovery import made_effect

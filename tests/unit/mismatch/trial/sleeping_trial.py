@@ -10,8 +10,8 @@ import sys
 import threading
 from pathlib import Path
 
-from scm.mismatch.trial.blind import answer_all
 from scm.mismatch.trial.labels import Case
+from scm.mismatch.trial.run import answer_all
 
 
 def sleep(_recording, out):

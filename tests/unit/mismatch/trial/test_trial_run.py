@@ -9,11 +9,10 @@ import pytest
 import scm
 from scm.errors import RecordingError, RunError
 from scm.mismatch.findings import Diagnosis, Verdict
-from scm.mismatch.trial import reality
+from scm.mismatch.trial import run
 from scm.mismatch.trial.again import compare, error, true_cars
-from scm.mismatch.trial.blind import answer_all
 from scm.mismatch.trial.labels import Case, find_cases, label_of, open_label, read_seals
-from scm.mismatch.trial.run import judged_again, on_own_cases, on_shipped_cases
+from scm.mismatch.trial.run import answer_all, judged_again, on_own_cases, on_shipped_cases
 from scm.recording.read import read_recordings
 from scm.vehicles.car import load_car
 
@@ -37,7 +36,7 @@ def breaks(recording, out):
 def made(tmp_path_factory):
     """Two healthy cases, diagnosed by somebody who never finds anything."""
     out = tmp_path_factory.mktemp("trial")
-    request = reality.CaseRequest(seed=11, cases=2, kind="none")
+    request = run.CaseRequest(seed=11, cases=2, kind="none")
     heard = []
     lines = on_own_cases(
         request, out, says_none, workers=0, notify=lambda *what: heard.append(what)
@@ -62,7 +61,7 @@ def test_kept_diagnoses_are_judged_again_alike(made):
 
 def test_a_second_trial_in_the_same_place_is_refused(made):
     with pytest.raises(RecordingError, match="holds a trial already"):
-        on_own_cases(reality.CaseRequest(cases=1), made[0], says_none, workers=0)
+        on_own_cases(run.CaseRequest(cases=1), made[0], says_none, workers=0)
 
 
 def test_a_label_changed_after_it_was_sealed_is_told(made, tmp_path):
@@ -105,7 +104,7 @@ def test_an_installed_package_says_that_it_has_no_reality(monkeypatch, tmp_path)
     (tmp_path / "scm").mkdir()
     monkeypatch.setattr(scm, "__file__", str(tmp_path / "scm" / "__init__.py"))
     with pytest.raises(RunError, match="from a clone"):
-        reality.find_root()
+        run.find_root()
 
 
 def label(names, parameters, car="nigel", **more):

@@ -9,8 +9,7 @@ from scm.data_quality.problem import DataProblem
 from scm.mismatch.findings import Diagnosis, Effect, Equation, Estimate, Undecided, Verdict
 from scm.mismatch.trial.again import Ratio
 from scm.mismatch.trial.labels import label_of
-from scm.mismatch.trial.score import failed, score
-from scm.mismatch.trial.table import each, lines, wilson
+from scm.mismatch.trial.score import each, failed, lines, score, wilson
 
 
 def label(*names, parameters=None, listed=True, equation="body", depends_on=("time",), **more):
