@@ -32,7 +32,7 @@ from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
-from scm.vehicles.guard import HOLD_NS, STOP_NS, Guard
+from scm.vehicles.guard import COMMAND_TIMEOUT_NS, FULL_STOP_NS, Guard
 
 REPORTED_M, REPORTED_RAD, GYRO_RAD_S = 0.002, 0.005, 0.002
 IN_FORCE_NS = NS_PER_S // 4
@@ -354,8 +354,8 @@ def _obeyed(commands: Iterable[DriveCommand]) -> tuple[list[Row], list[Stretch]]
     def let_go(until_ns: int | None) -> None:
         if not stretches:
             return
-        last = stretches[-1].end_ns - STOP_NS
-        for late in (HOLD_NS, STOP_NS):
+        last = stretches[-1].end_ns - FULL_STOP_NS
+        for late in (COMMAND_TIMEOUT_NS, FULL_STOP_NS):
             if until_ns is None or until_ns > last + late:
                 rows.append((last + late, 0.0, rows[-1][2]))
 
@@ -368,8 +368,8 @@ def _obeyed(commands: Iterable[DriveCommand]) -> tuple[list[Row], list[Stretch]]
         rows.append((t_ns, allowed.throttle, allowed.steering))
         goes_on = stretches and t_ns <= stretches[-1].end_ns
         if goes_on and stretches[-1].epoch == command.epoch:
-            stretches[-1] = stretches[-1]._replace(end_ns=t_ns + STOP_NS)
+            stretches[-1] = stretches[-1]._replace(end_ns=t_ns + FULL_STOP_NS)
         else:
-            stretches.append(Stretch(t_ns, t_ns + STOP_NS, command.epoch))
+            stretches.append(Stretch(t_ns, t_ns + FULL_STOP_NS, command.epoch))
     let_go(None)
     return rows, stretches

@@ -20,9 +20,10 @@ from typing import Literal
 from scm.clock import NS_PER_MS
 from scm.v2x.messages.drive_command import DriveCommand
 
-HOLD_NS = 150 * NS_PER_MS
-STOP_NS = 300 * NS_PER_MS
+COMMAND_TIMEOUT_NS = 150 * NS_PER_MS
+FULL_STOP_NS = 300 * NS_PER_MS
 LOST_NS = 1000 * NS_PER_MS
+"""Ages of the newest command from which on the modes `hold`, `stop` and `lost` apply."""
 
 Mode = Literal["drive", "hold", "stop", "lost"]
 
@@ -129,9 +130,9 @@ class Guard:
         age_ns = self._advance(now_ns)
         if self._lost:
             return Guarded(0.0, self._steering, "lost", hazard=True)
-        if self._stopped or age_ns is None or age_ns >= STOP_NS:
+        if self._stopped or age_ns is None or age_ns >= FULL_STOP_NS:
             return Guarded(0.0, self._steering, "stop", hazard=False)
-        if self._seq is None or age_ns >= HOLD_NS:
+        if self._seq is None or age_ns >= COMMAND_TIMEOUT_NS:
             return Guarded(0.0, self._steering, "hold", hazard=False)
         return Guarded(self._throttle, self._steering, "drive", hazard=False)
 

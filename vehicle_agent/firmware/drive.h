@@ -14,7 +14,7 @@ inline float clamp_command(float value) {
 // A little too much is clamped. What is absurd or no number is no command: of the damaged frames
 // that pass rosserial's 8-bit check, nearly all that would move the car carry such a value.
 inline bool is_command(float value) {
-  return value <= settings::absurd_command && value >= -settings::absurd_command;
+  return value <= settings::rejected_above && value >= -settings::rejected_above;
 }
 
 struct MotorOutput {

@@ -111,7 +111,7 @@ void setup() {
     pinMode(pin, OUTPUT);
   }
   for (const uint8_t pin : input_pins) pinMode(pin, INPUT_PULLUP);
-  wdt_enable(WDTO_250MS);
+  wdt_enable(WDTO_250MS);  // resets a hung processor; settings::command_timeout_ms is the host's silence
   begin_servo();
   begin_tail();
   attachInterrupt(digitalPinToInterrupt(settings::left_a_pin), on_left_edge, CHANGE);
@@ -125,7 +125,7 @@ void loop() {
   while (Serial.available() > 0) nigel.receive(static_cast<uint8_t>(Serial.read()), now_ms);
   apply(nigel.step(now_ms));
   imu.step(now_ms);
-  if (nigel.wants_readings(now_ms)) nigel.tell(read_all(), now_ms);
+  if (nigel.wants_readings(now_ms)) nigel.report(read_all(), now_ms);
   uint8_t byte;
   while (Serial.availableForWrite() > 0 && nigel.send(byte, now_ms)) Serial.write(byte);
   wdt_reset();

@@ -8,12 +8,12 @@
 namespace frames {
 
 constexpr uint8_t head = 5, around = 8;
-constexpr uint8_t patience_ms = 20;  // rosserial's own
+constexpr uint8_t byte_timeout_ms = 20;  // rosserial's own
 
 struct Frame {
   uint16_t topic;
   uint16_t length;         // of the payload [bytes]
-  const uint8_t* payload;  // lent until the decoder is asked again
+  const uint8_t* payload;  // lent until the next byte
 };
 
 inline uint8_t check(const uint8_t* bytes, uint8_t count) {
@@ -28,14 +28,14 @@ inline uint16_t u16_at(const uint8_t* bytes) {
 
 // Frames out of a stream of bytes, whatever else is in it. A frame that fails a check is given up
 // by one byte only, so that nothing which begins inside it is lost; one that pauses for longer
-// than `patience_ms` is given up whole. Feed one byte, then ask until there is no frame.
+// than `byte_timeout_ms` is given up whole. Feed one byte, then take frames until there is none.
 class Decoder {
  public:
   static constexpr uint8_t longest = 32;  // of a payload [bytes]; a longer one is no frame to us
 
   void feed(uint8_t byte, uint32_t now_ms) {
     settle();
-    if (now_ms - came_ms_ > patience_ms) count_ = 0;
+    if (now_ms - came_ms_ > byte_timeout_ms) count_ = 0;
     came_ms_ = now_ms;
     held_[count_++] = byte;
   }

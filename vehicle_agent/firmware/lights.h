@@ -1,4 +1,4 @@
-// Which lamps burn: what the host asked for, and what the drive command tells by itself.
+// Which lamps burn: what the host commands, and what follows from the drive command.
 #pragma once
 
 #include <stdint.h>
@@ -14,26 +14,26 @@ struct Lamps {
   bool low_beam, high_beam, reverse, left_indicator, right_indicator;
 };
 
-// Read the number that `light_cmd` carries into `asked`; return whether it is one of 0 to 15.
-inline bool read(float value, uint8_t& asked) {
+// Read the number that `light_cmd` carries into `commanded`; return whether it is one of 0 to 15.
+inline bool read(float value, uint8_t& commanded) {
   if (!(value >= 0.0f && value <= all)) return false;
-  asked = static_cast<uint8_t>(value);
+  commanded = static_cast<uint8_t>(value);
   return true;
 }
 
 // The high beam burns with the low one; both indicators together are the hazard lights.
-inline Lamps burning(uint8_t asked, float drive, uint32_t now_ms) {
+inline Lamps burning(uint8_t commanded, float drive, uint32_t now_ms) {
   const bool is_blink = now_ms / settings::indicator_half_period_ms % 2 == 0;
   const bool is_slow =
       drive < settings::brake_light_below && drive > -settings::brake_light_below;
-  const bool has_beam = (asked & (low_beam | high_beam)) != 0;
+  const bool has_beam = (commanded & (low_beam | high_beam)) != 0;
   const uint8_t dim = has_beam ? settings::tail_dim : 0;
   return {is_slow ? settings::tail_bright : dim,
           has_beam,
-          (asked & high_beam) != 0,
+          (commanded & high_beam) != 0,
           drive < 0.0f,
-          is_blink && (asked & left) != 0,
-          is_blink && (asked & right) != 0};
+          is_blink && (commanded & left) != 0,
+          is_blink && (commanded & right) != 0};
 }
 
 }  // namespace lights

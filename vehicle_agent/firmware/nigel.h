@@ -34,10 +34,10 @@ class Nigel {
   void receive(uint8_t byte, uint32_t now_ms) {
     frames::Frame frame;
     decoder_.feed(byte, now_ms);
-    while (decoder_.next(frame)) hear(frame, now_ms);
+    while (decoder_.next(frame)) receive_frame(frame, now_ms);
   }
 
-  // Return what the pins shall do now. Without a valid drive command for the patience of
+  // Return what the pins shall do now. Without a valid drive command for the timeout of
   // settings.h the motor brakes and the servo stays where it was sent.
   Outputs step(uint32_t now_ms) {
     if (!watchdog_.holds(now_ms)) drive_ = 0.0f;
@@ -45,15 +45,15 @@ class Nigel {
             lights::burning(lights_, drive_, now_ms)};
   }
 
-  // Return whether it is time to `tell`.
+  // Return whether it is time to `report`.
   bool wants_readings(uint32_t now_ms) const {
-    return session_.is_open() && now_ms - told_ms_ >= settings::telemetry_period_ms;
+    return session_.is_open() && now_ms - reported_ms_ >= settings::telemetry_period_ms;
   }
 
   // Send the readings; they are left out where an announcement is still on its way.
-  void tell(const Readings& readings, uint32_t now_ms) {
-    const uint32_t late_ms = now_ms - told_ms_ - settings::telemetry_period_ms;
-    told_ms_ = late_ms < settings::telemetry_period_ms ? now_ms - late_ms : now_ms;
+  void report(const Readings& readings, uint32_t now_ms) {
+    const uint32_t late_ms = now_ms - reported_ms_ - settings::telemetry_period_ms;
+    reported_ms_ = late_ms < settings::telemetry_period_ms ? now_ms - late_ms : now_ms;
     if (!outbox_.is_empty()) return;
     const float values[] = {wrapped_ticks(readings.left_ticks),
                             wrapped_ticks(readings.right_ticks),
@@ -78,9 +78,9 @@ class Nigel {
   }
 
  private:
-  void hear(const frames::Frame& frame, uint32_t now_ms) {
+  void receive_frame(const frames::Frame& frame, uint32_t now_ms) {
     if (frame.topic < topics::steer) {
-      session_.hear(frame.topic, now_ms);
+      session_.receive(frame.topic, now_ms);
       return;
     }
     float value;
@@ -103,5 +103,5 @@ class Nigel {
   Slewed steer_;
   float drive_ = 0.0f;
   uint8_t lights_ = 0;
-  uint32_t told_ms_ = 0;
+  uint32_t reported_ms_ = 0;
 };

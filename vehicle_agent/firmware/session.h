@@ -1,4 +1,4 @@
-// What is said between the car and its host besides commands: who listens, and is it still there.
+// What car and host exchange besides commands: who receives, and whether it is still there.
 #pragma once
 
 #include <stdint.h>
@@ -6,18 +6,18 @@
 #include "frames.h"
 #include "topics.h"
 
-// A host asks for the topics once. From then on it is asked for the time every 2.5 s, and taken
+// A host asks for the topics once. From then on its time is requested every 2.5 s, and taken
 // for gone when it has not answered for 11 s; all as in rosserial.
 class Session {
  public:
-  static constexpr uint16_t ask_every_ms = 2500, gone_after_ms = 11000;
+  static constexpr uint16_t request_period_ms = 2500, gone_after_ms = 11000;
 
   bool is_open() const { return is_open_; }
 
-  void hear(uint16_t topic, uint32_t now_ms) {
+  void receive(uint16_t topic, uint32_t now_ms) {
     if (topic == topics::publisher_info) {
       is_open_ = true;
-      is_asking_ = true;
+      is_requesting_ = true;
       announced_ = 0;
       answered_ms_ = now_ms;
     } else if (topic == topics::time) {
@@ -31,9 +31,9 @@ class Session {
   bool write(frames::Outbox& outbox, uint32_t now_ms) {
     if (is_open_ && now_ms - answered_ms_ > gone_after_ms) is_open_ = false;
     if (!is_open_) return false;
-    if (is_asking_ || now_ms - asked_ms_ > ask_every_ms) {
-      is_asking_ = false;
-      asked_ms_ = now_ms;
+    if (is_requesting_ || now_ms - requested_ms_ > request_period_ms) {
+      is_requesting_ = false;
+      requested_ms_ = now_ms;
       outbox.begin(topics::time);
       outbox.put_u32(0);
       outbox.put_u32(0);
@@ -46,7 +46,7 @@ class Session {
   }
 
  private:
-  bool is_open_ = false, is_asking_ = false;
+  bool is_open_ = false, is_requesting_ = false;
   uint8_t announced_ = topics::count;
-  uint32_t asked_ms_ = 0, answered_ms_ = 0;
+  uint32_t requested_ms_ = 0, answered_ms_ = 0;
 };

@@ -17,7 +17,7 @@ constexpr uint8_t tail_pin = 10, low_beam_pin = 11, high_beam_pin = 12, reverse_
 constexpr uint8_t left_indicator_pin = 14, right_indicator_pin = 15;  // A0, A1
 
 // The battery's pin is ours: the published wiring measures none.
-constexpr bool has_battery_divider = true;  // without one the pin floats: then tell NaN
+constexpr bool has_battery_divider = true;  // without one the pin floats: then report NaN
 constexpr uint8_t battery_pin = 16;         // A2
 constexpr float battery_upper_ohm = 20000.0f, battery_lower_ohm = 10000.0f;
 constexpr float adc_reference_v = 5.0f;
@@ -27,8 +27,10 @@ constexpr float servo_us_at_0_deg = 544.0f, servo_us_per_deg = (2400.0f - 544.0f
 constexpr float servo_centre_deg = 97.0f, servo_throw_deg = 30.0f;
 constexpr float steer_slew_per_s = 0.0f;  // of the command's range of 2; 0: as fast as it can
 
-constexpr uint16_t command_patience_ms = 250;
-constexpr float absurd_command = 10.0f;  // beyond it a command is refused and not clamped
+// Without a valid drive command for this long the car brakes. The hang reset in firmware.ino is
+// another watchdog: it restarts a processor that no longer runs its loop.
+constexpr uint16_t command_timeout_ms = 250;
+constexpr float rejected_above = 10.0f;  // a larger command is refused and not clamped
 constexpr uint8_t telemetry_period_ms = 20;
 
 // Wheels turning forward count up; the two encoders are mounted mirrored.

@@ -1,4 +1,4 @@
-// The topics that the host is told of: the published firmware's two, and ours.
+// The topics that the host learns of: the published firmware's two, and ours.
 #pragma once
 
 #include <stdint.h>

@@ -23,12 +23,11 @@ import msgspec
 
 from scm.clock import NS_PER_MS, Clock, WallClock
 from scm.log import event
+from scm.vehicles.guard import COMMAND_TIMEOUT_NS
 from vehicle_agent.nigel.cable import Cable
 from vehicle_agent.nigel.host import REST, Host, NigelCommand, Phase, clamped
 from vehicle_agent.nigel.telemetry import Telemetry
 
-COMMAND_TIMEOUT_NS = 150 * NS_PER_MS
-"""As in the guard: how long a command stays valid."""
 LOOP_NS = 5 * NS_PER_MS
 GOODBYES = 5
 GOODBYE_NS = 20 * NS_PER_MS

@@ -60,7 +60,7 @@ uint32_t car_send(uint8_t* into, uint32_t most, uint32_t now_ms) {
 
 void car_tell(int32_t left, int32_t right, float battery_v, uint32_t now_ms) {
   if (car->wants_readings(now_ms)) {
-    car->tell({left, right, {0.5f, 1.0f, -2.0f}, battery_v}, now_ms);
+    car->report({left, right, {0.5f, 1.0f, -2.0f}, battery_v}, now_ms);
   }
 }
 

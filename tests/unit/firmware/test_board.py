@@ -58,8 +58,8 @@ class Board:
     stack: int = 0
     _decoder: Decoder = field(default_factory=Decoder)
 
-    def tell(self, command: str) -> None:
-        """Give one command and take in all that the board says until it is done."""
+    def order(self, command: str) -> None:
+        """Give one command and read all that the board reports until it is done."""
         self.process.stdin.write(command + "\n")
         self.process.stdin.flush()
         for line in self.process.stdout:
@@ -77,10 +77,10 @@ class Board:
         pytest.fail("the board ended")
 
     def run(self, ms: float) -> None:
-        self.tell(f"run {ms}")
+        self.order(f"run {ms}")
 
     def send(self, *data: bytes) -> None:
-        self.tell(f"rx {b''.join(data).hex()}")
+        self.order(f"rx {b''.join(data).hex()}")
 
     def command(self, topic: int, value: float, ms: float = 25) -> None:
         """Send one command and let the board go on; a servo's register takes it at once."""
@@ -97,7 +97,7 @@ class Board:
         """Return when and to what a pin changed."""
         return [(at, value) for at, what, value in self.events if what == name and at > since_us]
 
-    def told(self, since_us: int = 0) -> list[tuple[int, tuple[float, ...]]]:
+    def reports(self, since_us: int = 0) -> list[tuple[int, tuple[float, ...]]]:
         """Return the telemetry, with the time at which each message was whole."""
         return [
             (at, struct.unpack("<8f", frame.payload[12:]))
@@ -131,7 +131,7 @@ def board(built):
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
         board = Board(process)
-        board.tell("battery 2500")
+        board.order("battery 2500")
         board.run(BOOT_MS)
         yield board
         process.stdin.close()
@@ -151,7 +151,7 @@ def test_the_topics_of_the_published_firmware_are_announced_and_ours_beside_them
     board.join()
     frames = [frame for _, frame in board.frames]
     assert frames[0] == Frame(TIME, bytes(8))
-    told = {
+    reported = {
         (info.number, info.name, info.kind, info.md5)
         for info in (
             unpack_topic_info(frame.payload)
@@ -159,7 +159,7 @@ def test_the_topics_of_the_published_firmware_are_announced_and_ours_beside_them
             if frame.topic in {PUBLISHER_INFO, SUBSCRIBER_INFO}
         )
     }
-    assert told == {
+    assert reported == {
         (STEER, "steer_cmd", FLOAT32, FLOAT32_MD5),
         (DRIVE, "drive_cmd", FLOAT32, FLOAT32_MD5),
         (LIGHT, "light_cmd", FLOAT32, FLOAT32_MD5),
@@ -176,8 +176,8 @@ def test_a_drive_command_turns_the_motor_as_the_published_mapping_says_and_no_fa
 ):
     assert board.pins["brake"] == 1
     board.command(DRIVE, drive)
-    told = {name: board.pins.get(name, 0) for name in ("pwm", "dir", "brake")}
-    assert told == {"pwm": pwm, "dir": is_reverse, "brake": 0}
+    reported = {name: board.pins.get(name, 0) for name in ("pwm", "dir", "brake")}
+    assert reported == {"pwm": pwm, "dir": is_reverse, "brake": 0}
     board.command(DRIVE, 0.0)
     assert (board.pins["pwm"], board.pins["brake"]) == (0, 1)
 
@@ -211,11 +211,11 @@ def test_silence_stops_the_motor_within_300_ms_and_leaves_the_servo(board, phase
     for _ in range(10):
         board.command(DRIVE, 0.6, ms=100)
     assert [value for _, value in board.seen("pwm")] == [153]
-    (heard_us, _), servo_us = board.seen("heard")[-1], board.pins["servo_us"]
+    (received_us, _), servo_us = board.seen("received")[-1], board.pins["servo_us"]
     board.run(400)
     (stopped_us, duty) = board.seen("pwm")[-1]
     assert duty == 0
-    assert 245 <= (stopped_us - heard_us) / 1000 <= 300
+    assert 245 <= (stopped_us - received_us) / 1000 <= 300
     assert board.pins["brake"] == 1
     assert board.pins["servo_us"] == servo_us
 
@@ -242,7 +242,7 @@ def test_garbage_moves_nothing(board):
     for at in range(0, len(wrong), 50):
         board.send(*wrong[at : at + 50])
         board.run(0.21 * sum(map(len, wrong[at : at + 50])))
-    moved = [event for event in board.events if event[0] > since_us and event[1] != "heard"]
+    moved = [event for event in board.events if event[0] > since_us and event[1] != "received"]
     assert moved == []
     board.run(30)
     board.command(DRIVE, 0.4)
@@ -262,8 +262,8 @@ def test_a_frame_cut_at_any_byte_loses_none_that_follows(board, pause_ms):
 
 
 def test_telemetry_comes_at_50_hz_with_what_the_sensors_say(board):
-    board.tell("imu on")
-    board.tell("reading 1638 -3277 16384 0 0 1310")
+    board.order("imu on")
+    board.order("reading 1638 -3277 16384 0 0 1310")
     board.run(1100)
     board.join()
     since_us = board.now_us
@@ -271,11 +271,12 @@ def test_telemetry_comes_at_50_hz_with_what_the_sensors_say(board):
         board.command(DRIVE, 0.4, ms=50)
         if at % 10 == 9:
             board.send(pack(Frame(TIME, pack_time(at))))
-    told = board.told(since_us)
-    assert len(told) / ((told[-1][0] - told[0][0]) * 1e-6) == pytest.approx(50, rel=0.02)
-    apart_ms = [(b[0] - a[0]) / 1000 for a, b in pairwise(told)]
+    reported = board.reports(since_us)
+    took_s = (reported[-1][0] - reported[0][0]) * 1e-6
+    assert len(reported) / took_s == pytest.approx(50, rel=0.02)
+    apart_ms = [(b[0] - a[0]) / 1000 for a, b in pairwise(reported)]
     assert max(apart_ms) < 35  # a question for the time may lie between two
-    left, right, gyro, accel_x, accel_y, battery, version, age_ms = told[-1][1]
+    left, right, gyro, accel_x, accel_y, battery, version, age_ms = reported[-1][1]
     assert (left, right, version) == (0, 0, 1)
     assert gyro == pytest.approx(math.radians(1310 / 131.072), rel=1e-4)
     assert (accel_x, accel_y) == pytest.approx(
@@ -289,7 +290,7 @@ def test_nobody_is_told_who_did_not_ask(board):
     board.command(DRIVE, 0.4, ms=200)
     assert board.frames == []
     board.join()
-    assert board.told() != []
+    assert board.reports() != []
 
 
 def turn(board, channels, steps, ms=0.2):
@@ -298,49 +299,49 @@ def turn(board, channels, steps, ms=0.2):
     for step in range(1, abs(steps) + 1):
         levels = order[(step if steps > 0 else -step) % 4]
         for pin, level in zip(channels, levels, strict=True):
-            board.tell(f"pin {pin} {level}")
+            board.order(f"pin {pin} {level}")
         board.run(ms)
 
 
 def test_both_encoders_count_each_edge_of_their_channel_a_up_and_down(board):
     for pin in (2, 3, 4, 5):
-        board.tell(f"pin {pin} 0")
+        board.order(f"pin {pin} 0")
     board.run(5)
     board.join()
-    start = board.told()[-1][1][:2]
+    start = board.reports()[-1][1][:2]
     turn(board, (2, 4), 400)
     turn(board, (3, 5), -400)
     board.run(50)
-    assert board.told()[-1][1][:2] == (start[0] + 200, start[1] + 200)
+    assert board.reports()[-1][1][:2] == (start[0] + 200, start[1] + 200)
     turn(board, (2, 4), -40)
     board.run(50)
-    assert board.told()[-1][1][:2] == (start[0] + 180, start[1] + 200)
+    assert board.reports()[-1][1][:2] == (start[0] + 180, start[1] + 200)
 
 
 @pytest.mark.parametrize("how", ["off", "stuck"])
 def test_an_imu_that_does_not_answer_gives_nan_holds_nothing_up_and_is_found_again(board, how):
-    board.tell("imu on")
-    board.tell("reading 0 0 16384 0 0 1310")
+    board.order("imu on")
+    board.order("reading 0 0 16384 0 0 1310")
     board.run(1100)
     board.join()
-    assert not math.isnan(board.told()[-1][1][2])
-    board.tell(f"imu {how}")
+    assert not math.isnan(board.reports()[-1][1][2])
+    board.order(f"imu {how}")
     since_us = board.now_us
     for _ in range(30):
         board.command(DRIVE, 0.4, ms=50)
-    told = board.told(since_us)
-    assert all(math.isnan(value) for value in told[-1][1][2:5])
-    assert len(told) == pytest.approx(75, abs=2)
+    reported = board.reports(since_us)
+    assert all(math.isnan(value) for value in reported[-1][1][2:5])
+    assert len(reported) == pytest.approx(75, abs=2)
     assert [value for _, value in board.seen("pwm", since_us)] == [102]
-    board.tell("imu on")
-    board.tell("reading 0 0 16384 0 0 1310")
+    board.order("imu on")
+    board.order("reading 0 0 16384 0 0 1310")
     board.run(1100)
-    assert board.told()[-1][1][2] == pytest.approx(math.radians(1310 / 131.072), rel=1e-4)
+    assert board.reports()[-1][1][2] == pytest.approx(math.radians(1310 / 131.072), rel=1e-4)
 
 
 def test_a_processor_that_hangs_is_reset_and_its_motor_stops_within_300_ms(board):
     board.command(DRIVE, 0.6)
-    board.tell("hang")
+    board.order("hang")
     since_us = board.now_us
     board.run(600)
     stops = board.seen("pwm", since_us)

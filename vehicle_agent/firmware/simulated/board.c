@@ -1,7 +1,7 @@
 // An Arduino Nano in simavr with Nigel around it: a serial line, an encoder on each wheel, an
 // IMU, a battery. It tells on stdout what its pins do, a line each: `microseconds name value`.
 //
-//   board firmware.hex              steps when told to: commands come on stdin, a line each
+//   board firmware.hex              steps on command: commands come on stdin, a line each
 //   board firmware.hex --pty LINK   runs in real time; the serial line is a pseudo-terminal
 //
 // Commands:  run MS | rx HEX | pin D0..D7 LEVEL | battery MILLIVOLT | imu on|off|stuck
@@ -42,7 +42,7 @@ static unsigned lowest_sp = RAM_END;
 
 static unsigned long long now_us(void) { return avr->cycle / US; }
 
-static void tell(const char *name, double value) {
+static void report(const char *name, double value) {
     printf("%llu %s %.10g\n", now_us(), name, value);
 }
 
@@ -63,7 +63,7 @@ static void deliver(void) {
     next = avr->cycle + BYTE_US * US;
     avr_irq_t *in = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
     avr_raise_irq(in, queue[queue_head++ % sizeof queue]);
-    if (queue_head == queue_tail) tell("heard", queue_head);
+    if (queue_head == queue_tail) report("received", queue_head);
 }
 
 static void receive(uint8_t byte) {
@@ -84,30 +84,30 @@ static void imu_reset(void) {
 
 static void on_twi(struct avr_irq_t *irq, uint32_t value, void *param) {
     (void)irq, (void)param;
-    avr_twi_msg_irq_t said = {.u.v = value};
+    avr_twi_msg_irq_t message = {.u.v = value};
     avr_irq_t *answer = avr_io_getirq(avr, AVR_IOCTL_TWI_GETIRQ(0), TWI_IRQ_INPUT);
-    if (said.u.twi.msg & TWI_COND_STOP) imu.is_chosen = 0;
-    if (said.u.twi.msg & TWI_COND_START) {
-        imu.is_chosen = imu.is_here && said.u.twi.addr >> 1 == IMU_ADDRESS;
+    if (message.u.twi.msg & TWI_COND_STOP) imu.is_chosen = 0;
+    if (message.u.twi.msg & TWI_COND_START) {
+        imu.is_chosen = imu.is_here && message.u.twi.addr >> 1 == IMU_ADDRESS;
         imu.is_first = 1;
         if (imu.is_chosen)
-            avr_raise_irq(answer, avr_twi_irq_msg(TWI_COND_ACK, said.u.twi.addr, 1));
+            avr_raise_irq(answer, avr_twi_irq_msg(TWI_COND_ACK, message.u.twi.addr, 1));
     }
     if (!imu.is_chosen) return;
-    if (said.u.twi.msg & TWI_COND_WRITE) {
-        avr_raise_irq(answer, avr_twi_irq_msg(TWI_COND_ACK, said.u.twi.addr, 1));
+    if (message.u.twi.msg & TWI_COND_WRITE) {
+        avr_raise_irq(answer, avr_twi_irq_msg(TWI_COND_ACK, message.u.twi.addr, 1));
         if (imu.is_first)
-            imu.at = said.u.twi.data & 127;
+            imu.at = message.u.twi.data & 127;
         else
-            imu.reg[imu.at++ & 127] = said.u.twi.data;
+            imu.reg[imu.at++ & 127] = message.u.twi.data;
         imu.is_first = 0;
     }
-    if (said.u.twi.msg & TWI_COND_READ) {
+    if (message.u.twi.msg & TWI_COND_READ) {
         // Its readings stay zero while it sleeps (bit 6 of register 0x6B).
         uint8_t is_asleep = imu.reg[0x6B] & 0x40 && imu.at >= 0x3B && imu.at <= 0x48;
         uint8_t data = is_asleep ? 0 : imu.reg[imu.at & 127];
         imu.at++;
-        avr_raise_irq(answer, avr_twi_irq_msg(TWI_COND_READ, said.u.twi.addr, data));
+        avr_raise_irq(answer, avr_twi_irq_msg(TWI_COND_READ, message.u.twi.addr, data));
     }
 }
 
@@ -168,13 +168,13 @@ static void watch(void) {
     int duty = motor_duty(), tail = tail_duty();
     double width_us = servo_us();
     // Written in two halves, it counts once it stands.
-    if (width_us != last_us && width_us == before_us) tell("servo_us", last_us = width_us);
+    if (width_us != last_us && width_us == before_us) report("servo_us", last_us = width_us);
     before_us = width_us;
-    if (duty != last_duty) tell("pwm", last_duty = duty);
-    if (tail != last_tail) tell("tail", last_tail = tail);
+    if (duty != last_duty) report("pwm", last_duty = duty);
+    if (tail != last_tail) report("tail", last_tail = tail);
     for (unsigned i = 0; i < sizeof pins / sizeof *pins; ++i) {
         int level = bit(pins[i].port, pins[i].number);
-        if (level != pins[i].last) tell(pins[i].name, pins[i].last = level);
+        if (level != pins[i].last) report(pins[i].name, pins[i].last = level);
     }
     unsigned sp = avr->data[SPL] | avr->data[SPL + 1] << 8;
     if (sp > 0x100 && sp < lowest_sp) lowest_sp = sp;
@@ -275,7 +275,7 @@ static int obey(char *line) {
         return 0;
     else
         fprintf(stderr, "board: unknown command: %s\n", line);
-    tell("ok", RAM_END - lowest_sp);
+    report("ok", RAM_END - lowest_sp);
     fflush(stdout);
     return 1;
 }
@@ -290,7 +290,7 @@ static void run_stepped(void) {
 
 static void run_live(void) {
     plug();
-    tell("ready", 1);
+    report("ready", 1);
     fflush(stdout);
     struct timespec next;
     clock_gettime(CLOCK_MONOTONIC, &next);
