@@ -8,8 +8,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.data_quality.pose_track import Series, clean, grid, long_gaps, rows_a_value, runs
-from scm.data_quality.problem import DataProblem, Span
-from scm.data_quality.quality import Repair
+from scm.data_quality.quality import DataProblem, Repair, Span
 from scm.data_quality.repairs import GYROS, Repairs, forward_speed
 from scm.recording.units import DIMENSIONS, UNITS, G
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.pose_track import Grid, Series, Track, cut_at_gaps, recorded_s, series
-from scm.data_quality.problem import DataProblem
-from scm.data_quality.quality import Measured, Relation
+from scm.data_quality.quality import DataProblem, Measured, Relation
 from scm.data_quality.whitened_fit import Fit, fit
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
@@ -41,7 +40,6 @@ class DistanceSensor:
         channels: It is made of.
         wheels: Whether it is counted on wheels, so that their radius enters.
         scale_std: What the car file, or the last digit, leaves open about its scale.
-        turned: Yaw as the wheels' difference says [rad]; None where there is none.
     """
 
     name: str
@@ -49,7 +47,6 @@ class DistanceSensor:
     wheels: bool
     scale_std: float
     distance: Series
-    turned: Series | None = None
 
 
 def distance_sensors(recording: Recording, car: Car | None) -> list[DistanceSensor]:
@@ -101,10 +98,9 @@ def _rolled(recording: Recording, car: Car | None) -> DistanceSensor | None:
 def _pair(
     name: str, channels: tuple[str, str], left: Series, right: Series, metre: float, car: Car
 ) -> DistanceSensor:
-    l_m, r_m = left.values * metre, right.at(left.t) * metre
-    turned = Series(left.t, (r_m - l_m) / car.value("body.track_m"))
+    middle = 0.5 * (left.values * metre + right.at(left.t) * metre)
     std = (car.quantity("wheel.radius_m").std or 0.0) / car.value("wheel.radius_m")
-    return DistanceSensor(name, channels, True, std, Series(left.t, 0.5 * (l_m + r_m)), turned)
+    return DistanceSensor(name, channels, True, std, Series(left.t, middle))
 
 
 def travel_against(
@@ -154,11 +150,11 @@ def travel_against(
             break
     if found is None:
         return None
-    relation = _relation(("pose.x", other), found, (warp, tilt), len(rows.t))
-    slip = Measured(_slipped(columns, found.values), 0.0)
-    chord = Measured(_chords(straight, columns[:, :, 0], starts), 0.0)
-    relation = replace(relation, numbers={**relation.numbers, "slip": slip, "chord": chord})
-    return replace(relation, step_s=max(poses.period_s, distance.period_s))
+    numbers = _numbers(found, warp, tilt) | {
+        "slip": Measured(_slipped(columns, found.values), 0.0),
+        "chord": Measured(_chords(straight, columns[:, :, 0], starts), 0.0),
+    }
+    return Relation(("pose.x", other), numbers, max(poses.period_s, distance.period_s))
 
 
 def _straightened(rows: Track, tilt: Floats) -> Track:
@@ -261,15 +257,12 @@ def _slope(t: Floats, values: Floats) -> Floats:
     return (values[b] - values[a]) / (t[b] - t[a])
 
 
-def _relation(pair: tuple[str, str], found: Fit, at: tuple[Floats, Floats], rows: int) -> Relation:
-    numbers = {
-        name: Measured(float(value), float(std), float(leak))
-        for name, value, std, leak in zip(NAMES, found.values, found.std, found.leak, strict=False)
-    }
+def _numbers(found: Fit, warp: Floats, tilt: Floats) -> dict[str, Measured]:
+    """Return what was fitted by name, delay and tilt with all rounds added up."""
+    numbers = found.numbers(NAMES)
     k = max(abs(float(found.values[0])), 1e-9)
-    for i, name in enumerate(NAMES[9 : len(found.values)]):
-        number = numbers[name]
-        numbers[name] = Measured(float(at[0][i]), number.std / k, number.leak)
-    for i, name in enumerate(NAMES[4:6]):
-        numbers[name] = replace(numbers[name], value=float(at[1][i]))
-    return Relation(pair=pair, numbers=numbers, noise=found.noise, rows=rows)
+    for name, total in zip(NAMES[9 : len(found.values)], warp, strict=False):
+        numbers[name] = Measured(float(total), numbers[name].std / k, numbers[name].leak)
+    for name, total in zip(NAMES[4:6], tilt, strict=True):
+        numbers[name] = replace(numbers[name], value=float(total))
+    return numbers

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.physical_limits import GENEROUS, Limits
-from scm.data_quality.problem import DataProblem
+from scm.data_quality.expected_motion import GENEROUS, Limits
+from scm.data_quality.quality import DataProblem
 from scm.data_quality.spikes import chained, held_since, single
 from scm.data_quality.timestamps import left_out, problem, rows_named, times, usual_step
 from scm.recording.read import Channel, Recording

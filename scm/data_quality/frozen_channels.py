@@ -15,8 +15,7 @@ from scm.data_quality.pose_track import (
     runs,
     series,
 )
-from scm.data_quality.problem import DataProblem, Span
-from scm.data_quality.row_spacing import called
+from scm.data_quality.quality import DataProblem, Span, called
 from scm.recording.read import Recording
 
 MIN_FROZEN_S = 1.0  # that a value stays while the car moves

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.problem import Span
+from scm.data_quality.quality import Span
 from scm.recording.read import Channel, Recording
 
 RESET_S = 1.0

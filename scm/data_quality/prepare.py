@@ -1,24 +1,29 @@
-"""A recording as it is compared with a car: screened row by row, repaired, cut at gaps."""
+"""A recording as it is compared with a car: screened row by row, repaired, cut at its gaps.
+
+Each stretch between gaps is driven again on its own.
+"""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
-from scm.data_quality.bursts import without_bursts
+import numpy as np
+
+from scm.arrays import Bools, Floats
 from scm.data_quality.check import check
 from scm.data_quality.encoder_counts import repaired_counters
-from scm.data_quality.physical_limits import limits_of
-from scm.data_quality.problem import DataProblem, Span, folded
-from scm.data_quality.quality import Quality
+from scm.data_quality.expected_motion import limits_of
+from scm.data_quality.pose_track import LONG_GAP_S, POSE, long_gaps
+from scm.data_quality.quality import DataProblem, Quality, Span, called, folded
 from scm.data_quality.repairs import corrected
-from scm.data_quality.row_spacing import called
+from scm.data_quality.row_spacing import without_bursts
 from scm.data_quality.spikes import without_spikes
-from scm.data_quality.stretches import stretches
 from scm.data_quality.timestamps import (
     Table,
     count_of,
     in_order,
     in_seconds,
+    same_stamps,
     tables_of,
     with_numbers,
     without_repeats,
@@ -26,12 +31,18 @@ from scm.data_quality.timestamps import (
 )
 from scm.errors import RecordingError
 from scm.recording.columns import LeftOut
-from scm.recording.read import Recording
+from scm.recording.read import Channel, Recording
 from scm.vehicles.car import Car
+from scm.vehicles.drive_channel import drive_name
 
 REPAIRS = ("unit", "sign", "clock", "clipped", "wrapped", "assumed")
 UNCHANGED = ("not_finite", "assumed")  # a cell without a number is no row that was changed
 MOST_REASONS = 10  # lines of an account; more of them mean the wrong file
+SHORTEST_S = 2.0  # a second to settle the actuators in, and one to compare
+FEWEST_POSES = 8
+EDGE_S = 0.5 * LONG_GAP_S  # tables do not stop at one row: rows that soon after belong to it
+RUN_IN_S = 2.0  # of commands before a stretch: where servo and lags stand when it begins
+STEERING = "command.steering"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,3 +165,143 @@ def screen(recording: Recording, car: Car) -> Screened:
     problems += found
     now, found = repaired_counters(now, limits)
     return Screened(now, (*problems, *found), jumps)
+
+
+@dataclass(frozen=True, slots=True)
+class Stretches:
+    """What a recording was cut into.
+
+    Attributes:
+        recordings: In the order of time; of a recording without such gaps the very recording.
+        problems: Where it was cut, and which rows are in no stretch.
+    """
+
+    recordings: tuple[Recording, ...]
+    problems: tuple[DataProblem, ...] = ()
+
+    def explains(self, other: DataProblem) -> bool:
+        """Return whether another problem names nothing but the gaps at which this was cut."""
+        cut = {gap for problem in self.problems for gap in problem.when_s or ()}
+        return (
+            other.name == "gap"
+            and bool(cut)
+            and all(
+                any(first <= begin and end <= last for first, last in cut)
+                for begin, end in other.when_s or ()
+            )
+        )
+
+
+def stretches(recording: Recording, car: Car, jumps: Sequence[Span] = ()) -> Stretches:
+    """Cut a recording where its poses or the commands that drive the car are missing for long.
+
+    All its tables are cut at the same moments. Other sensors may pause: they are compared where
+    they are. A stretch that is too short to be driven again is left out, with a problem that says
+    which rows.
+
+    Args:
+        recording: With stamps on one clock that go forward, see `corrected.corrected`.
+        car: Says which command drives it.
+        jumps: Further spans to cut at, over which the poses jump.
+    """
+    needed = (drive_name(recording, car), STEERING, *POSE)
+    if any(len(_stamps(recording, name)) == 0 for name in needed):
+        return Stretches((recording,))
+    gaps = long_gaps(*(_stamps(recording, name) for name in needed))
+    if not gaps and not jumps:
+        return Stretches((recording,))
+    cuts = sorted([*((first + EDGE_S, last - EDGE_S) for first, last in gaps), *jumps])
+    ends = [-np.inf, *(moment for cut in cuts for moment in cut), np.inf]
+    parts = [
+        between(recording, first, last) for first, last in zip(ends[::2], ends[1::2], strict=True)
+    ]
+    whole = tuple(part for part in parts if _can_be_driven(part, needed))
+    silent = [name for name in needed if long_gaps(_stamps(recording, name))]
+    return Stretches(whole, (_problem(recording, silent, gaps, jumps, whole),))
+
+
+def _stamps(recording: Recording, name: str) -> Floats:
+    channel = recording.channels.get(name)
+    return np.empty(0) if channel is None else channel.t
+
+
+def between(recording: Recording, first: float, last: float) -> Recording:
+    """Return what was recorded between two moments, and the commands that lead there."""
+    channels = dict[str, Channel]()
+    for name, channel in recording.channels.items():
+        rows = (channel.t >= first) & (channel.t <= last)
+        if name.startswith("command."):
+            rows |= _leading(channel.t, first)
+        if rows.any():
+            channels[name] = replace(channel, t=channel.t[rows], values=channel.values[rows])
+    scans = recording.scans and recording.scans.between(first, last)
+    return replace(recording, channels=channels, scans=scans)
+
+
+def _leading(t: Floats, first: float) -> Bools:
+    """Return the command rows before a moment that still matter there: the last one is held."""
+    before = np.flatnonzero(t < first)
+    rows = (t >= first - RUN_IN_S) & (t < first)
+    rows[before[-1:]] = True
+    return rows
+
+
+def _can_be_driven(part: Recording, needed: Sequence[str]) -> bool:
+    """Return whether poses and commands are there together for long enough."""
+    if any(name not in part.channels for name in needed):
+        return False
+    times = [part.channels[name].t for name in needed]
+    posed = all(len(part.channels[name].t) >= FEWEST_POSES for name in POSE)
+    return posed and min(t[-1] for t in times) - max(t[0] for t in times) >= SHORTEST_S
+
+
+def _problem(
+    recording: Recording,
+    silent: Sequence[str],
+    gaps: Sequence[Span],
+    jumps: Sequence[Span],
+    whole: Sequence[Recording],
+) -> DataProblem:
+    """Say where a recording was cut, and which of its rows are in no stretch."""
+    causes = []
+    if gaps:
+        longest_s = max(last - first for first, last in gaps)
+        often = "" if len(gaps) == 1 else f"{len(gaps)} times, at most "
+        causes.append(f"{_missing(silent)} are missing {often}for {longest_s:.1f} s")
+    if jumps:
+        often = "once" if len(jumps) == 1 else f"{len(jumps)} times"
+        causes.append(f"{'the' if gaps else 'The'} poses jump {often}")
+    rest = {
+        0: f"no stretch of {SHORTEST_S:g} s is left",
+        1: "one stretch of it is driven again",
+    }.get(len(whole), f"{len(whole)} stretches of it are driven again, each on its own")
+    lost = [
+        f"{count} of {len(recording.channels[names[0]].t)} rows of {called(names)}"
+        for names in same_stamps(recording)
+        if (count := _lost(recording, names[0], whole))
+    ]
+    text = f"{', and '.join(causes)}: {rest}."
+    if lost:
+        text += f" Not in a stretch of {SHORTEST_S:g} s that has both: {', '.join(lost)}."
+    return DataProblem(
+        channel=called(silent) if gaps and not jumps else "*",
+        name="gap",
+        text=text,
+        when_s=tuple(sorted([*gaps, *jumps])),
+        corrected="Cut there.",
+        record_instead="Record poses and commands without pauses, or one file a drive.",
+    )
+
+
+def _missing(silent: Sequence[str]) -> str:
+    """Return what is missing at the gaps, in words."""
+    posed = any(name in POSE for name in silent)
+    commanded = any(name not in POSE for name in silent)
+    return "Poses" if not commanded else "Commands" if not posed else "Poses or commands"
+
+
+def _lost(recording: Recording, name: str, whole: Iterable[Recording]) -> int:
+    """Return how many rows of a channel are in no stretch."""
+    t = recording.channels[name].t
+    parts = [part.channels[name].t for part in whole if name in part.channels]
+    return int((~np.isin(t, np.concatenate(parts))).sum()) if parts else len(t)

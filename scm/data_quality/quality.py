@@ -1,9 +1,58 @@
-"""What doubting a recording finds: problems, suspicions, and which parts of it can be used."""
+"""What is found in a recording: its problems, what its sensors show of each other, and repairs."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
-from scm.data_quality.problem import DataProblem, Span
+from msgspec import Struct, field, structs
+
+Span = tuple[float, float]
+MOST_NAMED = 3  # channels that one line names; of more it gives their number
+
+
+class DataProblem(Struct, kw_only=True, frozen=True):
+    """Something wrong with the recording itself, found by its sensors against each other.
+
+    Attributes:
+        channel: Where, `pose.x` or `imu.*`.
+        name: Short and fixed: `gap`, `frozen`, `copied`, `jump`, `unit`, `time_backwards`,
+            `missing`, `too_short`, `constant`, `not_finite` ...
+        text: One sentence: what, where, how much.
+        when_s: None: all the time.
+        corrected: What was done about it before physics was blamed; empty: nothing.
+        record_instead: What to record next time; empty where nothing helps.
+    """
+
+    channel: str
+    name: str
+    text: str = field(name="said")
+    when_s: tuple[Span, ...] | None = None
+    corrected: str = ""
+    record_instead: str = ""
+
+
+def folded(problems: Iterable[DataProblem]) -> tuple[DataProblem, ...]:
+    """Return problems, those that say the same of several channels as one."""
+    alike = dict[DataProblem, list[str]]()
+    for problem in problems:
+        channels = alike.setdefault(structs.replace(problem, channel=""), [])
+        if problem.channel not in channels:
+            channels.append(problem.channel)
+    return tuple(structs.replace(one, channel=_together(names)) for one, names in alike.items())
+
+
+def _together(channels: list[str]) -> str:
+    if len(channels) <= MOST_NAMED:
+        return ", ".join(channels)
+    families = dict.fromkeys(name.partition(".")[0] + ".*" * ("." in name) for name in channels)
+    return f"{len(channels)} channels ({', '.join(families)})"
+
+
+def called(names: Sequence[str]) -> str:
+    """Return one name for several channels: `imu.*`, or all of them."""
+    families = {name.partition(".")[0] for name in names}
+    if len(names) == 1:
+        return names[0]
+    return ", ".join(sorted(f"{f}.*" if f"{f}" not in names else f for f in families))
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,22 +69,18 @@ class Measured:
     leak: float = 1.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Relation:
     """Two sensors held against each other, whether or not anything is wrong with them.
 
     Attributes:
         pair: What was compared, such as `("pose.yaw", "imu.gyro_z")`.
         numbers: By name; what each means stands where the relation is made.
-        noise: Standard deviation of what is left, row to row, in the first one's unit.
-        rows: How many rows of the first one took part.
         step_s: Between rows of the slower one.
     """
 
     pair: tuple[str, str]
     numbers: Mapping[str, Measured]
-    noise: float
-    rows: int
     step_s: float = 0.0
 
 
@@ -111,4 +156,4 @@ class Quality:
     suspicions: tuple[Suspicion, ...]
     usable: Usable
     repairs: tuple[Repair, ...] = ()
-    relations: tuple[Relation, ...] = field(default=())
+    relations: tuple[Relation, ...] = ()

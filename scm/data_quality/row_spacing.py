@@ -1,11 +1,17 @@
-"""How the rows of a recording are spaced: gaps, jitter, too slow, too short."""
+"""How the rows of a recording are spaced: gaps, jitter, too slow, too short; bursts.
+
+A link that stalls, or a driver that reads a whole buffer, writes several readings at one moment
+after a pause as long as they took: a burst. Their stamps are late, each by another time.
+"""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from scm.arrays import Floats
-from scm.data_quality.problem import DataProblem, Span
+from scm.arrays import Bools, Floats, Ints
+from scm.data_quality.quality import DataProblem, Span, called
+from scm.data_quality.timestamps import HELD, Table, problem, same_stamps, tables_of, usual_step
 from scm.recording.read import Recording
 
 MIN_LENGTH_S = 5.0  # of a table
@@ -16,32 +22,20 @@ MAX_POSE_STEP_S = 0.1  # slower poses do not show how driving starts
 MAX_JITTER = 2.0  # of the 95th percentile of steps, in usual steps
 MAX_BURST_SHARE = 0.1  # of rows right after another
 MIN_BURST_SHARE = 0.005  # of rows; fewer are not mentioned
-
-
-def tables(recording: Recording) -> list[tuple[str, ...]]:
-    """Return channels grouped by their stamps: those of one table, as far as can be seen."""
-    groups: list[list[str]] = []
-    for name, channel in recording.channels.items():
-        for group in groups:
-            if np.array_equal(recording.channels[group[0]].t, channel.t, equal_nan=True):
-                group.append(name)
-                break
-        else:
-            groups.append([name])
-    return [tuple(group) for group in groups]
-
-
-def called(names: Sequence[str]) -> str:
-    """Return one name for several channels: `imu.*`, or all of them."""
-    families = {name.partition(".")[0] for name in names}
-    if len(names) == 1:
-        return names[0]
-    return ", ".join(sorted(f"{f}.*" if f"{f}" not in names else f for f in families))
+TOGETHER = 0.2  # of the usual step, as which rows are handed over together at most
+LATE = 0.6  # of the usual step that each row of a burst takes of the pause before it, at least
+LONGEST_STEP = 1.25  # usual steps between rows that are spread: a longer pause was a gap as well
+IN_BURSTS = 0.05  # of a table's rows; below, a row is late now and then
+MOST_IN_BURSTS = 0.4  # of a table's rows: all come so
+LONG_BURST = 4  # rows of one stall, which needs no other
+CHANGING = 0.5  # of the usual share of rows that change: below, a burst is copies of one row
+INFORMS = 1.15  # times the bends of rows that are not late: motion shows beside the noise
+STEADIER = (1.2, 0.7)  # bends that are left of a motion, of those before, at most
 
 
 def row_problems(recording: Recording) -> Iterator[DataProblem]:
     """Yield what is wrong with the spacing of the rows of each table."""
-    for names in tables(recording):
+    for names in same_stamps(recording):
         channel = recording.channels[names[0]]
         if len(channel.t) >= 2:
             yield from _spacing(channel.t, called(names), names)
@@ -115,3 +109,102 @@ def gaps_of(t: Floats, command: bool = False) -> tuple[Span, ...]:
         MIN_COMMAND_GAP_S if command else MIN_GAP_S, MIN_GAP_STEPS * float(np.median(forward))
     )
     return tuple((float(t[i]), float(t[i + 1])) for i in np.flatnonzero(step > longest))
+
+
+def without_bursts(recording: Recording) -> tuple[Recording, list[DataProblem]]:
+    """Return a sorted recording in which rows of one moment are spread over the pause before."""
+    channels, problems = dict(recording.channels), list[DataProblem]()
+    for table in tables_of(recording):
+        order = np.lexsort((table.numbers, table.t))
+        t = table.t[order]
+        _, size = bursts(t)
+        few = size.sum() < IN_BURSTS * len(t) and size.max(initial=0) < LONG_BURST
+        if table.is_held or len(size) == 0 or few:
+            continue
+        even = np.empty_like(t)
+        even[order] = spread(t)
+        if not _are_late(recording, table, even, usual=size.sum() > MOST_IN_BURSTS * len(t)):
+            continue
+        for name in table.names:
+            channel = channels[name]
+            at = np.searchsorted(table.numbers, channel.row_numbers)
+            channels[name] = replace(channel, t=even[at])
+        late_ms, step_ms = 1e3 * float(np.abs(even - table.t).max()), 1e3 * usual_step(t)
+        problems.append(problem(table.names, "bursts", (
+            f"{int(size.sum())} of {len(t)} rows were handed over up to {int(size.max())} at one "
+            f"moment: their stamps are late by up to {late_ms:.0f} ms.",
+            f"Their stamps are spread evenly, {step_ms:.3g} ms apart.",
+            "Stamp a value where it is measured, not where it arrives.",
+        )))  # fmt: skip
+    return replace(recording, channels=channels), problems
+
+
+def bursts(t: Floats) -> tuple[Ints, Ints]:
+    """Return the first row of each burst, and of how many rows it is; `t` does not fall.
+
+    A burst follows a pause that is long enough for all its rows.
+    """
+    usual_s = usual_step(t)
+    same = np.concatenate(([False], _together(t, usual_s), [False]))
+    first = np.flatnonzero(~same[:-1] & same[1:])
+    size = np.flatnonzero(same[:-1] & ~same[1:]) - first + 1
+    pause = np.where(first > 0, t[first] - t[first - 1], np.inf)
+    late = pause >= LATE * usual_s * size
+    return first[late], size[late]
+
+
+def spread(t: Floats) -> Floats:
+    """Return stamps with the rows of each burst even; the last row of each is right."""
+    usual_s, spread_t = usual_step(t), t.copy()
+    for first, size in zip(*bursts(t), strict=True):
+        end = t[first + size - 1]
+        step = usual_s
+        if first > 0:
+            step = min(LONGEST_STEP * usual_s, (end - t[first - 1]) / size)
+        spread_t[first : first + size] = end - step * np.arange(size - 1, -1, -1)
+    return spread_t
+
+
+def _together(t: Floats, usual_s: float) -> Bools:
+    """Return which steps are so short that both rows were handed over together, `(n - 1,)`."""
+    return np.asarray(np.diff(t) < TOGETHER * usual_s)
+
+
+def _are_late(recording: Recording, table: Table, even: Floats, *, usual: bool) -> bool:
+    """Return whether rows of one moment are late, by the motion that they show.
+
+    Copies of a row are not, nor is what is sent: it holds from when it is sent.
+
+    Args:
+        recording: As read.
+        table: With bursts.
+        even: Stamps of its rows, spread.
+        usual: Most rows come so: then noise may hide what the motion says.
+    """
+    changing, left = list[tuple[float, float]](), list[float]()
+    for name in table.names:
+        channel = recording.channels[name]
+        if name.startswith(HELD) or len(channel.t) < 3:
+            continue
+        t, spread_t = channel.t, even[np.searchsorted(table.numbers, channel.row_numbers)]
+        values = np.unwrap(channel.values) if name == "pose.yaw" else channel.values
+        moved, at_once = spread_t != t, _together(t, usual_step(t))
+        if at_once.any() and not at_once.all():
+            change = np.diff(values) != 0.0
+            changing.append((float(change[at_once].mean()), float(change[~at_once].mean())))
+        undisturbed = ~np.convolve(moved, np.ones(5), mode="same").astype(np.bool_)
+        before, after = (_bends(stamps, values, moved) for stamps in (t, spread_t))
+        noise = 0.0 if usual else _bends(t, values, undisturbed)
+        if before > INFORMS * noise:
+            left.append((after - noise) / (before - noise))
+    if not any(together >= CHANGING * apart for together, apart in changing):
+        return False
+    return float(np.median(left or [1.0])) < (STEADIER[0] if usual else STEADIER[1])
+
+
+def _bends(t: Floats, values: Floats, rows: Bools) -> float:
+    """Return how far values of some rows are off the line between their neighbours, on average."""
+    share = (t[1:-1] - t[:-2]) / np.maximum(t[2:] - t[:-2], 1e-9)
+    off = values[1:-1] - values[:-2] - share * (values[2:] - values[:-2])
+    some = np.abs(off[rows[1:-1]])
+    return float(some.mean()) if len(some) else 0.0

@@ -11,8 +11,8 @@ import numpy as np
 from msgspec import structs
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.physical_limits import GENEROUS, Limits
-from scm.data_quality.problem import DataProblem, Span
+from scm.data_quality.expected_motion import GENEROUS, Limits
+from scm.data_quality.quality import DataProblem, Span
 from scm.data_quality.timestamps import left_out, problem, rows_named, times, usual_step
 from scm.recording.read import Channel, Recording
 
@@ -158,15 +158,9 @@ def single(t: Floats, off: Callable[[Ints, Ints, Ints], Floats], bound: Floats) 
         near = residual[max(row - 2, 0) : row + 3]
         if residual[row] < near.max():
             continue
-        left = (
-            off(np.array([row - 1]), np.array([row - 2]), np.array([row + 1])) if row > 1 else 0.0
-        )
-        right = (
-            off(np.array([row + 1]), np.array([row - 1]), np.array([row + 2]))
-            if row < n - 2
-            else 0.0
-        )
-        found[row] = max(float(np.max(left)), float(np.max(right))) < BEYOND * residual[row]
+        beside = [(row - 1, row - 2, row + 1), (row + 1, row - 1, row + 2)]
+        inside = np.array([b for b in beside if min(b) >= 0 and max(b) < n])
+        found[row] = off(*inside.T).max() < BEYOND * residual[row]
     return found
 
 

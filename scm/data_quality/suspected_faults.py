@@ -87,18 +87,11 @@ def from_travel(
     yield from _scale(found, way, push)
     yield from _heading(found)
     yield from _point(found, ("ahead", "aside"), wheelbase_m)
-    tilt = {axis: _wide(found.numbers[f"tilt_{axis}"], FLOORS["tilt"], TILT_LEAK) for axis in "xy"}
+    tilt = {n: _wide(found.numbers[n], FLOORS["tilt"], TILT_LEAK) for n in ("tilt_x", "tilt_y")}
     sigma = math.hypot(*(m.value / m.std for m in tilt.values()))
     if sigma > LIMIT_OF_TWO and all(math.isfinite(m.std) for m in tilt.values()):
-        yield Suspicion(
-            name="camera_tilt",
-            channels=("pose.x", "pose.y"),
-            values={f"tilt_{axis}": m.value for axis, m in tilt.items()},
-            std={f"tilt_{axis}": m.std for axis, m in tilt.items()},
-            sigma=sigma,
-            shown_by=found.pair,
-            text="The pose's metre changes over the floor, as under a camera that leans.",
-        )
+        text = "The pose's metre changes over the floor, as under a camera that leans."
+        yield _suspicion("camera_tilt", ("pose.x", "pose.y"), tilt, sigma, found, text)
 
 
 def from_sideways(found: Relation, wheelbase_m: float) -> Iterator[Suspicion]:
@@ -122,23 +115,18 @@ def from_push(found: Relation, heading_rad: float = 0.0) -> Iterator[Suspicion]:
     """
     if not follows(found):
         return
+    channels = ("imu.accel_x", "imu.accel_y")
     x, y = (_wide(found.numbers[f"bias_{axis}"], FLOORS["accel_bias"]) for axis in "xy")
     sigma = math.hypot(x.value / x.std, y.value / y.std)
     if sigma > LIMIT_OF_TWO and math.isfinite(x.std + y.std):
-        yield Suspicion(
-            name="accel_bias",
-            channels=("imu.accel_x", "imu.accel_y"),
-            values={"along": x.value, "across": y.value},
-            std={"along": x.std, "across": y.std},
-            sigma=sigma,
-            shown_by=found.pair,
-            text=f"The accelerometer shows {x.value:+.2f} m/s^2 ahead and {y.value:+.2f} m/s^2 "
-            "left beyond what the pose does: a bias, or a mount that is not level.",
+        text = (
+            f"The accelerometer shows {x.value:+.2f} m/s^2 ahead and {y.value:+.2f} m/s^2 left "
+            "beyond what the pose does: a bias, or a mount that is not level."
         )
+        yield _suspicion("accel_bias", channels, {"along": x, "across": y}, sigma, found, text)
     seen = _wide(found.numbers["angle"], FLOORS["imu_angle"] + ANGLE_A_SECOND * found.step_s)
     angle = Measured(seen.value + heading_rad, seen.std, seen.leak)
     text = f"The accelerometer is turned by {math.degrees(angle.value):+.1f} deg on the car."
-    channels = ("imu.accel_x", "imu.accel_y")
     yield from _one("imu_misalignment", channels, "angle", angle, 0.0, found, text)
 
 
@@ -205,17 +193,10 @@ def _scale(found: Relation, way: DistanceSensor, push: Relation | None) -> Itera
     faults["pose_scale"] = (("pose.x", "pose.y"), "scale", scale)
     for name in _ruled_out(push, share.value):
         faults.pop(name, None)
+    text = f"The pose goes {scale.value:.3f} m for every metre of {way.name}."
     for name, (channels, parameter, measured) in faults.items():
-        yield Suspicion(
-            name=name,
-            channels=channels,
-            values={parameter: measured.value},
-            std={parameter: measured.std},
-            sigma=abs(sigma),
-            shown_by=found.pair,
-            indistinguishable=tuple(other for other in faults if other != name),
-            text=f"The pose goes {scale.value:.3f} m for every metre of {way.name}.",
-        )
+        others = tuple(other for other in faults if other != name)
+        yield _suspicion(name, channels, {parameter: measured}, abs(sigma), found, text, others)
 
 
 def _ruled_out(push: Relation | None, share: float) -> tuple[str, ...]:
@@ -248,16 +229,9 @@ def _point(found: Relation, names: tuple[str, ...], wheelbase_m: float) -> Itera
     if not numbers or sigma < (LIMIT if len(numbers) == 1 else LIMIT_OF_TWO):
         return
     where = ", ".join(f"{1e3 * m.value:+.0f} mm {name}" for name, m in numbers.items())
-    yield Suspicion(
-        name="pose_point",
-        channels=("pose.x", "pose.y"),
-        values={name: m.value for name, m in numbers.items()},
-        std={name: m.std for name, m in numbers.items()},
-        sigma=sigma,
-        shown_by=found.pair,
-        indistinguishable=("com_shift",),
-        text=f"The car turns as if the tracked point were off ({where}).",
-    )
+    text = f"The car turns as if the tracked point were off ({where})."
+    others = ("com_shift",)
+    yield _suspicion("pose_point", ("pose.x", "pose.y"), numbers, sigma, found, text, others)
 
 
 def _one(
@@ -266,16 +240,19 @@ def _one(
 ) -> Iterator[Suspicion]:  # fmt: skip
     sigma = abs(measured.value - neutral) / measured.std
     if sigma > LIMIT:
-        yield Suspicion(
-            name=name,
-            channels=channels,
-            values={parameter: measured.value},
-            std={parameter: measured.std},
-            sigma=sigma,
-            shown_by=found.pair,
-            indistinguishable=indistinguishable,
-            text=text,
-        )
+        numbers = {parameter: measured}
+        yield _suspicion(name, channels, numbers, sigma, found, text, indistinguishable)
+
+
+def _suspicion(
+    name: str, channels: tuple[str, ...], numbers: Mapping[str, Measured], sigma: float,
+    found: Relation, text: str, indistinguishable: tuple[str, ...] = (),
+) -> Suspicion:  # fmt: skip
+    values, std = ({n: getattr(m, what) for n, m in numbers.items()} for what in ("value", "std"))
+    return Suspicion(
+        name=name, channels=channels, values=values, std=std, sigma=sigma, shown_by=found.pair,
+        indistinguishable=indistinguishable, text=text,
+    )  # fmt: skip
 
 
 def _wide(measured: Measured, floor: float, most: float = LARGEST_LEAK) -> Measured:
@@ -290,9 +267,9 @@ def _wide(measured: Measured, floor: float, most: float = LARGEST_LEAK) -> Measu
 
 def _mean(known: Sequence[Measured]) -> Measured:
     """Return the mean weighed by certainty."""
-    weights = [m.std**-2 for m in known if math.isfinite(m.std)]
     known = [m for m in known if math.isfinite(m.std)]
     if not known:
         return Measured(1.0, math.inf)
+    weights = [m.std**-2 for m in known]
     value = sum(w * m.value for w, m in zip(weights, known, strict=True)) / sum(weights)
     return Measured(value, sum(weights) ** -0.5)

@@ -1,15 +1,14 @@
 """Stamps of a recording's rows: their unit, strays, their order, clocks that were set, repeats."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.physical_limits import Limits
-from scm.data_quality.problem import DataProblem
-from scm.data_quality.row_spacing import called
+from scm.data_quality.expected_motion import Limits
+from scm.data_quality.quality import DataProblem, called
 from scm.recording.read import Channel, Recording, Source
 from scm.recording.units import UNITS
 
@@ -82,21 +81,35 @@ def usual_step(t: Floats) -> float:
 
 def tables_of(recording: Recording) -> list[Table]:
     """Return the tables of a recording; channels that no file tells apart, by equal stamps."""
+    return [_table(recording, names) for names in _grouped(recording, _of_one_file)]
+
+
+def same_stamps(recording: Recording) -> list[tuple[str, ...]]:
+    """Return channels grouped by their stamps: those of one table, as far as can be seen."""
+    return _grouped(recording, _of_one_clock)
+
+
+def _grouped(
+    recording: Recording, together: Callable[[Channel, Channel], bool]
+) -> list[tuple[str, ...]]:
     groups: list[list[str]] = []
     for name, channel in recording.channels.items():
-        for group in groups:
-            if _together(recording.channels[group[0]], channel):
-                group.append(name)
-                break
-        else:
+        group = next((g for g in groups if together(recording.channels[g[0]], channel)), None)
+        if group is None:
             groups.append([name])
-    return [_table(recording, tuple(group)) for group in groups]
+        else:
+            group.append(name)
+    return [tuple(group) for group in groups]
 
 
-def _together(one: Channel, other: Channel) -> bool:
+def _of_one_clock(one: Channel, other: Channel) -> bool:
+    return np.array_equal(one.t, other.t, equal_nan=True)
+
+
+def _of_one_file(one: Channel, other: Channel) -> bool:
     if one.source is not None and other.source is not None:
         return one.source.index == other.source.index
-    return np.array_equal(one.t, other.t, equal_nan=True)
+    return _of_one_clock(one, other)
 
 
 def _table(recording: Recording, names: tuple[str, ...]) -> Table:

@@ -6,13 +6,14 @@ alike; how much of either there is comes from the rows themselves. Standard erro
 of the classical ones and those of sums over blocks, which forgive what is left of correlation.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from scm.arrays import Floats
+from scm.data_quality.quality import Measured
 from scm.vehicles.jit import array_kernel
 
 THETAS = (0.0, 0.2, 0.4, 0.6, 0.75, 0.85, 0.9, 0.94, 0.965, 0.98, 0.99, 0.995)
@@ -32,17 +33,18 @@ class Fit:
         values, std: Of each column, shape `(k,)`.
         leak: Square root of each factor's variance inflation, shape `(k,)`: how alike its column
             is to what the others make up together.
-        noise: Standard deviation of the whitened residual.
         theta: Share of the noise that does not add up.
-        residual: Before whitening, shape `(n, axes)`.
     """
 
     values: Floats
     std: Floats
     leak: Floats
-    noise: float
     theta: float
-    residual: Floats
+
+    def numbers(self, names: Iterable[str]) -> dict[str, Measured]:
+        """Return the first columns' values by name."""
+        columns = zip(names, self.values, self.std, self.leak, strict=False)
+        return {n: Measured(float(v), float(std), float(leak)) for n, v, std, leak in columns}
 
 
 def fit(
@@ -72,9 +74,7 @@ def fit(
         weights = _weights(e)
         values, rows, e = _solve(measured, columns, theta, weights, allowed, parts)
     std, leak = _errors(rows, e, weights, allowed)
-    spread = float(np.sqrt(np.mean(weights * e**2)))
-    residual = measured - columns @ values
-    return Fit(values, std, leak, spread, theta, residual)
+    return Fit(values, std, leak, theta)
 
 
 def whiten(values: Floats, theta: float, parts: Sequence[slice]) -> Floats:

@@ -9,7 +9,7 @@ from enum import StrEnum
 
 from msgspec import Struct, field
 
-from scm.data_quality.problem import DataProblem, Span
+from scm.data_quality.quality import DataProblem, Span
 
 DRIVE_FOLDER = "next_drive"
 MIN_OFFERED_STDS = 3.2  # of separation; a drive that separates less is not written

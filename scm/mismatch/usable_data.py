@@ -10,10 +10,8 @@ from msgspec import structs
 
 from scm.arrays import Floats
 from scm.data_quality.pose_track import clean, recorded_s
-from scm.data_quality.prepare import Prepared, prepare
-from scm.data_quality.problem import DataProblem
-from scm.data_quality.quality import Quality
-from scm.data_quality.stretches import between
+from scm.data_quality.prepare import Prepared, between, prepare
+from scm.data_quality.quality import DataProblem, Quality
 from scm.mismatch.budget import needed_s
 from scm.recorder.drives import SUFFIX
 from scm.recording.read import Recording

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from scm.arrays import Bools, Floats
-from scm.data_quality.problem import Span
+from scm.data_quality.quality import Span
 from scm.recording.motion import forward, pose_point
 from scm.recording.read import Recording
 from scm.replay.commands import Commanded, Commands

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.problem import Span
+from scm.data_quality.quality import Span
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.replay.drive import Drive
 

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import scm
-from scm.data_quality.problem import MOST_NAMED, DataProblem
+from scm.data_quality.quality import MOST_NAMED, DataProblem
 from scm.mismatch.evidence import RefittedParameter
 from scm.mismatch.findings import Diagnosis, Fit
 from scm.mismatch.report.html_text import around, figure, section, table, tag

@@ -8,7 +8,7 @@ import numpy as np
 from msgspec import structs
 
 from scm.arrays import Floats
-from scm.data_quality.problem import Span
+from scm.data_quality.quality import Span
 from scm.mismatch.evidence import Evidence, Residual
 from scm.mismatch.findings import Diagnosis
 from scm.mismatch.report.panels import Panel, panels_of

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.problem import Span
+from scm.data_quality.quality import Span
 from scm.maps.svg import element
 from scm.mismatch.evidence import FreeRuns, Residual
 from scm.mismatch.findings import Located, Place

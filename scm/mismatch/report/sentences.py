@@ -8,7 +8,7 @@ from pathlib import Path
 
 from msgspec import structs
 
-from scm.data_quality.problem import DataProblem, Span
+from scm.data_quality.quality import DataProblem, Span
 from scm.mismatch.findings import Diagnosis, Effect, Equation, Located, Place, Verdict
 from scm.mismatch.report.wording import (
     capital,

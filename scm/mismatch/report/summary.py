@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from scm.data_quality.problem import DataProblem
+from scm.data_quality.quality import DataProblem
 from scm.mismatch.findings import Diagnosis, Effect
 from scm.mismatch.report.sentences import (
     can_judge,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.problem import Span
+from scm.data_quality.quality import Span
 from scm.errors import RecordingError
 from scm.mismatch.evidence import FreeRuns
 from scm.mismatch.findings import Fit, PartErrors

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.data_quality.problem import Span
+from scm.data_quality.quality import Span
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.evidence import FreeRuns, Residual
 from scm.mismatch.findings import Equation, Fit, Located, Place

@@ -1,6 +1,6 @@
 """Twelve equal remarks are one line."""
 
-from scm.data_quality.problem import DataProblem, folded
+from scm.data_quality.quality import DataProblem, folded
 
 
 def lost(channel: str, rows: int = 3) -> DataProblem:

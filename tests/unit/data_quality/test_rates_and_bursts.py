@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.data_quality.bursts import spread
 from scm.data_quality.check import check
 from scm.data_quality.pose_track import track
 from scm.data_quality.prepare import prepare
 from scm.data_quality.repairs import corrected
+from scm.data_quality.row_spacing import spread
 from scm.recording.motion import Poses
 from scm.recording.read import Channel, Recording
 from scm.replay.drive import Drive

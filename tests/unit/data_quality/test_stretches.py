@@ -9,10 +9,9 @@ import pytest
 from scm.arrays import Floats
 from scm.data_quality.check import check
 from scm.data_quality.pose_track import grid, long_gaps, track
-from scm.data_quality.prepare import prepare
+from scm.data_quality.prepare import prepare, stretches
 from scm.data_quality.quality import Quality
 from scm.data_quality.repairs import forward_speed
-from scm.data_quality.stretches import stretches
 from scm.recording.read import Recording
 from scm.recording.scans import Scans
 from scm.recording.span import part_of

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from scm.data_quality.problem import DataProblem
+from scm.data_quality.quality import DataProblem
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns, RefittedParameter, Residual, Tried
 from scm.mismatch.findings import (
     Alternative,

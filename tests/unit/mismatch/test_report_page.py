@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from scm.data_quality.problem import DataProblem
+from scm.data_quality.quality import DataProblem
 from scm.mismatch.evidence import Evidence, RefittedParameter, Residual
 from scm.mismatch.findings import Effect, Equation, Estimate, Located, Verdict
 from scm.mismatch.report.sentences import verdict_sentence

@@ -5,7 +5,7 @@ import math
 import pytest
 from msgspec.structs import replace
 
-from scm.data_quality.problem import DataProblem
+from scm.data_quality.quality import DataProblem
 from scm.mismatch.findings import Diagnosis, Effect, Equation, Estimate, Undecided, Verdict
 from scm.mismatch.trial.again import Ratio
 from scm.mismatch.trial.labels import label_of

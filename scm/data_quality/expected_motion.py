@@ -1,4 +1,4 @@
-"""Whether another car was driven than the car file describes: its speed, steering and wheels."""
+"""What a car file leads to expect: limits of motion, and whether another car was driven."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -8,13 +8,17 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.data_quality.pose_track import Series, Track, clean, grid, held, long_gaps
-from scm.data_quality.problem import DataProblem
-from scm.data_quality.quality import Relation
+from scm.data_quality.quality import DataProblem, Relation
 from scm.geometry import Pose2
 from scm.recording.read import Recording
+from scm.recording.units import G
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
 
+GENEROUS = 3.0  # times what the file says: a car is pushed, rolls downhill, spins, or is tuned
+FULL_SPEED = "drive.full_speed_m_s"
+WIDEST_LOCK_RAD = 0.7  # of a car whose file does not say how far its wheels turn
+GRIP = 1.0  # of a tyre whose file does not say what force it passes on, over its load
 OTHER_CAR = "the car file is another car's"
 ANOTHER = "Nothing: give the file of the car that was driven."
 MAX_SPEED_RATIO = 1.4  # of the speed driven to the file's; beyond, it is another car
@@ -37,6 +41,55 @@ SERVO_DELAY_S = 0.15  # usual, of steering
 SHORTEST_S = 5.0
 MIN_YAW_STD_RAD_S = 0.02  # of a drive that turns
 MIN_SWING = 0.2  # of steering, as a share of its largest
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a car's motion stays below, `GENEROUS` times what its file says.
+
+    Attributes:
+        speed: [m/s]; `acceleration`: in any direction [m/s^2]; `turning`: of its heading [rad/s].
+        wheels: Angular speed of its wheels [rad/s].
+        counts: Of its encoders a second; `turn`: a turn; None where the file does not say it.
+        length: Its wheelbase [m].
+    """
+
+    speed: float
+    acceleration: float
+    turning: float
+    wheels: float
+    counts: float | None
+    turn: float | None
+    length: float
+
+
+def limits_of(car: Car) -> Limits:
+    """Return what a car's motion stays below."""
+    steady = steady_speed(car)
+    top = car.value(FULL_SPEED) if steady is None else steady.top
+    lock = _value(car, "steering.limit_rad", WIDEST_LOCK_RAD)
+    grip = G * max(
+        _value(car, key, GRIP) for key in ("tyre.force_extremum", "tyre.lateral_force_extremum")
+    )
+    length = car.value("body.wheelbase_m")
+    curvature = math.tan(min(lock, 1.5)) / length
+    turning = min(top * curvature, math.sqrt(grip * curvature))  # its tyres slip beyond
+    wheels = top / car.value("wheel.radius_m")
+    key = "encoder.counts_per_revolution"
+    turn = car.value(key) if car.has(key) else None
+    return Limits(
+        speed=GENEROUS * top,
+        acceleration=GENEROUS * grip,
+        turning=GENEROUS * turning,
+        wheels=GENEROUS * wheels,
+        counts=None if turn is None else GENEROUS * wheels * turn / math.tau,
+        turn=turn,
+        length=length,
+    )
+
+
+def _value(car: Car, key: str, default: float) -> float:
+    return car.value(key) if car.has(key) else default
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,12 +201,17 @@ def steady_speed(car: Car) -> SteadySpeed | None:
     top = top_speed(car)
     if top is not None:
         return SteadySpeed(np.array([0.0, 1.0]), np.array([0.0, top]))
-    fleet = Fleet(car, len(THROTTLES))
-    for _ in THROTTLES:
-        fleet.add(Pose2(0.0, 0.0, 0.0))
-    throttle = np.tile(THROTTLES, (round(STEADY_S / STEP_S), 1))
-    reached = fleet.rollout(throttle, np.zeros_like(throttle), STEP_S, ("speed",))["speed"][-1]
+    throttles = np.tile(THROTTLES, (round(STEADY_S / STEP_S), 1))
+    reached = _reached(car, throttles, np.zeros_like(throttles), "speed")
     return SteadySpeed(THROTTLES, np.maximum.accumulate(reached))
+
+
+def _reached(car: Car, throttle: Floats, steering: Floats, what: str) -> Floats:
+    """Return what cars reach that stand and then get these commands, (steps, cars) each."""
+    fleet = Fleet(car, throttle.shape[1])
+    for _ in range(throttle.shape[1]):
+        fleet.add(Pose2(0.0, 0.0, 0.0))
+    return np.asarray(fleet.rollout(throttle, steering, STEP_S, (what,))[what][-1])
 
 
 def _speed(recording: Recording, car: Car, movement: Series) -> str:
@@ -226,14 +284,9 @@ def _in_wheel_angles(recording: Recording, car: Car) -> tuple[Recording, float]:
         return recording, 1.0
     if car.has("steering.limit_rad"):
         return recording, car.value("steering.limit_rad")
-    fleet = Fleet(car, len(STEERINGS))
-    for _ in STEERINGS:
-        fleet.add(Pose2(0.0, 0.0, 0.0))
     steerings = np.tile(STEERINGS, (round(STEERED_S / STEP_S), 1))
-    turned = fleet.rollout(np.zeros_like(steerings), steerings, STEP_S, ("steer_angle",))[
-        "steer_angle"
-    ]
-    values = np.interp(steering.values, STEERINGS, turned[-1])
+    turned = _reached(car, np.zeros_like(steerings), steerings, "steer_angle")
+    values = np.interp(steering.values, STEERINGS, turned)
     changed = replace(steering, values=values, dimension="angle")
     return replace(recording, channels={**recording.channels, "command.steering": changed}), 1.0
 
