@@ -69,9 +69,9 @@ class City:
     """One city as the web sees it.
 
     Attributes:
-        send: Asks a request on the bus and waits for the reply, at most so many seconds.
+        send: Sends a request on the bus and waits for the reply, at most so many seconds.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
-        shelves: Folders that the interface reads and writes.
+        folders: Folders that the interface reads and writes.
         link: Its connection to the bus.
     """
 
@@ -89,7 +89,7 @@ class City:
 
     @property
     def wire(self) -> Wire | None:
-        """What says commands on the bus; None: nobody can be driven from here."""
+        """Publishes commands on the bus; None: nobody can be driven from here."""
         return self.link.wire
 
     def now_ns(self) -> int:
@@ -98,10 +98,10 @@ class City:
         return stepped_ns if self.link.clock is None else max(stepped_ns, self.link.clock.now_ns())
 
     def call(self, request: Request, reply: type[R]) -> R:
-        """Ask the city and return its answer; blocks, so only for routes in the thread pool.
+        """Send a request to the city and return its reply; blocks: only for routes in the thread pool.
 
         Raises:
-            RefusedError: when the city says no, or does not answer in time.
+            RefusedError: when the city refuses, or does not reply in time.
         """
         answer = self.send(request, REQUEST_TIMEOUT_S)
         if isinstance(answer, Refused):

@@ -1,12 +1,12 @@
-"""The live stream: one loop encodes what changed, once, for all pages that listen.
+"""The live stream: one loop encodes what changed, once, for all pages that subscribe.
 
-A page first gets a `snapshot` of its topics, then `delta`s with those that changed, each whole;
-events come one by one and never twice. What nobody hears is not made. A page too slow to take them
-gets a new snapshot instead of a backlog, with the events it has not had. Silence is broken by a
-`beat` once a second.
+A page first gets a `snapshot` of its topics, then `delta`s: the topics that changed, each complete.
+Events come one by one and never twice. A topic without a subscriber is not encoded. When a page
+reads too slowly and its queue is full, the queue is dropped and the page gets a new snapshot, with
+the events that it has not received. When nothing changes, a `beat` is sent once a second.
 
-An id is `<run>-<frame>-<event>`: a page that comes back with the last one it saw gets the events
-after that one; after a restart of the server the run differs, and it gets the last ones anew.
+An id is `<run>-<frame>-<event>`. A page that reconnects with its last id gets the events after that
+one; after a restart of the server the run differs, and it gets the last `EVENTS_SHOWN` events.
 """
 
 import asyncio
@@ -32,10 +32,10 @@ QUEUE_DEPTH = 20  # frames: one second
 
 
 class Listener:
-    """One page: frames on their way to it; when it cannot keep up they are all dropped.
+    """One page and the frames queued for it; when it cannot keep up, all of them are dropped.
 
     Attributes:
-        told_seq: Number of the newest event that it took; None: it took nothing yet.
+        sent_seq: Number of the newest event sent to it; None: nothing was sent yet.
     """
 
     def __init__(self, topics: frozenset[str]) -> None:
@@ -47,7 +47,7 @@ class Listener:
         self.closed = False
 
     def offer(self, frame: bytes, event_seq: int) -> None:
-        """Queue a frame, which tells events up to a number; a full queue is emptied."""
+        """Queue a frame with events up to a number; a full queue is emptied."""
         if self.behind:
             return
         if len(self._frames) >= QUEUE_DEPTH:

@@ -121,12 +121,12 @@ class Garage:
         for fleet in self.fleets.values():
             fleet.threads = count
 
-    def command(self, indices: VehicleArrays) -> None:
+    def command(self, vehicles: VehicleArrays) -> None:
         """Command all motors and servos."""
         for name, rows in self._rows.items():
             fleet, own = self.fleets[name], self._indices[name]
-            fleet.throttle[rows] = indices.throttle[own]
-            fleet.steering[rows] = indices.steering[own]
+            fleet.throttle[rows] = vehicles.throttle[own]
+            fleet.steering[rows] = vehicles.steering[own]
 
     def advance(self, ground: Ground, t_ns: int, duration: float) -> None:
         """Move all cars for a time [s] on the floor and in the wind of an instant."""
@@ -140,18 +140,18 @@ class Garage:
         for name, rows in self._rows.items():
             self._packs[name].drain(rows, duration)
 
-    def locate(self, indices: VehicleArrays) -> None:
-        """Write where all cars are and how they move into the slots."""
+    def locate(self, vehicles: VehicleArrays) -> None:
+        """Write where all cars are and how they move into the vehicle arrays."""
         for name, rows in self._rows.items():
             fleet, own = self.fleets[name], self._indices[name]
-            indices.x[own] = fleet.x[rows]
-            indices.y[own] = fleet.y[rows]
-            indices.yaw[own] = fleet.yaw[rows]
-            indices.speed[own] = fleet.speed[rows]
-            indices.yaw_rate[own] = fleet.yaw_rate[rows]
+            vehicles.x[own] = fleet.x[rows]
+            vehicles.y[own] = fleet.y[rows]
+            vehicles.yaw[own] = fleet.yaw[rows]
+            vehicles.speed[own] = fleet.speed[rows]
+            vehicles.yaw_rate[own] = fleet.yaw_rate[rows]
 
     def signal(self, name: str) -> Floats:
-        """Return one signal of all cars by slot, (capacity,); 0 where there is no hosted car."""
+        """Return one signal of all cars by vehicle index, (capacity,); 0 where there is no hosted car."""
         values = np.zeros(self._capacity)
         for car_file, rows in self._rows.items():
             of_fleet = cast("Floats", getattr(self.fleets[car_file], name))

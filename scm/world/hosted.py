@@ -1,6 +1,7 @@
 """A car that the world simulates, for requests; no stage of a tick walks over these.
 
-Its dynamics live in the `Garage`, what it does now in the `VehicleArrays`, its driver in the crowd.
+Its dynamics live in the `Garage`, its present state in the `VehicleArrays`, its driver in the
+`DriverBatch`.
 """
 
 from dataclasses import dataclass, field
@@ -21,11 +22,11 @@ class HostedCar:
     """One hosted car.
 
     Attributes:
-        slot: Its number in the city.
+        index: Its vehicle index, in all arrays of the city.
         row: Its place in its fleet.
         guard: Of its commands, while somebody else holds its lease.
         switches: How its headlights and indicators are switched.
-        slow_news: What its CAMs tell now and then.
+        slow_news: Sends the low-frequency container of its CAMs.
     """
 
     name: str

@@ -22,8 +22,8 @@ from scm.world.world import DEFAULT_CAR, NAME, PERIOD_NS, World, city_event
 
 ROOM = 256
 DEFINITION_EVERY_NS = 10 * NS_PER_S
-"""What the city is, is said again so often: the bus keeps it for late joiners, and rarely one of
-them asked in vain."""
+"""Interval at which the definition of the city is published again: the bus stores it for late
+joiners, but on rare occasions one of them gets no reply."""
 
 
 class WorldPart(BasePart):
@@ -33,9 +33,9 @@ class WorldPart(BasePart):
         city_map: The city.
         seed: Of all noise and of lost radio frames.
         hosted: (name, car file) of cars to spawn at the start; they circulate.
-        room: How many more cars may come.
-        kept: What a run before this one left behind: its cars are there instead of `hosted`, of
-            which those circulate again that are still there.
+        room: Spare capacity: how many more cars may come.
+        restored: State stored by an earlier run: its cars replace `hosted`, and those of `hosted`
+            that it contains circulate again.
     """
 
     name = NAME
@@ -62,7 +62,7 @@ class WorldPart(BasePart):
         self._definition_due_ns = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Advance to `now_ns`; the first step also says what the city is and spawns its cars."""
+        """Advance to `now_ns`; the first step also publishes the definition and spawns the cars."""
         first: list[Outgoing] = []
         if self._definition is None:
             self._definition = WorldDefinition(

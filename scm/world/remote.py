@@ -73,9 +73,9 @@ class RemoteCar:
 
     Attributes:
         session: Of its agent; when this session ends, the car is lost.
-        slot: Its number in the contact space.
-        pose: Of the rear axle, from the newest report, or where it was told to start.
-        heard_ns: When that came, on the world's clock.
+        index: Its vehicle index, also in the contact space.
+        pose: Of the rear axle, from the newest report, or where it was to start.
+        received_ns: When that report arrived, on the world's clock.
         lost_ns: Since when its agent is known to be gone or silent; None while it is there.
         dead: Whether the session ended: its reports count only when it is there again.
         missed_ns: Time that its agent let pass without moving it, by the times of its reports.

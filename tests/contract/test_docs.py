@@ -1,5 +1,9 @@
-"""The documentation is a site that builds without a warning, and what it names exists."""
+"""The documentation is a site that builds without a warning, and what it names exists.
 
+The same holds for the docstrings of packages.
+"""
+
+import ast
 import importlib.util
 import re
 import subprocess
@@ -14,6 +18,10 @@ FOLDERS = "bench|docs|examples|maps|recordings|scm|tests|vehicle_agent"
 PATH = re.compile(rf"`((?:{FOLDERS})/[\w./-]+)`")
 MODULE = re.compile(r"`((?:scm|vehicle_agent)(?:\.[a-z]\w*)+)(?:\.[A-Z]\w*)*`")
 NO_MODULES = {"scm.drive.v1"}  # a protocol of WebSockets
+NAMED = re.compile(r"`([a-z][\w./]*)`")  # a module, folder or file in a package's docstring
+COLUMN = re.compile(r"^ *([a-z]\w*/?(?:, [a-z]\w*/?)*) {2,}\S", re.MULTILINE)  # in a table of it
+NO_FILES = {"recording.yaml", "report.json", "drawn.json", "report.html", "car.toml"}
+NO_FILES |= {"value", "t", "start", "cycle"}  # arguments of sensor faults; a function of a plan
 MADE = ("docs/physics/", "docs/changelog.md")  # by the code, and a history
 
 
@@ -96,3 +104,29 @@ def is_there(root: Path, name: str) -> bool:
     if importlib.util.find_spec(module) is None:
         return False
     return hasattr(importlib.import_module(module), attribute)
+
+
+def sources(root: Path) -> list[Path]:
+    """Return the modules of the product."""
+    return [p for top in ("scm", "vehicle_agent") for p in sorted((root / top).rglob("*.py"))]
+
+
+def test_every_module_that_a_package_docstring_names_exists(root: Path) -> None:
+    """Seen from the package itself, from one that contains it, or from the root."""
+    missing = []
+    for file in (p for p in sources(root) if p.name == "__init__.py"):
+        text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+        columns = {name for names in COLUMN.findall(text) for name in names.split(", ")}
+        places = [p for p in file.parents if p == root or root in p.parents]
+        missing += [
+            f"{file.relative_to(root)}: {name}"
+            for name in sorted((columns | set(NAMED.findall(text))) - NO_FILES)
+            if not any(is_file(place, name) for place in places)
+        ]
+    assert missing == []
+
+
+def is_file(place: Path, name: str) -> bool:
+    """Return whether a folder holds a file, folder or module of this name."""
+    module = place / name.replace(".", "/")
+    return any(p.exists() for p in (place / name, module, module.with_suffix(".py")))

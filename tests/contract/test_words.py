@@ -1,4 +1,4 @@
-"""No identifier of the code is made of a word that the glossary has retired."""
+"""No identifier is made of a word that the glossary has retired; documented names exist."""
 
 import ast
 import re
@@ -18,6 +18,9 @@ STANDARD = {
     "_slots_",  # of ctypes structures
     "calm",  # the public name of a signal plan
 }
+SECTION = re.compile(r"^( *)(Args|Attributes):\n((?:\1 +\S.*\n?)+)", re.MULTILINE)
+ENTRY = re.compile(r"^( +)(\*{0,2}\w+(?:, \*{0,2}\w+)*): ")
+Definition = ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 PUBLISHED = ("scm/client/nouns",)  # written from the interface: methods carry its operation ids
 
 
@@ -28,6 +31,12 @@ def retired() -> set[str]:
     rows = [line.split("|")[1] for line in table.splitlines() if line.startswith("|")][2:]
     words = {word for row in rows for word in re.findall(r"[a-z]+", re.sub(r"\(.*?\)", "", row))}
     return words - TWIN_MEANS_CITY_TWIN
+
+
+@cache
+def tree_of(place: Path) -> ast.Module:
+    """Return the syntax tree of a module."""
+    return ast.parse(place.read_text(encoding="utf-8"))
 
 
 def words_of(identifier: str) -> list[str]:
@@ -62,8 +71,7 @@ def defined_in(tree: ast.AST) -> Iterator[tuple[str, int]]:
 
 def faults(place: Path) -> list[str]:
     """Return the places of retired words in the names of one module, its own among them."""
-    tree = ast.parse(place.read_text(encoding="utf-8"))
-    names = [(place.stem, 1), *defined_in(tree)]
+    names = [(place.stem, 1), *defined_in(tree_of(place))]
     return sorted({
         f"{place.relative_to(ROOT)}:{line}: {name}"
         for name, line in names
@@ -95,3 +103,54 @@ def test_words_of_an_identifier() -> None:
     assert words_of("told_ns") == ["told", "ns"]
     assert "told" in retired()
     assert "twins" not in retired()
+
+
+def test_documented_arguments_and_attributes_exist() -> None:
+    """What "Args:" and "Attributes:" list are names of the function or the class."""
+    places = [place for top in ("scm", "vehicle_agent") for place in modules(top)]
+    assert [f"{p.relative_to(ROOT)}: {n}" for p in places for n in undefined(tree_of(p))] == []
+
+
+def definitions(inside: ast.Module | Definition) -> Iterator[Definition]:
+    """Yield the classes and functions of a module, those inside classes too."""
+    for node in inside.body:
+        if isinstance(node, Definition):
+            yield node
+            if isinstance(node, ast.ClassDef):
+                yield from definitions(node)
+
+
+def undefined(module: ast.Module) -> Iterator[str]:
+    """Yield what the docstrings of a module list that the code does not have."""
+    for node in definitions(module):
+        for indent, title, block in SECTION.findall(ast.get_docstring(node) or ""):
+            entries = [ENTRY.match(line) for line in block.splitlines()]
+            depth = min(len(e[1]) for e in entries if e) if any(entries) else len(indent)
+            listed = [
+                e[2].replace("*", "").split(", ") for e in entries if e and len(e[1]) == depth
+            ]
+            known = names_of(node, title)
+            yield from (f"{node.name}: {n}" for names in listed for n in names if n not in known)
+
+
+def names_of(node: Definition, title: str) -> set[str]:
+    """Return the parameters of a function or class, or the attributes of a class."""
+    if not isinstance(node, ast.ClassDef):
+        return {each.arg for each in ast.walk(node.args) if isinstance(each, ast.arg)}
+    names = {
+        each.id
+        for part in node.body
+        for each in ast.walk(part)
+        if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)
+    }
+    names |= {each.name for each in definitions(node)}
+    names |= {
+        each.attr
+        for each in ast.walk(node)
+        if isinstance(each, ast.Attribute) and ast.unparse(each.value) == "self"
+    }
+    if title == "Args":
+        names |= {
+            a.arg for each in definitions(node) for a in ast.walk(each) if isinstance(a, ast.arg)
+        }
+    return names

@@ -1,7 +1,7 @@
 """The result of a calibration as a picture: speed over throttle, and curvature over steering.
 
 Dots are legs as the Eye measured them at steady state; the dashed line is the car as its file had
-it, the full one as identified. The kernel simulates both lines with the commands of the drive.
+it, the solid one as identified. The kernel simulates both lines with the commands of the drive.
 """
 
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ LEG_END_S = 0.5
 STEERING_SLEW_S = 0.2
 """The begin of a leg, while the guard limits the rate of the steering."""
 MIN_TRAVEL_M = 0.008
-CURVATURE_LABELS = "steering told, + left", "curvature of the way [1/m], + left"
+CURVATURE_LABELS = "commanded steering, + left", "curvature of the path [1/m], + left"
 MAX_STEERING_SPREAD = 0.11
 """Maximum spread of a leg's steering that counts as constant."""
 LEVEL_WIDTHS = (0.05, 0.25)
@@ -34,15 +34,15 @@ class SteadyLegs:
     """The ends of legs: command and resulting motion.
 
     Attributes:
-        throttle: WatchdogReport in the mean, (legs,); likewise `steering`.
+        throttle: Mean commanded throttle, (legs,); likewise `steering`.
         speed: Of the car as measured, as its file had it, and as found [m/s], (3, legs).
-        bend: Curvature of its path, likewise [1/m].
+        curvature: Curvature of its path, likewise [1/m].
     """
 
     throttle: Floats
     steering: Floats
     speed: Floats
-    bend: Floats
+    curvature: Floats
 
 
 def steady_legs(resimulated: Resimulation) -> SteadyLegs:
@@ -96,8 +96,8 @@ def write_picture(found: Fit, deadband: float, path: Path) -> None:
     legs = steady_legs(found.resimulated)
     bands = deadband, found.numbers["drive.deadband"].value
     panels = (
-        (legs.throttle, legs.speed, "throttle told", "speed [m/s]", LEVEL_WIDTHS[0], bands),
-        (legs.steering, legs.bend, *CURVATURE_LABELS, LEVEL_WIDTHS[1], None),
+        (legs.throttle, legs.speed, "commanded throttle", "speed [m/s]", LEVEL_WIDTHS[0], bands),
+        (legs.steering, legs.curvature, *CURVATURE_LABELS, LEVEL_WIDTHS[1], None),
     )
     parts = [*legend(62.0, 20.0, (("before", "as its file had it"), ("after", "as found")))]
     parts += [element("circle", cx=355.0, cy=16.0, r="3.5", class_="dot")]

@@ -1,6 +1,6 @@
 """What people see of a diagnosis: a page, the same as JSON, and the car file with what was found.
 
-write       all of it into one folder: findings and evidence go in, `record.Report` is made of them,
+write       all of it into one folder: `record` makes a `Report` of findings and evidence,
             and every file is written from that
 record      the report as one record: sentences, cards and pictures, worked out once
 sentences   verdict, where and when, advice; wording: names, numbers, units; panels: first screen

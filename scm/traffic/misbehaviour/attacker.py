@@ -40,7 +40,7 @@ class _Record:
 
 
 class Attacker:
-    """A part, and what some of its stations say instead of the truth; see `scm.runtime.part.Part`.
+    """A part of which some stations send false messages; see `scm.runtime.part.Part`.
 
     Args:
         part: Whose outbox is changed; everything else is its own.
@@ -49,8 +49,8 @@ class Attacker:
         seed: Of all attacks.
         own_names: Ghosts go under names of their own, as if they had certificates; else under the
             attacker's, as a city that guards its keys allows nothing else.
-        say: Takes lines for a person: the first lie, each suspicion, the sum at the end. None:
-            nobody is told. A city that guards its keys tells no car who is suspected.
+        print_line: Receives lines for a person: the first false message, each suspicion, the sum
+            at the end. None: nothing is printed. A guarded city reports suspicions to no car.
 
     Raises:
         RunError: when there is no such attack.

@@ -1,15 +1,17 @@
-"""The monitor's program card: what may never be green together, and the least times it accepts.
+"""The monitor's conflict table: what may never be green together, and the minimum times.
 
-It is derived from the map a second time and by other code than the controller's program, on
-purpose: a mistake in one of the two shows as a difference, not as a common blind spot. Where the
-controller adds and rounds up, the card asks for the bare minimum of a car that
+It is derived from the map by other code than the controller's program, on purpose: a mistake in
+one of the two shows as a difference, not as a common blind spot. A rule that changes in `timing.py`
+must therefore be changed here as well. Where the controller adds and rounds up, this table requires
+only the bare minimum of a car that
 
     brakes at 0.5 m/s^2 from 0.267 m/s after 0.3 s                     before a yellow may end,
     drives itself, 0.30 m, out of the conflict at 0.217 m/s            before others may start,
     starts at the line after 0.3 s and is over it with all its length  before a green may end
 
-(Nigel's figures, see its car file; a lane's speed limit counts if it is less). The card's hash is
-published: two people can compare it with the one they agreed on.
+(Nigel's figures, see its car file). A lane with a speed limit below 0.217 m/s makes clearance and
+green longer; yellow always assumes 0.267 m/s, the fastest approach. The table's hash is published:
+people can compare it with the one they agreed on.
 """
 
 import hashlib
@@ -30,8 +32,8 @@ REACTS_IN_S = 0.3
 
 _STEP_M = 0.005
 
-# Where a movement heads at first, the pieces of its lane, and from where to where it counts on it.
-_Way = tuple[float, tuple[Segment, ...], float, float]
+# A movement: initial heading, the segments of its lane, and where its conflict begins and ends [m].
+_Path = tuple[float, tuple[Segment, ...], float, float]
 
 
 class GroupLimits(msgspec.Struct, kw_only=True, frozen=True):
@@ -52,12 +54,12 @@ class ConflictTable(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def table_hash(table: ConflictTable) -> str:
-    """Return twelve hexadecimal digits that change with anything on the card."""
+    """Return twelve hexadecimal digits that change with anything in the table."""
     return hashlib.sha256(msgspec.json.encode(table)).hexdigest()[:12]
 
 
 def conflict_table_of(city_map: CityMap, junction: Junction) -> ConflictTable:
-    """Return the card of a junction."""
+    """Return the conflict table of a junction."""
     lanes = {lane.name: lane for lane in city_map.lanes}
     lines = [line for line in city_map.stop_lines if line.junction == junction.name]
     return ConflictTable(
@@ -116,10 +118,10 @@ def _meet(one: Conflict, other: Conflict, lanes: dict[str, Lane]) -> bool:
 
 
 @cache
-def _come_near(one: _Way, other: _Way, away: tuple[float, float], near_m: float) -> bool:
-    """Return whether two ways come near; the other one starts `away` from the start of the one.
+def _come_near(one: _Path, other: _Path, away: tuple[float, float], near_m: float) -> bool:
+    """Return whether two paths come near; the other starts at `away`, seen from the first's start.
 
-    Where they lie on the map does not matter: junctions that look alike are walked once.
+    Their place on the map does not matter, so junctions of equal shape are computed once.
     """
     there = _walk(away, other)
     return any(
@@ -127,10 +129,10 @@ def _come_near(one: _Way, other: _Way, away: tuple[float, float], near_m: float)
     )
 
 
-def _walk(start: tuple[float, float], way: _Way) -> list[tuple[float, float]]:
-    """Return places along a movement, one every stride, by plain dead reckoning [m]."""
-    (x, y), (yaw, segments, from_m, to_m) = start, way
-    gone_m, places = 0.0, []
+def _walk(start: tuple[float, float], path: _Path) -> list[tuple[float, float]]:
+    """Return points along a movement, one every `_STEP_M`, by dead reckoning [m]."""
+    (x, y), (yaw, segments, from_m, to_m) = start, path
+    travelled_m, places = 0.0, []
     for segment in segments:
         turn_per_m = 0.0
         length_m = segment.length_m or 0.0
@@ -143,7 +145,7 @@ def _walk(start: tuple[float, float], way: _Way) -> list[tuple[float, float]]:
             yaw += turn_per_m * step_m / 2.0
             x, y = x + step_m * math.cos(yaw), y + step_m * math.sin(yaw)
             yaw += turn_per_m * step_m / 2.0
-            gone_m += step_m
-            if from_m <= gone_m <= to_m:
+            travelled_m += step_m
+            if from_m <= travelled_m <= to_m:
                 places.append((x, y))
     return places

@@ -159,7 +159,7 @@ class JunctionDetectors:
     """The detectors of one junction: show it cars, then read it.
 
     Attributes:
-        heard_ns: When anything was last heard or seen here; None: never.
+        received_ns: When a car was last received or seen here; None: never.
     """
 
     def __init__(self, junction: Junction, roads: Roads, reach_m: float = REACH_M) -> None:

@@ -53,10 +53,16 @@ NIGEL = CarFacts()
 
 
 def yellow_s(car: CarFacts, limit_mps: float = math.inf) -> float:
-    """Return the least yellow [s], level road.
+    """Return the minimum yellow [s] on a level road.
+
+    Args:
+        car: Its top speed decides where that is finite, whatever the lane allows: yellow is for
+            the fastest approach that is possible.
+        limit_mps: The lane's speed limit; used, with `OVER_LIMIT`, only for a car whose top speed
+            is infinite, which means unknown.
 
     Raises:
-        PlanError: when neither the car nor the lane says how fast it may come.
+        PlanError: when neither the car's top speed nor the limit is finite.
     """
     speed_mps = car.speed_mps if math.isfinite(car.speed_mps) else OVER_LIMIT * limit_mps
     if not math.isfinite(speed_mps):

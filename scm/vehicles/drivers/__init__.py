@@ -10,5 +10,5 @@ speed_control    allowed speed and throttle               green_light   speed ad
 steering         a path and a pose to a steering command  reception     whether reception is good
 Tables of arrays: lane_graph the map, driver_state the drivers, received_cams the stations,
 signal_table the signals. channel decides which radio frames arrive; limits reads a car's limits
-from its car file; early warms up the compiled code in parallel.
+from its car file.
 """

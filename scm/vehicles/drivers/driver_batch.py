@@ -39,7 +39,7 @@ class DriverBatch:
     """The drivers of many cars.
 
     Args:
-        streets: The lanes of the map.
+        lane_graph: The lanes of the map.
         capacity: Number of vehicle indices.
         seed: Decides which radio frames are lost.
         radio: The radio channel; None: an ideal one.

@@ -152,14 +152,14 @@ def test_each_leg_driven_again_lies_where_it_was_seen(found):
 def test_the_ends_of_legs_show_the_dead_band_and_the_trim(found):
     legs = steady_legs(found.resimulated)
     assert len(legs.throttle) == 24  # of 40: in the others the steering swings
-    speed, bend = legs.speed[0], legs.bend[0]
+    speed, bend = legs.speed[0], legs.curvature[0]
     assert (np.sign(speed) == np.sign(legs.throttle)).all()
     per, at_zero = np.polyfit(np.abs(legs.throttle), np.abs(speed), 1)
     assert -at_zero / per == pytest.approx(Hidden().dead_band, abs=0.03)
     per, at_zero = np.polyfit(legs.steering, bend, 1)
     wheelbase_m = 0.14154
     assert np.arctan(at_zero * wheelbase_m) == pytest.approx(Hidden().trim, abs=0.01)
-    assert legs.bend[2] == pytest.approx(bend, abs=0.5)
+    assert legs.curvature[2] == pytest.approx(bend, abs=0.5)
 
 
 def test_the_car_file_loads_with_what_was_found_and_keeps_the_rest(found, tmp_path):
