@@ -98,7 +98,7 @@ class City:
         return stepped_ns if self.link.clock is None else max(stepped_ns, self.link.clock.now_ns())
 
     def call(self, request: Request, reply: type[R]) -> R:
-        """Send a request to the city and return its reply; blocks: only for routes in the thread pool.
+        """Send a request and return the reply; blocks, so only for routes in the thread pool.
 
         Raises:
             RefusedError: when the city refuses, or does not reply in time.

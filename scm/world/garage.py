@@ -151,7 +151,7 @@ class Garage:
             vehicles.yaw_rate[own] = fleet.yaw_rate[rows]
 
     def signal(self, name: str) -> Floats:
-        """Return one signal of all cars by vehicle index, (capacity,); 0 where there is no hosted car."""
+        """Return one signal by vehicle index, (capacity,); 0 where there is no hosted car."""
         values = np.zeros(self._capacity)
         for car_file, rows in self._rows.items():
             of_fleet = cast("Floats", getattr(self.fleets[car_file], name))

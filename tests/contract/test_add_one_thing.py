@@ -190,7 +190,7 @@ THINGS = {
             assert "weather" in rights_of("vehicle", "n1").publishes
         """,
     ),
-    "a REST noun": Thing(
+    "a REST noun that only reads": Thing(
         files={
             "scm/api/routes/greetings.py": '''
                 """Greetings of the city."""

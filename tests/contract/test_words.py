@@ -1,4 +1,4 @@
-"""No identifier is made of a word that the glossary has retired; documented names exist."""
+"""No identifier is made of a retired word, see CONTRIBUTING.md; documented names exist."""
 
 import ast
 import re
@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-GLOSSARY = ROOT / "docs" / "glossary.md"
+TABLE = ROOT / "CONTRIBUTING.md"
 TWIN_MEANS_CITY_TWIN = {"twin", "twins"}  # a car's versioned file; only effects may not be twins
 RECORDS = ("Struct", "BaseModel", "Message", "Record")
 STANDARD = {
@@ -26,8 +26,8 @@ PUBLISHED = ("scm/client/nouns",)  # written from the interface: methods carry i
 
 @cache
 def retired() -> set[str]:
-    """Return the words of the first column of the glossary's table."""
-    table = GLOSSARY.read_text(encoding="utf-8").split("## Retired words")[1]
+    """Return the words of the first column of the table of retired words."""
+    table = TABLE.read_text(encoding="utf-8").split("## Retired words")[1]
     rows = [line.split("|")[1] for line in table.splitlines() if line.startswith("|")][2:]
     words = {word for row in rows for word in re.findall(r"[a-z]+", re.sub(r"\(.*?\)", "", row))}
     return words - TWIN_MEANS_CITY_TWIN
