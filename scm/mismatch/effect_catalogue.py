@@ -43,6 +43,7 @@ class Parameter:
         step: A change that shows, for derivatives.
         given: What the car file says of the key; an effect is reported as what is added to it.
         ties: Other keys that move with it, and how much for one unit.
+        own: Key of the car's own number that means the same; empty: there is none.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Parameter:
     per_unit: float = 1.0
     given: float = 0.0
     ties: tuple[tuple[str, float], ...] = ()
+    own: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +169,10 @@ def terms_needed(car: Car) -> list[str]:
     Delays are left out: they are laid on the recorded commands.
     """
     known, have = all_terms(), {term.name for term in car.terms}
-    names = [name for name in identifications() if name in known and name not in have]
+    names = [
+        name for name, how in identifications().items()
+        if name in known and name not in have and not how.only_with
+    ]  # fmt: skip
     setters = {t.sets for t in car.terms if t.sets}
     return [
         name
@@ -188,10 +193,19 @@ def params_of(name: str) -> tuple[Mapping[str, Param], Mapping[str, float]]:
     return params, {n: at_rest.get(p.name, p.default) for n, p in params.items()}
 
 
-def candidates(car: Car) -> tuple[Candidate, ...]:
-    """Return every candidate that makes sense for a car."""
-    found = list[Candidate]()
+def candidates(car: Car, *, beside: bool = False) -> tuple[Candidate, ...]:
+    """Return every candidate that makes sense for a car.
+
+    Args:
+        car: Given.
+        beside: Instead those that it lacks and that are searched for only beside one that it has.
+    """
+    found, have = list[Candidate](), {term.name for term in car.terms}
     for name, how in identifications().items():
+        if bool(how.only_with) != beside or (
+            beside and (how.only_with not in have or name in have)
+        ):
+            continue
         params, neutral = params_of(name)
         wanted = [p for n, p in params.items() if p.fit and n in (how.parameters or params)]
         parameters = tuple(
@@ -221,8 +235,9 @@ def _parameter(
         given, neutral = car.value(param.key), 0.0
     low, high = how.bounds.get(param.reported, param.bounds)
     return Parameter(
-        param.reported, key, param.unit, (low - given, high - given), neutral, step, per_unit, given
-    )
+        param.reported, key, param.unit, (low - given, high - given), neutral, step, per_unit,
+        given, own=how.own,
+    )  # fmt: skip
 
 
 def by_name(found: tuple[Candidate, ...], name: str) -> Candidate:

@@ -3,8 +3,25 @@
 It stands in the effect's own file, so that one effect is one file.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+
+from scm.arrays import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """What a faulty sensor is off by, as a report draws it.
+
+    Attributes:
+        of: Returns the error from what it depends on, and the fault's number.
+    """
+
+    x_name: str
+    x_unit: str
+    y_name: str
+    y_unit: str
+    of: Callable[[Floats, float], Floats]
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +42,12 @@ class Identification:
         adds: Whether its number is added to one that the car file may have already.
         also_moves: Other keys of the car file that may move with it, and how much for one unit.
         like: The effect that cancels it on a level floor: no drive there tells the two apart.
+        why_alike: A sentence on that, in one of the two.
+        own: A car's own number that means the same as its first parameter.
+        only_with: An effect of the car without which this one is not searched for.
+        advice: What a mechanic does about it: check, repair, or record.
+        turns: Whether it is drawn as an angle of the wheels, as all of steering and tyres are.
+        line: How a sensor's fault is drawn.
         shared: What several cars may share of it: `camera`, `tags` or `floor`.
     """
 
@@ -42,4 +65,10 @@ class Identification:
     adds: bool = False
     also_moves: Mapping[str, float] = field(default_factory=dict)
     like: str = ""
+    why_alike: str = ""
+    own: str = ""
+    only_with: str = ""
+    advice: str = ""
     shared: str = ""
+    turns: bool = False
+    line: Line | None = None

@@ -1,9 +1,10 @@
 """Chooses the experiment that separates explanations most, and says it in a sentence."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from scm.mismatch.effect_catalogue import identifications
 from scm.mismatch.experiment.changed import CHANGED, Experiment, drive_alone
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES
 from scm.mismatch.experiment.pace import Floor, Pace, pace_of
@@ -15,13 +16,6 @@ from scm.mismatch.fit.likelihood import Likelihood
 
 MIN_LAMBDA, SURE_LAMBDA = 10.0, 25.0  # below nobody can tell, above anybody can
 ENOUGH_LAMBDA = 400.0  # twenty sigma: a better drive need not be looked for
-INDISTINGUISHABLE: Mapping[frozenset[str], str] = {
-    frozenset({"payload", "motor_gain"}):
-        "On a level floor these do the same to the car: no drive there tells them apart.",
-    frozenset({"grade", "wind"}):
-        "Both push the car one way wherever it heads: no drive on this floor tells them apart.",
-}  # fmt: skip
-"""By algebra the same, whatever a simulation's small print says; why no drive helps."""
 MAX_EXPLANATIONS = 4
 MAX_REFITTED = 6
 SLOPE = "grade.slope"
@@ -77,9 +71,9 @@ def suggest(
     counted = explanations[:MAX_EXPLANATIONS]
     pace = pace_of(model.car, model.drives, floor)
     between = names_of(explanations)
-    no_drive_helps = next(
-        (why for pair, why in INDISTINGUISHABLE.items() if set(between) <= pair), ""
-    )
+    known = identifications().items()
+    alike = (how.why_alike for name, how in known if set(between) <= {name, how.like})
+    no_drive_helps = next(filter(None, alike), "")  # whatever a simulation's small print says
     weighed = list[Weighed]()
     if not no_drive_helps:
         notify(f"simulating {len(MANOEUVRES)} drives under each explanation")

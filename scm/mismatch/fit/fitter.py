@@ -4,7 +4,7 @@ The numbers of a hypothesis' effects are free; the car's own are free too, held 
 deviations that the car file states.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,15 +23,6 @@ ENOUGH = 0.5
 SPOTS = 3  # places that an effect of some place is begun at
 TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild moments prove nothing
 FARTHEST = 2.0  # prior stds: beyond, it is no longer the number of the file
-OF_OWN: Mapping[str, str] = {
-    "payload.mass_kg": "body.mass_kg",
-    "com_shift.shift_m": "body.cog_to_rear_axle_m",
-    "tyre_stiffness.scale": "tyre.lateral_slip_extremum",
-    "steering.rate_scale": "steering.rate_rad_s",
-    "motor.gain": "drive.stall_torque_nm",
-    "drive.delay_s": "clock.throttle_s",
-}
-"""Numbers of effects by the car's own number that means the same."""
 Trial = tuple[tuple[Candidate, ...], Floats]
 
 
@@ -148,8 +139,8 @@ class Fitter:
 
     def _free(self, effects: Sequence[Candidate]) -> Bools:
         """Return which of the car's own numbers no effect sets, or means the same by."""
-        set_by_effects = {parameter.key for effect in effects for parameter in effect.parameters}
-        set_by_effects |= {OF_OWN[key] for key in set_by_effects & OF_OWN.keys()}
+        parameters = [parameter for effect in effects for parameter in effect.parameters]
+        set_by_effects = {key for one in parameters for key in (one.key, one.own)}
         return np.array([own.key not in set_by_effects for own in self.model.nominal])
 
     def _numbers(self, effects: Sequence[Candidate], z: Floats, values: Floats) -> dict[str, float]:

@@ -1,14 +1,12 @@
 """The sentences of a report: the verdict, where and when, how much better, what to do."""
 
 import math
-import tomllib
-from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 
 from msgspec import structs
 
 from scm.data_quality.quality import DataProblem, Span
+from scm.mismatch.effect_catalogue import identifications
 from scm.mismatch.findings import Diagnosis, Effect, Equation, Located, Place, Verdict
 from scm.mismatch.report.wording import (
     capital,
@@ -194,21 +192,19 @@ def better_sentence(diagnosis: Diagnosis, retuned_m: float | None = None) -> str
 def advice_of(effect: Effect) -> str:
     """Return what to check or repair; for an effect outside the library, where to look."""
     if effect.is_known:
-        return _advice().get(effect.name, _KNOWN_EFFECT)
+        known = identifications().get(effect.name)
+        return known.advice if known and known.advice else _KNOWN_EFFECT
     return _UNKNOWN_EFFECT.format(drivers=" and ".join(effect.depends_on) or "the drive")
 
 
 def checks_of(names: Sequence[str]) -> list[str]:
     """Return what to check for each of several effects of which one is present."""
-    table = _advice()
-    return [f"{capital(title_of(name))}: {table[name]}" for name in names if name in table]
-
-
-@cache
-def _advice() -> Mapping[str, str]:
-    path = Path(__file__).with_name("advice.toml")
-    table: dict[str, str] = tomllib.loads(path.read_text(encoding="utf-8"))
-    return table
+    known = identifications()
+    return [
+        f"{capital(title_of(n))}: {known[n].advice}"
+        for n in names
+        if n in known and known[n].advice
+    ]
 
 
 def where_and_when(found: Sequence[Located]) -> str:

@@ -16,7 +16,7 @@ from scm.arrays import Floats
 from scm.mismatch.budget import Budget
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.findings import Equation
-from scm.mismatch.fit.fitter import FARTHEST, OF_OWN, SPOTS, Fitter
+from scm.mismatch.fit.fitter import FARTHEST, SPOTS, Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import fit_noise
@@ -255,7 +255,7 @@ def _at_limit(effect: Candidate, base: Hypothesis) -> list[int]:
 
     A number that the recording pulls as far as its prior allows is most likely the cause.
     """
-    keys = {OF_OWN.get(parameter.key, parameter.key) for parameter in effect.parameters}
+    keys = {parameter.own or parameter.key for parameter in effect.parameters}
     own = enumerate(zip(base.model.nominal, base.z, strict=True))
     return [j for j, (o, z) in own if o.key in keys and abs(z) > 0.85 * FARTHEST]
 

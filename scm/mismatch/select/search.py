@@ -15,7 +15,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.budget import Question
-from scm.mismatch.effect_catalogue import Candidate, Parameter
+from scm.mismatch.effect_catalogue import Candidate, candidates
 from scm.mismatch.findings import Equation
 from scm.mismatch.fit.data_split import Parts, split
 from scm.mismatch.fit.hypothesis import Hypothesis
@@ -39,13 +39,6 @@ COMPARED_WITHIN = 25.0  # criterion within which the two best effects are compar
 MARGIN = 10.0  # gain beyond its penalty of each effect beside the first of a round
 MANY_DOUBLINGS, FAR_DOUBLINGS = 9.0, 16.0  # of the least noise, summed over its kinds
 TIMES_FITTED_FAR = 2
-SPEED_LIMIT = Candidate(
-    "drive_saturation", Equation.DRIVE, ("throttle",),
-    (Parameter("forward", "drive.limit_forward", "1", (0.02, 1.0), 1.0, 0.02),),
-    ((0.7,), (0.4,), (0.15,)),
-    "Whatever is commanded, the drive takes no more than {forward} of full throttle.",
-)  # fmt: skip
-"""A commanded speed may be more than a car is allowed to drive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,12 +215,12 @@ def by_windows(context: Context, drives: Sequence[Drive], car: Car) -> ByWindows
         car: With every effect at rest.
     """
     context.notify("judging by windows: the car differs in many ways")
-    catalogue, have = context.catalogue, {term.name for term in car.terms}
+    catalogue = context.catalogue
     if any(is_led(drive) for drive in drives):
         known = (Equation.STEERING, Equation.SENSOR)
         catalogue = tuple(c for c in catalogue if c.equation in known)
-    elif "speed_control" in have and SPEED_LIMIT.name not in have:
-        car, catalogue = car.with_terms([SPEED_LIMIT.name]), (*catalogue, SPEED_LIMIT)
+    elif more := candidates(car, beside=True):
+        car, catalogue = car.with_terms([one.name for one in more]), (*catalogue, *more)
     model = WindowedLikelihood(Simulator(drives, car, budget=context.budget))
     parts = split(model)
     mine = replace(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scm.mismatch.effect_catalogue import params_of
+from scm.mismatch.effect_catalogue import identifications, params_of
 from scm.mismatch.findings import Diagnosis, Effect, Verdict
 from scm.mismatch.trial.again import Ratio
 from scm.mismatch.trial.labels import CONTROLS, Label
@@ -28,14 +28,6 @@ ALIKE = {
     "yaw rate": ("turn rate", "yaw_rate"),
 }  # fmt: skip
 ONE = {other: name for name, others in ALIKE.items() for other in others}
-# No drive on a level floor, or no stamps, tell these apart: left undecided, they are right.
-INDISTINGUISHABLE = {
-    "payload": {"motor_gain"},
-    "motor_gain": {"payload"},
-    "grade": {"wind"},
-    "wind": {"grade"},
-    "pose_latency": {"clock_offset"},
-}
 TOGETHER = (
     {"force_x_n", "force_y_n"}, {"tilt_x", "tilt_y"}, {"x_m", "y_m"}, {"x_mps2", "y_mps2"},
 )  # fmt: skip
@@ -158,16 +150,23 @@ def _belongs(effect: Effect, label: Label) -> bool:
     return effect.is_known and effect.name in label.names
 
 
+def indistinguishable_from(name: str) -> set[str]:
+    """Return effects that no drive on a level floor, or no stamps, tell from one."""
+    known = identifications().get(name)
+    like = {known.like} if known and known.like else set[str]()
+    return like | ({"clock_offset"} if name == "pose_latency" else set())
+
+
 def _is_indistinguishable(name: str, label: Label, undecided: set[str]) -> bool:
     """Return whether an effect is another name of what was left undecided."""
     alike = {name for name in label.names if name in undecided}
-    return name in undecided and any(name in INDISTINGUISHABLE.get(other, set()) for other in alike)
+    return name in undecided and any(name in indistinguishable_from(other) for other in alike)
 
 
 def _rightly_undecided(label: Label, names: tuple[str, ...], undecided: set[str]) -> bool:
     """Return whether others were rightly left undecided."""
     for name in label.names:
-        others = INDISTINGUISHABLE.get(name, set())
+        others = indistinguishable_from(name)
         if name not in names and not (
             others and name in undecided and undecided <= others | {name}
         ):

@@ -7,7 +7,7 @@ of any form: one that is right runs through their bands.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, Values
 from scm.mismatch.discovery.impulse_response import WAVES, Cells, by_turn, respond, waves_response
 from scm.mismatch.discovery.screen import amount, shape, variable
 from scm.mismatch.discovery.try_dictionary import Tried
-from scm.mismatch.effect_catalogue import Candidate
+from scm.mismatch.effect_catalogue import Candidate, identifications
 from scm.mismatch.evidence import Curve
 from scm.mismatch.findings import Equation
 from scm.mismatch.fit.fitter import Fitter
@@ -40,25 +40,12 @@ from scm.replay.camera import Camera, Moved
 from scm.replay.drive import STEP_S, Drive
 from scm.replay.numbers import Numbers
 from scm.replay.windows import Side, Windows
+from scm.vehicles.identification import Line
 
 EVERY_S = 0.5
 BINS = 12
 LEAST_IN_BIN = 4
 POINTS = 25
-_TURNING = {"drive_asymmetry", "com_shift", "load_transfer"}  # beside steering and tyres
-
-_Line = tuple[str, str, str, str, Callable[[Floats, float], Floats]]
-_SENSORS: Mapping[str, _Line] = {
-    "clock_drift": ("time", "s", "clock ahead", "s", lambda x, v: v * (x - x[0])),
-    "pose_scale": ("distance from the origin", "m", "position error", "m",
-                   lambda x, v: (v - 1.0) * x),
-    "camera_tilt": ("position", "m", "scale error", "1", lambda x, v: 1.0 / (1.0 + v * x) - 1.0),
-    "wheel_radius": ("speed", "m/s", "wheel speed error", "m/s", lambda x, v: (1.0 / v - 1.0) * x),
-    "encoder_loss": ("speed", "m/s", "wheel speed error", "m/s", lambda x, v: -v * x),
-    "speed_scale": ("speed", "m/s", "odometer error", "m/s", lambda x, v: (v - 1.0) * x),
-    "gyro_scale": ("yaw rate", "rad/s", "gyro error", "rad/s", lambda x, v: (v - 1.0) * x),
-    "gyro_bias": ("yaw rate", "rad/s", "gyro error", "rad/s", lambda x, v: v + 0.0 * x),
-}  # fmt: skip
 DISCOVERED_BINS = 16
 LEAST_CELLS = 3
 TURN_POINTS = 73
@@ -86,12 +73,13 @@ def curve(best: Hypothesis, effect: Candidate) -> Curve | None:
     Several drives count as one; their times follow the recordings' clocks.
     """
     model = best.model
-    if effect.name in _SENSORS:
-        return _sensor_curve(model, effect, _own(best, effect))
+    known = identifications()[effect.name]
+    if known.line:
+        return _sensor_curve(model, effect, _own(best, effect), known.line)
     if effect.equation is Equation.SENSOR or not effect.depends_on:
         return None
     own = _own(best, effect)
-    turning = effect.equation in (Equation.STEERING, Equation.TYRE) or effect.name in _TURNING
+    turning = effect.equation in (Equation.STEERING, Equation.TYRE) or known.turns
     parts = [_acted(drive, best, effect, own, int(turning)) for drive in model.drives]
     x, y, band = (np.concatenate([part[i] for part in parts]) for i in range(3))
     (y_name, y_unit), (x_name, x_unit) = (FORCE, ANGLE)[turning], _variable(effect)
@@ -116,20 +104,20 @@ def _own(best: Hypothesis, effect: Candidate) -> _Own:
     )
 
 
-def _sensor_curve(model: Likelihood, effect: Candidate, own: _Own) -> Curve | None:
+def _sensor_curve(model: Likelihood, effect: Candidate, own: _Own, line: Line) -> Curve:
     """Return what a faulty sensor is off by, from its formula; of two numbers the larger one."""
     i = int(np.argmax(np.abs(own.values))) if effect.name == "camera_tilt" else 0
-    x_name, x_unit, y_name, y_unit, line = _SENSORS[effect.name]
+    x_name = line.x_name
     seen = np.concatenate([_seen(drive, x_name, i) for drive in model.drives])
     low, high = np.percentile(seen, (1.0, 99.0))
     if x_name == "position":
         x_name = f"position {'xy'[i]}"
     x = np.linspace(low, high, POINTS)
     value, std = float(own.values[i]), float(own.std[i])
-    sides = np.stack([line(x, value + side * std) for side in (-1.0, 1.0)])
+    sides = np.stack([line.of(x, value + side * std) for side in (-1.0, 1.0)])
     return Curve(
-        effect=effect.name, x_name=x_name, x_unit=x_unit, y_name=y_name, y_unit=y_unit,
-        x=x, y=line(x, value), low=sides.min(axis=0), high=sides.max(axis=0),
+        effect=effect.name, x_name=x_name, x_unit=line.x_unit, y_name=line.y_name,
+        y_unit=line.y_unit, x=x, y=line.of(x, value), low=sides.min(axis=0), high=sides.max(axis=0),
     )  # fmt: skip
 
 

@@ -14,7 +14,6 @@ from scm.mismatch.evidence import RefittedParameter
 from scm.mismatch.experiment.plan import Explanation
 from scm.mismatch.experiment.suggest import Suggestion, suggest
 from scm.mismatch.findings import Alternative, Effect, Equation, Estimate
-from scm.mismatch.fit.fitter import OF_OWN
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import LOCK, MIN_RELATIVE_STD, TIMING_S, UNKNOWN, Likelihood
 from scm.mismatch.report.wording import joined, percent, quantity, short
@@ -198,7 +197,7 @@ def _size(candidate: Candidate, j: int, values: Sequence[float]) -> float:
 
 def _prior_std(model: Likelihood, parameter: Parameter, value: float) -> float:
     """Return the prior std of the car's own number that means the same."""
-    own = next((o for o in model.nominal if o.key == OF_OWN.get(parameter.key)), None)
+    own = next((o for o in model.nominal if o.key == parameter.own), None)
     if own is None:
         return 0.0
     return own.std * abs(value / own.mean) if parameter.unit == "1" else own.std

@@ -36,5 +36,6 @@ SENSOR_FAULT = SensorFault(
         equation="sensor", depends_on=("constant",), starts=((0.1, 0.0), (0.0, 0.1)),
         steps=(0.02, 0.02),
         sentence="The accelerometer reads {x_mps2} and {y_mps2} too much along and across.",
+        advice="Calibrate the IMU at rest on a level floor before each drive.",
     ),
 )  # fmt: skip

@@ -16,7 +16,7 @@ Source: pinhole projection (Hartley and Zisserman, Multiple View Geometry, chapt
 import numpy as np
 
 from scm.arrays import Floats
-from scm.vehicles.identification import Identification
+from scm.vehicles.identification import Identification, Line
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -51,5 +51,7 @@ SENSOR_FAULT = SensorFault(
         shared="camera",
         sentence="The camera looks askew: its scale changes by {tilt_x} along x and {tilt_y} "
                  "along y.",
+        advice="Calibrate the overhead camera again, with marks over the whole floor.",
+        line=Line("position", "m", "scale error", "1", lambda x, v: 1.0 / (1.0 + v * x) - 1.0),
     ),
 )  # fmt: skip

@@ -7,7 +7,7 @@ Source: crystal tolerance is 1e-4; interpolating drivers and virtual machines re
 """
 
 from scm.arrays import Floats
-from scm.vehicles.identification import Identification
+from scm.vehicles.identification import Identification, Line
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -31,5 +31,7 @@ SENSOR_FAULT = SensorFault(
         equation="sensor", depends_on=("time",), starts=((0.003,), (-0.003,)), steps=(0.0005,),
         shared="camera",
         sentence="The camera's clock runs fast by {rate}.",
+        advice="Let both computers take their time from one clock (NTP or PTP).",
+        line=Line("time", "s", "clock ahead", "s", lambda x, v: v * (x - x[0])),
     ),
 )  # fmt: skip

@@ -33,5 +33,7 @@ SENSOR_FAULT = SensorFault(
         steps=(0.01,), bounds={"offset_s": (-0.3, 0.0)}, shared="camera",
         sentence="The poses' clock is {offset_s} against the car's: commands and sensors are "
                  "stamped late.",
+        advice="Let both computers take their time from one clock (NTP or PTP), and record a "
+               "sharp start to check it.",
     ),
 )  # fmt: skip

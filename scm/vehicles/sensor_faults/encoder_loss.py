@@ -8,7 +8,7 @@ Source: dirty disc, missed interrupts; the definition is ours. On encoders alone
 """
 
 from scm.arrays import Floats
-from scm.vehicles.identification import Identification
+from scm.vehicles.identification import Identification, Line
 from scm.vehicles.param import LogNormal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -29,5 +29,8 @@ SENSOR_FAULT = SensorFault(
     identification=Identification(
         equation="sensor", depends_on=("wheel",), starts=((0.03,), (0.1,)), steps=(0.01,),
         sentence="The encoders lose {fraction} of their counts.",
+        advice="Clean the encoder's disc, check its plug, and compare counts with ten turns of "
+               "the wheel by hand.",
+        line=Line("speed", "m/s", "wheel speed error", "m/s", lambda x, v: -v * x),
     ),
 )  # fmt: skip

@@ -7,7 +7,7 @@ Source: IEEE Std 952, gyro error model; + shows a turn to the left.
 """
 
 from scm.arrays import Floats
-from scm.vehicles.identification import Identification
+from scm.vehicles.identification import Identification, Line
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -28,5 +28,8 @@ SENSOR_FAULT = SensorFault(
     identification=Identification(
         equation="sensor", depends_on=("constant",), starts=((0.02,), (-0.02,)), steps=(0.005,),
         sentence="The gyro reads {bias_rad_s} too much.",
+        advice="Keep the car still for five seconds before each drive and subtract what the gyro "
+               "shows.",
+        line=Line("yaw rate", "rad/s", "gyro error", "rad/s", lambda x, v: v + 0.0 * x),
     ),
 )  # fmt: skip

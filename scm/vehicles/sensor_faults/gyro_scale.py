@@ -7,7 +7,7 @@ Source: IEEE Std 952, scale factor error.
 """
 
 from scm.arrays import Floats
-from scm.vehicles.identification import Identification
+from scm.vehicles.identification import Identification, Line
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -28,5 +28,7 @@ SENSOR_FAULT = SensorFault(
     identification=Identification(
         equation="sensor", depends_on=("yaw rate",), starts=((1.03,), (0.97,)), steps=(0.01,),
         sentence="The gyro shows {scale} of the true yaw rate.",
+        advice="Turn the car by ten full turns by hand and compare with the gyro.",
+        line=Line("yaw rate", "rad/s", "gyro error", "rad/s", lambda x, v: (v - 1.0) * x),
     ),
 )  # fmt: skip

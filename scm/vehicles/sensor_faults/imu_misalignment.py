@@ -36,5 +36,6 @@ SENSOR_FAULT = SensorFault(
     identification=Identification(
         equation="sensor", depends_on=("acceleration",), starts=((0.05,), (-0.05,)), steps=(0.01,),
         sentence="The IMU is turned by {angle_rad} in the car.",
+        advice="Mount the IMU straight, or write its angle into the car file.",
     ),
 )  # fmt: skip

@@ -30,5 +30,6 @@ SENSOR_FAULT = SensorFault(
         equation="sensor", depends_on=("constant",), starts=((0.02,), (-0.02,)), steps=(0.005,),
         shared="tags",
         sentence="The camera's heading is off by {offset_rad}.",
+        advice="Put the marker on straight, or write its angle down.",
     ),
 )  # fmt: skip

@@ -32,5 +32,6 @@ SENSOR_FAULT = SensorFault(
         equation="sensor", depends_on=("speed",), starts=((0.02,), (0.04,), (0.08,), (0.16,)),
         steps=(0.01,), shared="camera",
         sentence="The camera's poses are {delay_s} old when they are stamped.",
+        advice="Stamp poses when the picture is taken, not when they arrive.",
     ),
 )  # fmt: skip

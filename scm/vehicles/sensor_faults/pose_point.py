@@ -40,5 +40,7 @@ SENSOR_FAULT = SensorFault(
         equation="sensor", depends_on=("yaw rate",),
         starts=((0.03, 0.0), (-0.03, 0.0), (0.0, 0.02)), steps=(0.005, 0.005), shared="tags",
         sentence="The tracked point lies {x_m} ahead and {y_m} left of where it is said to be.",
+        advice="Measure where the marker sits from the rear axle's centre, and write it into the "
+               "recording's `point`.",
     ),
 )  # fmt: skip

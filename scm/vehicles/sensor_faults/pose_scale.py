@@ -7,7 +7,7 @@ Source: ground-plane calibration; a camera believed at the wrong height does thi
 """
 
 from scm.arrays import Floats
-from scm.vehicles.identification import Identification
+from scm.vehicles.identification import Identification, Line
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -29,5 +29,8 @@ SENSOR_FAULT = SensorFault(
         equation="sensor", depends_on=("position",), starts=((1.02,), (0.98,)), steps=(0.005,),
         shared="camera",
         sentence="The camera shows {scale_cm} for every 100 cm on the floor.",
+        advice="Measure two marks on the floor with a tape and calibrate the tracking again.",
+        line=Line("distance from the origin", "m", "position error", "m",
+                  lambda x, v: (v - 1.0) * x),
     ),
 )  # fmt: skip

@@ -7,7 +7,7 @@ Source: rolling without slip; an odometer knows its wheels' radius and gearing o
 """
 
 from scm.arrays import Floats
-from scm.vehicles.identification import Identification
+from scm.vehicles.identification import Identification, Line
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.sensor_fault import SensorFault
 
@@ -29,5 +29,7 @@ SENSOR_FAULT = SensorFault(
         equation="sensor", depends_on=("speed",), starts=((1.03,), (0.97,)), steps=(0.005,),
         needs_odometer=True,
         sentence="The speed sensor shows {scale} of the true speed.",
+        advice="Roll the car along a tape measure and set the odometer's wheel radius and gearing.",
+        line=Line("speed", "m/s", "odometer error", "m/s", lambda x, v: (v - 1.0) * x),
     ),
 )  # fmt: skip

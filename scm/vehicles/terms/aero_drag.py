@@ -60,5 +60,7 @@ TERM = Term(
         equation="body", depends_on=("speed",), starts=((0.1,), (0.5,)), steps=(0.05,),
         needs_mps=0.5, adds=True,
         sentence="Something brakes the car with the square of its speed, {coefficient}.",
+        advice="Nothing to repair unless something sticks out of the car. Keep the drag in the "
+               "simulator for fast drives.",
     ),
 )  # fmt: skip

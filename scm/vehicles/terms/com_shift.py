@@ -35,5 +35,9 @@ TERM = Term(
         starts=((0.015,), (-0.015,), (0.05,), (-0.05,)), steps=(0.005,), needs_m_s2=1.0,
         also_moves={"measure.pose_point_x_m": 1.0},
         sentence="The centre of gravity lies {shift_m} further forward than the file says.",
+        advice="Weigh front and rear axle apart and correct the car file. Look for a battery that"
+               " slid.",
+        own="body.cog_to_rear_axle_m",
+        turns=True,
     ),
 )  # fmt: skip

@@ -41,5 +41,7 @@ TERM = Term(
         equation="body", depends_on=("steering angle", "speed"), starts=((0.3,), (1.0,)),
         steps=(0.1,),
         sentence="Turning the wheels brakes the car: coefficient {coefficient}.",
+        advice="Look for tyres that rub and for toe-in; push the car in a circle by hand and feel"
+               " it.",
     ),
 )  # fmt: skip

@@ -32,5 +32,8 @@ TERM = Term(
         equation="drive", depends_on=("side",), starts=((0.05,), (-0.05,), (0.15,), (-0.15,)),
         steps=(0.02,),
         sentence="The left motor pulls {difference} more than nominal, the right one as much less.",
+        advice="Compare left and right: motor current, wheel diameter, and whether one wheel "
+               "drags.",
+        turns=True,
     ),
 )  # fmt: skip

@@ -34,5 +34,7 @@ TERM = Term(
         equation="drive", depends_on=("throttle",), starts=((0.2,), (-0.2,)), steps=(0.03,),
         rare=10.0,
         sentence="Throttle and drive are not proportional: curvature {curvature}.",
+        advice="Note the steady speed at five throttles; look for an exponential setting in the "
+               "radio or the controller.",
     ),
 )  # fmt: skip

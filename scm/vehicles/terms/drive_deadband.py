@@ -32,5 +32,7 @@ TERM = Term(
         equation="drive", depends_on=("throttle",), starts=((0.015,), (0.04,), (0.1,)),
         steps=(0.01,),
         sentence="Throttle below {threshold} does nothing.",
+        advice="Raise the throttle slowly from zero and note where the car starts. Calibrate the "
+               "controller's neutral.",
     ),
 )  # fmt: skip

@@ -32,5 +32,8 @@ TERM = Term(
         equation="drive", depends_on=("throttle",), starts=((0.02,), (0.04,), (0.08,), (0.16,)),
         steps=(0.01,),
         sentence="The motor answers the throttle {delay_s} late.",
+        advice="Look at the way from command to motor: radio, controller, filters. Keep the delay"
+               " in the simulator if it belongs there.",
+        own="clock.throttle_s",
     ),
 )  # fmt: skip

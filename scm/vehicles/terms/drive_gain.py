@@ -33,5 +33,6 @@ TERM = Term(
         equation="drive", depends_on=("throttle",), starts=((0.9,), (1.1,), (0.75,), (1.3,)),
         steps=(0.02,),
         sentence="The car drives as if the throttle were {gain} of the command.",
+        advice="Check the throttle's end points in the controller, and the battery's voltage.",
     ),
 )  # fmt: skip

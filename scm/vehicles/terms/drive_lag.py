@@ -35,5 +35,7 @@ TERM = Term(
         steps=(0.01,),
         sentence="The motor follows the throttle sluggishly, with a time constant of "
                  "{time_constant_s}.",
+        advice="Look for a soft start or a filter in the motor controller. Switch it off, or keep"
+               " the lag in the simulator.",
     ),
 )  # fmt: skip

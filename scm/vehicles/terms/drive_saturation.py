@@ -7,6 +7,7 @@ Holds: a limit in software, or a power stage at its end.   Shows in: full thrott
 Source: clipping by definition; an F1TENTH asked for 5 m/s and held to 1.3 (FrictionMaps, DS3).
 """
 
+from scm.vehicles.identification import Identification
 from scm.vehicles.jit import kernel_function
 from scm.vehicles.param import Normal, Param
 from scm.vehicles.term import Per, Term
@@ -29,5 +30,11 @@ TERM = Term(
               "largest throttle that still acts", Normal(1.0, 0.2)),
         Param("reverse", 1.0, "1", "drive.limit_reverse", (0.02, 1.0),
               "largest reverse throttle that still acts", Normal(1.0, 0.2)),
+    ),
+    identification=Identification(
+        equation="drive", depends_on=("throttle",), starts=((0.7,), (0.4,), (0.15,)), steps=(0.02,),
+        parameters=("forward",), only_with="speed_control",
+        sentence="Whatever is commanded, the drive takes no more than {forward} of full throttle.",
+        advice="Look for a limit of speed or current in the controller's settings.",
     ),
 )  # fmt: skip

@@ -34,5 +34,6 @@ TERM = Term(
         steps=(0.01,), rare=6.0, needs_m_s2=1.0,
         sentence="Load moves between the wheels as if the centre of gravity were {height_m} "
                  "higher.",
+        advice="Measure the height of the centre of gravity: tilt the car until it tips.",
     ),
 )  # fmt: skip

@@ -33,5 +33,8 @@ TERM = Term(
         equation="drive", depends_on=("torque",), starts=((0.9,), (1.1,), (0.75,), (1.3,)),
         steps=(0.03,), rare=14.0, like="payload",
         sentence="The motors give {gain} of their torque.",
+        advice="Weigh the car and measure its pull with a spring scale: motor or mass, one of "
+               "both is off.",
+        own="drive.stall_torque_nm",
     ),
 )  # fmt: skip

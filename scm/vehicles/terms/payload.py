@@ -34,5 +34,8 @@ TERM = Term(
         equation="body", depends_on=("acceleration",), starts=((0.3,), (1.0,), (2.5,)),
         steps=(0.1,), bounds={"mass_kg": (0.0, 20.0)}, like="motor_gain",
         sentence="The car carries {mass_kg} more than its file says.",
+        advice="Weigh the car as it was driven and correct the car file.",
+        own="body.mass_kg",
+        why_alike="On a level floor these do the same to the car: no drive there tells them apart.",
     ),
 )  # fmt: skip

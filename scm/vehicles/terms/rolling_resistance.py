@@ -39,5 +39,6 @@ TERM = Term(
         equation="drive", depends_on=("constant",), starts=((0.01,), (0.03,), (0.08,)),
         steps=(0.005,), adds=True,
         sentence="Rolling resistance is {coefficient} of the weight.",
+        advice="Look at tyre pressure, rubbing wheels and the kind of floor.",
     ),
 )  # fmt: skip

@@ -33,5 +33,7 @@ TERM = Term(
         equation="steering", depends_on=("steering history",), starts=((0.015,), (0.04,), (0.1,)),
         steps=(0.01,),
         sentence="The steering has {width_rad} of play.",
+        advice="Wiggle a front wheel by hand with the servo powered. Tighten or replace the ball "
+               "joints of the linkage.",
     ),
 )  # fmt: skip

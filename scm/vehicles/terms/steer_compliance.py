@@ -62,5 +62,7 @@ TERM = Term(
         steps=(0.01,), needs_m_s2=0.5,
         sentence="The front wheels give way under side force, {rad_per_weight} for the car's "
                  "weight.",
+        advice="Press a front wheel sideways with the servo powered: look for a soft servo saver "
+               "or a bending link.",
     ),
 )  # fmt: skip

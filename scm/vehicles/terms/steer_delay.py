@@ -32,5 +32,7 @@ TERM = Term(
         equation="steering", depends_on=("steering",), starts=((0.02,), (0.04,), (0.08,), (0.16,)),
         steps=(0.01,),
         sentence="The steering answers {delay_s} late.",
+        advice="Look at the way from command to servo: radio, controller, filters. Keep the delay"
+               " in the simulator if it belongs there.",
     ),
 )  # fmt: skip

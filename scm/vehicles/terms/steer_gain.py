@@ -32,5 +32,7 @@ TERM = Term(
         equation="steering", depends_on=("steering",), starts=((0.9,), (1.1,), (0.75,), (1.3,)),
         steps=(0.02,),
         sentence="The wheels turn by {gain} of the commanded angle.",
+        advice="Measure the wheels' angle at half command, and correct the servo's travel or the "
+               "car file.",
     ),
 )  # fmt: skip

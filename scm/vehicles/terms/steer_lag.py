@@ -34,5 +34,7 @@ TERM = Term(
         equation="steering", depends_on=("steering",), starts=((0.02,), (0.04,), (0.08,), (0.16,)),
         steps=(0.01,),
         sentence="The steering follows sluggishly, with a time constant of {time_constant_s}.",
+        advice="Look for a filter on the steering command or a worn servo. Keep the lag in the "
+               "simulator if it belongs there.",
     ),
 )  # fmt: skip

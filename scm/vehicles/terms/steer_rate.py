@@ -32,5 +32,7 @@ TERM = Term(
         equation="steering", depends_on=("steering",), starts=((0.5,), (0.75,), (1.5,)),
         steps=(0.05,),
         sentence="The steering servo turns at {scale} of its nominal rate.",
+        advice="Time the servo from stop to stop under load; check its voltage.",
+        own="steering.rate_rad_s",
     ),
 )  # fmt: skip

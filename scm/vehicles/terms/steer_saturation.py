@@ -34,5 +34,7 @@ TERM = Term(
         equation="steering", depends_on=("steering",), starts=((0.7, 1.0), (1.0, 0.7), (0.7, 0.7)),
         steps=(0.02, 0.02), bounds={"left": (0.3, 1.0), "right": (0.3, 1.0)},
         sentence="The steering ends at {left} of full lock on the left and {right} on the right.",
+        advice="Steer to both ends: find what stops the wheels early (linkage, wheel arch, end "
+               "point of the servo).",
     ),
 )  # fmt: skip

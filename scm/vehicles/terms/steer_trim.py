@@ -31,5 +31,6 @@ TERM = Term(
         equation="steering", depends_on=("constant",),
         starts=((0.02,), (-0.02,), (0.08,), (-0.08,)), steps=(0.005,),
         sentence="The wheels stand {offset_rad} to the left when the command is straight ahead.",
+        advice="Set the steering's neutral: the car should roll straight with no command.",
     ),
 )  # fmt: skip

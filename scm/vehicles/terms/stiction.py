@@ -37,5 +37,6 @@ TERM = Term(
         equation="drive", depends_on=("speed",), starts=((0.02,), (0.06,), (0.15,)), steps=(0.01,),
         sentence="Near standstill the driven wheels stick with {torque_nm} more than the model "
                  "knows.",
+        advice="Push the car from rest by hand: look for a dry gear or a bearing that sticks.",
     ),
 )  # fmt: skip

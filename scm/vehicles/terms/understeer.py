@@ -34,5 +34,7 @@ TERM = Term(
         equation="steering", depends_on=("lateral acceleration",), starts=((0.01,), (0.05,)),
         steps=(0.003,), needs_m_s2=0.5,
         sentence="The car turns less the faster it corners: {gradient}.",
+        advice="Compare front and rear tyres; look for play or softness in front. If they are "
+               "right, keep it in the simulator.",
     ),
 )  # fmt: skip

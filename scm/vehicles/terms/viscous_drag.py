@@ -43,5 +43,7 @@ TERM = Term(
         equation="body", depends_on=("speed",), starts=((0.4,), (1.5,), (4.0,)), steps=(0.1,),
         adds=True,
         sentence="Something brakes the car in proportion to its speed, {coefficient}.",
+        advice="Turn the wheels by hand and look for thick grease, a cable that drags, or a soft "
+               "floor.",
     ),
 )  # fmt: skip

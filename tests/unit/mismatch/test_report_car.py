@@ -26,7 +26,7 @@ NAMES = """
     steer_gain steer_saturation steer_backlash steer_delay steer_lag steer_rate steer_compliance
     tyre_stiffness tyre_grip tyre_relaxation understeer com_shift load_transfer corner_drag wind
     pose_latency pose_scale camera_tilt pose_point pose_heading wheel_radius encoder_loss gyro_bias
-    gyro_scale accel_bias imu_misalignment clock_offset clock_drift unit_error
+    gyro_scale accel_bias imu_misalignment clock_offset clock_drift
 """
 
 
