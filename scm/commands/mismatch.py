@@ -107,7 +107,7 @@ def _cars(arguments: argparse.Namespace) -> "tuple[dict[str, list[Recording]], t
 def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> str:
     """Diagnose one car, write its report, and return what to print."""
     from scm.mismatch.pipeline import diagnose, write
-    from scm.mismatch.report.summary import summary
+    from scm.mismatch.report.write import summary
 
     found = diagnose(
         arguments.recording, arguments.car, arguments.data, vehicle=arguments.vehicle,
@@ -136,7 +136,7 @@ def _of_cars(
     """
     from scm.mismatch.pipeline import write
     from scm.mismatch.report.cars_page import several_summary
-    from scm.mismatch.report.summary import summary
+    from scm.mismatch.report.write import summary
     from scm.mismatch.several.diagnose import diagnose_one, diagnose_several, write_all
 
     budget_s, strict = arguments.budget_s, arguments.strict

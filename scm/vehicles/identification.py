@@ -45,6 +45,7 @@ class Identification:
         why_alike: A sentence on that, in one of the two.
         own: A car's own number that means the same as its first parameter.
         only_with: An effect of the car without which this one is not searched for.
+        experiments: By name, those with more than a drive that make sense for some effects only.
         advice: What a mechanic does about it: check, repair, or record.
         turns: Whether it is drawn as an angle of the wheels, as all of steering and tyres are.
         line: How a sensor's fault is drawn.
@@ -68,6 +69,7 @@ class Identification:
     why_alike: str = ""
     own: str = ""
     only_with: str = ""
+    experiments: tuple[str, ...] = ()
     advice: str = ""
     shared: str = ""
     turns: bool = False

@@ -4,9 +4,8 @@ import math
 from pathlib import Path
 
 from scm.errors import CarError
-from scm.mismatch.report.car_file import term_names
-from scm.mismatch.report.toml_text import number, quoted, set_entry, set_list
 from scm.vehicles.car import Car, load_car
+from scm.vehicles.car_text import number, quoted, set_entry, set_list, term_names
 from vehicle_agent.calibrate.fit import TERMS, Z_90, Fit
 
 COMMENT = "found by vehicle-agent calibrate"

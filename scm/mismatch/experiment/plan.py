@@ -9,8 +9,7 @@ import numpy as np
 from scm.arrays import Bools, Floats
 from scm.geometry import Pose2
 from scm.mismatch.effect_catalogue import Candidate
-from scm.mismatch.experiment.manoeuvres import ROW_S, Manoeuvre
-from scm.mismatch.experiment.pace import SIDEWAYS_M_S2, Pace
+from scm.mismatch.experiment.manoeuvres import ROW_S, SIDEWAYS_M_S2, Manoeuvre, Pace
 from scm.mismatch.fit.likelihood import Likelihood, Simulator
 from scm.mismatch.fit.rollouts import Rollouts
 from scm.mismatch.fit.sensor_prediction import Prediction

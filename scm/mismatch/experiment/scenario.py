@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from scm.mismatch.experiment.pace import Floor
+from scm.mismatch.experiment.manoeuvres import Floor
 from scm.mismatch.experiment.plan import Placed
 from scm.mismatch.experiment.suggest import Suggestion
 from scm.replay.drive import STEP_S

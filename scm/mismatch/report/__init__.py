@@ -2,10 +2,9 @@
 
 write       all of it into one folder: `record` makes a `Report` of findings and evidence,
             and every file is written from that
-record      the report as one record: sentences, cards and pictures, worked out once
+record      the report as one record, worked out once; `report.json`, `drawn.json`
 sentences   verdict, where and when, advice; wording: names, numbers, units; panels: first screen
-pictures    all SVGs, with residual_pictures, free_run_pictures and plot
-fields      `report.json` and `drawn.json`; page and html_text: `report.html`
-car_file    `car.toml` and its own effects, with toml_text; summary: the command's last lines
+pictures    all SVGs, with drive_pictures and plot
+page        `report.html`; car_file: `car.toml` and its own effects
 cars_page   the page of several cars
 """

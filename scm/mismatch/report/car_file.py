@@ -8,7 +8,7 @@ import inspect
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from msgspec import structs
@@ -16,8 +16,15 @@ from msgspec import structs
 from scm.errors import CarError
 from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Diagnosis, Effect, Estimate
-from scm.mismatch.report.toml_text import number, quoted, set_entry, set_list
 from scm.vehicles.car import Car, Quantity, Value, all_terms, load_car
+from scm.vehicles.car_text import (
+    number,
+    quoted,
+    set_entry,
+    set_list,
+    term_names,
+    without_further,
+)
 from scm.vehicles.describe_effects import all_effects, params_of
 from scm.vehicles.jit import plain
 from scm.vehicles.own_term import SUFFIX
@@ -275,22 +282,9 @@ def _times(share: Estimate, number: float) -> Estimate:
     )
 
 
-def term_names(car: Car) -> list[str]:
-    """Return what a car file's `terms` holds for this car, in its order."""
-    return [
-        term.name if term.name in all_terms() else term.name + SUFFIX for term in _heads(car.terms)
-    ]
-
-
-def _heads(terms: Sequence[Term]) -> list[Term]:
-    """Return the effects without the further terms that come with them."""
-    further = {part.name for term in terms for part in term.also}
-    return [term for term in terms if term.name not in further]
-
-
 def _own_terms(car: Car) -> list[Term]:
     """Return the car's effects that the library does not have."""
-    return [term for term in _heads(car.terms) if term.name not in all_terms()]
+    return [term for term in without_further(car.terms) if term.name not in all_terms()]
 
 
 def write_own_terms(car: Car, folder: Path) -> list[str]:

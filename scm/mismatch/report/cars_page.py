@@ -9,13 +9,11 @@ from urllib.parse import quote
 
 from scm.maps.svg import element
 from scm.mismatch.findings import Diagnosis, Estimate
-from scm.mismatch.report.fields import plain
-from scm.mismatch.report.html_text import around, figure, section, table, tag
-from scm.mismatch.report.page import document, panel_html
+from scm.mismatch.report.page import around, document, figure, panel_html, section, table, tag
 from scm.mismatch.report.panels import Panel
 from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
+from scm.mismatch.report.record import plain
 from scm.mismatch.report.sentences import advice_of, can_judge, count, verdict_sentence
-from scm.mismatch.report.summary import summary
 from scm.mismatch.report.wording import (
     amounts,
     capital,
@@ -27,7 +25,7 @@ from scm.mismatch.report.wording import (
     title_of,
     unit_text,
 )
-from scm.mismatch.report.write import PAGE
+from scm.mismatch.report.write import PAGE, summary
 from scm.mismatch.several.findings import Agreement, CarAgreement, Cause, Common
 
 CARS, POSITION = "cars.json", "position_m"

@@ -9,7 +9,7 @@ import numpy as np
 from scm.maps.svg import element
 from scm.mismatch.evidence import Curve, Evidence, RefittedParameter, Tried
 from scm.mismatch.findings import Diagnosis
-from scm.mismatch.report.free_run_pictures import error_pictures, window_pictures
+from scm.mismatch.report.drive_pictures import error_pictures, floor_map, time_line, window_pictures
 from scm.mismatch.report.plot import (
     TEXT_PX,
     Frame,
@@ -23,7 +23,6 @@ from scm.mismatch.report.plot import (
     text,
     ticks_across,
 )
-from scm.mismatch.report.residual_pictures import floor_map, time_line
 from scm.mismatch.report.wording import capital, quantities, title_of, unit_text
 
 _WIDTH, _HEIGHT = 440.0, 270.0  # of a picture beside another [px]

@@ -51,6 +51,7 @@ SENSOR_FAULT = SensorFault(
         shared="camera",
         sentence="The camera looks askew: its scale changes by {tilt_x} along x and {tilt_y} "
                  "along y.",
+        experiments=("rotated",),
         advice="Calibrate the overhead camera again, with marks over the whole floor.",
         line=Line("position", "m", "scale error", "1", lambda x, v: 1.0 / (1.0 + v * x) - 1.0),
     ),

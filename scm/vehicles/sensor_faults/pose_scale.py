@@ -29,6 +29,7 @@ SENSOR_FAULT = SensorFault(
         equation="sensor", depends_on=("position",), starts=((1.02,), (0.98,)), steps=(0.005,),
         shared="camera",
         sentence="The camera shows {scale_cm} for every 100 cm on the floor.",
+        experiments=("rotated",),
         advice="Measure two marks on the floor with a tape and calibrate the tracking again.",
         line=Line("distance from the origin", "m", "position error", "m",
                   lambda x, v: (v - 1.0) * x),

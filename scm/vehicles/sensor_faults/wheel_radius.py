@@ -31,6 +31,7 @@ SENSOR_FAULT = SensorFault(
     identification=Identification(
         equation="sensor", depends_on=("wheel",), starts=((1.03,), (0.97,)), steps=(0.005,),
         sentence="The wheels roll as if their radius were {scale} of the nominal one.",
+        experiments=("other_wheels",),
         advice="Measure how far the car rolls in ten turns of a wheel, and correct the car file.",
         line=Line("speed", "m/s", "wheel speed error", "m/s", lambda x, v: (1.0 / v - 1.0) * x),
     ),

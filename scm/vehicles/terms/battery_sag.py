@@ -32,6 +32,7 @@ TERM = Term(
     identification=Identification(
         equation="drive", depends_on=("time",), starts=((0.03,), (0.12,)), steps=(0.01,),
         sentence="The drive weakens by {fraction_per_min} a minute, as a battery that runs down.",
+        experiments=("cooled",),
         advice="Charge or replace the battery. If it is as it should be, keep the sag in the "
                "simulator.",
     ),

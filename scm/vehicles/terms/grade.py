@@ -55,6 +55,7 @@ TERM = Term(
         starts=((0.02, 0.0), (0.02, 1.57), (0.02, 3.14), (0.02, -1.57)), steps=(0.005, 0.1),
         rare=4.0, like="wind", shared="floor",
         sentence="The floor rises by {slope} towards {uphill_rad} from world x.",
+        experiments=("rotated",),
         advice="Put a spirit level on the floor. Level the floor, or keep the slope in the "
                "simulator.",
         why_alike="Both push the car one way wherever it heads: no drive on this floor tells them"

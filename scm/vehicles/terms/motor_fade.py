@@ -41,6 +41,7 @@ TERM = Term(
     identification=Identification(
         equation="drive", depends_on=("load", "time"), starts=((0.1,), (0.3,)), steps=(0.03,),
         sentence="The motors lose up to {fraction} of their drive as they warm up.",
+        experiments=("cooled",),
         advice="Let the motor cool for five minutes and drive again: if the strength comes back, "
                "it is heat.",
     ),

@@ -62,6 +62,7 @@ TERM = Term(
         shared="floor",
         sentence="A spot of floor near ({x_m}, {y_m}), {radius_m} in radius, has grip {grip} and "
                  "rolling resistance {rolling}.",
+        experiments=("rotated",),
         advice="Look at the floor at the marked place: dust, tape, a wet spot, another material. "
                "Clean it, or keep it on the map.",
     ),

@@ -33,6 +33,7 @@ TERM = Term(
         equation="tyre", depends_on=("slip",), starts=((0.7,), (1.2,)), steps=(0.05,), rare=4.0,
         needs_m_s2=1.0, bounds={"scale": (0.2, 2.0)},
         sentence="The tyres hold {scale} of their nominal side force.",
+        experiments=("other_wheels",),
         advice="Clean tyres and floor; compare with a new set of tyres.",
     ),
 )  # fmt: skip

@@ -65,6 +65,7 @@ TERM = Term(
         equation="tyre", depends_on=("slip history",), starts=((0.05,), (0.15,), (0.4,)),
         steps=(0.02,), needs_m_s2=0.5, parameters=("length_m",),
         sentence="The tyres build up side force only after rolling {length_m}.",
+        experiments=("other_wheels",),
         advice="Nothing to repair: the tyre needs some way to build up its side force. Keep it in "
                "the simulator.",
     ),

@@ -34,6 +34,7 @@ TERM = Term(
         equation="tyre", depends_on=("slip",), starts=((0.4,), (0.7,), (1.5,)), steps=(0.05,),
         needs_m_s2=1.0, bounds={"scale": (0.2, 4.0)},
         sentence="The tyres answer side slip with {scale} of their nominal stiffness.",
+        experiments=("other_wheels",),
         advice="Check tyre pressure and wear, and whether all four are of one kind.",
         own="tyre.lateral_slip_extremum",
     ),

@@ -44,6 +44,7 @@ TERM = Term(
         starts=((0.2, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.2)), steps=(0.05, 0.05), rare=10.0,
         bounds={"force_x_n": (-20.0, 20.0)}, like="grade", shared="floor",
         sentence="A steady push of {force_x_n} and {force_y_n} along the floor's x and y.",
+        experiments=("rotated",),
         advice="Look for a fan, a draught or a cable that pulls the car one way.",
     ),
 )  # fmt: skip

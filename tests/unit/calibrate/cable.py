@@ -8,9 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from scm.clock import NS_PER_MS
-from scm.mismatch.report.car_file import term_names
-from scm.mismatch.report.toml_text import set_entry, set_list
 from scm.vehicles.car import load_car
+from scm.vehicles.car_text import set_entry, set_list, term_names
 from tests.unit.calibrate.rig import LIMITS, START, STEP_NS, T0, Eye, Hidden
 from vehicle_agent.bodies.nigel import NigelBody
 from vehicle_agent.calibrate.part import CalibrationPart

@@ -5,12 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scm.mismatch.experiment.changed import drive_alone
-from scm.mismatch.experiment.manoeuvres import MANOEUVRES
-from scm.mismatch.experiment.pace import Floor, pace_of
+from scm.mismatch.experiment.manoeuvres import MANOEUVRES, Floor, pace_of
 from scm.mismatch.experiment.plan import place
 from scm.mismatch.experiment.separation import Separation
-from scm.mismatch.experiment.suggest import Suggestion, Weighed
+from scm.mismatch.experiment.suggest import Suggestion, Weighed, drive_alone
 from scm.mismatch.findings import Undecided, Verdict
 from scm.mismatch.fit.data_split import split
 from scm.mismatch.fit.likelihood import Likelihood

@@ -10,8 +10,8 @@ from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Effect, Equation, Estimate, Verdict
 from scm.mismatch.report.car_file import write_car
 from scm.mismatch.report.sentences import advice_of
-from scm.mismatch.report.toml_text import set_entry, set_list
 from scm.vehicles.car import all_terms, load_car
+from scm.vehicles.car_text import set_entry, set_list
 from scm.vehicles.describe_effects import all_effects, params_of
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.sensor_fault import all_sensor_faults

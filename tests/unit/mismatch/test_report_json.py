@@ -5,8 +5,7 @@ import json
 import pytest
 
 from scm.mismatch.findings import Estimate
-from scm.mismatch.report.fields import json_text, plain
-from scm.mismatch.report.record import on_clock
+from scm.mismatch.report.record import json_text, on_clock, plain
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_up_findings import replace
 

@@ -10,8 +10,7 @@ from scm.data_quality.quality import DataProblem
 from scm.mismatch.evidence import Evidence, RefittedParameter, Residual
 from scm.mismatch.findings import Effect, Equation, Estimate, Located, Verdict
 from scm.mismatch.report.sentences import verdict_sentence
-from scm.mismatch.report.summary import summary
-from scm.mismatch.report.write import write_report
+from scm.mismatch.report.write import summary, write_report
 from scm.vehicles.car import load_car
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_up_findings import replace

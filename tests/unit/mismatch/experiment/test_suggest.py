@@ -7,13 +7,17 @@ import numpy as np
 import pytest
 
 from scm.mismatch.effect_catalogue import by_name, candidates, terms_needed
-from scm.mismatch.experiment.changed import ramp_and_mass
-from scm.mismatch.experiment.manoeuvres import MANOEUVRES
-from scm.mismatch.experiment.pace import Floor, pace_of
+from scm.mismatch.experiment.manoeuvres import MANOEUVRES, Floor, pace_of
 from scm.mismatch.experiment.plan import Explanation, Leg, place, planned
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.experiment.separation import linear_separation
-from scm.mismatch.experiment.suggest import MIN_LAMBDA, SURE_LAMBDA, names_of, suggest
+from scm.mismatch.experiment.suggest import (
+    MIN_LAMBDA,
+    SURE_LAMBDA,
+    names_of,
+    ramp_and_mass,
+    suggest,
+)
 from scm.mismatch.fit.hypothesis import numbers_of
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.recorder.play import read_drive

@@ -8,6 +8,10 @@ import json
 import re
 from collections.abc import Sequence
 
+from scm.vehicles.car import Car, all_terms
+from scm.vehicles.own_term import SUFFIX
+from scm.vehicles.term import Term
+
 _QUOTES = ('"""', "'''", '"', "'")
 
 
@@ -122,3 +126,17 @@ def _last_entry_end(text: str, start: int, end: int) -> int:
     for line in re.finditer(r"^[ \t]*[^\s#].*$", text[start:end], re.MULTILINE):
         last = start + line.end()
     return last
+
+
+def term_names(car: Car) -> list[str]:
+    """Return what a car file's `terms` holds for this car, in its order."""
+    return [
+        term.name if term.name in all_terms() else term.name + SUFFIX
+        for term in without_further(car.terms)
+    ]
+
+
+def without_further(terms: Sequence[Term]) -> list[Term]:
+    """Return the effects without the further terms that come with them."""
+    further = {part.name for term in terms for part in term.also}
+    return [term for term in terms if term.name not in further]
