@@ -16,7 +16,8 @@ import pymunk
 from pymunk import batch
 
 from scm.arrays import Floats
-from scm.records.city_map import CityMap, Floor, MapTag, Wall
+from scm.records.city_map import CityMap, MapTag, Wall
+from scm.records.floor import Floor
 from scm.world.contacts import INSTANT, ITERATIONS, Contacts
 from scm.world.solids import Hull, car_body, solids
 

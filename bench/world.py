@@ -15,7 +15,8 @@ from collections.abc import Callable, Sequence
 import pymunk
 
 from scm.maps.segments import wall_segments
-from scm.records.city_map import CityMap, Floor, Lane, MapTag, Segment, Wall
+from scm.records.city_map import CityMap, Lane, MapTag, Segment, Wall
+from scm.records.floor import Floor
 from scm.v2x.message import Message, encode
 from scm.v2x.messages.route_request import RouteRequest
 from scm.world import step

@@ -11,7 +11,8 @@ from drawing import plt
 from scm.geometry import Pose2
 from scm.maps.draw import draw_svg
 from scm.maps.load import load_map
-from scm.records.city_map import Box, CityMap, Floor, MapTag, Plate, Ramp
+from scm.records.city_map import Box, CityMap, MapTag
+from scm.records.floor import Floor, Plate, Ramp
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground

@@ -1,13 +1,16 @@
 """The web application of one city: routes by noun, the live stream, the dashboard's files."""
 
 import asyncio
+import importlib
 import uuid
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from http import HTTPStatus
+from inspect import signature
 
 from fastapi import APIRouter, FastAPI
 
+from scm import registry
 from scm.api import openapi, problem, uploads
 from scm.api.acknowledgements import Acknowledgements
 from scm.api.audit_trail import Audited
@@ -27,43 +30,6 @@ from scm.api.limits import Limited
 from scm.api.metrics import Measured, Metrics
 from scm.api.mismatch_jobs import MismatchJobs
 from scm.api.operations import Operations
-from scm.api.routes import (
-    audit,
-    boxes,
-    cameras,
-    cars,
-    cities,
-    close_up,
-    disturbances,
-    drive,
-    events,
-    eye,
-    eye_calibration,
-    eye_in_force,
-    eye_print,
-    health,
-    leases,
-    live,
-    map,  # noqa: A004  named for its noun
-    metrics,
-    misbehaviour,
-    mismatch,
-    ngsi,
-    operations,
-    planned_path,
-    recordings,
-    scan,
-    scenarios,
-    session,
-    signal_plans,
-    signals,
-    stations,
-    stop,
-    traffic,
-    vehicle_frames,
-    vehicles,
-)
-from scm.api.routes import keys as key_routes
 from scm.api.signal_plans import PlanRepository
 from scm.api.stream import Stream
 from scm.api.trace import Traced
@@ -74,6 +40,7 @@ from scm.records.city_map import CityMap
 from scm.store.memory import MemoryStore
 from scm.store.repository import Repository
 
+ROUTES = "scm.api.routes"
 FILES = {
     r"/api/v1/mismatch/uploads": uploads.MOST_BYTES,
     r"/api/v1/eye/cameras/[^/]+/views": LARGEST_PICTURE,
@@ -112,7 +79,7 @@ def create_app(
     """
     site = site._replace(base=check_base(site.base))
     clock = WallClock()
-    parts = _Parts(
+    services = _Services(
         city=City(view, send, city_map, plans or {}, folders or Folders(), link or Link()),
         keys=keys,
         store=state or MemoryStore(),
@@ -125,16 +92,16 @@ def create_app(
         redoc_url=None,
         openapi_url="/api/v1/openapi.json",
         generate_unique_id_function=openapi.operation_id,
-        lifespan=parts.lifespan,
+        lifespan=services.lifespan,
         servers=[{"url": site.base}] if site.base else None,
     )
     app.state.base = site.base
-    app.state.stream = parts.stream
-    app.state.frames = parts.frames
+    app.state.stream = services.stream
+    app.state.frames = services.frames
     app.state.keys = keys
     problem.install(app)
-    _add_layers(app, parts, clock, site)
-    nouns = parts.by_prefix()
+    _add_layers(app, services, clock, site)
+    nouns = services.routers()
     for prefix, routers in nouns.items():
         for noun in routers:
             app.include_router(noun, prefix=prefix, responses=problem.RESPONSES)
@@ -143,103 +110,55 @@ def create_app(
     return app
 
 
-class _Parts:
-    """What the routes of one server share, and the nouns that are made of it."""
+class _Services:
+    """What routes share: each names as arguments of its `router` those that it needs."""
 
     def __init__(
         self, *, city: City, keys: KeyRing | None, store: Repository, clock: WallClock
     ) -> None:
         self.city = city
         self.keys = keys
-        self.known = None if keys is None else KnownKeys(keys, clock)
+        self.known_keys = None if keys is None else KnownKeys(keys, clock)
         self.store = store
-        self.seen = Acknowledgements(store, clock)
-        self.work = Operations(clock)
+        self.acknowledgements = Acknowledgements(store, clock)
+        self.operations = Operations(clock)
         self.plans = PlanRepository(city.folders.plans)
-        self.jobs = MismatchJobs(city, self.work, clock, city.link.words)
-        self.stream = Stream(city, uuid.uuid4().hex[:8], self.seen)
+        self.jobs = MismatchJobs(city, self.operations, clock, city.link.words)
+        self.stream = Stream(city, uuid.uuid4().hex[:8], self.acknowledgements)
         self.frames = VehicleFrames(city.view)
         self.metrics = Metrics(city, self.stream)
 
-    def by_prefix(self) -> dict[str, tuple[APIRouter, ...]]:
-        """Return all nouns, by the prefix of their addresses."""
-        city = self.city
-        return {
-            "/api/v1": (*self.of_the_city(), *self.live(), *self.of_the_server()),
-            "": (health.router(city), ngsi.router(city), metrics.router(self.metrics)),
-        }
-
-    def of_the_city(self) -> tuple[APIRouter, ...]:
-        """Return what is true of the city now, and what may be asked of it."""
-        city = self.city
-        return (
-            cities.router(city),
-            vehicles.router(city),
-            cars.router(city),
-            leases.router(city),
-            planned_path.router(city),
-            signals.router(city, self.plans),
-            signal_plans.router(city, self.plans, self.work),
-            stations.router(city),
-            map.router(city),
-            boxes.router(city),
-            disturbances.router(city),
-            eye.router(city),
-            stop.router(city),
-            misbehaviour.router(city),
-            traffic.router(city),
-        )
-
-    def live(self) -> tuple[APIRouter, ...]:
-        """Return what goes on for as long as somebody looks."""
-        city, stream = self.city, self.stream
-        return (
-            live.router(stream),
-            cameras.router(city, stream),
-            scan.router(city, stream),
-            vehicle_frames.router(self.frames),
-            close_up.router(city, stream),
-            drive.router(city, stream, self.known),
-        )
-
-    def of_the_server(self) -> tuple[APIRouter, ...]:
-        """Return what the server itself keeps: its logs, files, long work and keys."""
-        city = self.city
-        return (
-            events.router(city, self.seen),
-            audit.router(self.store),
-            operations.router(self.work),
-            recordings.router(city, self.work),
-            scenarios.router(city, self.work, self.keys),
-            eye_calibration.router(city, self.work),
-            eye_in_force.router(city),
-            eye_print.router(city),
-            mismatch.router(city, self.jobs),
-            session.router(),
-            key_routes.router(self.keys),
-        )
+    def routers(self) -> dict[str, list[APIRouter]]:
+        """Return the router of each file in `routes`, by the prefix of its addresses."""
+        found: dict[str, list[APIRouter]] = {}
+        for name in registry.names(ROUTES):
+            module = importlib.import_module(f"{ROUTES}.{name}")
+            services = {need: getattr(self, need) for need in signature(module.router).parameters}
+            prefix = getattr(module, "PREFIX", "/api/v1")
+            found.setdefault(prefix, []).append(module.router(**services))
+        return found
 
     @asynccontextmanager
     async def lifespan(self, _app: FastAPI) -> AsyncIterator[None]:
         """Run the streams while the server runs; call off what is still at work at its end."""
         tasks = [asyncio.create_task(self.stream.run()), asyncio.create_task(self.frames.run())]
         yield
-        self.work.close()
+        self.operations.close()
         self.stream.close()
         self.frames.close()
         await asyncio.gather(*tasks)
 
 
-def _add_layers(app: FastAPI, parts: _Parts, clock: WallClock, site: Site) -> None:
+def _add_layers(app: FastAPI, services: _Services, clock: WallClock, site: Site) -> None:
     policy = content_policy(index_text(site.base))
     app.add_middleware(Headed)  # what is added later sees a request earlier
     app.add_middleware(Idempotent, clock=clock)
     app.add_middleware(Bounded, larger=FILES)
-    app.add_middleware(Audited, store=parts.store, clock=clock)
+    app.add_middleware(Audited, store=services.store, clock=clock)
     app.add_middleware(Limited, clock=clock)  # what is asked too often fills no log
     app.add_middleware(Dashboard, base=site.base)
-    app.add_middleware(Gate, keys=parts.known, policy=policy, origins=site.origins)
-    app.add_middleware(Measured, metrics=parts.metrics, clock=clock)
+    app.add_middleware(Gate, keys=services.known_keys, policy=policy, origins=site.origins)
+    app.add_middleware(Measured, metrics=services.metrics, clock=clock)
     app.add_middleware(Traced)
     app.add_middleware(Based, base=site.base)
     app.add_exception_handler(HTTPStatus.NOT_FOUND, astray)

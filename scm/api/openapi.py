@@ -2,8 +2,8 @@
 
 Routes say what they answer by `scm.api.schemas`. Here the records move below `components`, so that
 each is described once and may hold others of its own kind; what `Attributes:` of a record's
-docstring says goes to its fields, the rest comes from `scm.api.words`, and examples of lists and
-records are put together from those of their parts.
+docstring says goes to its fields, before what their types say (`scm.records.fields`). Examples of
+lists and records are put together from those of their parts.
 """
 
 import inspect
@@ -17,7 +17,6 @@ from fastapi.routing import APIRoute
 
 from scm.api.inputs import JsonInput, QueryInput
 from scm.api.roles import ROLES, SCHEME
-from scm.api.words import UNITS, WORDS
 from scm.errors import RunError
 
 PUBLISHED = {
@@ -28,6 +27,12 @@ PUBLISHED = {
     "StageInterval": "SignalSlot",
 }
 """Names of records that programs generated from the description already know."""
+
+UNITS: dict[str, float | int] = {
+    "m": 1.25, "s": 2.5, "ms": 12.5, "ns": 120_000_000_000, "mps": 0.3, "mps2": 0.5, "rad": 0.1,
+    "radps": 0.2, "deg": 0.4, "mm": 1.8, "px": 640, "hz": 20.0, "nm": 0.01, "v": 7.4,
+}  # fmt: skip
+"""An example for a number that ends in this unit, where its type names none."""
 
 _DEFS, _COMPONENTS = "#/$defs/", "#/components/schemas/"
 _ENTRY = re.compile(r"^ {4}(\w+(?:, \w+)*): ")
@@ -160,9 +165,8 @@ def _describe_fields(schema: Schema) -> None:
         schema["description"] = about
     for name, field in fields.items():
         _lift_words(field)
-        words = described_fields.get(name) or (WORDS[name][0] if name in WORDS else "")
-        if words:
-            field.setdefault("description", words)
+        if name in described_fields:
+            field["description"] = described_fields[name]
         field.pop("title", None)
 
 
@@ -226,18 +230,16 @@ def _example(name: str, field: Schema, schemas: Schema, depth: int) -> Any:
 
 
 def _of_type(name: str, field: Schema, schemas: Schema, depth: int) -> Any:
-    kind, known = field.get("type"), WORDS[name][1] if name in WORDS else None
+    kind = field.get("type")
     if kind == "array":
-        if _is_a("array", known) and "$ref" not in (field.get("items") or {}):
-            return known
         parts = field.get("prefixItems") or [field.get("items") or {}]
         return [_example(name, part, schemas, depth) for part in parts] if depth < _DEPTH else []
     if kind == "object":
-        return known if _is_a("object", known) else _record(field, schemas, depth + 1)
+        return _record(field, schemas, depth + 1)
     if kind == "boolean":
-        return known if _is_a("boolean", known) else True
+        return True
     numbers = (UNITS.get(name.rpartition("_")[2]), field.get("minimum"), 1)
-    for value in (known, field.get("default"), *numbers):
+    for value in (field.get("default"), *numbers):
         if _is_a(str(kind), value) and value != "" and _is_within(field, value):
             return value
     return None

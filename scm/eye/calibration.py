@@ -10,7 +10,8 @@ import numpy as np
 from scm.arrays import Floats
 from scm.errors import EyeError
 from scm.eye.camera import LENS_PARAMETERS
-from scm.records.city_map import Camera, Record
+from scm.records.city_map import Camera
+from scm.records.floor import Record
 
 LENS_NAMES = {
     "pinhole": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"),

@@ -6,7 +6,8 @@ import numpy as np
 
 from scm.maps.floor_shapes import is_convex, signed_area, slope_of
 from scm.maps.grey import unpack
-from scm.records.city_map import CityMap, Floor, FrictionMap, HeightMap, Patch, Plate, Samples
+from scm.records.city_map import CityMap
+from scm.records.floor import Floor, FrictionMap, HeightMap, Patch, Plate, Samples
 
 MOST_GRIP, MOST_ROLLING = 2.0, 0.5
 STEEPEST = 0.35

@@ -13,7 +13,8 @@ from scm.geometry import Pose2
 from scm.maps.floor_shapes import outline_of, ramp_outline
 from scm.maps.grey import full_scale, unpack
 from scm.maps.svg import element, label, layer, outline, placed
-from scm.records.city_map import CityMap, Floor, FrictionMap, HeightMap, Patch, Plate, Ramp
+from scm.records.city_map import CityMap
+from scm.records.floor import Floor, FrictionMap, HeightMap, Patch, Plate, Ramp
 
 ICE, SAND, LIGHT, DARK, INK = "#8fd3ff", "#e0a35a", "#ffffff", "#000000", "#23272e"
 MOST_CELLS = 72

@@ -4,7 +4,8 @@ import math
 from typing import NamedTuple
 
 from scm.geometry import Pose2
-from scm.records.city_map import Floor, Patch, Plate, Point, Ramp
+from scm.records.city_map import Point
+from scm.records.floor import Floor, Patch, Plate, Ramp
 
 CIRCLE_CORNERS = 32
 

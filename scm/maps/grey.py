@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from scm.arrays import Floats
 from scm.errors import MapError, reading
-from scm.records.city_map import Samples
+from scm.records.floor import Samples
 
 MAX_FLOOR_PIXELS = 4_000_000
 KINDS = {"uint8": "<u1", "uint16": "<u2", "float32": "<f4"}

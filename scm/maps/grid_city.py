@@ -29,7 +29,6 @@ from scm.records.city_map import (
     Conflict,
     Crossing,
     Crosswalk,
-    Floor,
     Group,
     Junction,
     Lane,
@@ -42,6 +41,7 @@ from scm.records.city_map import (
     StopLine,
     Wall,
 )
+from scm.records.floor import Floor
 
 WIDTH = 0.257
 OFFSET = 0.14

@@ -12,8 +12,8 @@ from scm.maps.check import problems_of
 from scm.maps.grey import read_grey
 from scm.maps.grid_city import named_city
 from scm.maps.occupancy import map_from_occupancy
-from scm.records import city_map
 from scm.records.city_map import CityMap
+from scm.records.floor import Record
 
 MAPS_DIR = Path(scm.__file__).parent.parent / "maps"
 
@@ -30,7 +30,7 @@ _PLAIN = (
     (re.compile(r"^Expected `array` of length (\d+), got (\d+)$"), r"expected \1 values, got \2"),
 )
 _UNKNOWN = re.compile(r"^key (?P<key>\S+) is not known here$")
-_KEYS = sorted({key for kind in city_map.Record.__subclasses__() for key in kind.__struct_fields__})
+_KEYS = sorted({key for kind in Record.__subclasses__() for key in kind.__struct_fields__})
 _TYPES = {
     "str": "text in quotes",
     "float": "a number",

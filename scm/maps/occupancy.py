@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import MapError
 from scm.maps.grid import OccupancyGrid, load_occupancy
-from scm.records.city_map import CityMap, Floor, MapTag, Point, Spawn, Wall
+from scm.records.city_map import CityMap, MapTag, Point, Spawn, Wall
+from scm.records.floor import Floor
 
 # Steps of an aslant wall vanish; the corners of a single cell, half its diagonal away, stay.
 STRAIGHTEN_CELLS = 0.7

@@ -21,7 +21,6 @@ from scm.records.city_map import (
     CityMap,
     Conflict,
     Crossing,
-    Floor,
     Group,
     Junction,
     Lane,
@@ -33,6 +32,7 @@ from scm.records.city_map import (
     Spawn,
     StopLine,
 )
+from scm.records.floor import Floor
 
 FASTEST_MPS = 0.25
 SLOWEST_MPS = 0.08

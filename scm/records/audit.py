@@ -1,8 +1,20 @@
 """The audit log."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
+from msgspec import Meta
+
+from scm.records.fields import (
+    Digest,
+    ErrorText,
+    KindName,
+    Number,
+    RequestedBy,
+    StationName,
+    Text,
+    TNs,
+)
 
 
 class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -22,14 +34,14 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
         request, reply: The request and its reply, as the station noted them.
     """
 
-    number: int
-    t_ns: int
-    station: str
-    kind: str
-    text: str
-    by: str
-    request_id: str
-    trace_id: str
+    number: Number
+    t_ns: TNs
+    station: StationName
+    kind: KindName
+    text: Text
+    by: RequestedBy
+    request_id: Annotated[str, Meta(examples=["k1"])]
+    trace_id: Annotated[str, Meta(examples=["4bf92f3577b34da6a3ce929d0e0e4736"])]
     request: dict[str, Any]
     reply: dict[str, Any]
 
@@ -46,5 +58,5 @@ class ChainVerdict(msgspec.Struct, kw_only=True, frozen=True):
 
     whole: bool
     entries: int
-    digest: str
-    error: str
+    digest: Digest
+    error: ErrorText

@@ -2,17 +2,23 @@
 
 import msgspec
 
+from scm.records.fields import XM, YM, Name, YawRad
+
 
 class SnapshotBox(msgspec.Struct, kw_only=True, frozen=True):
     """One construction box that cars can push; pose of its middle, map frame."""
 
-    name: str
-    x_m: float
-    y_m: float
-    yaw_rad: float
+    name: Name
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
 
 
 class Boxes(msgspec.Struct, kw_only=True, frozen=True):
-    """Where the boxes are that cars can push."""
+    """Where the boxes are that cars can push.
+
+    Attributes:
+        boxes: Boxes that cars can push.
+    """
 
     boxes: tuple[SnapshotBox, ...]

@@ -1,6 +1,11 @@
 """Cameras of the city and of cars."""
 
+from typing import Annotated
+
 import msgspec
+from msgspec import Meta
+
+from scm.records.fields import CameraNames
 
 
 class Cameras(msgspec.Struct, kw_only=True, frozen=True):
@@ -11,5 +16,5 @@ class Cameras(msgspec.Struct, kw_only=True, frozen=True):
         watched: Those whose pictures somebody looks at now.
     """
 
-    cameras: tuple[str, ...]
-    watched: tuple[str, ...]
+    cameras: CameraNames
+    watched: Annotated[tuple[str, ...], Meta(examples=[["front_camera"]])]

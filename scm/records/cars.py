@@ -6,6 +6,7 @@ import msgspec
 from msgspec import Meta
 
 from scm.records.body import Body
+from scm.records.fields import CarName, Text
 
 
 class CarFile(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=False):
@@ -29,10 +30,10 @@ class CarFile(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=False):
         text: The file itself, TOML; empty in lists.
     """
 
-    car: str
-    scale: str = ""
+    car: CarName
+    scale: Annotated[str, Meta(examples=["1:14"])] = ""
     shipped: bool
-    problem: str = ""
+    problem: Annotated[str, Meta(examples=["body.mass_kg: missing"])] = ""
     rear_m: float = 0.0
     front_m: float = 0.0
     right_m: float = 0.0
@@ -42,8 +43,8 @@ class CarFile(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=False):
     wheel_radius_m: float = 0.0
     mass_kg: float = 0.0
     turning_radius_m: float = 0.0
-    misfit: str = ""
-    text: str = ""
+    misfit: Annotated[str, Meta(examples=["it is 0.27 m wide, ..."])] = ""
+    text: Text = ""
 
 
 class CarFiles(msgspec.Struct, kw_only=True, frozen=True):
@@ -55,7 +56,7 @@ class CarFiles(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     cars: tuple[CarFile, ...]
-    folder: str
+    folder: Annotated[str, Meta(examples=["cars"])]
 
 
 class NewCarBody(Body, kw_only=True, frozen=True):

@@ -1,7 +1,11 @@
 """Cities on the bus."""
 
-import msgspec
+from typing import Annotated
 
+import msgspec
+from msgspec import Meta
+
+from scm.records.fields import Name, Title, TNs
 from scm.records.stations import StationRow
 
 
@@ -15,6 +19,7 @@ class CityRow(msgspec.Struct, kw_only=True, frozen=True):
         interface: Version of this interface, the first chunk of all addresses.
         seed: Of all its randomness; None: the world was not received yet.
         lanes: How many the map has; likewise `junctions`.
+        junctions: Junctions.
         vehicles: How many cars are on the map.
         t_ns: Time of the world; None: not received yet.
         tick: Of the world's newest snapshot; None: likewise.
@@ -24,16 +29,16 @@ class CityRow(msgspec.Struct, kw_only=True, frozen=True):
         parts: Its own processes that are there.
     """
 
-    name: str
-    map: str
-    title: str
-    software: str
-    interface: str
+    name: Name
+    map: Annotated[str, Meta(examples=["driving_school"])]
+    title: Title
+    software: Annotated[str, Meta(examples=["0.1.0"])]
+    interface: Annotated[str, Meta(examples=["v1"])]
     seed: int | None
     lanes: int
     junctions: int
     vehicles: int
-    t_ns: int | None
+    t_ns: TNs | None
     tick: int | None
     real_time_factor: float
     snapshot_age_s: float | None

@@ -5,167 +5,58 @@ map's tag fixes it: its centre is the origin unless the file puts the tag elsewh
 a lane (`at_m`) count from its start.
 """
 
-from typing import Literal
+from typing import Annotated, Literal
 
-import msgspec
+from msgspec import Meta
+
+from scm.records.fields import (
+    XM,
+    YM,
+    AtM,
+    GroupName,
+    GroupNames,
+    HeightM,
+    HeightPx,
+    JunctionName,
+    KindName,
+    LaneName,
+    LengthM,
+    Name,
+    Number,
+    PlanName,
+    Points,
+    SourceName,
+    TagId,
+    Title,
+    VehicleName,
+    WidthM,
+    WidthPx,
+    YawRad,
+)
+from scm.records.floor import Floor, Record, Wind
 
 Point = tuple[float, float]
 
 
-class Record(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Base of everything in a map file: unknown keys are refused."""
-
-
-class Samples(Record, kw_only=True, frozen=True):
-    """The grey values of a picture that a map names; the loader puts them in, for the map travels.
-
-    Attributes:
-        kind: What a value is: `uint8`, `uint16` or `float32`, little-endian.
-        packed: The values, row by row from the top, deflated.
-    """
-
-    rows: int
-    columns: int
-    kind: Literal["uint8", "uint16", "float32"]
-    packed: bytes
-
-
-class FrictionMap(Record, kw_only=True, frozen=True):
-    """A grey picture of how the floor holds: between black and white it is interpolated.
-
-    Attributes:
-        image: Grey picture (PNG, PGM ...) beside the map file.
-        x_m: What the whole picture covers; likewise `y_m`. Around it the floor's own values hold.
-        grip: Factor on the tyres' friction where it is black, and where it is white.
-        rolling: Likewise, coefficient of rolling resistance on top of the tyres' own.
-    """
-
-    image: str
-    x_m: tuple[float, float]
-    y_m: tuple[float, float]
-    grip: tuple[float, float] = (0.0, 1.0)
-    rolling: tuple[float, float] = (0.0, 0.0)
-    samples: Samples | None = None
-
-
-class HeightMap(Record, kw_only=True, frozen=True):
-    """A picture of hills and hollows; around it the floor is level, so its rim must be at 0.
-
-    Attributes:
-        image: Grey picture of 8 or 16 bits (PNG, PGM ...) or NPY file beside the map file.
-        m_per_grey: Height of one grey value, or of a value of 1 in an NPY file.
-        zero_grey: The value at height 0.
-    """
-
-    image: str
-    x_m: tuple[float, float]
-    y_m: tuple[float, float]
-    m_per_grey: float
-    zero_grey: float = 0.0
-    samples: Samples | None = None
-
-
-class Patch(Record, kw_only=True, frozen=True):
-    """A piece of other floor: circle, rectangle or polygon; a later one lies on an earlier one.
-
-    Attributes:
-        grip: Factor on the tyres' friction.
-        rolling: Coefficient of rolling resistance on top of the tyres' own.
-    """
-
-    name: str
-    grip: float = 1.0
-    rolling: float = 0.0
-    x_m: float | None = None
-    y_m: float | None = None
-    yaw_rad: float = 0.0
-    radius_m: float | None = None
-    length_m: float | None = None
-    width_m: float | None = None
-    points: tuple[Point, ...] = ()
-
-
-class Ramp(Record, kw_only=True, frozen=True):
-    """A plane that rises along `yaw_rad` from one height to another; centre and size [m]."""
-
-    name: str
-    x_m: float
-    y_m: float
-    yaw_rad: float = 0.0
-    length_m: float
-    width_m: float
-    from_m: float = 0.0
-    to_m: float
-
-
-class Plate(Record, kw_only=True, frozen=True):
-    """A level piece of floor with an edge to be driven over: a rectangle or a convex polygon."""
-
-    name: str
-    height_m: float
-    x_m: float | None = None
-    y_m: float | None = None
-    yaw_rad: float = 0.0
-    length_m: float | None = None
-    width_m: float | None = None
-    points: tuple[Point, ...] = ()
-
-
-class Floor(Record, kw_only=True, frozen=True):
-    """The ground plate: a rectangle [m], and how it holds, rolls and rises.
-
-    Attributes:
-        grip: Factor on the tyres' friction everywhere else.
-        rolling: Likewise, coefficient of rolling resistance on top of the tyres' own.
-    """
-
-    x_m: tuple[float, float]
-    y_m: tuple[float, float]
-    colour: str = "#5f6368"
-    grip: float = 1.0
-    rolling: float = 0.0
-    friction_map: FrictionMap | None = None
-    height_map: HeightMap | None = None
-    patches: tuple[Patch, ...] = ()
-    ramps: tuple[Ramp, ...] = ()
-    plates: tuple[Plate, ...] = ()
-
-    @property
-    def is_level(self) -> bool:
-        """Whether nothing on it slopes and it has no edges."""
-        return not (self.ramps or self.plates or self.height_map)
-
-
-class Wind(Record, kw_only=True, frozen=True):
-    """The air over the whole map.
-
-    Attributes:
-        x_mps: Where it blows to, along map x; likewise `y_mps`.
-        gust_mps: Standard deviation of its gusts, along x and along y.
-        gust_s: How long a gust lasts.
-    """
-
-    x_mps: float = 0.0
-    y_mps: float = 0.0
-    gust_mps: float = 0.0
-    gust_s: float = 1.0
-
-
 class MapTag(Record, kw_only=True, frozen=True):
-    """An AprilTag that lies on the floor and fixes the frame; `size_m` is the black edge."""
+    """An AprilTag that lies on the floor and fixes the frame; `size_m` is the black edge.
 
-    tag_id: int
-    x_m: float = 0.0
-    y_m: float = 0.0
-    yaw_rad: float = 0.0
+    Attributes:
+        size_m: Edge of its black square [m].
+    """
+
+    tag_id: TagId
+    x_m: XM = 0.0
+    y_m: YM = 0.0
+    yaw_rad: YawRad = 0.0
     size_m: float
 
 
 class VehicleTag(Record, kw_only=True, frozen=True):
     """Which AprilTag is printed for a car: no other car is given it."""
 
-    vehicle: str
-    tag_id: int
+    vehicle: VehicleName
+    tag_id: TagId
 
 
 class Segment(Record, kw_only=True, frozen=True):
@@ -176,30 +67,43 @@ class Segment(Record, kw_only=True, frozen=True):
         angle_rad: Turned along the arc, + = left.
     """
 
-    length_m: float | None = None
+    length_m: LengthM | None = None
     radius_m: float | None = None
     angle_rad: float | None = None
 
 
 class Lane(Record, kw_only=True, frozen=True):
-    """A way for cars: centre line from a start pose through segments, and what follows it."""
+    """A way for cars: centre line from a start pose through segments, and what follows it.
 
-    name: str
-    width_m: float
-    start: tuple[float, float, float]
+    Attributes:
+        segments: Its pieces, one after the other.
+        speed_limit_mps: Highest speed allowed [m/s].
+    """
+
+    name: Name
+    width_m: WidthM
+    start: Annotated[
+        tuple[float, float, float],
+        Meta(
+            description="Pose of its start: x [m], y [m], yaw [rad].",
+            examples=[[0.701, 1.168, -0.087]],
+        ),
+    ]
     segments: tuple[Segment, ...]
-    next: tuple[str, ...] = ()
+    next: Annotated[
+        tuple[str, ...], Meta(description="What follows.", examples=[["east_loop"]])
+    ] = ()
     speed_limit_mps: float
 
 
 class StopLine(Record, kw_only=True, frozen=True):
     """Where a car's front waits for a signal group before a junction."""
 
-    name: str
-    lane: str
-    at_m: float
-    junction: str
-    group: str
+    name: Name
+    lane: LaneName
+    at_m: AtM
+    junction: JunctionName
+    group: GroupName
 
 
 class Conflict(Record, kw_only=True, frozen=True):
@@ -210,7 +114,7 @@ class Conflict(Record, kw_only=True, frozen=True):
         to_m: Where the rear axle of a car is when its tail has cleared every crossing lane.
     """
 
-    lane: str
+    lane: LaneName
     from_m: float
     to_m: float
 
@@ -223,8 +127,8 @@ class Group(Record, kw_only=True, frozen=True):
         more: Further ways, where an approach parts: straight on, left, right.
     """
 
-    name: str
-    number: int
+    name: Name
+    number: Number
     movement: Conflict
     more: tuple[Conflict, ...] = ()
 
@@ -235,9 +139,13 @@ class Group(Record, kw_only=True, frozen=True):
 
 
 class PlanStage(Record, kw_only=True, frozen=True):
-    """Groups that are green together in a junction's own plan, and for how long."""
+    """Groups that are green together in a junction's own plan, and for how long.
 
-    groups: tuple[str, ...]
+    Attributes:
+        green_s: How long they are green [s].
+    """
+
+    groups: GroupNames
     green_s: float
 
 
@@ -245,29 +153,30 @@ class Junction(Record, kw_only=True, frozen=True):
     """Where lanes cross; which groups conflict is derived from the stretches' geometry.
 
     Attributes:
+        groups: Signal groups.
         stages: A cycle of its own, as the plan `own`; empty: it has the plans of all junctions.
     """
 
-    name: str
-    number: int
+    name: Name
+    number: Number
     groups: tuple[Group, ...]
-    plan: str
+    plan: PlanName
     stages: tuple[PlanStage, ...] = ()
 
 
 class Approach(Record, kw_only=True, frozen=True):
     """A way into a crossing: the line where a car's front gives way, and the ways from there."""
 
-    name: str
-    lane: str
-    at_m: float
+    name: Name
+    lane: LaneName
+    at_m: AtM
     ways: tuple[Conflict, ...]
 
 
 class Crossing(Record, kw_only=True, frozen=True):
     """Where lanes cross without lights: signs decide who goes first, else right before left."""
 
-    name: str
+    name: Name
     approaches: tuple[Approach, ...]
 
 
@@ -275,39 +184,41 @@ class Light(Record, kw_only=True, frozen=True):
     """A three-lamp head on a pole; it shows its group's colour.
 
     Attributes:
+        light_id: Number of the signal head.
         yaw_rad: Where the lamps look: towards the cars they are meant for.
     """
 
     light_id: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    junction: str
-    group: str
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
+    junction: JunctionName
+    group: GroupName
 
 
 class Crosswalk(Record, kw_only=True, frozen=True):
     """Painted stripes across a lane: centre, direction of the lane there, and size [m]."""
 
-    name: str
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    length_m: float
-    width_m: float
+    name: Name
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
+    length_m: LengthM
+    width_m: WidthM
 
 
 class Area(Record, kw_only=True, frozen=True):
     """Paved ground beside the lanes, a polygon: the open middle of a junction, a parking place."""
 
-    name: str
-    points: tuple[Point, ...]
+    name: Name
+    points: Points
 
 
 class Sign(Record, kw_only=True, frozen=True):
     """A traffic sign on a pole.
 
     Attributes:
+        sign_id: Number of the sign.
         kind: `stop`, `give_way`, `speed_limit`, `no_left`, `only_right`, ...; see `maps.signs`.
         yaw_rad: Where its face looks: towards the cars it is meant for.
         lane: The lane it holds for; without, that of the cars that its face looks at.
@@ -316,12 +227,12 @@ class Sign(Record, kw_only=True, frozen=True):
     """
 
     sign_id: int
-    kind: str
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    lane: str | None = None
-    at_m: float | None = None
+    kind: KindName
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
+    lane: LaneName | None = None
+    at_m: AtM | None = None
     value_mps: float | None = None
 
 
@@ -334,10 +245,10 @@ class Wall(Record, kw_only=True, frozen=True):
         thickness_m: Across it; 0: the line itself is the face, as traced from a scan.
     """
 
-    points: tuple[Point, ...]
+    points: Points
     closed: bool = False
     thickness_m: float = 0.01
-    height_m: float = 0.2
+    height_m: HeightM = 0.2
 
 
 class Box(Record, kw_only=True, frozen=True):
@@ -348,13 +259,13 @@ class Box(Record, kw_only=True, frozen=True):
         friction: Between the box and the floor.
     """
 
-    name: str
-    x_m: float
-    y_m: float
-    yaw_rad: float = 0.0
-    length_m: float
-    width_m: float
-    height_m: float = 0.2
+    name: Name
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad = 0.0
+    length_m: LengthM
+    width_m: WidthM
+    height_m: HeightM = 0.2
     mass_kg: float | None = None
     friction: float = 0.5
 
@@ -362,10 +273,16 @@ class Box(Record, kw_only=True, frozen=True):
 class Spawn(Record, kw_only=True, frozen=True):
     """A place where a car may be put: on a lane, or anywhere by pose."""
 
-    name: str
-    lane: str | None = None
-    at_m: float | None = None
-    pose: tuple[float, float, float] | None = None
+    name: Name
+    lane: LaneName | None = None
+    at_m: AtM | None = None
+    pose: (
+        Annotated[
+            tuple[float, float, float],
+            Meta(description="x [m], y [m], yaw [rad].", examples=[[1.384, 0.655, -0.785]]),
+        ]
+        | None
+    ) = None
 
 
 class Camera(Record, kw_only=True, frozen=True):
@@ -375,22 +292,28 @@ class Camera(Record, kw_only=True, frozen=True):
         x_m, y_m, z_m: Optical centre in the map frame.
         yaw_rad: Direction of the image's right edge over the floor (x of the picture).
         tilt_x_rad, tilt_y_rad: Small rotations about the picture's x and y away from straight down.
+        fx_px: Focal length along a row [px].
+        fy_px: Focal length along a column [px].
+        cx_px: Principal point, column [px].
+        cy_px: Principal point, row [px].
         lens: `fisheye` is OpenCV's model of wide lenses (angle, not tangent, over the picture).
         distortion: k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4, 0.
+        rate_hz: How often a second.
+        noise_sigma: Standard deviation of a grey value.
         place_std: Standard deviations of x, y, z [m], yaw, tilt x, tilt y [rad], as `scm eye
             locate` found them; without, the Eye takes millimetres and half a milliradian.
         rolling_s: From the exposure of the first row to that of the last; 0: all at once.
     """
 
-    name: str
-    x_m: float
-    y_m: float
+    name: Name
+    x_m: XM
+    y_m: YM
     z_m: float
-    yaw_rad: float = 0.0
+    yaw_rad: YawRad = 0.0
     tilt_x_rad: float = 0.0
     tilt_y_rad: float = 0.0
-    width_px: int
-    height_px: int
+    width_px: WidthPx
+    height_px: HeightPx
     fx_px: float
     fy_px: float
     cx_px: float
@@ -414,6 +337,7 @@ class RadioChannel(Record, kw_only=True, frozen=True):
         path_loss_exponent: How the strength falls with distance: 2 in the open.
         wall_db: What each wall between two stations takes.
         delay_ms: From antenna to reader; `jitter_ms` more at most, evenly spread.
+        jitter_ms: How much longer it may take, evenly spread [ms].
         data_rate_mbps: Of the one channel; 0: endless.
         hidden_share: How much of the load at a receiver its senders do not receive themselves:
             these frames collide.
@@ -436,16 +360,24 @@ class CityMap(Record, kw_only=True, frozen=True):
     """One city.
 
     Attributes:
+        map: Name of a map.
         revision: Counts changes of the lanes that cars must know of.
         drives_on: The side of the road. On the left, rules are mirrored: left comes before right,
             and who turns right lets oncoming cars pass.
+        first_vehicle_tag_id: AprilTag of the first car; the others follow.
+        lanes: Lanes.
+        junctions: Junctions.
+        lights: Lamps that burn.
+        boxes: Boxes that cars can push.
+        cameras: Cameras.
+        radio_range_m: Range of the radio between cars [m].
         speed_advice: Whether drivers come to red lights no sooner than SPATEM lets them pass.
     """
 
     map: Literal[1]
-    name: str
-    title: str
-    source: str
+    name: Name
+    title: Title
+    source: SourceName
     revision: int = 1
     drives_on: Literal["right", "left"] = "right"
     floor: Floor

@@ -1,8 +1,11 @@
 """What makes measurements void."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
+from msgspec import Meta
+
+from scm.records.fields import EndNs, EndS, KindName, SourceName, StartNs, StartS, Text, VoidReasons
 
 Kind = Literal["flash", "monitor", "silent", "part_lost", "late"]
 
@@ -11,6 +14,7 @@ class Disturbance(msgspec.Struct, kw_only=True, frozen=True):
     """Something that makes measurements void.
 
     Attributes:
+        kind: Of which sort it is.
         source: The junction or part that it concerns.
         start_ns: When it began, on the clock of whoever reports it.
         end_ns: When it was over; None: it lasts.
@@ -19,21 +23,21 @@ class Disturbance(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     kind: Kind
-    source: str
-    start_ns: int
-    end_ns: int | None = None
-    text: str
-    advice: str = ""
+    source: SourceName
+    start_ns: StartNs
+    end_ns: EndNs | None = None
+    text: Text
+    advice: Annotated[str, Meta(examples=["Start the city again with fewer cars."])] = ""
 
 
 class RecordedDisturbance(msgspec.Struct, kw_only=True, frozen=True):
     """One of them, from when to when since the recording began; see `/disturbances`."""
 
-    kind: str
-    source: str
-    text: str
-    start_s: float
-    end_s: float
+    kind: KindName
+    source: SourceName
+    text: Text
+    start_s: StartS
+    end_s: EndS
 
 
 class RecordedDisturbances(msgspec.Struct, kw_only=True, frozen=True):
@@ -45,10 +49,14 @@ class RecordedDisturbances(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     disturbances: tuple[RecordedDisturbance, ...]
-    void: tuple[str, ...]
+    void: VoidReasons
 
 
 class DisturbanceList(msgspec.Struct, kw_only=True, frozen=True):
-    """What made measurements void in the last hour, the oldest first."""
+    """What made measurements void in the last hour, the oldest first.
+
+    Attributes:
+        disturbances: What makes measurements void.
+    """
 
     disturbances: tuple[Disturbance, ...]

@@ -6,6 +6,17 @@ import msgspec
 from msgspec import Meta
 
 from scm.records.body import Body, By
+from scm.records.fields import (
+    Id,
+    Name,
+    Note,
+    RequestedBy,
+    SeverityName,
+    SourceName,
+    Text,
+    TNs,
+    VehicleName,
+)
 
 
 class Acknowledgement(msgspec.Struct, kw_only=True, frozen=True):
@@ -18,9 +29,9 @@ class Acknowledgement(msgspec.Struct, kw_only=True, frozen=True):
         at_ns: When [ns since 1970].
     """
 
-    event: str
-    by: str
-    note: str
+    event: Annotated[str, Meta(examples=["9f3a51c07be2d418"])]
+    by: RequestedBy
+    note: Note
     at_ns: int
 
 
@@ -34,13 +45,13 @@ class LoggedEvent(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     seq: int
-    id: str
-    severity: str
-    source: str
-    t_ns: int
-    name: str
-    text: str
-    vehicle: str | None = None
+    id: Id
+    severity: SeverityName
+    source: SourceName
+    t_ns: TNs
+    name: Name
+    text: Text
+    vehicle: VehicleName | None = None
 
 
 class EventRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -56,16 +67,16 @@ class EventRow(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     seq: int
-    id: str
-    severity: str
-    source: str
-    t_ns: int
-    name: str
-    text: str
-    vehicle: str | None
-    acknowledged_by: str | None
+    id: Id
+    severity: SeverityName
+    source: SourceName
+    t_ns: TNs
+    name: Name
+    text: Text
+    vehicle: VehicleName | None
+    acknowledged_by: Annotated[str, Meta(examples=["ada"])] | None
     acknowledged_ns: int | None
-    note: str
+    note: Note
 
 
 class Acknowledged(msgspec.Struct, kw_only=True, frozen=True):

@@ -3,8 +3,26 @@
 from typing import Annotated, Literal
 
 import msgspec
+from msgspec import Meta
 
 from scm.records.city_map import Camera
+from scm.records.fields import (
+    XM,
+    YM,
+    AgeS,
+    CameraName,
+    HeightPx,
+    LatencyMs,
+    ReasonText,
+    RequestedBy,
+    SpeedMps,
+    TagId,
+    TNs,
+    VehicleName,
+    WidthPx,
+    WindowS,
+    YawRad,
+)
 
 Pixel = tuple[float, float]
 
@@ -18,8 +36,14 @@ class TagSeen(msgspec.Struct, kw_only=True, frozen=True):
         hamming: Bits of 36 that were read wrong and corrected; None: not reported.
     """
 
-    tag_id: int
-    centre_px: Pixel
+    tag_id: TagId
+    centre_px: Annotated[
+        Pixel,
+        Meta(
+            description="Middle of the tag in the raw picture: column, row [px].",
+            examples=[[320.4, 240.1]],
+        ),
+    ]
     corners_px: tuple[Pixel, Pixel, Pixel, Pixel]
     margin: float
     hamming: int | None = None
@@ -33,8 +57,8 @@ class Calibrated(msgspec.Struct, kw_only=True, frozen=True):
         place: Of the place and its lens; empty: as the camera was started, by the map file.
     """
 
-    lens: str = ""
-    place: str = ""
+    lens: Annotated[str, Meta(examples=["overhead-lens"])] = ""
+    place: Annotated[str, Meta(examples=["overhead-place"])] = ""
 
 
 class InForce(msgspec.Struct, kw_only=True, frozen=True):
@@ -49,8 +73,8 @@ class InForce(msgspec.Struct, kw_only=True, frozen=True):
 
     now: Calibrated
     since_ns: int | None = None
-    by: str = ""
-    reason: str = ""
+    by: RequestedBy = ""
+    reason: ReasonText = ""
     before: Calibrated | None = None
 
 
@@ -58,7 +82,9 @@ class Residual(msgspec.Struct, kw_only=True, frozen=True):
     """Measured minus true: distance on the floor, and yaw (+ = measured further left).
 
     Attributes:
+        position_mm: Distance from the truth, on the floor [mm].
         x_mm, y_mm: Along map x and y [mm].
+        yaw_deg: Measured further left than the truth [degree].
     """
 
     position_mm: float
@@ -77,10 +103,10 @@ class ResidualSample(msgspec.Struct, kw_only=True, frozen=True):
         yaw_deg: Likewise, + = measured further left [degree].
     """
 
-    vehicle: str
-    t_ns: int
-    x_m: float
-    y_m: float
+    vehicle: VehicleName
+    t_ns: TNs
+    x_m: XM
+    y_m: YM
     x_mm: float
     y_mm: float
     yaw_deg: float
@@ -110,14 +136,18 @@ class ResidualStats(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SeenRow(msgspec.Struct, kw_only=True, frozen=True):
-    """One car as a camera sees it."""
+    """One car as a camera sees it.
 
-    vehicle: str
-    tag_id: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    age_s: float
+    Attributes:
+        residual: What it differs from the truth by; null: no truth of that time.
+    """
+
+    vehicle: VehicleName
+    tag_id: TagId
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
+    age_s: AgeS
     residual: Residual | None
 
 
@@ -135,16 +165,16 @@ class TagRow(msgspec.Struct, kw_only=True, frozen=True):
             known.
     """
 
-    tag_id: int
+    tag_id: TagId
     what: Literal["car", "map", "other"]
-    vehicle: str
+    vehicle: VehicleName
     margin: float
     hamming: int | None
     size_px: float
     seen_s: float
-    x_m: float | None
-    y_m: float | None
-    yaw_rad: float | None
+    x_m: XM | None
+    y_m: YM | None
+    yaw_rad: YawRad | None
 
 
 class PoseRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -155,20 +185,21 @@ class PoseRow(msgspec.Struct, kw_only=True, frozen=True):
         std_x_m, std_y_m, std_yaw_rad: Standard deviations, as the Eye reports them.
         map_tag_age_ms: Since the camera last saw the map's tag.
         flags: What is wrong with the camera, by its own account: do not trust it.
+        residual: What it differs from the truth by; null: no truth of that time.
     """
 
-    camera: str
-    vehicle: str
-    tag_id: int
-    t_ns: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
+    camera: CameraName
+    vehicle: VehicleName
+    tag_id: TagId
+    t_ns: TNs
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
     std_x_m: float
     std_y_m: float
     std_yaw_rad: float
     map_tag_age_ms: float
-    age_s: float
+    age_s: AgeS
     flags: Annotated[tuple[str, ...], msgspec.Meta(examples=[["bumped"]])]
     residual: Residual | None
 
@@ -182,23 +213,24 @@ class CameraRow(msgspec.Struct, kw_only=True, frozen=True):
         tags: Those of that frame, or of the newest detection when that frame was skipped.
         tags_t_ns: Exposure of the frame that they were found in, as text; None: none yet.
         known: Tags of the last minute, whose they are, and where.
+        seen: What is seen.
         good: Whether its poses can be trusted, by its own report; None: not reported.
         complaints: What is wrong, in sentences.
         in_force: By which calibration it sees; null: not reported.
     """
 
-    camera: str
-    frame_t_ns: str | None
-    width_px: int | None
-    height_px: int | None
-    age_s: float | None
-    latency_ms: float | None
+    camera: CameraName
+    frame_t_ns: Annotated[str, Meta(examples=["120000000000"])] | None
+    width_px: WidthPx | None
+    height_px: HeightPx | None
+    age_s: AgeS | None
+    latency_ms: LatencyMs | None
     tags: tuple[TagSeen, ...]
     tags_t_ns: Annotated[str | None, msgspec.Meta(examples=["120000000000"])]
     known: tuple[TagRow, ...]
     seen: tuple[SeenRow, ...]
     good: bool | None
-    complaints: tuple[str, ...]
+    complaints: Annotated[tuple[str, ...], Meta(examples=[["the map tag was not seen for 3 s"]])]
     in_force: InForce | None
 
 
@@ -217,27 +249,31 @@ class TrackRow(msgspec.Struct, kw_only=True, frozen=True):
         cameras: Those that saw it last.
     """
 
-    vehicle: str
-    tag_id: int
-    t_ns: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    speed_mps: float
+    vehicle: VehicleName
+    tag_id: TagId
+    t_ns: TNs
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
+    speed_mps: SpeedMps
     lateral_speed_mps: float
     yaw_rate_radps: float
     std_x_m: float
     std_y_m: float
     std_yaw_rad: float
     std_speed_mps: float
-    age_s: float
+    age_s: AgeS
     stale: bool
     flags: Annotated[tuple[str, ...], msgspec.Meta(examples=[["roof_tag_size"]])]
     cameras: Annotated[tuple[str, ...], msgspec.Meta(examples=[["overhead"]])]
 
 
 class Overhead(msgspec.Struct, kw_only=True, frozen=True):
-    """The Eye's cameras, with what each sees."""
+    """The Eye's cameras, with what each sees.
+
+    Attributes:
+        cameras: Cameras.
+    """
 
     cameras: tuple[CameraRow, ...]
 
@@ -263,7 +299,7 @@ class TrackList(msgspec.Struct, kw_only=True, frozen=True):
 class VehicleResiduals(msgspec.Struct, kw_only=True, frozen=True):
     """What one car's poses were off by."""
 
-    vehicle: str
+    vehicle: VehicleName
     stats: ResidualStats
 
 
@@ -276,8 +312,8 @@ class Residuals(msgspec.Struct, kw_only=True, frozen=True):
         samples: Poses with their residuals, two a second of each car, evenly thinned.
     """
 
-    camera: str
-    window_s: float
+    camera: CameraName
+    window_s: WindowS
     stats: ResidualStats
     vehicles: tuple[VehicleResiduals, ...]
     samples: tuple[ResidualSample, ...]

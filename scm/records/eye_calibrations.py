@@ -6,6 +6,7 @@ import msgspec
 from msgspec import Meta
 
 from scm.records.body import Body, By
+from scm.records.fields import CameraName, HeightPx, Name, WidthPx
 
 NAME = r"^[a-z0-9_-]{1,48}$"
 LARGEST_TOML = 64 * 1024
@@ -31,12 +32,12 @@ class CalibrationRow(msgspec.Struct, kw_only=True, frozen=True):
         reported: Whether there is a report of how it was found.
     """
 
-    name: str
+    name: Name
     kind: Literal["lens", "place"]
-    camera: str
+    camera: CameraName
     made_ns: int
-    width_px: int
-    height_px: int
+    width_px: WidthPx
+    height_px: HeightPx
     rms_px: float | None
     views: int | None
     reported: bool
@@ -64,7 +65,7 @@ class View(msgspec.Struct, kw_only=True, frozen=True):
             nobody looked.
     """
 
-    name: str
+    name: Name
     made_ns: int
     found: Annotated[Any, msgspec.Meta(examples=[{"points": 40, "sharpness": 3.1}])]
 

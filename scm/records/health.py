@@ -2,6 +2,8 @@
 
 import msgspec
 
+from scm.records.fields import Detail, Name, StatusText
+
 
 class Alive(msgspec.Struct, kw_only=True, frozen=True):
     """The server answers.
@@ -10,7 +12,7 @@ class Alive(msgspec.Struct, kw_only=True, frozen=True):
         status: `ok`.
     """
 
-    status: str
+    status: StatusText
 
 
 class Check(msgspec.Struct, kw_only=True, frozen=True):
@@ -24,9 +26,9 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
         detail: What was found, in words.
     """
 
-    name: str
+    name: Name
     good: bool
-    detail: str
+    detail: Detail
 
 
 class Ready(msgspec.Struct, kw_only=True, frozen=True):
@@ -38,6 +40,6 @@ class Ready(msgspec.Struct, kw_only=True, frozen=True):
         checks: What was looked at.
     """
 
-    status: str
+    status: StatusText
     snapshot_age_s: float | None
     checks: tuple[Check, ...]

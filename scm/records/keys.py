@@ -4,6 +4,8 @@ from typing import Literal
 
 import msgspec
 
+from scm.records.fields import Id, OwnerName
+
 Role = Literal["viewer", "operator", "engineer", "admin"]
 
 
@@ -13,11 +15,12 @@ class KeyRow(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         id: Public part of the key.
         owner: Whose it is.
+        role: What it is in the city, or what its holder may do.
         made_s: When it was made, seconds since 1970.
     """
 
-    id: str
-    owner: str
+    id: Id
+    owner: OwnerName
     role: Role
     made_s: int
 

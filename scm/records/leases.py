@@ -6,6 +6,7 @@ import msgspec
 from msgspec import Meta
 
 from scm.records.body import Body
+from scm.records.fields import OwnerName, VehicleName
 
 
 class LeaseRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -17,8 +18,8 @@ class LeaseRow(msgspec.Struct, kw_only=True, frozen=True):
         left_ms: Until it ends if it is not renewed; None: it is at home, and never ends.
     """
 
-    vehicle: str
-    owner: str
+    vehicle: VehicleName
+    owner: OwnerName
     epoch: int
     left_ms: float | None
 

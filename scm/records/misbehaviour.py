@@ -1,6 +1,11 @@
 """Scores of stations whose messages are checked."""
 
+from typing import Annotated
+
 import msgspec
+from msgspec import Meta
+
+from scm.records.fields import StationName, TNs
 
 
 class StationScore(msgspec.Struct, kw_only=True, frozen=True):
@@ -16,10 +21,10 @@ class StationScore(msgspec.Struct, kw_only=True, frozen=True):
             its place: nobody confirms where it is. No accusation.
     """
 
-    station: str
+    station: StationName
     station_id: int
     score: float
-    worst: str
+    worst: Annotated[str, Meta(examples=["speed_jump"])]
     suspected: bool
     tag_unseen: bool = False
 
@@ -38,6 +43,6 @@ class Misbehaviour(msgspec.Struct, kw_only=True, frozen=True):
 
     watched: bool
     witness: bool
-    t_ns: int | None
+    t_ns: TNs | None
     stations: tuple[StationScore, ...]
-    reported: tuple[str, ...]
+    reported: Annotated[tuple[str, ...], Meta(examples=[["n5"]])]

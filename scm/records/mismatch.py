@@ -6,6 +6,16 @@ import msgspec
 from msgspec import Meta
 
 from scm.records.body import Body
+from scm.records.fields import (
+    CarName,
+    CarNames,
+    Name,
+    OwnerName,
+    RecordingNames,
+    SourceName,
+    VehicleName,
+    VerdictText,
+)
 
 BUDGET_S = 1800.0  # as `scm mismatch` has it
 
@@ -26,16 +36,16 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
         owner: Who requested it.
     """
 
-    recordings: tuple[str, ...]
-    source: str
+    recordings: RecordingNames
+    source: SourceName
     told: Annotated[tuple[str, ...], msgspec.Meta(examples=[["told_1"]])] = ()
-    vehicle: str = ""
-    car: str = ""
+    vehicle: VehicleName = ""
+    car: CarName = ""
     budget_s: float = BUDGET_S
     from_s: float | None = None
     to_s: float | None = None
     asked_ns: int = 0
-    owner: str = ""
+    owner: OwnerName = ""
 
 
 class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -55,13 +65,13 @@ class ReportRow(msgspec.Struct, kw_only=True, frozen=True):
         cut_short: Whether time ran out before everything was tried.
     """
 
-    name: str
+    name: Name
     made_ns: int
-    verdict: str
-    said: str
-    effects: tuple[str, ...] = ()
-    vehicle: str = ""
-    source: str = ""
+    verdict: Annotated[str, Meta(examples=["mismatch"])]
+    said: VerdictText
+    effects: Annotated[tuple[str, ...], Meta(examples=[["tyre grip"]])] = ()
+    vehicle: VehicleName = ""
+    source: SourceName = ""
     before_m: float | None = None
     after_m: float | None = None
     runtime_s: float = 0.0
@@ -77,9 +87,9 @@ class Together(msgspec.Struct, kw_only=True, frozen=True):
         cars: Names of their reports, this one's among them.
     """
 
-    said: str
-    conclusions: tuple[str, ...]
-    cars: tuple[str, ...]
+    said: VerdictText
+    conclusions: Annotated[tuple[str, ...], Meta(examples=[["Both see it alike."]])]
+    cars: CarNames
 
 
 class Offers(msgspec.Struct, kw_only=True, frozen=True):
@@ -91,8 +101,8 @@ class Offers(msgspec.Struct, kw_only=True, frozen=True):
         most_upload_bytes: The largest zip that is taken.
     """
 
-    recordings: tuple[str, ...]
-    cars: tuple[str, ...]
+    recordings: RecordingNames
+    cars: CarNames
     most_upload_bytes: int
 
 
@@ -111,12 +121,17 @@ class Report(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     row: ReportRow
-    report: dict[str, Any] | None
-    drawn: dict[str, Any] | None
+    report: Annotated[dict[str, Any], Meta(examples=[{"verdict": "mismatch"}])] | None
+    drawn: (
+        Annotated[
+            dict[str, Any], Meta(examples=[{"said": "The car grips less than its file says."}])
+        ]
+        | None
+    )
     job: Job | None
-    drives: tuple[str, ...]
+    drives: Annotated[tuple[str, ...], Meta(examples=[["next_drive"]])]
     told: int
-    files: tuple[str, ...]
+    files: Annotated[tuple[str, ...], Meta(examples=[["report.json"]])]
     together: Together | None
 
 
@@ -150,10 +165,10 @@ class Upload(msgspec.Struct, kw_only=True, frozen=True):
         vehicles: Car files or cars that its description names; empty of a city's run.
     """
 
-    upload: str
+    upload: Annotated[str, Meta(examples=["drive-1f2e3d4c"])]
     files: int
     size_bytes: int
-    vehicles: tuple[str, ...]
+    vehicles: Annotated[tuple[str, ...], Meta(examples=[["n1"]])]
 
 
 class JobBody(Body, kw_only=True, frozen=True):

@@ -8,6 +8,24 @@ from msgspec import Meta
 from scm.records.body import Body
 from scm.records.boxes import SnapshotBox
 from scm.records.city_map import Box, Light
+from scm.records.fields import (
+    TS,
+    CameraName,
+    CarName,
+    CarNames,
+    ColourName,
+    GroupName,
+    KindName,
+    Name,
+    NotesText,
+    Number,
+    OwnerName,
+    SeverityName,
+    SourceName,
+    Text,
+    Title,
+    VehicleName,
+)
 
 State = Literal["being written", "complete", "cut off", "unreadable"]
 
@@ -20,8 +38,8 @@ _CARS_AT = msgspec.Meta(
 class Notes(msgspec.Struct, kw_only=True, frozen=True):
     """What people wrote about a recording; the file keeps its name."""
 
-    title: str = ""
-    notes: str = ""
+    title: Title = ""
+    notes: NotesText = ""
 
 
 class RecordingRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -30,19 +48,22 @@ class RecordingRow(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         state: `being written`; `complete`; `cut off`: its writer was killed, and it is read as far
             as it goes; `unreadable`: `trouble` gives the reason.
+        trouble: Why it cannot be read; empty: it can.
         begin_ns: When the first message arrived, since 1970; None: it holds none.
+        length_s: How long it is [s].
+        size_bytes: How large it is [byte].
         cars: Those that reported their state, in natural order.
     """
 
-    name: str
-    title: str
-    notes: str
+    name: Name
+    title: Title
+    notes: NotesText
     state: State
-    trouble: str
+    trouble: Annotated[str, Meta(examples=["it is no MCAP file"])]
     begin_ns: int | None
     length_s: float
     size_bytes: int
-    cars: tuple[str, ...]
+    cars: CarNames
 
 
 class CarAt(msgspec.Struct, kw_only=True, frozen=True, array_like=True):
@@ -70,10 +91,10 @@ class CarAt(msgspec.Struct, kw_only=True, frozen=True, array_like=True):
 class CarFacts(msgspec.Struct, kw_only=True, frozen=True):
     """What of a car is the same in all frames."""
 
-    vehicle: str
-    kind: str
-    car: str
-    owner: str
+    vehicle: VehicleName
+    kind: KindName
+    car: CarName
+    owner: OwnerName
 
 
 class Frame(msgspec.Struct, kw_only=True, frozen=True):
@@ -86,7 +107,7 @@ class Frame(msgspec.Struct, kw_only=True, frozen=True):
         boxes: None: as in the frame before.
     """
 
-    t_s: float
+    t_s: TS
     cars: Annotated[tuple[CarAt, ...], _CARS_AT]
     boxes: tuple[SnapshotBox, ...] | None
 
@@ -94,32 +115,35 @@ class Frame(msgspec.Struct, kw_only=True, frozen=True):
 class SignalChange(msgspec.Struct, kw_only=True, frozen=True):
     """From when on a signal group shows a colour."""
 
-    t_s: float
-    group: str
-    colour: str
+    t_s: TS
+    group: GroupName
+    colour: ColourName
 
 
 class PictureAt(msgspec.Struct, kw_only=True, frozen=True):
     """From when on a picture of a camera is the newest one; `vehicle` empty: an overhead one."""
 
-    t_s: float
-    vehicle: str
-    camera: str
+    t_s: TS
+    vehicle: VehicleName
+    camera: CameraName
 
 
 class CarCamera(msgspec.Struct, kw_only=True, frozen=True):
     """A car's own camera: `front` or `rear`."""
 
-    vehicle: str
-    camera: str
+    vehicle: VehicleName
+    camera: CameraName
 
 
 class Frames(msgspec.Struct, kw_only=True, frozen=True):
     """A stretch of a recording.
 
     Attributes:
+        from_s: Where it begins [s].
         to_s: How far it goes: less than requested where that would be too much for one answer.
+        hz: How often a second.
         cars: Whom the frames' numbers mean.
+        frames: Moments, in order of time.
         signals: Changes, the colours at `from_s` first; a group is `junction/group`.
         pictures: The Eye's and the cars' own, of each camera the one that is newest at `from_s`
             first.
@@ -135,20 +159,20 @@ class Frames(msgspec.Struct, kw_only=True, frozen=True):
     frames: tuple[Frame, ...]
     signals: tuple[SignalChange, ...]
     pictures: tuple[PictureAt, ...]
-    damaged: tuple[str, ...]
+    damaged: Annotated[tuple[str, ...], Meta(examples=[["from 12 s to 13 s: cut off"]])]
     next_s: float | None
 
 
 class RecordedEvent(msgspec.Struct, kw_only=True, frozen=True):
     """An event of a recording; `number` counts from its begin."""
 
-    number: int
-    t_s: float
-    severity: str
-    source: str
-    name: str
-    text: str
-    vehicle: str | None
+    number: Number
+    t_s: TS
+    severity: SeverityName
+    source: SourceName
+    name: Name
+    text: Text
+    vehicle: VehicleName | None
 
 
 class Summary(msgspec.Struct, kw_only=True, frozen=True):
@@ -157,6 +181,8 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         cars: All cars in it.
         map_title: Of the map that was driven on; empty: not known.
+        lights: Lamps that burn.
+        boxes: Boxes that cars can push.
         first_frame_s: When the world first reported where cars are: it may have begun later.
         eye_cameras: The overhead cameras of which it has pictures.
         car_cameras: The cars' own, likewise.
@@ -164,11 +190,11 @@ class Summary(msgspec.Struct, kw_only=True, frozen=True):
 
     recording: RecordingRow
     cars: tuple[CarFacts, ...]
-    map_title: str
+    map_title: Annotated[str, Meta(examples=["Driving School"])]
     lights: tuple[Light, ...]
     boxes: tuple[Box, ...]
     first_frame_s: float
-    eye_cameras: tuple[str, ...]
+    eye_cameras: Annotated[tuple[str, ...], Meta(examples=[["overhead"]])]
     car_cameras: tuple[CarCamera, ...]
 
 

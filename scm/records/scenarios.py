@@ -6,25 +6,37 @@ import msgspec
 from msgspec import Meta
 
 from scm.records.body import Body
+from scm.records.fields import Name, Purpose, Text
 
 MOST_BYTES = 200_000
 
 
 class Scenario(msgspec.Struct, kw_only=True, frozen=True):
-    """One script; `shipped`: it came with the program, and cannot be changed here."""
+    """One script; `shipped`: it came with the program, and cannot be changed here.
 
-    name: str
-    about: str
+    Attributes:
+        shipped: Whether it came with the program: it cannot be changed.
+    """
+
+    name: Name
+    about: Purpose
     shipped: bool
-    text: str = ""
+    text: Text = ""
 
 
 class Lines(msgspec.Struct, kw_only=True, frozen=True):
-    """What a run printed; `first` is the number of the first line that is still known."""
+    """What a run printed; `first` is the number of the first line that is still known.
 
-    run: str
+    Attributes:
+        first: Number of the first of these.
+    """
+
+    run: Annotated[str, Meta(description="Id of a scenario's run.", examples=["scenario-3"])]
     first: int
-    lines: tuple[str, ...]
+    lines: Annotated[
+        tuple[str, ...],
+        Meta(description="What was printed, line by line.", examples=[["n1 needed 12.4 s"]]),
+    ]
 
 
 class ScenarioBody(Body, kw_only=True, frozen=True):

@@ -2,6 +2,7 @@
 
 import msgspec
 
+from scm.records.fields import OwnerName
 from scm.records.keys import Role
 
 
@@ -10,9 +11,10 @@ class Session(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         owner: Whose key it is; without keys: `this machine`.
+        role: What it is in the city, or what its holder may do.
     """
 
-    owner: str
+    owner: OwnerName
     role: Role
 
 

@@ -2,28 +2,45 @@
 
 import msgspec
 
+from scm.records.fields import (
+    ColourName,
+    Detail,
+    EndNs,
+    FaultName,
+    GroupName,
+    JunctionName,
+    ModeName,
+    PlanName,
+    StartNs,
+    TNs,
+)
+
 
 class Bar(msgspec.Struct, kw_only=True, frozen=True):
     """One colour of one group; `end_ns` None: it is shown still."""
 
-    colour: str
-    start_ns: int
-    end_ns: int | None
+    colour: ColourName
+    start_ns: StartNs
+    end_ns: EndNs | None
 
 
 class GroupBars(msgspec.Struct, kw_only=True, frozen=True):
-    """What one group showed, oldest first."""
+    """What one group showed, oldest first.
 
-    group: str
+    Attributes:
+        bars: What was shown, oldest first.
+    """
+
+    group: GroupName
     bars: tuple[Bar, ...]
 
 
 class Running(msgspec.Struct, kw_only=True, frozen=True):
     """What ran from a time on."""
 
-    t_ns: int
-    mode: str
-    plan: str
+    t_ns: TNs
+    mode: ModeName
+    plan: PlanName
 
 
 class History(msgspec.Struct, kw_only=True, frozen=True):
@@ -32,10 +49,12 @@ class History(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         t_ns: Of the last message received; None: none yet.
         kept_s: How far back anything is stored.
+        groups: Signal groups.
+        ran: What ran, oldest first.
     """
 
-    junction: str
-    t_ns: int | None
+    junction: JunctionName
+    t_ns: TNs | None
     kept_s: int
     groups: tuple[GroupBars, ...]
     ran: tuple[Running, ...]
@@ -54,7 +73,7 @@ class LeadScore(msgspec.Struct, kw_only=True, frozen=True):
         told: Mean of the published confidence.
     """
 
-    colour: str
+    colour: ColourName
     lead_s: int
     errors_s: tuple[float, ...]
     unknown: int
@@ -68,14 +87,16 @@ class ForecastScore(msgspec.Struct, kw_only=True, frozen=True):
     """How the forecasts of SPaT of the last minutes came true.
 
     Attributes:
+        kept_s: How far back anything is stored [s].
         judged: Colours that ended.
         early: Of them, before the earliest published end.
         late: After the latest published end.
         open: Whose latest end was never published.
         cut: Ended by flash; not judged.
+        leads: By how long before.
     """
 
-    junction: str
+    junction: JunctionName
     kept_s: int
     judged: int
     early: int
@@ -88,6 +109,6 @@ class ForecastScore(msgspec.Struct, kw_only=True, frozen=True):
 class Verdict(msgspec.Struct, kw_only=True, frozen=True):
     """A verdict of the monitor, from a time on its clock."""
 
-    t_ns: int
-    fault: str | None
-    detail: str
+    t_ns: TNs
+    fault: FaultName | None
+    detail: Detail

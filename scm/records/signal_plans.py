@@ -6,6 +6,20 @@ import msgspec
 from msgspec import Meta
 
 from scm.records.body import Body, By, Reason
+from scm.records.fields import (
+    CycleS,
+    Digest,
+    EndS,
+    GroupName,
+    GroupNames,
+    JunctionName,
+    PlanName,
+    PolicyName,
+    Purpose,
+    ReasonText,
+    RequestedBy,
+    StartS,
+)
 
 
 class SignalStage(msgspec.Struct, kw_only=True, frozen=True):
@@ -19,7 +33,7 @@ class SignalStage(msgspec.Struct, kw_only=True, frozen=True):
         extra_red_s: On top of red clear.
     """
 
-    groups: tuple[str, ...]
+    groups: GroupNames
     green_s: float
     extra_red_s: float = 0.0
 
@@ -28,13 +42,14 @@ class SignalPhase(msgspec.Struct, kw_only=True, frozen=True):
     """A phase: one signal group, and the times that the kernel and the rings keep.
 
     Attributes:
+        min_green_s: Green lasts at least so long [s].
         yellow_s: Yellow change.
         red_clear_s: Red clear, all red before anybody in conflict may start.
         passage_s: A green gaps out this long after the last vehicle.
         max1_s, max2_s: A green ends after it once others are called; max 2 holds in queues.
     """
 
-    group: str
+    group: GroupName
     min_green_s: float
     yellow_s: float
     red_clear_s: float
@@ -46,9 +61,9 @@ class SignalPhase(msgspec.Struct, kw_only=True, frozen=True):
 class StageInterval(msgspec.Struct, kw_only=True, frozen=True):
     """A stage of a cycle: green from `start_s` to `end_s` after the cycle's begin."""
 
-    groups: tuple[str, ...]
-    start_s: float
-    end_s: float
+    groups: GroupNames
+    start_s: StartS
+    end_s: EndS
 
 
 class SignalPlan(msgspec.Struct, kw_only=True, frozen=True):
@@ -62,9 +77,9 @@ class SignalPlan(msgspec.Struct, kw_only=True, frozen=True):
         offset_s: When its cycle begins in the common one; None: it keeps none.
     """
 
-    plan: str
-    about: str
-    cycle_s: float
+    plan: PlanName
+    about: Purpose
+    cycle_s: CycleS
     stages: tuple[SignalStage, ...]
     slots: tuple[StageInterval, ...]
     in_step: bool = False
@@ -72,10 +87,14 @@ class SignalPlan(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SignalPolicy(msgspec.Struct, kw_only=True, frozen=True):
-    """A policy that may be requested; `has_detectors`: it uses detectors."""
+    """A policy that may be requested; `has_detectors`: it uses detectors.
 
-    policy: str
-    about: str
+    Attributes:
+        has_detectors: Whether it listens for cars.
+    """
+
+    policy: PolicyName
+    about: Purpose
     has_detectors: bool
 
 
@@ -90,12 +109,12 @@ class PlanProof(msgspec.Struct, kw_only=True, frozen=True):
         took_s: How long the search took.
     """
 
-    digest: str
+    digest: Digest
     states: int
     transitions: int
     plan_states: int
     plan_transitions: int
-    cycle_s: float
+    cycle_s: CycleS
     took_s: float
 
 
@@ -105,21 +124,23 @@ class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         source: `shipped` with the city or its map, or `saved` by somebody.
         usable: Whether it is proven for the junction as it is now.
+        stages: Its stages, in the order of the cycle.
         offset_s: When its cycle begins, after a time that is a whole number of cycles on the
             controller's clock; null: in step with nobody.
         saved_ns: When it was saved; 0: it was not.
+        proof: What the search found of it; null: nobody searched.
     """
 
-    junction: str
-    plan: str
-    about: str
+    junction: JunctionName
+    plan: PlanName
+    about: Purpose
     source: Literal["shipped", "saved"]
     usable: bool
-    cycle_s: float
+    cycle_s: CycleS
     stages: tuple[SignalStage, ...]
     offset_s: float | None = None
-    by: str = ""
-    reason: str = ""
+    by: RequestedBy = ""
+    reason: ReasonText = ""
     saved_ns: int = 0
     proof: PlanProof | None = None
 

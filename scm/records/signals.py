@@ -6,6 +6,24 @@ import msgspec
 from msgspec import Meta
 
 from scm.records.body import Body, By, Reason
+from scm.records.fields import (
+    AgeS,
+    ColourName,
+    Detail,
+    EndNs,
+    FaultName,
+    GroupName,
+    GroupNames,
+    JunctionName,
+    ModeName,
+    PendingName,
+    PlanName,
+    PolicyName,
+    ReasonText,
+    RequestedBy,
+    StartNs,
+    TNs,
+)
 from scm.records.signal_plans import SignalStage
 
 LONGEST_S = 900.0  # that an override may last
@@ -24,16 +42,17 @@ class SignalOverride(msgspec.Struct, kw_only=True, frozen=True):
     """An override in force.
 
     Attributes:
+        verb: What is requested.
         ends_ns: When it lapses at the latest.
         policy: With the verb `policy`: which one.
     """
 
     verb: Verb
-    groups: tuple[str, ...]
-    by: str
-    reason: str
+    groups: GroupNames
+    by: RequestedBy
+    reason: ReasonText
     ends_ns: int
-    policy: str = ""
+    policy: PolicyName = ""
 
 
 class SignalTurn(msgspec.Struct, kw_only=True, frozen=True):
@@ -42,15 +61,20 @@ class SignalTurn(msgspec.Struct, kw_only=True, frozen=True):
     Groups of the next turn as well stay green between them.
     """
 
-    groups: tuple[str, ...]
-    start_ns: int
-    end_ns: int | None
+    groups: GroupNames
+    start_ns: StartNs
+    end_ns: EndNs | None
 
 
 class SignalDetector(msgspec.Struct, kw_only=True, frozen=True):
-    """What the detectors of a group's lanes see; `queue` counts cars."""
+    """What the detectors of a group's lanes see; `queue` counts cars.
 
-    group: str
+    Attributes:
+        call: Whether a car requests green.
+        queue: Cars that wait.
+    """
+
+    group: GroupName
     call: bool
     queue: int
 
@@ -59,6 +83,8 @@ class SignalGroup(msgspec.Struct, kw_only=True, frozen=True):
     """One group of heads that always show the same.
 
     Attributes:
+        colour: Colour.
+        since_ns: Since when [ns].
         min_end_ns: The colour will not change before; never moves earlier.
         max_end_ns: It will have changed by then, never moves later; None: not known.
         next_colour: What comes then; None: not known.
@@ -67,7 +93,7 @@ class SignalGroup(msgspec.Struct, kw_only=True, frozen=True):
         likely_confidence: The share of such forecasts that come true within a second, 0 to 1.
     """
 
-    group: str
+    group: GroupName
     colour: Colour
     since_ns: int
     min_end_ns: int
@@ -89,9 +115,12 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
         since_ns: When this colour began, on the controller's clock.
     """
 
-    group: str
-    colour: str | None
-    next_colour: str | None = None
+    group: GroupName
+    colour: ColourName | None
+    next_colour: (
+        Annotated[str, Meta(description="What comes then; null: not known.", examples=["yellow"])]
+        | None
+    ) = None
     min_s: float | None = None
     max_s: float | None = None
     likely_s: float | None = None
@@ -102,9 +131,9 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
 class MonitorRow(msgspec.Struct, kw_only=True, frozen=True):
     """The second channel; `fault` is None while all is well, `age_s` since its last message."""
 
-    fault: str | None
-    detail: str
-    age_s: float
+    fault: FaultName | None
+    detail: Detail
+    age_s: AgeS
 
 
 class JunctionRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -112,14 +141,22 @@ class JunctionRow(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         t_ns: The controller's clock now; None: never received.
+        fresh: Whether it was received within the last second.
+        groups: Signal groups.
+        monitor: Status of the second channel; null: not received.
     """
 
-    junction: str
-    t_ns: int | None
+    junction: JunctionName
+    t_ns: TNs | None
     fresh: bool
-    mode: str | None
-    plan: str | None
-    plans: tuple[str, ...]
+    mode: ModeName | None
+    plan: PlanName | None
+    plans: Annotated[
+        tuple[str, ...],
+        Meta(
+            description="Names of the signal plans offered.", examples=[["busy", "calm", "flash"]]
+        ),
+    ]
     groups: tuple[GroupRow, ...]
     monitor: MonitorRow | None
 
@@ -129,6 +166,7 @@ class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         pending: Plan or policy to come at the next safe moment; empty: none.
+        wishes: Overrides in force.
         detectors: Of its groups; none: nobody listens for cars now.
         turns: Greens on and to come; none: nobody knows.
         failure: Why a policy was given up for fixed time; empty: none was.
@@ -136,14 +174,14 @@ class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
             edited to since. No stages: it is one of the junction's own.
     """
 
-    junction: str
-    policy: str
-    plan: str
-    pending: str
+    junction: JunctionName
+    policy: PolicyName
+    plan: PlanName
+    pending: PendingName
     wishes: tuple[SignalOverride, ...]
     detectors: tuple[SignalDetector, ...]
     turns: tuple[SignalTurn, ...]
-    failure: str
+    failure: Annotated[str, Meta(examples=["the policy did not answer"])]
     stages: tuple[SignalStage, ...]
     offset_s: float | None
 
@@ -158,10 +196,10 @@ class FlashReply(msgspec.Struct, kw_only=True, frozen=True):
         wishes: In force now; absent from a `PlanReply`.
     """
 
-    junction: str
-    pending: str
-    policy: str | None = None
-    plan: str | None = None
+    junction: JunctionName
+    pending: PendingName
+    policy: PolicyName | None = None
+    plan: PlanName | None = None
     wishes: tuple[SignalOverride, ...] = ()
 
 

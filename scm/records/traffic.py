@@ -1,9 +1,27 @@
 """Counts of traffic, and violations."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
+from msgspec import Meta
 
+from scm.records.fields import (
+    XM,
+    YM,
+    AtM,
+    JunctionName,
+    LaneName,
+    Number,
+    Passed,
+    SourceName,
+    SpeedMps,
+    Text,
+    TNs,
+    VehicleName,
+    VoidReasons,
+    WindowS,
+    YawRad,
+)
 from scm.records.signals import SignalGroup
 
 Kind = Literal["red_light", "stop_line", "speed", "wrong_way", "collision"]
@@ -18,35 +36,39 @@ class LaneCount(msgspec.Struct, kw_only=True, frozen=True):
         speed_mps: Mean, where they passed.
     """
 
-    lane: str
-    passed: int
+    lane: LaneName
+    passed: Passed
     flow_hz: float
     headway_s: float | None = None
-    speed_mps: float | None = None
+    speed_mps: SpeedMps | None = None
 
 
 class ApproachCount(msgspec.Struct, kw_only=True, frozen=True):
     """One lane that leads to a line before a junction; means are over the window.
 
     Attributes:
+        flow_hz: Cars a second; times 3600: an hour.
+        headway_s: Mean time from one car to the next [s].
         delay_s: Mean control delay: from entering the lane to leaving the junction, beyond what
             that takes at the limits.
         level: HCM's level of service of that delay, `A` to `F`; empty: nobody passed yet.
         stops: Mean number of stops of a car.
         queue: Cars that stand before the line now; `queue_m`: from the line to the tail of the
             last; `queue_most`: 95 % of the time no more.
+        queue_m: From the line to the tail of the last car that stands [m].
+        queue_most: Cars in the queue: 95 % of the time no more.
         saturation_headway_s: Mean headway of cars that leave a queue one after another.
         saturation: Flow over what could pass in the green time; None: too few have queued.
     """
 
-    junction: str
-    lane: str
-    passed: int
+    junction: JunctionName
+    lane: LaneName
+    passed: Passed
     flow_hz: float
     headway_s: float | None = None
-    speed_mps: float | None = None
+    speed_mps: SpeedMps | None = None
     delay_s: float | None = None
-    level: str = ""
+    level: Annotated[str, Meta(examples=["B"])] = ""
     stops: float = 0.0
     queue: int = 0
     queue_m: float = 0.0
@@ -58,19 +80,23 @@ class ApproachCount(msgspec.Struct, kw_only=True, frozen=True):
 class TrackPoint(msgspec.Struct, kw_only=True, frozen=True):
     """Where the car was estimated to be: rear axle, map frame; `source` reported it."""
 
-    t_ns: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    speed_mps: float
-    source: str
+    t_ns: TNs
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
+    speed_mps: SpeedMps
+    source: SourceName
 
 
 class TrafficCounts(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """All lanes on which somebody was counted, and all approaches; over the last `window_s`."""
+    """All lanes on which somebody was counted, and all approaches; over the last `window_s`.
 
-    t_ns: int
-    window_s: float
+    Attributes:
+        lanes: Lanes.
+    """
+
+    t_ns: TNs
+    window_s: WindowS
     lanes: tuple[LaneCount, ...] = ()
     approaches: tuple[ApproachCount, ...] = ()
 
@@ -83,7 +109,7 @@ class Counts(TrafficCounts, kw_only=True, frozen=True):
             do.
     """
 
-    void: tuple[str, ...] = ()
+    void: VoidReasons = ()
 
 
 class Violation(msgspec.Struct, kw_only=True, frozen=True, gc=False):
@@ -91,6 +117,7 @@ class Violation(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
     Attributes:
         number: Counts the violations of this observer, from 1.
+        kind: Of which sort it is.
         lane: Where it happened; empty: on no lane.
         at_m: Where along that lane the rear axle was.
         text: One sentence with what was allowed and what was done.
@@ -101,20 +128,20 @@ class Violation(msgspec.Struct, kw_only=True, frozen=True, gc=False):
         track: The seconds before, oldest first.
     """
 
-    vehicle: str
-    number: int
+    vehicle: VehicleName
+    number: Number
     kind: Kind
-    t_ns: int
-    x_m: float
-    y_m: float
-    lane: str = ""
-    at_m: float = 0.0
-    text: str
+    t_ns: TNs
+    x_m: XM
+    y_m: YM
+    lane: LaneName = ""
+    at_m: AtM = 0.0
+    text: Text
     certainty: float
-    sources: tuple[str, ...]
-    junction: str = ""
+    sources: Annotated[tuple[str, ...], Meta(examples=[["eye", "spat"]])]
+    junction: JunctionName = ""
     signal: SignalGroup | None = None
-    against: tuple[str, ...] = ()
+    against: Annotated[tuple[str, ...], Meta(examples=[["n2"]])] = ()
     track: tuple[TrackPoint, ...] = ()
 
 

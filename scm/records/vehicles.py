@@ -7,6 +7,25 @@ from msgspec import Meta
 
 from scm.records.body import Body
 from scm.records.eye import Residual
+from scm.records.fields import (
+    XM,
+    YM,
+    CameraNames,
+    CarName,
+    IsAlive,
+    KindName,
+    LengthM,
+    ModeName,
+    OwnerName,
+    RouteLanes,
+    SpeedMps,
+    TagId,
+    TNs,
+    TripId,
+    VehicleName,
+    VoidReasons,
+    YawRad,
+)
 
 
 class PathRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -17,8 +36,8 @@ class PathRow(msgspec.Struct, kw_only=True, frozen=True):
         is_whole: Whether it ends where the trip does, and not at 12 m.
     """
 
-    vehicle: str
-    trip_id: str | None
+    vehicle: VehicleName
+    trip_id: TripId | None
     points_m: tuple[tuple[float, ...], ...]
     is_whole: bool
 
@@ -27,16 +46,21 @@ class TripRow(msgspec.Struct, kw_only=True, frozen=True):
     """Progress of a trip; `length_m` is None for a route without end.
 
     Attributes:
+        done_m: How far the car is on its way [m].
+        arrived: Whether the car is at its goal.
         void: Why its time so far does not count; none: it does.
     """
 
-    trip_id: str
+    trip_id: TripId
     done_m: float
-    length_m: float | None
+    length_m: LengthM | None
     arrived: bool
-    waiting_for: str | None
-    route: tuple[str, ...]
-    void: tuple[str, ...]
+    waiting_for: (
+        Annotated[str, Meta(description="What it waits for; null: nothing.", examples=["crossing"])]
+        | None
+    )
+    route: RouteLanes
+    void: VoidReasons
 
 
 class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
@@ -44,6 +68,8 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         cameras: Those that its file gives it; may be empty.
+        steering_rad: Angle of the front wheels, + = left [rad].
+        epoch: Counts the leases of this car: a command of an older one is refused.
         age_ms: How old its newest state is now, the snapshot's own age included.
         lease_left_ms: Until the lease ends if it is not renewed; None: it is at home.
         battery_v: Of the drive battery, under load as it is; None: not measured.
@@ -54,39 +80,50 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
         throttle: As the car reports it; None: it reports nothing.
         stuck: It was commanded to drive for seconds and stays: what it most likely pushes against,
             names of cars, `wall`, boxes; empty: nothing that is known. None: it is not stuck.
+        trip: The way it is on; null: none.
         eye: What the Eye's newest pose differs from the truth; None: not seen lately.
     """
 
-    vehicle: str
-    kind: str
-    car: str
-    cameras: tuple[str, ...]
-    tag_id: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    speed_mps: float
+    vehicle: VehicleName
+    kind: KindName
+    car: CarName
+    cameras: CameraNames
+    tag_id: TagId
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
+    speed_mps: SpeedMps
     steering_rad: float
-    owner: str
+    owner: OwnerName
     epoch: int
     lease_left_ms: float | None
     battery_v: float | None
     battery_charge: float | None
     command_age_ms: float | None
-    mode: str
+    mode: ModeName
     age_ms: float
-    alive: bool
-    lights: tuple[str, ...]
+    alive: IsAlive
+    lights: Annotated[
+        tuple[str, ...],
+        Meta(description="Lamps that burn.", examples=[["headlights_low", "indicator_left"]]),
+    ]
     throttle: float | None
-    stuck: tuple[str, ...] | None
+    stuck: Annotated[tuple[str, ...], Meta(examples=[["wall"]])] | None
     trip: TripRow | None
     eye: Residual | None
 
 
 class VehiclesTopic(msgspec.Struct, kw_only=True, frozen=True):
-    """All vehicles and the world's time; `t_ns` and `tick` are None until it is received."""
+    """All vehicles and the world's time; `t_ns` and `tick` are None until it is received.
 
-    t_ns: int | None
+    Attributes:
+        tick: Counts the steps of the world.
+        real_time_factor: Simulated over elapsed time, over the last second.
+        late_ticks: Ticks of the world that ended after the next was due, since its start.
+        vehicles: Cars.
+    """
+
+    t_ns: TNs | None
     tick: int | None
     real_time_factor: float
     late_ticks: int
@@ -102,8 +139,8 @@ class LinkRow(msgspec.Struct, kw_only=True, frozen=True):
         clock_ahead_ms: Its clock less ours, as if both ways took equally long.
     """
 
-    vehicle: str
-    answered_by: str
+    vehicle: VehicleName
+    answered_by: Annotated[str, Meta(examples=["world"])]
     round_trip_ms: float
     clock_ahead_ms: float
 

@@ -11,7 +11,8 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.maps.floor_shapes import outline_of, pieces_of
 from scm.maps.grey import full_scale, unpack
-from scm.records.city_map import CityMap, Floor, Point
+from scm.records.city_map import CityMap, Point
+from scm.records.floor import Floor
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground_kernel import ANYTHING, CLIMBS, Sheet, feel

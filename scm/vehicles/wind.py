@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from scm.clock import NS_PER_S
-from scm.records.city_map import Wind
+from scm.records.floor import Wind
 
 WAVES = 64
 

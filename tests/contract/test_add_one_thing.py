@@ -197,29 +197,35 @@ THINGS = {
 
                 from fastapi import APIRouter, Response
 
-                from scm.api.city import City, json_response
+                from scm.api.city import json_response
                 from scm.api.roles import VIEWER
                 from scm.api.schemas import answer
-                from scm.records.boxes import Boxes
+                from scm.records.greetings import Greetings
 
 
-                def router(city: City) -> APIRouter:
+                def router() -> APIRouter:
                     """Return the routes."""
-                    del city
-                    routes = APIRouter(prefix="/greetings", tags=["greetings"])
+                    routes = APIRouter(tags=["greetings"], dependencies=[VIEWER])
 
-                    @routes.get("", summary="Greet", responses=answer(Boxes), dependencies=[VIEWER])
+                    @routes.get("/greetings", summary="Greet", responses=answer(Greetings))
                     async def greetings() -> Response:
-                        return json_response(Boxes(boxes=()))
+                        return json_response(Greetings(text="Hello"))
 
                     return routes
             ''',
-        },
-        edits={
-            "scm/api/app.py": [
-                ("    health,\n", "    greetings,\n    health,\n"),
-                ("boxes.router(city),", "boxes.router(city), greetings.router(city),"),
-            ],
+            "scm/records/greetings.py": '''
+                """Greetings of the city."""
+
+                import msgspec
+
+                from scm.records.fields import Text
+
+
+                class Greetings(msgspec.Struct, kw_only=True, frozen=True):
+                    """What the city says to who comes in."""
+
+                    text: Text
+            ''',
         },
         check="""
             from scm.api.app import create_app

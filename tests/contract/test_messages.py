@@ -136,7 +136,10 @@ def values(of):
 
 
 def annotated(of, meta):
-    """Return a strategy for a type with limits."""
+    """Return a strategy for a type with limits, or with a description alone."""
+    limits = ("ge", "gt", "le", "lt", "min_length", "max_length", "pattern")
+    if all(getattr(meta, limit) is None for limit in limits):
+        return values(of)
     if of is int:
         return st.integers(meta.ge, meta.le)
     if of is not str:
@@ -155,7 +158,8 @@ def structs(kind):
     in_key = variables(kind) if issubclass(kind, Message) else []
     fields = {}
     for field in msgspec.structs.fields(kind):
-        is_name = field.name in in_key and field.type is str
+        is_text = str in (field.type, getattr(field.type, "__origin__", None))
+        is_name = field.name in in_key and is_text
         fields[field.name] = NAME if is_name else values(field.type)
     return st.builds(kind, **fields)
 

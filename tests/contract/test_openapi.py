@@ -142,7 +142,7 @@ def test_every_parameter_has_words_and_an_example(document):
 
 
 def test_every_field_has_words(document):
-    """Under `Attributes:` of the record's docstring, or in scm.api.words for its name."""
+    """In the `Meta` of its type (scm.records.fields), or below `Attributes:` of its record."""
     wrong = [where for where, field in fields_of(document) if not field.get("description")]
     assert not wrong, said(wrong)
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scm.records.city_map import Box, CityMap, Floor, MapTag, Wall
+from scm.records.city_map import Box, CityMap, MapTag, Wall
+from scm.records.floor import Floor
 from scm.world.boxes import Boxes, arm_of, inertia_of
 from scm.world.contacts import STEP_S, STEPS_IN_SPACE, Contacts
 from scm.world.solids import Hull

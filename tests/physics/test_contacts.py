@@ -9,7 +9,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from scm.geometry import Pose2
-from scm.records.city_map import CityMap, Floor, MapTag, Wall
+from scm.records.city_map import CityMap, MapTag, Wall
+from scm.records.floor import Floor
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.drive_command import DriveCommand

@@ -8,7 +8,8 @@ import pytest
 from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.segments import wall_segments
-from scm.records.city_map import Box, CityMap, Floor, MapTag, Patch, Plate, Ramp, Wall
+from scm.records.city_map import Box, CityMap, MapTag, Wall
+from scm.records.floor import Floor, Patch, Plate, Ramp
 from scm.v2x.messages.boxes_request import BoxesRequest
 from scm.v2x.messages.route_request import RouteRequest
 from scm.vehicles.car import load_car

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from scm.geometry import Pose2
-from scm.records.city_map import CityMap, Floor, MapTag, Patch, Ramp
+from scm.records.city_map import CityMap, MapTag
+from scm.records.floor import Floor, Patch, Ramp
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground

@@ -9,7 +9,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scm.geometry import Pose2
-from scm.records.city_map import Box, CityMap, Floor, MapTag, Wall
+from scm.records.city_map import Box, CityMap, MapTag, Wall
+from scm.records.floor import Floor
 from scm.vehicles.car import load_car
 from scm.world.contacts import STEP_S, Contacts
 from scm.world.solids import hull_of

@@ -1,1 +1,4 @@
-"""One file per noun of the web interface; each builds its router from the city it is given."""
+"""One file per noun of the web interface; `router` names as arguments the services that it needs.
+
+The application finds each file by its name and mounts it below `/api/v1`, or its own `PREFIX`.
+"""

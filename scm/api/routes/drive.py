@@ -18,7 +18,7 @@ from scm.records.drive import PROTOCOL
 from scm.v2x.message import Refused
 
 
-def router(city: City, stream: Stream, keys: KnownKeys | None) -> APIRouter:
+def router(city: City, stream: Stream, known_keys: KnownKeys | None) -> APIRouter:
     """Return the route."""
     routes = APIRouter(prefix="/vehicles", tags=["vehicles"], dependencies=[OPERATOR])
 
@@ -35,7 +35,7 @@ def router(city: City, stream: Stream, keys: KnownKeys | None) -> APIRouter:
         key = str(socket.scope["scm_key"])
 
         async def may_drive() -> bool:
-            return keys is None or await keys.find(key) is not None
+            return known_keys is None or await known_keys.find(key) is not None
 
         await DriveSession(
             city,

@@ -55,7 +55,7 @@ Open = Annotated[
 ]
 
 
-def router(city: City, seen: Acknowledgements) -> APIRouter:
+def router(city: City, acknowledgements: Acknowledgements) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/events", tags=["events"], dependencies=[VIEWER])
 
@@ -74,7 +74,7 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
         def keep(row: EventRow) -> bool:
             return row.seq > after and (not only_open or _is_open(row))
 
-        rows = _rows(city, seen, wanted)
+        rows = _rows(city, acknowledgements, wanted)
         page = page_of(rows, lambda row: row.id, keep=keep, limit=limit, cursor=cursor)
         return page_response(request, page)
 
@@ -85,7 +85,8 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
         response_class=Response,
     )
     def export(form: Form, wanted: Wanted, *, only_open: Open = False) -> Response:
-        rows = (row for row in _rows(city, seen, wanted) if not only_open or _is_open(row))
+        rows = _rows(city, acknowledgements, wanted)
+        rows = (row for row in rows if not only_open or _is_open(row))
         return table_response(rows, EventRow, form, f"{city.city_map.name}-events")
 
     @routes.post(
@@ -97,7 +98,7 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
     def acknowledge(
         body: Json[AcknowledgeBody], signer: Signer, key: IdempotencyKey = ""
     ) -> Response:
-        acknowledged = seen.add(body.events, signer(body.by), body.note)
+        acknowledged = acknowledgements.add(body.events, signer(body.by), body.note)
         return json_response(Acknowledged(acknowledgements=acknowledged))
 
     @routes.delete(
@@ -108,7 +109,7 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
         dependencies=[OPERATOR],
     )
     def withdraw(name: Name, key: IdempotencyKey = "") -> Response:
-        row = seen.withdraw(name)
+        row = acknowledgements.withdraw(name)
         if row is None:
             raise not_found("acknowledgement", name)
         return json_response(row)
@@ -116,8 +117,10 @@ def router(city: City, seen: Acknowledgements) -> APIRouter:
     return routes
 
 
-def _rows(city: City, seen: Acknowledgements, wanted: EventFilter) -> Iterator[EventRow]:
-    known = seen.rows()
+def _rows(
+    city: City, acknowledgements: Acknowledgements, wanted: EventFilter
+) -> Iterator[EventRow]:
+    known = acknowledgements.rows()
     for event in city.view.events():
         if wanted.passes(event):
             yield _row(event, known.get(event.id))

@@ -49,7 +49,7 @@ ViewName = Annotated[
 ]
 
 
-def router(city: City, work: Operations) -> APIRouter:
+def router(city: City, operations: Operations) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/eye", tags=["eye"], dependencies=[VIEWER])
     folder = city.folders.calibrations
@@ -68,7 +68,7 @@ def router(city: City, work: Operations) -> APIRouter:
         return jobs
 
     _add_views(routes, city, there)
-    _add_measuring(routes, city, there, work)
+    _add_measuring(routes, city, there, operations)
     _add_calibrations(routes, there)
     _add_files(routes, there)
     return routes
@@ -131,7 +131,7 @@ def _add_views(routes: APIRouter, city: City, there: Any) -> None:
         return json_response(_views(there(), name))
 
 
-def _add_measuring(routes: APIRouter, city: City, there: Any, work: Operations) -> None:
+def _add_measuring(routes: APIRouter, city: City, there: Any, operations: Operations) -> None:
     @routes.post(
         "/cameras/{name}/lens",
         summary="Look for a board in all pictures, or measure the lens by them",
@@ -150,7 +150,7 @@ def _add_measuring(routes: APIRouter, city: City, there: Any, work: Operations) 
         _check_free(jobs, save_as)
         what = f"lens of {name}" if save_as else f"board in pictures of {name}"
         job = jobs.measure_lens(name, _board_words(body), save_as)
-        return accepted(work.start("calibration", what, job, owner=_owner(request)))
+        return accepted(operations.start("calibration", what, job, owner=_owner(request)))
 
     @routes.post(
         "/cameras/{name}/place",
@@ -172,7 +172,9 @@ def _add_measuring(routes: APIRouter, city: City, there: Any, work: Operations) 
             raise RefusedError(Refused(code="invalid", detail=detail))
         tags = _floor_tags(body)
         job = jobs.locate(name, _newest(city, name), body.lens or "", tags, body.save_as)
-        return accepted(work.start("calibration", f"place of {name}", job, owner=_owner(request)))
+        return accepted(
+            operations.start("calibration", f"place of {name}", job, owner=_owner(request))
+        )
 
 
 def _add_calibrations(routes: APIRouter, there: Any) -> None:

@@ -19,6 +19,8 @@ READY_S = 2.0
 LEAST_FREE_BYTES = 200 * 2**20
 _log = logging.getLogger(__name__)
 
+PREFIX = ""
+
 
 def router(city: City) -> APIRouter:
     """Return the routes."""

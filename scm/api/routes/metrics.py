@@ -7,6 +7,8 @@ from scm.api.metrics import Metrics
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer_file
 
+PREFIX = ""
+
 
 def router(metrics: Metrics) -> APIRouter:
     """Return the route."""

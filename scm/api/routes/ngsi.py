@@ -35,6 +35,8 @@ Short = Annotated[
 ]
 _HEEDED = frozenset({"type", "limit", "offset", "count", "options", "local"})
 
+PREFIX = ""
+
 
 def router(city: City) -> APIRouter:
     """Return the routes."""

@@ -78,7 +78,7 @@ CameraOnCar = Annotated[
 ]
 
 
-def router(city: City, work: Operations) -> APIRouter:
+def router(city: City, operations: Operations) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/recordings", tags=["recordings"], dependencies=[VIEWER])
     repository = RecordingRepository(city.folders.recordings)
@@ -87,7 +87,7 @@ def router(city: City, work: Operations) -> APIRouter:
     _add_disturbances(routes, repository)
     _add_pictures(routes, repository, city)
     _add_notes(routes, repository)
-    _add_parts(routes, repository, work)
+    _add_parts(routes, repository, operations)
 
     @routes.get(
         "",
@@ -299,7 +299,7 @@ def _add_notes(routes: APIRouter, repository: RecordingRepository) -> None:
         return tagged(request, fresh)
 
 
-def _add_parts(routes: APIRouter, repository: RecordingRepository, work: Operations) -> None:
+def _add_parts(routes: APIRouter, repository: RecordingRepository, operations: Operations) -> None:
     @routes.post(
         "/{name}/parts",
         summary="Copy a part of it into a recording of its own",
@@ -334,7 +334,7 @@ def _add_parts(routes: APIRouter, repository: RecordingRepository, work: Operati
 
         what = f"{body.from_s:g} to {to_s:g} s of {name}"
         owner = str(request.scope["scm_owner"])
-        return accepted(work.start("cut", what, do, owner=owner))
+        return accepted(operations.start("cut", what, do, owner=owner))
 
 
 def _rows(repository: RecordingRepository, names: tuple[str, ...]) -> tuple[RecordingRow, ...]:

@@ -25,11 +25,13 @@ Run = Annotated[
 ]
 
 
-def router(city: City, work: Operations, keys: KeyRing | None) -> APIRouter:
+def router(city: City, operations: Operations, keys: KeyRing | None) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/scenarios", tags=["scenarios"], dependencies=[VIEWER])
     repository = ScenarioRepository(city.folders.scenarios)
-    runs = ScenarioRuns(repository, work, city.link.connect, city.link.script_credentials, keys)
+    runs = ScenarioRuns(
+        repository, operations, city.link.connect, city.link.script_credentials, keys
+    )
     _add_scripts(routes, repository)
 
     @routes.post(

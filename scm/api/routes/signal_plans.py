@@ -46,12 +46,12 @@ Digest = Annotated[
 ]
 
 
-def router(city: City, repository: PlanRepository, work: Operations) -> APIRouter:
+def router(city: City, plans: PlanRepository, operations: Operations) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/signals/{name}", tags=["signals"], dependencies=[VIEWER])
-    _add_reading(routes, city, repository)
-    _add_proving(routes, city, repository, work)
-    _add_writing(routes, city, repository)
+    _add_reading(routes, city, plans)
+    _add_proving(routes, city, plans, operations)
+    _add_writing(routes, city, plans)
     return routes
 
 
@@ -72,7 +72,7 @@ def _add_reading(routes: APIRouter, city: City, repository: PlanRepository) -> N
 
 
 def _add_proving(
-    routes: APIRouter, city: City, repository: PlanRepository, work: Operations
+    routes: APIRouter, city: City, repository: PlanRepository, operations: Operations
 ) -> None:
     @routes.post(
         "/proofs",
@@ -89,7 +89,7 @@ def _add_proving(
         owner = str(request.scope.get("scm_owner", ""))
         what = f"plan {body.plan} of junction {name}"
         return accepted(
-            work.start(
+            operations.start(
                 "plan-proof", what, lambda progress: repository.prove(file, progress), owner=owner
             )
         )

@@ -50,12 +50,12 @@ _VERBS: dict[str, tuple[Verb, str]] = {
 }
 
 
-def router(city: City, repository: PlanRepository) -> APIRouter:
+def router(city: City, plans: PlanRepository) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/signals", tags=["signals"], dependencies=[VIEWER])
     _add_reading(routes, city)
     _add_overrides(routes, city)
-    _add_running(routes, city, repository)
+    _add_running(routes, city, plans)
     _add_monitor(routes, city)
     return routes
 

@@ -23,6 +23,133 @@ class SignalsNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
+    def plans(self, name: str, *, limit: int = 100, cursor: str = "") -> Page[PlanRow]:
+        """All plans of a junction.
+
+        Args:
+            name: a name on the bus
+            limit: rows a page
+            cursor: `next` of the page before; empty: the first page
+        """
+        return self._connection.request(
+            "GET",
+            f"/api/v1/signals/{part(name)}/plans",
+            Page[PlanRow],
+            query={"limit": limit, "cursor": cursor},
+        )
+
+    def one_plan(self, name: str, plan: str) -> PlanRow:
+        """One plan.
+
+        Args:
+            name: a name on the bus
+            plan: a plan's name
+        """
+        return self._connection.request(
+            "GET", f"/api/v1/signals/{part(name)}/plans/{part(plan)}", PlanRow
+        )
+
+    def save(
+        self,
+        name: str,
+        plan: str,
+        *,
+        if_match: str | None = None,
+        if_none_match: str | None = None,
+        about: str = "",
+        by: str = "",
+        reason: str = "",
+        stages: tuple[StageBody, ...],
+        offset_s: float | None = None,
+        idempotency_key: str = "",
+    ) -> PlanRow:
+        """Save a proven plan.
+
+        Args:
+            name: a name on the bus
+            plan: a plan's name
+            if_match: ETag of the state that was edited; `*`: whichever there is
+            if_none_match: `*`: only where there is none yet
+            about: what it is for
+            by: who requests it, for the log; empty: whoever calls
+            reason: why, for the log
+            stages: in the order of the cycle
+            offset_s: when its cycle begins, after a time that is a whole number of cycles on the
+                controller's clock, less than the cycle; plans with the same cycle keep step so;
+                null: with nobody
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.request(
+            "PUT",
+            f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
+            PlanRow,
+            headers={"if-match": if_match, "if-none-match": if_none_match},
+            body={
+                "about": about,
+                "by": by,
+                "reason": reason,
+                "stages": stages,
+                "offset_s": offset_s,
+            },
+            key=idempotency_key,
+        )
+
+    def delete(
+        self,
+        name: str,
+        plan: str,
+        *,
+        if_match: str | None = None,
+        if_none_match: str | None = None,
+        idempotency_key: str = "",
+    ) -> PlanRow:
+        """Delete a saved plan.
+
+        Args:
+            name: a name on the bus
+            plan: a plan's name
+            if_match: ETag of the state that was edited; `*`: whichever there is
+            if_none_match: `*`: only where there is none yet
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.request(
+            "DELETE",
+            f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
+            PlanRow,
+            headers={"if-match": if_match, "if-none-match": if_none_match},
+            key=idempotency_key,
+        )
+
+    def prove(
+        self, name: str, *, plan: str, stages: tuple[StageBody, ...], idempotency_key: str = ""
+    ) -> Operation:
+        """Search every state of kernel and plan for fault.
+
+        Args:
+            name: a name on the bus
+            plan: what the plan will be called
+            stages: in the order of the cycle
+            idempotency_key: Same key, same effect, once; empty: a new one.
+        """
+        return self._connection.request(
+            "POST",
+            f"/api/v1/signals/{part(name)}/proofs",
+            Operation,
+            body={"plan": plan, "stages": stages},
+            key=idempotency_key,
+        )
+
+    def proof(self, name: str, digest: str) -> PlanProof:
+        """One proof.
+
+        Args:
+            name: a name on the bus
+            digest: of a proof
+        """
+        return self._connection.request(
+            "GET", f"/api/v1/signals/{part(name)}/proofs/{part(digest)}", PlanProof
+        )
+
     def all_signals(self) -> Signals:
         """All junctions."""
         return self._connection.request("GET", "/api/v1/signals", Signals)
@@ -360,131 +487,4 @@ class SignalsNoun:
             MonitorStatus,
             body={"by": by, "reason": reason},
             key=idempotency_key,
-        )
-
-    def plans(self, name: str, *, limit: int = 100, cursor: str = "") -> Page[PlanRow]:
-        """All plans of a junction.
-
-        Args:
-            name: a name on the bus
-            limit: rows a page
-            cursor: `next` of the page before; empty: the first page
-        """
-        return self._connection.request(
-            "GET",
-            f"/api/v1/signals/{part(name)}/plans",
-            Page[PlanRow],
-            query={"limit": limit, "cursor": cursor},
-        )
-
-    def one_plan(self, name: str, plan: str) -> PlanRow:
-        """One plan.
-
-        Args:
-            name: a name on the bus
-            plan: a plan's name
-        """
-        return self._connection.request(
-            "GET", f"/api/v1/signals/{part(name)}/plans/{part(plan)}", PlanRow
-        )
-
-    def save(
-        self,
-        name: str,
-        plan: str,
-        *,
-        if_match: str | None = None,
-        if_none_match: str | None = None,
-        about: str = "",
-        by: str = "",
-        reason: str = "",
-        stages: tuple[StageBody, ...],
-        offset_s: float | None = None,
-        idempotency_key: str = "",
-    ) -> PlanRow:
-        """Save a proven plan.
-
-        Args:
-            name: a name on the bus
-            plan: a plan's name
-            if_match: ETag of the state that was edited; `*`: whichever there is
-            if_none_match: `*`: only where there is none yet
-            about: what it is for
-            by: who requests it, for the log; empty: whoever calls
-            reason: why, for the log
-            stages: in the order of the cycle
-            offset_s: when its cycle begins, after a time that is a whole number of cycles on the
-                controller's clock, less than the cycle; plans with the same cycle keep step so;
-                null: with nobody
-            idempotency_key: Same key, same effect, once; empty: a new one.
-        """
-        return self._connection.request(
-            "PUT",
-            f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
-            PlanRow,
-            headers={"if-match": if_match, "if-none-match": if_none_match},
-            body={
-                "about": about,
-                "by": by,
-                "reason": reason,
-                "stages": stages,
-                "offset_s": offset_s,
-            },
-            key=idempotency_key,
-        )
-
-    def delete(
-        self,
-        name: str,
-        plan: str,
-        *,
-        if_match: str | None = None,
-        if_none_match: str | None = None,
-        idempotency_key: str = "",
-    ) -> PlanRow:
-        """Delete a saved plan.
-
-        Args:
-            name: a name on the bus
-            plan: a plan's name
-            if_match: ETag of the state that was edited; `*`: whichever there is
-            if_none_match: `*`: only where there is none yet
-            idempotency_key: Same key, same effect, once; empty: a new one.
-        """
-        return self._connection.request(
-            "DELETE",
-            f"/api/v1/signals/{part(name)}/plans/{part(plan)}",
-            PlanRow,
-            headers={"if-match": if_match, "if-none-match": if_none_match},
-            key=idempotency_key,
-        )
-
-    def prove(
-        self, name: str, *, plan: str, stages: tuple[StageBody, ...], idempotency_key: str = ""
-    ) -> Operation:
-        """Search every state of kernel and plan for fault.
-
-        Args:
-            name: a name on the bus
-            plan: what the plan will be called
-            stages: in the order of the cycle
-            idempotency_key: Same key, same effect, once; empty: a new one.
-        """
-        return self._connection.request(
-            "POST",
-            f"/api/v1/signals/{part(name)}/proofs",
-            Operation,
-            body={"plan": plan, "stages": stages},
-            key=idempotency_key,
-        )
-
-    def proof(self, name: str, digest: str) -> PlanProof:
-        """One proof.
-
-        Args:
-            name: a name on the bus
-            digest: of a proof
-        """
-        return self._connection.request(
-            "GET", f"/api/v1/signals/{part(name)}/proofs/{part(digest)}", PlanProof
         )

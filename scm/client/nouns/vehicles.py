@@ -21,6 +21,33 @@ class VehiclesNoun:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
+    def reports(self, name: str, *, scan: bool = False) -> Iterator[LiveEvent]:
+        """All that a car reports, as server-sent events `reports`.
+
+        Args:
+            name: a name on the bus
+            scan: each turn of its LIDAR too, as `scan`; null: it has none
+        """
+        return self._connection.events(
+            f"/api/v1/vehicles/{part(name)}/reports", query={"scan": scan}
+        )
+
+    def link(self, name: str) -> LinkRow:
+        """How long the way to a car and back is now.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/link", LinkRow)
+
+    def path(self, name: str) -> PathRow:
+        """A car's way ahead, at most 12 m of it.
+
+        Args:
+            name: a name on the bus
+        """
+        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/path", PathRow)
+
     def all_vehicles(self) -> VehiclesTopic:
         """All cars on the map."""
         return self._connection.request("GET", "/api/v1/vehicles", VehiclesTopic)
@@ -119,30 +146,3 @@ class VehiclesNoun:
             body={"headlights": headlights, "indicators": indicators},
             key=idempotency_key,
         )
-
-    def path(self, name: str) -> PathRow:
-        """A car's way ahead, at most 12 m of it.
-
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/path", PathRow)
-
-    def reports(self, name: str, *, scan: bool = False) -> Iterator[LiveEvent]:
-        """All that a car reports, as server-sent events `reports`.
-
-        Args:
-            name: a name on the bus
-            scan: each turn of its LIDAR too, as `scan`; null: it has none
-        """
-        return self._connection.events(
-            f"/api/v1/vehicles/{part(name)}/reports", query={"scan": scan}
-        )
-
-    def link(self, name: str) -> LinkRow:
-        """How long the way to a car and back is now.
-
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/link", LinkRow)

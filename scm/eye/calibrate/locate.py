@@ -26,8 +26,9 @@ from scm.errors import EyeError
 from scm.eye.camera import LARGEST_TILT_RAD, LENS_PARAMETERS, CameraModel, camera_model
 from scm.eye.detect import CORNER_STD_PX
 from scm.geometry import wrap_angle
-from scm.records.city_map import Camera, CityMap, MapTag, Record
+from scm.records.city_map import Camera, CityMap, MapTag
 from scm.records.eye import TagSeen
+from scm.records.floor import Record
 from scm.scenery.tags import TAG_COUNT, floor_corners
 
 NAMES = ("x_m", "y_m", "z_m", "yaw_rad", "tilt_x_rad", "tilt_y_rad")

@@ -7,7 +7,8 @@ import numpy as np
 
 from scm.errors import EyeError
 from scm.eye.camera import CameraModel, camera_model
-from scm.records.city_map import Camera, CityMap, Floor, MapTag
+from scm.records.city_map import Camera, CityMap, MapTag
+from scm.records.floor import Floor
 
 PINHOLE = (-0.12, 0.03, 0.0004, -0.0003, 0.0)
 """Distortion of a cheap lens of 60 degrees."""

@@ -16,7 +16,8 @@ from scm.eye.render.motion import Driven
 from scm.geometry import Pose2
 from scm.maps.polyline import Polyline, join, sample
 from scm.maps.route import Roads
-from scm.records.city_map import CityMap, Floor, Segment
+from scm.records.city_map import CityMap, Segment
+from scm.records.floor import Floor
 from scm.scenery.bodies import car_body
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 

@@ -86,28 +86,44 @@ _TimeMark = Annotated[
 
 
 class VehicleLength(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """0.1 m, 1023 unknown; confidence: 0 no trailer, 4 unknown."""
+    """0.1 m, 1023 unknown; confidence: 0 no trailer, 4 unknown.
+
+    Attributes:
+        value, confidence: In the units and the confidence classes of the standard.
+    """
 
     value: Annotated[int, coded(1, 1023, unavailable=1023, out_of_range=(1022,))]
     confidence: Annotated[int, coded(0, 4, unavailable=4)] = 0
 
 
 class Acceleration(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """0.1 m/s^2, 161 unknown; confidence 0.1 m/s^2, 102 unknown."""
+    """0.1 m/s^2, 161 unknown; confidence 0.1 m/s^2, 102 unknown.
+
+    Attributes:
+        value, confidence: In the units and the confidence classes of the standard.
+    """
 
     value: Annotated[int, coded(-160, 161, unavailable=161, out_of_range=(-160, 160))] = 161
     confidence: Annotated[int, coded(0, 102, unavailable=102, out_of_range=(101,))] = 102
 
 
 class Curvature(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """1e-4 1/m, + = left, 1023 unknown; confidence: a class, 7 unknown."""
+    """1e-4 1/m, + = left, 1023 unknown; confidence: a class, 7 unknown.
+
+    Attributes:
+        value, confidence: In the units and the confidence classes of the standard.
+    """
 
     value: Annotated[int, coded(-1023, 1023, unavailable=1023, out_of_range=(-1023, 1022))] = 1023
     confidence: Annotated[int, coded(0, 7, unavailable=7, out_of_range=(6,))] = 7
 
 
 class YawRate(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """0.01 degree/s, + = left, 32767 unknown; confidence: a class, 8 unknown."""
+    """0.01 degree/s, + = left, 32767 unknown; confidence: a class, 8 unknown.
+
+    Attributes:
+        value, confidence: In the units and the confidence classes of the standard.
+    """
 
     value: Annotated[
         int, coded(-32_766, 32_767, unavailable=32_767, out_of_range=(-32_766, 32_766))
@@ -116,7 +132,11 @@ class YawRate(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
 
 class BasicContainer(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """Station type, and position of the middle of the front bumper."""
+    """Station type, and position of the middle of the front bumper.
+
+    Attributes:
+        station_type: By the standard; 5: passenger car.
+    """
 
     station_type: StationType = PASSENGER_CAR
     reference_position: ReferencePosition
@@ -128,6 +148,7 @@ class VehicleHighFrequency(msgspec.Struct, kw_only=True, frozen=True, gc=False):
     Attributes:
         drive_direction: 0 forward, 1 backward, 2 unknown.
         vehicle_width: 0.1 m, 62 unknown.
+        curvature: Of its path, by the standard.
         curvature_calculation_mode: 0 from the yaw rate, 1 not, 2 unknown.
     """
 
@@ -149,7 +170,13 @@ class HighFrequencyContainer(msgspec.Struct, kw_only=True, frozen=True, gc=False
 
 
 class ExteriorLights(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """Which lights are switched on, in the order of the standard's bits."""
+    """Which lights are switched on, in the order of the standard's bits.
+
+    Attributes:
+        low_beam_headlights_on, high_beam_headlights_on, left_turn_signal_on: Whether it is on.
+        right_turn_signal_on, daytime_running_lights_on, reverse_light_on: Whether it is on.
+        fog_light_on, parking_lights_on: Whether it is on.
+    """
 
     low_beam_headlights_on: bool = False
     high_beam_headlights_on: bool = False
@@ -162,7 +189,11 @@ class ExteriorLights(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
 
 class VehicleLowFrequency(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """What changes slowly; path_history: newest point first, each from the one before it."""
+    """What changes slowly; path_history: newest point first, each from the one before it.
+
+    Attributes:
+        vehicle_role: By the standard; 0: nothing special.
+    """
 
     vehicle_role: Annotated[int, coded(0, 15)] = 0
     exterior_lights: ExteriorLights = ExteriorLights()
@@ -176,7 +207,13 @@ class LowFrequencyContainer(msgspec.Struct, kw_only=True, frozen=True, gc=False)
 
 
 class CamBody(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """A CAM; generation_delta_time: milliseconds modulo 65536."""
+    """A CAM; generation_delta_time: milliseconds modulo 65536.
+
+    Attributes:
+        protocol_version: Of the message.
+        station_id: Its number in messages of the standard.
+        generation_delta_time: When it was made, modulo 65 536 [ms].
+    """
 
     protocol_version: Byte
     station_id: StationId

@@ -56,7 +56,12 @@ Name = Annotated[str, Meta(min_length=1, max_length=63)]
 
 
 class Ellipse(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """Confidence of a position: 0.01 m, 4095 unknown; 0.1 degree, 3601 unknown."""
+    """Confidence of a position: 0.01 m, 4095 unknown; 0.1 degree, 3601 unknown.
+
+    Attributes:
+        semi_major, semi_minor: Of the ellipse [cm]; 4095: not known.
+        semi_major_orientation: Clockwise from north [0.1 degree]; 3601: not known.
+    """
 
     semi_major: SemiAxis = NO_ELLIPSE
     semi_minor: SemiAxis = NO_ELLIPSE
@@ -64,14 +69,22 @@ class Ellipse(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
 
 class Altitude(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """0.01 m, 800001 unknown; confidence: a class, 15 unknown."""
+    """0.01 m, 800001 unknown; confidence: a class, 15 unknown.
+
+    Attributes:
+        value, confidence: In the units and the confidence classes of the standard.
+    """
 
     value: AltitudeValue = NO_ALTITUDE
     confidence: AltitudeConfidence = NO_ALTITUDE_CONFIDENCE
 
 
 class ReferencePosition(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """1e-7 degree of the enlarged city."""
+    """1e-7 degree of the enlarged city.
+
+    Attributes:
+        latitude, longitude: Of the enlarged city [1e-7 degree].
+    """
 
     latitude: Latitude
     longitude: Longitude
@@ -80,21 +93,34 @@ class ReferencePosition(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
 
 class Heading(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """0.1 degree clockwise from north, map +y, 3601 unknown; confidence likewise, 127 unknown."""
+    """0.1 degree clockwise from north, map +y, 3601 unknown; confidence likewise, 127 unknown.
+
+    Attributes:
+        value, confidence: In the units and the confidence classes of the standard.
+    """
 
     value: HeadingValue
     confidence: Confidence = NO_CONFIDENCE
 
 
 class Speed(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """0.01 m/s, 16383 unknown; confidence 0.01 m/s, 127 unknown."""
+    """0.01 m/s, 16383 unknown; confidence 0.01 m/s, 127 unknown.
+
+    Attributes:
+        value, confidence: In the units and the confidence classes of the standard.
+    """
 
     value: Annotated[int, coded(0, 16_383, unavailable=16_383, out_of_range=(16_382,))]
     confidence: Confidence = NO_CONFIDENCE
 
 
 class DeltaPosition(msgspec.Struct, kw_only=True, frozen=True, gc=False):
-    """From a reference: 1e-7 degree, 131072 unknown; 0.01 m up, 12800 unknown."""
+    """From a reference: 1e-7 degree, 131072 unknown; 0.01 m up, 12800 unknown.
+
+    Attributes:
+        delta_latitude, delta_longitude: Against the reference position [1e-7 degree].
+        delta_altitude: Against the reference position [cm].
+    """
 
     delta_latitude: Delta
     delta_longitude: Delta
@@ -105,7 +131,11 @@ class DeltaPosition(msgspec.Struct, kw_only=True, frozen=True, gc=False):
 
 
 class PathPoint(msgspec.Struct, kw_only=True, frozen=True, omit_defaults=True):
-    """A past position; path_delta_time: 0.01 s from here to the previous point in the list."""
+    """A past position; path_delta_time: 0.01 s from here to the previous point in the list.
+
+    Attributes:
+        path_delta_time: Since the point before [10 ms].
+    """
 
     path_position: DeltaPosition
     path_delta_time: Annotated[int, coded(1, 65_535)] | None = None

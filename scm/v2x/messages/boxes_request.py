@@ -6,7 +6,11 @@ from scm.v2x.message import Message, Request
 
 
 class BoxesReply(Message, kw_only=True, frozen=True):
-    """They stand where they began; `boxes` is how many there are."""
+    """They stand where they began; `boxes` is how many there are.
+
+    Attributes:
+        boxes: Boxes that cars can push.
+    """
 
     KEY: ClassVar[str] = "world/boxes/reply"
 

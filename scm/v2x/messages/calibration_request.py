@@ -6,6 +6,7 @@ import msgspec
 
 from scm.records.city_map import Camera
 from scm.records.eye import InForce
+from scm.records.fields import CameraName
 from scm.v2x.message import Message, Request
 
 
@@ -37,7 +38,7 @@ class CalibrationReply(Message, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "eye/{camera}/req/reply"
 
-    camera: str
+    camera: CameraName
     in_force: InForce
 
 

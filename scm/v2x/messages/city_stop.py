@@ -2,19 +2,24 @@
 
 from typing import ClassVar
 
+from scm.records.fields import ReasonText, RequestedBy, TNs
 from scm.v2x.message import Delivery, Message
 
 
 class CityStop(Message, kw_only=True, frozen=True):
-    """State of the red button; repeated once a second while engaged."""
+    """State of the red button; repeated once a second while engaged.
+
+    Attributes:
+        engaged: Whether the city-wide stop is engaged: no car may drive.
+    """
 
     KEY: ClassVar[str] = "world/stop"
     DELIVERY: ClassVar[Delivery] = Delivery.EVENT
 
-    t_ns: int
+    t_ns: TNs
     engaged: bool
-    by: str = ""
-    reason: str = ""
+    by: RequestedBy = ""
+    reason: ReasonText = ""
 
 
 MESSAGE = CityStop

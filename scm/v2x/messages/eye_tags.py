@@ -3,6 +3,7 @@
 from typing import ClassVar
 
 from scm.records.eye import TagSeen
+from scm.records.fields import CameraName, LatencyMs, TNs
 from scm.v2x.message import Message
 
 
@@ -12,10 +13,10 @@ class EyeTags(Message, kw_only=True, frozen=True):
     KEY: ClassVar[str] = "eye/{camera}/tags"
     RATE_HZ: ClassVar[float | None] = 10.0
 
-    camera: str
-    t_ns: int
+    camera: CameraName
+    t_ns: TNs
     tags: tuple[TagSeen, ...]
-    latency_ms: float
+    latency_ms: LatencyMs
 
 
 MESSAGE = EyeTags

@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal
 
+from scm.records.fields import OwnerName, VehicleName
 from scm.v2x.message import Message, Request
 
 
@@ -16,8 +17,8 @@ class LeaseReply(Message, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "v/{vehicle}/lease/reply"
 
-    vehicle: str
-    owner: str
+    vehicle: VehicleName
+    owner: OwnerName
     epoch: int
     ttl_ms: int
 

@@ -2,15 +2,21 @@
 
 from typing import ClassVar, Literal
 
+from scm.records.fields import VehicleName
 from scm.v2x.message import Message, Request
 
 
 class LightReply(Message, kw_only=True, frozen=True):
-    """How the switches stand now; tail, brake and reverse lamps follow by themselves."""
+    """How the switches stand now; tail, brake and reverse lamps follow by themselves.
+
+    Attributes:
+        headlights: How they are switched.
+        indicators: How they are switched.
+    """
 
     KEY: ClassVar[str] = "v/{vehicle}/cmd/lights/reply"
 
-    vehicle: str
+    vehicle: VehicleName
     headlights: Literal["off", "low", "high"]
     indicators: Literal["off", "left", "right", "hazard"]
 

@@ -1,9 +1,11 @@
 """A station is suspected of lying on the air: what was observed, and the messages that show it."""
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
+from msgspec import Meta
 
+from scm.records.fields import XM, YM, SpeedMps, TNs, YawRad
 from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.message import Delivery, Message
 
@@ -19,26 +21,30 @@ class Observation(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     kind: Literal["beacon", "static", "security", "position", "speed", "longAcc"]
-    check: str
+    check: Annotated[str, Meta(examples=["speed_jump"])]
     plausibility: float
     claims: int
 
 
 class EvidenceCam(msgspec.Struct, kw_only=True, frozen=True):
-    """A CAM that was judged, and when it was sent."""
+    """A CAM that was judged, and when it was sent.
 
-    t_ns: int
+    Attributes:
+        body: The message itself, by the names of the standard.
+    """
+
+    t_ns: TNs
     body: CamBody
 
 
 class EvidencePose(msgspec.Struct, kw_only=True, frozen=True):
     """Where the Eye saw the station's own tag: the rear axle, map frame."""
 
-    t_ns: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    speed_mps: float
+    t_ns: TNs
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
+    speed_mps: SpeedMps
 
 
 class MisbehaviourReport(Message, kw_only=True, frozen=True):
@@ -60,9 +66,9 @@ class MisbehaviourReport(Message, kw_only=True, frozen=True):
     DELIVERY: ClassVar[Delivery] = Delivery.EVENT
     KEEP: ClassVar[int] = 5
 
-    suspect: str
+    suspect: Annotated[str, Meta(examples=["n5"])]
     suspect_id: int
-    t_ns: int
+    t_ns: TNs
     since_ns: int
     score: float
     observations: tuple[Observation, ...]

@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+from scm.records.fields import Detail, FaultName, JunctionName, TNs
 from scm.v2x.message import Delivery, Message
 
 
@@ -20,10 +21,10 @@ class MonitorStatus(Message, kw_only=True, frozen=True):
     RATE_HZ: ClassVar[float | None] = 2.0
     DELIVERY: ClassVar[Delivery] = Delivery.EVENT
 
-    junction: str
-    t_ns: int
-    fault: str | None
-    detail: str = ""
+    junction: JunctionName
+    t_ns: TNs
+    fault: FaultName | None
+    detail: Detail = ""
     since_ns: int
 
 

@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+from scm.records.fields import JunctionName, PendingName, PlanName
 from scm.records.signal_plans import SignalStage
 from scm.v2x.message import Message, Request
 
@@ -16,9 +17,9 @@ class PlanReply(Message, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "tl/{junction}/req/reply"
 
-    junction: str
-    plan: str
-    pending: str = ""
+    junction: JunctionName
+    plan: PlanName
+    pending: PendingName = ""
 
 
 class PlanRequest(Request, kw_only=True, frozen=True):

@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+from scm.records.fields import VehicleName
 from scm.v2x.message import Message, Request
 
 
@@ -10,7 +11,7 @@ class RemoveReply(Message, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "v/{vehicle}/remove/reply"
 
-    vehicle: str
+    vehicle: VehicleName
 
 
 class RemoveRequest(Request, kw_only=True, frozen=True):

@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal
 
+from scm.records.fields import LengthM, RouteLanes, TripId, VehicleName
 from scm.v2x.message import Message, Request
 
 
@@ -14,10 +15,10 @@ class RouteReply(Message, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "v/{vehicle}/cmd/route/reply"
 
-    vehicle: str
-    trip_id: str
-    route: tuple[str, ...]
-    length_m: float | None
+    vehicle: VehicleName
+    trip_id: TripId
+    route: RouteLanes
+    length_m: LengthM | None
 
 
 class RouteRequest(Request, kw_only=True, frozen=True):

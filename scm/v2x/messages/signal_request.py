@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal
 
+from scm.records.fields import JunctionName, PendingName, PolicyName
 from scm.records.signals import SignalOverride, Verb
 from scm.v2x.message import Message, Request
 
@@ -12,13 +13,14 @@ class SignalReply(Message, kw_only=True, frozen=True):
     Attributes:
         policy: In force now.
         pending: The policy to come into force; empty: none.
+        wishes: Overrides in force.
     """
 
     KEY: ClassVar[str] = "tl/{junction}/wish/reply"
 
-    junction: str
-    policy: str
-    pending: str = ""
+    junction: JunctionName
+    policy: PolicyName
+    pending: PendingName = ""
     wishes: tuple[SignalOverride, ...] = ()
 
 

@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+from scm.records.fields import XM, YM, TagId, VehicleName, YawRad
 from scm.v2x.message import Message, Request
 
 
@@ -10,11 +11,11 @@ class SpawnReply(Message, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "world/spawn/reply"
 
-    vehicle: str
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    tag_id: int
+    vehicle: VehicleName
+    x_m: XM
+    y_m: YM
+    yaw_rad: YawRad
+    tag_id: TagId
 
 
 class SpawnRequest(Request, kw_only=True, frozen=True):

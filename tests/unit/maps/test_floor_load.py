@@ -10,7 +10,7 @@ from scm.errors import MapError
 from scm.maps.floor_shapes import is_convex, outline_of, pieces_of, signed_area
 from scm.maps.grey import read_grey, unpack
 from scm.maps.load import MAPS_DIR, load_map
-from scm.records.city_map import Floor, Patch, Plate, Ramp
+from scm.records.floor import Floor, Patch, Plate, Ramp
 from scm.v2x.message import decode, encode
 from scm.v2x.messages.world_definition import WorldDefinition
 

@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose
 from scm.clock import NS_PER_S
 from scm.geometry import Pose2
 from scm.maps.load import load_map
-from scm.records.city_map import CityMap, Floor, MapTag, Patch, Plate, Ramp, Wind
+from scm.records.city_map import CityMap, MapTag
+from scm.records.floor import Floor, Patch, Plate, Ramp, Wind
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from scm.records.city_map import Box, CityMap, Floor, MapTag, Wall
+from scm.records.city_map import Box, CityMap, MapTag, Wall
+from scm.records.floor import Floor
 from scm.world.broad_phase import TOUCH_M, BroadPhase, obstacles_of
 from scm.world.solids import obstacle_boxes
 

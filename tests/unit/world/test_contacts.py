@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scm.records.city_map import Box, CityMap, Floor, MapTag, Wall
+from scm.records.city_map import Box, CityMap, MapTag, Wall
+from scm.records.floor import Floor
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.contacts import Contacts, Hull

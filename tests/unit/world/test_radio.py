@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from scm.records.city_map import CityMap, Floor, Group, Junction, Light, MapTag, RadioChannel
+from scm.records.city_map import CityMap, Group, Junction, Light, MapTag, RadioChannel
 from scm.records.city_map import Conflict as Stretch
+from scm.records.floor import Floor
 from scm.v2x.messages.part_status import PartStatus
 from scm.vehicles.drivers.channel import channel_of
 from scm.world.radio import DelayQueue, Radio, Receivers, roadside_places
