@@ -30,6 +30,8 @@ FOLDER = Path(__file__).parents[2] / "scm" / "client"
 REFERENCE = "#/components/schemas/"
 KEY = "Idempotency-Key"
 WIDTH = 99
+ON_THE_BUS = "a name on the bus"
+SHARED = ("limit", "cursor", "if_match", "if_none_match")  # explained by scm.client.operation.Noun
 BY = "Written by docs/make/client.py: do not change it here."
 CLIENT = '''"""The client of a city, noun by noun.
 
@@ -227,30 +229,27 @@ class _Method:
         self._schemas = schemas
         noun, own = operation["tags"][0], operation["operationId"]
         self.name = _name(own.removeprefix(re.sub(r"\W", "_", noun) + "_"))
-        self._places: dict[str, dict[str, str]] = defaultdict(dict)
         self._given: list[str] = []
         self._about: list[str] = []
         self._has_key = False
         for parameter in operation.get("parameters", ()):
             self._add_parameter(parameter)
-        self._body, self._sends_bytes = self._add_body()
+        self._add_body()
         if self._has_key:
             self._given.append('idempotency_key: str = ""')
-            self._about.append("idempotency_key: Same key, same effect, once; empty: a new one.")
 
-    def _add(self, place: str, key: str, schema: Schema, required: bool) -> None:
+    def _add(self, key: str, schema: Schema, required: bool) -> None:
         own = _name(key)
-        while (
-            hasattr(builtins, own) or own == "part" or own in {_name_of(one) for one in self._given}
-        ):
+        while hasattr(builtins, own) or own in {_name_of(one) for one in self._given}:
             own += "_"
-        self._places[place][key] = own
         kind = _type(schema, self._schemas)
         default = "" if required else _default(schema)
         if default == "None" and "None" not in kind:
             kind += " | None"
         self._given.append(f"{own}: {kind}" + (f" = {default}" if default else ""))
-        self._about.append(f"{own}: {schema.get('description') or key}")
+        about = schema.get("description") or key
+        if own not in SHARED and about != ON_THE_BUS:
+            self._about.append(f"{own}: {about}")
 
     def _add_parameter(self, parameter: Schema) -> None:
         if parameter["name"] == KEY:
@@ -259,28 +258,27 @@ class _Method:
         if parameter["name"] == "Last-Event-ID":
             return
         schema = {"description": parameter.get("description"), **parameter["schema"]}
-        self._add(parameter["in"], parameter["name"], schema, parameter.get("required", False))
+        self._add(parameter["name"], schema, parameter.get("required", False))
         if parameter["in"] == "path" and "*" not in self._given:
             return
         if "*" not in self._given:
             self._given.insert(len(self._given) - 1, "*")
 
-    def _add_body(self) -> tuple[bool, bool]:
+    def _add_body(self) -> None:
         content = self._operation.get("requestBody", {}).get("content", {})
         if not content:
-            return False, False
+            return
         if "*" not in self._given:
             self._given.append("*")
         schema = content.get("application/json", {}).get("schema")
         if schema is None:
             self._given.append("content: bytes")
             self._about.append("content: What to send.")
-            return False, True
+            return
         target = self._schemas[schema["$ref"].removeprefix(REFERENCE)] if "$ref" in schema else {}
         required = set(target.get("required", ()))
         for key, one in target.get("properties", {}).items():
-            self._add("body", key, one, key in required)
-        return True, False
+            self._add(key, one, key in required)
 
     def source(self) -> str:
         """Return the method."""
@@ -288,43 +286,22 @@ class _Method:
             self._given.pop()
         if self._has_key and "*" not in self._given:
             self._given.insert(len(self._given) - 1, "*")
-        media, schema = _success(self._operation)
-        kind, call = self._call(media, schema)
         given = ", ".join(["self", *self._given])
-        summary = self._operation["summary"]
-        lines = [f"    def {self.name}({given}) -> {kind}:"]
-        lines += _docstring(summary, "Args", self._about, 8)[:-1]
-        does = call if kind == "None" else f"return {call}"
-        return "\n".join([*lines, f"        {does}", ""])
+        lines = [f'    @operation("{self._method}", "{self._path}")']
+        lines += [f"    def {self.name}({given}) -> {self._answer()}:"]
+        lines += _docstring(self._operation["summary"], "Args", self._about, 8)
+        return "\n".join(lines)
 
-    def _call(self, media: str, schema: Schema) -> tuple[str, str]:
-        """Return what the method answers, and the call that gets it."""
-        path = re.sub(r"\{(\w+)(:\w+)?\}", self._part, self._path)
-        facts = [f'f"{path}"' if path != self._path else f'"{path}"']
-        for place, word in (("query", "query"), ("header", "headers")):
-            if self._places[place]:
-                facts.append(f"{word}={_dict(self._places[place])}")
-        if not media or media == "application/json" or media.endswith("+json"):
-            kind = _type(schema, self._schemas) if media else "None"
-            verb = "send" if self._sends_bytes else "request" if media else "send_only"
-            more = ([kind] if media else []) + (["content"] if self._sends_bytes else [])
-            facts = [f'"{self._method}"', facts[0], *more, *facts[1:]]
-            facts += [f"body={_dict(self._places['body'])}"] if self._body else []
-            facts += ["key=idempotency_key"] if self._has_key else []
-            return kind, f"self._connection.{verb}({', '.join(facts)})"
+    def _answer(self) -> str:
+        """Return the type of what the method answers."""
+        media, schema = _success(self._operation)
+        if not media:
+            return "None"
+        if media == "application/json" or media.endswith("+json"):
+            return _type(schema, self._schemas)
         if media == "text/event-stream":
-            return "Iterator[LiveEvent]", f"self._connection.events({', '.join(facts)})"
-        if media.startswith(("image/", "text/")):
-            return "bytes", f"self._connection.fetch({', '.join(facts)})"
-        return "Iterator[bytes]", f"self._connection.pieces({', '.join(facts)})"
-
-    def _part(self, found: re.Match[str]) -> str:
-        own = self._places["path"][found[1]]
-        return "{part(" + own + ")}" if found[2] != ":path" else "{" + own + "}"
-
-
-def _dict(places: dict[str, str]) -> str:
-    return "{" + ", ".join(f'"{key}": {own}' for key, own in places.items()) + "}"
+            return "Iterator[LiveEvent]"
+        return "bytes" if media.startswith(("image/", "text/")) else "Iterator[bytes]"
 
 
 def _name_of(given: str) -> str:
@@ -333,16 +310,13 @@ def _name_of(given: str) -> str:
 
 def _noun(noun: str, operations: list[tuple[str, str, Schema]], schemas: Schema) -> str:
     methods = [_Method(*one, schemas) for one in operations]
-    head = [f"class {_class(noun)}Noun:", f'    """Operations on {noun}."""', ""]
-    head += ["    def __init__(self, connection: Connection) -> None:"]
-    head += ["        self._connection = connection"]
-    body = "\n".join([*head, "", *(method.source() for method in methods)])
+    head = [f"class {_class(noun)}Noun(Noun):", f'    """Operations on {noun}."""', ""]
+    body = "\n".join([*head, *(method.source() for method in methods)])
     used = {name for one in operations for name in _references(_success(one[2])[1])}
     used |= {name for one in operations for name in _sent(one[2], schemas)}
     lines = [f'"""Operations on {noun} of a city.', "", f'{BY}\n"""', ""]
     lines += [*_typing(body), *_imports(used, schemas)]
-    more = ", part" if "{part(" in body else ""
-    lines.append(f"from scm.client.connection import Connection{more}")
+    lines.append("from scm.client.operation import Noun, operation")
     lines += ["from scm.client.stream import LiveEvent"] if "[LiveEvent]" in body else []
     return "\n".join([*lines, "", "", body])
 

@@ -43,13 +43,6 @@ def test_every_operation_has_a_method_of_its_noun(document):
     client.close()
 
 
-def test_an_operation_without_an_answer_returns_none(maker, document):
-    made = maker.files(document)
-    remove = made["nouns/scenarios.py"].partition("def remove(")[2].partition("def ")[0]
-    assert "-> None" in remove
-    assert 'self._connection.send_only("DELETE"' in remove
-
-
 def test_a_new_route_would_be_noticed(maker, document):
     """The first test fails for it: it changes what would be written."""
     path = "/api/v1/stations/{name}/mood"

@@ -5,17 +5,15 @@ Written by docs/make/client.py: do not change it here.
 
 from typing import Literal
 
-from scm.client.connection import Connection, part
+from scm.client.operation import Noun, operation
 from scm.records.audit import AuditRow, ChainVerdict
 from scm.records.page import Page
 
 
-class AuditNoun:
+class AuditNoun(Noun):
     """Operations on audit."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/audit")
     def deeds(
         self,
         *,
@@ -29,27 +27,13 @@ class AuditNoun:
         """Deeds, newest first.
 
         Args:
-            limit: rows a page
-            cursor: `next` of the page before; empty: the first page
             station: who did it
             by: who asked
             kind: part of class or path
             text: to be found in it
         """
-        return self._connection.request(
-            "GET",
-            "/api/v1/audit",
-            Page[AuditRow],
-            query={
-                "limit": limit,
-                "cursor": cursor,
-                "station": station,
-                "by": by,
-                "kind": kind,
-                "text": text,
-            },
-        )
 
+    @operation("GET", "/api/v1/audit.{form}")
     def export(
         self,
         form: Literal["csv", "jsonl"],
@@ -68,11 +52,8 @@ class AuditNoun:
             kind: part of class or path
             text: to be found in it
         """
-        return self._connection.fetch(
-            f"/api/v1/audit.{part(form)}",
-            query={"station": station, "by": by, "kind": kind, "text": text},
-        )
 
+    @operation("GET", "/api/v1/audit/verdict")
     def verdict(self, *, number: int = 0, digest: str = "") -> ChainVerdict:
         """Check the whole chain.
 
@@ -80,6 +61,3 @@ class AuditNoun:
             number: of an entry noted before; 0: none
             digest: its hash, noted before
         """
-        return self._connection.request(
-            "GET", "/api/v1/audit/verdict", ChainVerdict, query={"number": number, "digest": digest}
-        )

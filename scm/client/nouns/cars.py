@@ -6,20 +6,18 @@ Written by docs/make/client.py: do not change it here.
 from collections.abc import Iterator
 from typing import Literal
 
-from scm.client.connection import Connection, part
+from scm.client.operation import Noun, operation
 from scm.records.cars import CarFile, CarFiles
 
 
-class CarsNoun:
+class CarsNoun(Noun):
     """Operations on cars."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/cars")
     def all_cars(self) -> CarFiles:
         """All car files of this city."""
-        return self._connection.request("GET", "/api/v1/cars", CarFiles)
 
+    @operation("POST", "/api/v1/cars")
     def write(
         self,
         *,
@@ -60,33 +58,9 @@ class CarsNoun:
             tag_size_m: black edge of the tag on its roof; 0: none
             lidar: whether it has one
             camera: whether it has one
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "POST",
-            "/api/v1/cars",
-            CarFile,
-            body={
-                "car": car,
-                "scale": scale,
-                "mass_kg": mass_kg,
-                "wheelbase_m": wheelbase_m,
-                "motor": motor,
-                "top_speed_mps": top_speed_mps,
-                "acceleration_mps2": acceleration_mps2,
-                "driven": driven,
-                "length_m": length_m,
-                "width_m": width_m,
-                "track_m": track_m,
-                "wheel_radius_m": wheel_radius_m,
-                "steering_limit_rad": steering_limit_rad,
-                "tag_size_m": tag_size_m,
-                "lidar": lidar,
-                "camera": camera,
-            },
-            key=idempotency_key,
-        )
 
+    @operation("GET", "/api/v1/cars/preview")
     def preview(
         self,
         *,
@@ -127,42 +101,19 @@ class CarsNoun:
             lidar: whether it has one
             camera: whether it has one
         """
-        return self._connection.request(
-            "GET",
-            "/api/v1/cars/preview",
-            CarFile,
-            query={
-                "car": car,
-                "scale": scale,
-                "mass_kg": mass_kg,
-                "wheelbase_m": wheelbase_m,
-                "motor": motor,
-                "top_speed_mps": top_speed_mps,
-                "acceleration_mps2": acceleration_mps2,
-                "driven": driven,
-                "length_m": length_m,
-                "width_m": width_m,
-                "track_m": track_m,
-                "wheel_radius_m": wheel_radius_m,
-                "steering_limit_rad": steering_limit_rad,
-                "tag_size_m": tag_size_m,
-                "lidar": lidar,
-                "camera": camera,
-            },
-        )
 
+    @operation("GET", "/api/v1/cars/{name}.toml")
     def download(self, name: str) -> Iterator[bytes]:
         """Download a car file.
 
         Args:
             name: name of a car file
         """
-        return self._connection.pieces(f"/api/v1/cars/{part(name)}.toml")
 
+    @operation("GET", "/api/v1/cars/{name}")
     def one_car(self, name: str) -> CarFile:
         """One car file.
 
         Args:
             name: name of a car file
         """
-        return self._connection.request("GET", f"/api/v1/cars/{part(name)}", CarFile)

@@ -3,24 +3,17 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from scm.client.connection import Connection, part
+from scm.client.operation import Noun, operation
 from scm.records.cities import Cities, CityRow
 
 
-class CitiesNoun:
+class CitiesNoun(Noun):
     """Operations on cities."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/cities")
     def all_cities(self) -> Cities:
         """The cities that this server shows: its own."""
-        return self._connection.request("GET", "/api/v1/cities", Cities)
 
+    @operation("GET", "/api/v1/cities/{name}")
     def one_city(self, name: str) -> CityRow:
-        """One city.
-
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/cities/{part(name)}", CityRow)
+        """One city."""

@@ -3,16 +3,13 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from scm.client.connection import Connection
+from scm.client.operation import Noun, operation
 from scm.records.disturbances import DisturbanceList
 
 
-class DisturbancesNoun:
+class DisturbancesNoun(Noun):
     """Operations on disturbances."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/disturbances")
     def disturbances(self) -> DisturbanceList:
         """What made measurements void in the last hour, and does so now."""
-        return self._connection.request("GET", "/api/v1/disturbances", DisturbanceList)

@@ -6,7 +6,7 @@ Written by docs/make/client.py: do not change it here.
 from collections.abc import Iterator
 from typing import Any, Literal
 
-from scm.client.connection import Connection, part
+from scm.client.operation import Noun, operation
 from scm.records.eye import CameraRow, CameraState, Overhead, PoseRow, Residuals, TrackList
 from scm.records.eye_calibrations import CalibrationFile, CalibrationRow, View, Views
 from scm.records.operations import Operation
@@ -15,142 +15,86 @@ from scm.v2x.messages.calibration_request import CalibrationReply
 from scm.v2x.messages.eye_tags import EyeTags
 
 
-class EyeNoun:
+class EyeNoun(Noun):
     """Operations on eye."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/eye")
     def overhead(self) -> Overhead:
         """All cameras, with tags and poses seen."""
-        return self._connection.request("GET", "/api/v1/eye", Overhead)
 
+    @operation("GET", "/api/v1/eye/cameras")
     def cameras(self, *, limit: int = 100, cursor: str = "") -> Page[CameraRow]:
-        """The cameras, a page.
+        """The cameras, a page."""
 
-        Args:
-            limit: rows a page
-            cursor: `next` of the page before; empty: the first page
-        """
-        return self._connection.request(
-            "GET", "/api/v1/eye/cameras", Page[CameraRow], query={"limit": limit, "cursor": cursor}
-        )
-
+    @operation("GET", "/api/v1/eye/cameras/{name}")
     def camera(self, name: str) -> CameraState:
-        """One camera.
+        """One camera."""
 
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/eye/cameras/{part(name)}", CameraState)
-
+    @operation("GET", "/api/v1/eye/cameras/{name}/frame.jpg")
     def frame(self, name: str, *, t_ns: int | None = None) -> bytes:
         """A camera's newest picture.
 
         Args:
-            name: a name on the bus
             t_ns: exposure of the picture; none: the newest
         """
-        return self._connection.fetch(
-            f"/api/v1/eye/cameras/{part(name)}/frame.jpg", query={"t_ns": t_ns}
-        )
 
+    @operation("GET", "/api/v1/eye/cameras/{name}/tags")
     def tags(self, name: str) -> EyeTags:
-        """The tags found in a camera's newest picture.
+        """The tags found in a camera's newest picture."""
 
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/eye/cameras/{part(name)}/tags", EyeTags)
-
+    @operation("GET", "/api/v1/eye/poses")
     def poses(self, *, limit: int = 100, cursor: str = "") -> Page[PoseRow]:
-        """The newest pose of each car by each camera.
+        """The newest pose of each car by each camera."""
 
-        Args:
-            limit: rows a page
-            cursor: `next` of the page before; empty: the first page
-        """
-        return self._connection.request(
-            "GET", "/api/v1/eye/poses", Page[PoseRow], query={"limit": limit, "cursor": cursor}
-        )
-
+    @operation("GET", "/api/v1/eye/tracks")
     def tracks(self) -> TrackList:
         """Where each car is by all cameras together."""
-        return self._connection.request("GET", "/api/v1/eye/tracks", TrackList)
 
+    @operation("GET", "/api/v1/eye/cameras/{name}/residuals")
     def residuals(
         self, name: str, *, window_s: float = 120.0, vehicle: str = "", most: int = 1000
     ) -> Residuals:
         """How far a camera's poses lay from the truth.
 
         Args:
-            name: a name on the bus
             window_s: how far back [s]
             vehicle: one car; empty: all
             most: samples at most, evenly taken
         """
-        return self._connection.request(
-            "GET",
-            f"/api/v1/eye/cameras/{part(name)}/residuals",
-            Residuals,
-            query={"window_s": window_s, "vehicle": vehicle, "most": most},
-        )
 
+    @operation("GET", "/api/v1/eye/cameras/{name}/views")
     def views(self, name: str) -> Views:
-        """Pictures of a board, and what was found in them.
+        """Pictures of a board, and what was found in them."""
 
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/eye/cameras/{part(name)}/views", Views)
-
+    @operation("POST", "/api/v1/eye/cameras/{name}/views")
     def add_view(self, name: str, *, content: bytes, idempotency_key: str = "") -> View:
         """Keep a picture of a board: one that is sent, or the camera's newest.
 
         Args:
-            name: a name on the bus
             content: What to send.
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.send(
-            "POST", f"/api/v1/eye/cameras/{part(name)}/views", View, content, key=idempotency_key
-        )
 
+    @operation("DELETE", "/api/v1/eye/cameras/{name}/views")
     def delete_views(self, name: str, *, idempotency_key: str = "") -> Views:
-        """Throw all pictures of a board away.
+        """Throw all pictures of a board away."""
 
-        Args:
-            name: a name on the bus
-            idempotency_key: Same key, same effect, once; empty: a new one.
-        """
-        return self._connection.request(
-            "DELETE", f"/api/v1/eye/cameras/{part(name)}/views", Views, key=idempotency_key
-        )
-
+    @operation("GET", "/api/v1/eye/cameras/{name}/views/{view}")
     def view(self, name: str, view: str) -> bytes:
         """A picture of a board.
 
         Args:
-            name: a name on the bus
             view: a picture's file name
         """
-        return self._connection.fetch(f"/api/v1/eye/cameras/{part(name)}/views/{part(view)}")
 
+    @operation("DELETE", "/api/v1/eye/cameras/{name}/views/{view}")
     def delete_view(self, name: str, view: str, *, idempotency_key: str = "") -> Views:
         """Throw a picture of a board away.
 
         Args:
-            name: a name on the bus
             view: a picture's file name
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "DELETE",
-            f"/api/v1/eye/cameras/{part(name)}/views/{part(view)}",
-            Views,
-            key=idempotency_key,
-        )
 
+    @operation("POST", "/api/v1/eye/cameras/{name}/lens")
     def lens(
         self,
         name: str,
@@ -169,7 +113,6 @@ class EyeNoun:
         """Look for a board in all pictures, or measure the lens by them.
 
         Args:
-            name: a name on the bus
             board: what was printed
             columns: squares, or tags, across
             rows: squares, or tags, down
@@ -179,26 +122,9 @@ class EyeNoun:
             first_id: of the tag at the lower left
             fisheye: a lens of more than about 100 degrees
             save_as: what the lens is called, as with a place; null: only look
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "POST",
-            f"/api/v1/eye/cameras/{part(name)}/lens",
-            Operation,
-            body={
-                "board": board,
-                "columns": columns,
-                "rows": rows,
-                "square_m": square_m,
-                "marker_m": marker_m,
-                "dictionary": dictionary,
-                "first_id": first_id,
-                "fisheye": fisheye,
-                "save_as": save_as,
-            },
-            key=idempotency_key,
-        )
 
+    @operation("POST", "/api/v1/eye/cameras/{name}/place")
     def place(
         self,
         name: str,
@@ -211,44 +137,24 @@ class EyeNoun:
         """Find where a camera hangs, by the tags on the floor that it sees now.
 
         Args:
-            name: a name on the bus
             lens: a stored lens; null: the map's
             tags: tags on the floor beside the map's: id, x_m, y_m, yaw_rad, size_m of each
             save_as: what the result is called, with a number where it is taken by then
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "POST",
-            f"/api/v1/eye/cameras/{part(name)}/place",
-            Operation,
-            body={"lens": lens, "tags": tags, "save_as": save_as},
-            key=idempotency_key,
-        )
 
+    @operation("GET", "/api/v1/eye/calibrations")
     def calibrations(self, *, limit: int = 100, cursor: str = "") -> Page[CalibrationRow]:
-        """All calibrations kept, newest first.
+        """All calibrations kept, newest first."""
 
-        Args:
-            limit: rows a page
-            cursor: `next` of the page before; empty: the first page
-        """
-        return self._connection.request(
-            "GET",
-            "/api/v1/eye/calibrations",
-            Page[CalibrationRow],
-            query={"limit": limit, "cursor": cursor},
-        )
-
+    @operation("GET", "/api/v1/eye/calibrations/{name}")
     def calibration(self, name: str) -> CalibrationFile:
         """One.
 
         Args:
             name: a calibration's name
         """
-        return self._connection.request(
-            "GET", f"/api/v1/eye/calibrations/{part(name)}", CalibrationFile
-        )
 
+    @operation("PUT", "/api/v1/eye/calibrations/{name}")
     def write(
         self,
         name: str,
@@ -262,20 +168,10 @@ class EyeNoun:
 
         Args:
             name: a calibration's name
-            if_match: ETag of the state that was edited; `*`: whichever there is
-            if_none_match: `*`: only where there is none yet
             toml: a lens of `scm eye calibrate`, or one [[cameras]] block
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "PUT",
-            f"/api/v1/eye/calibrations/{part(name)}",
-            CalibrationFile,
-            headers={"if-match": if_match, "if-none-match": if_none_match},
-            body={"toml": toml},
-            key=idempotency_key,
-        )
 
+    @operation("DELETE", "/api/v1/eye/calibrations/{name}")
     def delete(
         self,
         name: str,
@@ -288,36 +184,25 @@ class EyeNoun:
 
         Args:
             name: a calibration's name
-            if_match: ETag of the state that was edited; `*`: whichever there is
-            if_none_match: `*`: only where there is none yet
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "DELETE",
-            f"/api/v1/eye/calibrations/{part(name)}",
-            CalibrationFile,
-            headers={"if-match": if_match, "if-none-match": if_none_match},
-            key=idempotency_key,
-        )
 
+    @operation("GET", "/api/v1/eye/calibrations/{name}/report")
     def report(self, name: str) -> dict[str, Any]:
         """How a calibration was found.
 
         Args:
             name: a calibration's name
         """
-        return self._connection.request(
-            "GET", f"/api/v1/eye/calibrations/{part(name)}/report", dict[str, Any]
-        )
 
+    @operation("GET", "/api/v1/eye/calibrations/{name}/file.toml")
     def download(self, name: str) -> Iterator[bytes]:
         """Download a calibration.
 
         Args:
             name: a calibration's name
         """
-        return self._connection.pieces(f"/api/v1/eye/calibrations/{part(name)}/file.toml")
 
+    @operation("PUT", "/api/v1/eye/cameras/{name}/calibration")
     def use(
         self,
         name: str,
@@ -331,46 +216,25 @@ class EyeNoun:
         """See by a calibration from the next frame on.
 
         Args:
-            name: a name on the bus
             by: who requests it, for the log; empty: whoever calls
             reason: why
             calibration: a stored calibration
             accept_unsure: whether it is meant although the Eye would flag its poses as unsure and
                 guarded cars would stop; without it such a calibration is a 409 of code `unsure`
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "PUT",
-            f"/api/v1/eye/cameras/{part(name)}/calibration",
-            CalibrationReply,
-            body={
-                "by": by,
-                "reason": reason,
-                "calibration": calibration,
-                "accept_unsure": accept_unsure,
-            },
-            key=idempotency_key,
-        )
 
+    @operation("POST", "/api/v1/eye/cameras/{name}/calibration/back")
     def back(
         self, name: str, *, by: str = "", reason: str, idempotency_key: str = ""
     ) -> CalibrationReply:
         """Put back what the camera saw by before.
 
         Args:
-            name: a name on the bus
             by: who requests it, for the log; empty: whoever calls
             reason: why
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "POST",
-            f"/api/v1/eye/cameras/{part(name)}/calibration/back",
-            CalibrationReply,
-            body={"by": by, "reason": reason},
-            key=idempotency_key,
-        )
 
+    @operation("GET", "/api/v1/eye/print/tags.pdf")
     def print_tags(
         self,
         *,
@@ -385,11 +249,8 @@ class EyeNoun:
             paper: of the printer
             map_tag: whether with the tag on the floor
         """
-        return self._connection.pieces(
-            "/api/v1/eye/print/tags.pdf",
-            query={"vehicles": vehicles, "paper": paper, "map_tag": map_tag},
-        )
 
+    @operation("GET", "/api/v1/eye/print/board.pdf")
     def print_board(
         self,
         *,
@@ -412,15 +273,3 @@ class EyeNoun:
             first_id: of a grid of tags
             paper: of the printer
         """
-        return self._connection.pieces(
-            "/api/v1/eye/print/board.pdf",
-            query={
-                "board": board,
-                "columns": columns,
-                "rows": rows,
-                "square_mm": square_mm,
-                "marker_mm": marker_mm,
-                "first_id": first_id,
-                "paper": paper,
-            },
-        )

@@ -5,22 +5,20 @@ Written by docs/make/client.py: do not change it here.
 
 from collections.abc import Iterator
 
-from scm.client.connection import Connection, part
+from scm.client.operation import Noun, operation
 from scm.records.mismatch import DrivePlans, Offers, Report, ReportRow, Upload
 from scm.records.operations import Operation
 from scm.records.page import Page
 
 
-class MismatchNoun:
+class MismatchNoun(Noun):
     """Operations on mismatch."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/mismatch/offers")
     def offers(self) -> Offers:
         """What can be searched."""
-        return self._connection.request("GET", "/api/v1/mismatch/offers", Offers)
 
+    @operation("POST", "/api/v1/mismatch/jobs")
     def search(
         self,
         *,
@@ -46,75 +44,38 @@ class MismatchNoun:
                 1800, of a search again as before
             from_s: leave out what is before, since its begin [s]
             to_s: leave out what is after [s]
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "POST",
-            "/api/v1/mismatch/jobs",
-            Operation,
-            body={
-                "recording": recording,
-                "upload": upload,
-                "again": again,
-                "vehicle": vehicle,
-                "car": car,
-                "budget_s": budget_s,
-                "from_s": from_s,
-                "to_s": to_s,
-            },
-            key=idempotency_key,
-        )
 
+    @operation("POST", "/api/v1/mismatch/uploads")
     def upload(self, *, name: str = "", content: bytes, idempotency_key: str = "") -> Upload:
         """Send a recording: a zip with recording.yaml, or of a run.
 
         Args:
             name: what to call it
             content: What to send.
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.send(
-            "POST",
-            "/api/v1/mismatch/uploads",
-            Upload,
-            content,
-            query={"name": name},
-            key=idempotency_key,
-        )
 
+    @operation("GET", "/api/v1/mismatch/reports")
     def reports(self, *, limit: int = 100, cursor: str = "") -> Page[ReportRow]:
-        """All reports, newest first.
+        """All reports, newest first."""
 
-        Args:
-            limit: rows a page
-            cursor: `next` of the page before; empty: the first page
-        """
-        return self._connection.request(
-            "GET",
-            "/api/v1/mismatch/reports",
-            Page[ReportRow],
-            query={"limit": limit, "cursor": cursor},
-        )
-
+    @operation("GET", "/api/v1/mismatch/reports/{name}")
     def report(self, name: str) -> Report:
         """One report.
 
         Args:
             name: a report's name
         """
-        return self._connection.request("GET", f"/api/v1/mismatch/reports/{part(name)}", Report)
 
+    @operation("DELETE", "/api/v1/mismatch/reports/{name}")
     def remove(self, name: str, *, idempotency_key: str = "") -> None:
         """Remove a report.
 
         Args:
             name: a report's name
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        self._connection.send_only(
-            "DELETE", f"/api/v1/mismatch/reports/{part(name)}", key=idempotency_key
-        )
 
+    @operation("GET", "/api/v1/mismatch/reports/{name}/files/{file}")
     def download(self, name: str, file: str) -> Iterator[bytes]:
         """Download a file of a report.
 
@@ -122,8 +83,8 @@ class MismatchNoun:
             name: a report's name
             file: which file
         """
-        return self._connection.pieces(f"/api/v1/mismatch/reports/{part(name)}/files/{part(file)}")
 
+    @operation("GET", "/api/v1/mismatch/reports/{name}/drives/{drive}")
     def plans(self, name: str, drive: str) -> DrivePlans:
         """A suggested drive.
 
@@ -131,12 +92,10 @@ class MismatchNoun:
             name: a report's name
             drive: a suggested drive
         """
-        return self._connection.request(
-            "GET", f"/api/v1/mismatch/reports/{part(name)}/drives/{part(drive)}", DrivePlans
-        )
 
+    @operation("POST", "/api/v1/mismatch/reports/{name}/drives/{drive}/play")
     def play(
-        self, name: str, drive: str, *, vehicle: str, part_: int = 1, idempotency_key: str = ""
+        self, name: str, drive: str, *, vehicle: str, part: int = 1, idempotency_key: str = ""
     ) -> Operation:
         """Let a car of the city play a drive of a report.
 
@@ -144,13 +103,5 @@ class MismatchNoun:
             name: a report's name
             drive: a suggested drive
             vehicle: a car of the city
-            part_: of a drive in parts, between which the car is changed
-            idempotency_key: Same key, same effect, once; empty: a new one.
+            part: of a drive in parts, between which the car is changed
         """
-        return self._connection.request(
-            "POST",
-            f"/api/v1/mismatch/reports/{part(name)}/drives/{part(drive)}/play",
-            Operation,
-            body={"vehicle": vehicle, "part": part_},
-            key=idempotency_key,
-        )

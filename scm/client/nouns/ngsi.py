@@ -5,15 +5,13 @@ Written by docs/make/client.py: do not change it here.
 
 from typing import Any, Literal
 
-from scm.client.connection import Connection, part
+from scm.client.operation import Noun, operation
 
 
-class NgsiNoun:
+class NgsiNoun(Noun):
     """Operations on ngsi."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/ngsi-ld/v1/entities")
     def all_entities(
         self,
         *,
@@ -27,24 +25,12 @@ class NgsiNoun:
 
         Args:
             type_: comma between: Vehicle, RoadSegment, TrafficFlowObserved; none: all
-            limit: at most
             offset: to skip
             count: tell how many there are in all
             options: `keyValues`, `simplified`: attributes are their values
         """
-        return self._connection.request(
-            "GET",
-            "/ngsi-ld/v1/entities",
-            tuple[dict[str, Any], ...],
-            query={
-                "type": type_,
-                "limit": limit,
-                "offset": offset,
-                "count": count,
-                "options": options,
-            },
-        )
 
+    @operation("GET", "/ngsi-ld/v1/entities/{entity}")
     def one_entity(
         self, entity: str, *, options: Literal["", "normalized", "keyValues", "simplified"] = ""
     ) -> dict[str, Any]:
@@ -54,9 +40,3 @@ class NgsiNoun:
             entity: its urn
             options: `keyValues`, `simplified`: attributes are their values
         """
-        return self._connection.request(
-            "GET",
-            f"/ngsi-ld/v1/entities/{part(entity)}",
-            dict[str, Any],
-            query={"options": options},
-        )

@@ -5,35 +5,33 @@ Written by docs/make/client.py: do not change it here.
 
 from collections.abc import Iterator
 
-from scm.client.connection import Connection, part
+from scm.client.operation import Noun, operation
 from scm.records.disturbances import RecordedDisturbances
 from scm.records.operations import Operation
 from scm.records.page import Page
 from scm.records.recordings import Frames, Notes, RecordedEvent, RecordingRow, Summary
 
 
-class RecordingsNoun:
+class RecordingsNoun(Noun):
     """Operations on recordings."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/recordings/{name}.mcap")
     def file(self, name: str) -> Iterator[bytes]:
         """The file as the recorder wrote it, or a range of it.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.pieces(f"/api/v1/recordings/{part(name)}.mcap")
 
+    @operation("GET", "/api/v1/recordings/{name}/foxglove.mcap")
     def foxglove(self, name: str) -> Iterator[bytes]:
         """The file for Foxglove.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.pieces(f"/api/v1/recordings/{part(name)}/foxglove.mcap")
 
+    @operation("GET", "/api/v1/recordings/{name}/csv")
     def as_csv(
         self, name: str, *, vehicle: str = "", from_s: float = 0.0, to_s: float | None = None
     ) -> bytes:
@@ -45,19 +43,16 @@ class RecordingsNoun:
             from_s: seconds since the recording began
             to_s: to when; without: to the end
         """
-        return self._connection.fetch(
-            f"/api/v1/recordings/{part(name)}/csv",
-            query={"vehicle": vehicle, "from_s": from_s, "to_s": to_s},
-        )
 
+    @operation("GET", "/api/v1/recordings/{name}/summary")
     def summary(self, name: str) -> Summary:
         """What a replay has to know first.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.request("GET", f"/api/v1/recordings/{part(name)}/summary", Summary)
 
+    @operation("GET", "/api/v1/recordings/{name}/frames")
     def frames(
         self, name: str, *, from_s: float = 0.0, to_s: float = 10.0, hz: float = 10.0
     ) -> Frames:
@@ -69,38 +64,24 @@ class RecordingsNoun:
             to_s: seconds since the recording began
             hz: frames a second, at most
         """
-        return self._connection.request(
-            "GET",
-            f"/api/v1/recordings/{part(name)}/frames",
-            Frames,
-            query={"from_s": from_s, "to_s": to_s, "hz": hz},
-        )
 
+    @operation("GET", "/api/v1/recordings/{name}/events")
     def events(self, name: str, *, limit: int = 500, cursor: str = "") -> Page[RecordedEvent]:
         """Its events, in their order.
 
         Args:
             name: a recording: its file without .mcap
-            limit: rows a page
-            cursor: `next` of the page before; empty: the first page
         """
-        return self._connection.request(
-            "GET",
-            f"/api/v1/recordings/{part(name)}/events",
-            Page[RecordedEvent],
-            query={"limit": limit, "cursor": cursor},
-        )
 
+    @operation("GET", "/api/v1/recordings/{name}/disturbances")
     def disturbances(self, name: str) -> RecordedDisturbances:
         """What made measurements void while it was recorded.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.request(
-            "GET", f"/api/v1/recordings/{part(name)}/disturbances", RecordedDisturbances
-        )
 
+    @operation("GET", "/api/v1/recordings/{name}/eye/{camera}.jpg")
     def picture(self, name: str, camera: str, *, t_s: float = 0.0) -> bytes:
         """What an overhead camera saw, at a time.
 
@@ -109,40 +90,34 @@ class RecordingsNoun:
             camera: an overhead camera
             t_s: seconds since the recording began
         """
-        return self._connection.fetch(
-            f"/api/v1/recordings/{part(name)}/eye/{part(camera)}.jpg", query={"t_s": t_s}
-        )
 
+    @operation("GET", "/api/v1/recordings/{name}/vehicles/{vehicle}/camera/{camera}.jpg")
     def car_picture(self, name: str, vehicle: str, camera: str, *, t_s: float = 0.0) -> bytes:
         """What a car's own camera saw, at a time.
 
         Args:
             name: a recording: its file without .mcap
-            vehicle: a name on the bus
             camera: one of its cameras
             t_s: seconds since the recording began
         """
-        return self._connection.fetch(
-            f"/api/v1/recordings/{part(name)}/vehicles/{part(vehicle)}/camera/{part(camera)}.jpg",
-            query={"t_s": t_s},
-        )
 
+    @operation("GET", "/api/v1/recordings/{name}/map.svg")
     def map_svg(self, name: str) -> bytes:
         """The map it was driven on.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.fetch(f"/api/v1/recordings/{part(name)}/map.svg")
 
+    @operation("GET", "/api/v1/recordings/{name}/notes")
     def notes(self, name: str) -> Notes:
         """What people wrote about it.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.request("GET", f"/api/v1/recordings/{part(name)}/notes", Notes)
 
+    @operation("PUT", "/api/v1/recordings/{name}/notes")
     def write(
         self,
         name: str,
@@ -157,21 +132,11 @@ class RecordingsNoun:
 
         Args:
             name: a recording: its file without .mcap
-            if_match: ETag of the state that was edited; `*`: whichever there is
-            if_none_match: `*`: only where there is none yet
             title: shown first
             notes: in words, as long as need be
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "PUT",
-            f"/api/v1/recordings/{part(name)}/notes",
-            Notes,
-            headers={"if-match": if_match, "if-none-match": if_none_match},
-            body={"title": title, "notes": notes},
-            key=idempotency_key,
-        )
 
+    @operation("POST", "/api/v1/recordings/{name}/parts")
     def cut(
         self,
         name: str,
@@ -186,45 +151,24 @@ class RecordingsNoun:
             name: a recording: its file without .mcap
             from_s: seconds since the recording began
             to_s: likewise; without: to the end
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "POST",
-            f"/api/v1/recordings/{part(name)}/parts",
-            Operation,
-            body={"from_s": from_s, "to_s": to_s},
-            key=idempotency_key,
-        )
 
+    @operation("GET", "/api/v1/recordings")
     def all_recordings(self, *, limit: int = 100, cursor: str = "") -> Page[RecordingRow]:
-        """All recordings, the one written last first.
+        """All recordings, the one written last first."""
 
-        Args:
-            limit: rows a page
-            cursor: `next` of the page before; empty: the first page
-        """
-        return self._connection.request(
-            "GET",
-            "/api/v1/recordings",
-            Page[RecordingRow],
-            query={"limit": limit, "cursor": cursor},
-        )
-
+    @operation("GET", "/api/v1/recordings/{name}")
     def one_recording(self, name: str) -> RecordingRow:
         """One recording.
 
         Args:
             name: a recording: its file without .mcap
         """
-        return self._connection.request("GET", f"/api/v1/recordings/{part(name)}", RecordingRow)
 
+    @operation("DELETE", "/api/v1/recordings/{name}")
     def remove(self, name: str, *, idempotency_key: str = "") -> None:
         """Delete a recording.
 
         Args:
             name: a recording: its file without .mcap
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        self._connection.send_only(
-            "DELETE", f"/api/v1/recordings/{part(name)}", key=idempotency_key
-        )

@@ -5,29 +5,18 @@ Written by docs/make/client.py: do not change it here.
 
 from collections.abc import Iterator
 
-from scm.client.connection import Connection, part
+from scm.client.operation import Noun, operation
 from scm.client.stream import LiveEvent
 from scm.records.scans import ScanRow
 
 
-class ScansNoun:
+class ScansNoun(Noun):
     """Operations on scans."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/vehicles/{name}/scan")
     def one(self, name: str) -> ScanRow:
-        """The next turn of a car's LIDAR.
+        """The next turn of a car's LIDAR."""
 
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/scan", ScanRow)
-
+    @operation("GET", "/api/v1/vehicles/{name}/scan/stream")
     def every(self, name: str) -> Iterator[LiveEvent]:
-        """Every turn, as server-sent events.
-
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.events(f"/api/v1/vehicles/{part(name)}/scan/stream")
+        """Every turn, as server-sent events."""

@@ -3,24 +3,21 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from scm.client.connection import Connection
+from scm.client.operation import Noun, operation
 from scm.records.session import Ended, Session
 
 
-class SessionNoun:
+class SessionNoun(Noun):
     """Operations on session."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/session")
     def session(self) -> Session:
         """Who this key says you are."""
-        return self._connection.request("GET", "/api/v1/session", Session)
 
+    @operation("PUT", "/api/v1/session")
     def begin(self) -> Session:
         """Keep this key as a cookie, good for reading."""
-        return self._connection.request("PUT", "/api/v1/session", Session)
 
+    @operation("DELETE", "/api/v1/session")
     def end(self) -> Ended:
         """Forget the cookie."""
-        return self._connection.request("DELETE", "/api/v1/session", Ended)

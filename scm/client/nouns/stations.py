@@ -3,34 +3,21 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from scm.client.connection import Connection, part
+from scm.client.operation import Noun, operation
 from scm.records.stations import StationEvents, Stations
 
 
-class StationsNoun:
+class StationsNoun(Noun):
     """Operations on stations."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/stations")
     def all_stations(self) -> Stations:
         """All stations."""
-        return self._connection.request("GET", "/api/v1/stations", Stations)
 
+    @operation("GET", "/api/v1/stations/{name}")
     def one_station(self, name: str) -> Stations:
-        """One station.
+        """One station."""
 
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/stations/{part(name)}", Stations)
-
+    @operation("GET", "/api/v1/stations/{name}/events")
     def station_events(self, name: str) -> StationEvents:
-        """The last events that a station told, or that are about it.
-
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request(
-            "GET", f"/api/v1/stations/{part(name)}/events", StationEvents
-        )
+        """The last events that a station told, or that are about it."""

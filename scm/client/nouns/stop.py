@@ -3,20 +3,18 @@
 Written by docs/make/client.py: do not change it here.
 """
 
-from scm.client.connection import Connection
+from scm.client.operation import Noun, operation
 from scm.v2x.messages.city_stop import CityStop
 
 
-class StopNoun:
+class StopNoun(Noun):
     """Operations on stop."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/stop")
     def stop(self) -> CityStop:
         """Whether the city-wide stop is engaged."""
-        return self._connection.request("GET", "/api/v1/stop", CityStop)
 
+    @operation("PUT", "/api/v1/stop")
     def set_stop(
         self, *, engaged: bool, by: str = "", reason: str = "", idempotency_key: str = ""
     ) -> CityStop:
@@ -26,12 +24,4 @@ class StopNoun:
             engaged: true: stop every car
             by: who requests it, for the log; empty: whoever calls
             reason: why, for the log
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "PUT",
-            "/api/v1/stop",
-            CityStop,
-            body={"engaged": engaged, "by": by, "reason": reason},
-            key=idempotency_key,
-        )

@@ -5,16 +5,14 @@ Written by docs/make/client.py: do not change it here.
 
 from collections.abc import Iterator
 
-from scm.client.connection import Connection
+from scm.client.operation import Noun, operation
 from scm.client.stream import LiveEvent
 
 
-class StreamNoun:
+class StreamNoun(Noun):
     """Operations on stream."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/stream")
     def live(self, *, topics: str = "") -> Iterator[LiveEvent]:
         """What is live: a snapshot, then what changed, at 20 Hz.
 
@@ -22,8 +20,7 @@ class StreamNoun:
             topics: those to hear, comma between: pulse, stop, vehicles, signals, signal_status,
                 boxes, acknowledgements, eye, stations, events; none: all
         """
-        return self._connection.events("/api/v1/stream", query={"topics": topics})
 
+    @operation("GET", "/api/v1/vehicles.bin")
     def states(self) -> Iterator[bytes]:
         """All cars' states at 20 Hz, binary; the layout stands in docs/dashboard/map.md."""
-        return self._connection.pieces("/api/v1/vehicles.bin")

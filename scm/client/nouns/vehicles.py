@@ -6,7 +6,7 @@ Written by docs/make/client.py: do not change it here.
 from collections.abc import Iterator
 from typing import Literal
 
-from scm.client.connection import Connection, part
+from scm.client.operation import Noun, operation
 from scm.client.stream import LiveEvent
 from scm.records.vehicles import LinkRow, PathRow, VehicleRow, VehiclesTopic
 from scm.v2x.messages.light_request import LightReply
@@ -15,43 +15,30 @@ from scm.v2x.messages.route_request import RouteReply
 from scm.v2x.messages.spawn_request import SpawnReply
 
 
-class VehiclesNoun:
+class VehiclesNoun(Noun):
     """Operations on vehicles."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-
+    @operation("GET", "/api/v1/vehicles/{name}/reports")
     def reports(self, name: str, *, scan: bool = False) -> Iterator[LiveEvent]:
         """All that a car reports, as server-sent events `reports`.
 
         Args:
-            name: a name on the bus
             scan: each turn of its LIDAR too, as `scan`; null: it has none
         """
-        return self._connection.events(
-            f"/api/v1/vehicles/{part(name)}/reports", query={"scan": scan}
-        )
 
+    @operation("GET", "/api/v1/vehicles/{name}/link")
     def link(self, name: str) -> LinkRow:
-        """How long the way to a car and back is now.
+        """How long the way to a car and back is now."""
 
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/link", LinkRow)
-
+    @operation("GET", "/api/v1/vehicles/{name}/path")
     def path(self, name: str) -> PathRow:
-        """A car's way ahead, at most 12 m of it.
+        """A car's way ahead, at most 12 m of it."""
 
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}/path", PathRow)
-
+    @operation("GET", "/api/v1/vehicles")
     def all_vehicles(self) -> VehiclesTopic:
         """All cars on the map."""
-        return self._connection.request("GET", "/api/v1/vehicles", VehiclesTopic)
 
+    @operation("POST", "/api/v1/vehicles")
     def spawn(
         self, *, vehicle: str = "", car: str = "nigel", spawn: str = "", idempotency_key: str = ""
     ) -> SpawnReply:
@@ -61,40 +48,21 @@ class VehiclesNoun:
             vehicle: its name; empty: the world names it
             car: name of its car file
             spawn: a spawn place, or X,Y,DEG (metres, degrees, map frame); empty: any free one
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "POST",
-            "/api/v1/vehicles",
-            SpawnReply,
-            body={"vehicle": vehicle, "car": car, "spawn": spawn},
-            key=idempotency_key,
-        )
 
+    @operation("GET", "/api/v1/vehicles/{name}")
     def one_car(self, name: str) -> VehicleRow:
-        """One car.
+        """One car."""
 
-        Args:
-            name: a name on the bus
-        """
-        return self._connection.request("GET", f"/api/v1/vehicles/{part(name)}", VehicleRow)
-
+    @operation("DELETE", "/api/v1/vehicles/{name}")
     def remove(self, name: str, *, reason: str = "", idempotency_key: str = "") -> RemoveReply:
         """Take a car off the map.
 
         Args:
-            name: a name on the bus
             reason: why, for the log
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "DELETE",
-            f"/api/v1/vehicles/{part(name)}",
-            RemoveReply,
-            query={"reason": reason},
-            key=idempotency_key,
-        )
 
+    @operation("POST", "/api/v1/vehicles/{name}/route")
     def route(
         self,
         name: str,
@@ -108,21 +76,13 @@ class VehiclesNoun:
         """Send a car on a route.
 
         Args:
-            name: a name on the bus
             via: lanes to pass, in this order
             laps: how often to pass them
             speed_mps: target speed on a free road; null: the limits
             then: at the end of the last lane: stand, or drive on without end
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "POST",
-            f"/api/v1/vehicles/{part(name)}/route",
-            RouteReply,
-            body={"via": via, "laps": laps, "speed_mps": speed_mps, "then": then},
-            key=idempotency_key,
-        )
 
+    @operation("PUT", "/api/v1/vehicles/{name}/lights")
     def lights(
         self,
         name: str,
@@ -134,15 +94,6 @@ class VehiclesNoun:
         """Switch a car's headlights and indicators.
 
         Args:
-            name: a name on the bus
             headlights: null: as they are
             indicators: null: as they are
-            idempotency_key: Same key, same effect, once; empty: a new one.
         """
-        return self._connection.request(
-            "PUT",
-            f"/api/v1/vehicles/{part(name)}/lights",
-            LightReply,
-            body={"headlights": headlights, "indicators": indicators},
-            key=idempotency_key,
-        )
