@@ -10,7 +10,6 @@ from functools import cache
 import numpy as np
 
 from scm.arrays import Bools
-from scm.errors import TermError
 from scm.mismatch.findings import Equation
 from scm.replay.drive import Drive, has_odometer
 from scm.vehicles.car import Car, all_terms
@@ -238,16 +237,3 @@ def _parameter(
         param.reported, key, param.unit, (low - given, high - given), neutral, step, per_unit,
         given, own=how.own,
     )  # fmt: skip
-
-
-def by_name(found: tuple[Candidate, ...], name: str) -> Candidate:
-    """Return a candidate.
-
-    Raises:
-        TermError: when there is none of that name.
-    """
-    for candidate in found:
-        if candidate.name == name:
-            return candidate
-    msg = f"no candidate {name!r}"
-    raise TermError(msg)

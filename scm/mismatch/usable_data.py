@@ -1,6 +1,5 @@
 """The data step: recordings checked and repaired, and of too long ones the pieces compared."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -61,13 +60,6 @@ def check(
     chosen, partly = sampled(usable, compared_s) if usable else (usable, ())
     titles = titles_of(chosen or recordings)
     return Data(tuple(chosen), (*problems, *partly), account, titles)
-
-
-def usable_of(
-    recordings: Sequence[Recording], car: Car, compared_s: float = math.inf
-) -> list[Recording]:
-    """Return the stretches of recordings that a diagnosis would use, repaired."""
-    return list(check(recordings, car, compared_s).recordings)
 
 
 def titles_of(recordings: Sequence[Recording]) -> tuple[str, ...]:

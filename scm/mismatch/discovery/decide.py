@@ -15,14 +15,14 @@ from scm.arrays import Floats
 from scm.mismatch.budget import Question
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect
 from scm.mismatch.discovery.sensor_effects import SensorEffect
-from scm.mismatch.discovery.try_dictionary import Tried, criterion, try_dictionary
+from scm.mismatch.discovery.try_dictionary import DictionaryFits, criterion, try_dictionary
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.findings import Alternative
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.noise import lowered
 from scm.mismatch.select.round import Context, extend, fit_with_noise
-from scm.mismatch.select.search import Explanation, Selection
+from scm.mismatch.select.search import Selection
 
 MARGIN = 10.0  # criterion; what is hardly better than a known effect is that effect
 MAX_BESIDE, MAX_FITTED = 2, 2
@@ -62,7 +62,7 @@ class Discovery:
 
     beside: Hypothesis
     best: Compared | None
-    tried: Tried
+    tried: DictionaryFits
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +82,8 @@ class Offered:
     has_unseen: bool
 
 
-def explain(context: Context, unseen: Floats, found: Selection) -> Explanation:
-    """Return whether a discovered effect leaves nothing that known effects could explain.
+def explain(context: Context, unseen: Floats, found: Selection) -> tuple[bool, Discovery | None]:
+    """Return whether a discovered effect leaves nothing that known effects could explain, and it.
 
     Then no further ones need be searched for: it is better than the best hypothesis by far, on
     unseen data too, and no known effect beside it pays its penalty. It is computed once.
@@ -93,14 +93,14 @@ def explain(context: Context, unseen: Floats, found: Selection) -> Explanation:
         unseen: Weight of each innovation that no fit has seen, (events,); may be all zero.
         found: So far.
     """
-    if found.explanation is not None:
-        return Explanation(ends=False, discovery=found.explanation.discovery)
+    if found.discovery is not None:
+        return False, found.discovery
     known = _compared(context, found.best, unseen)
     discovery = discover(context, found, unseen)
     best, ends = discovery.best, False
     if best and best.cost < known.cost - BY_FAR and not _is_worse(best, known, unseen):
         ends = _one_beside(context, best.fitted) is None
-    return Explanation(ends, discovery)
+    return ends, discovery
 
 
 def decide(
@@ -115,9 +115,8 @@ def decide(
         found: By it.
         unseen: As in `explain`.
     """
-    why = found.explanation
-    if why and why.ends and why.discovery and why.discovery.best:
-        return why.discovery.best.fitted, why.discovery
+    if found.is_explained and found.discovery and found.discovery.best:
+        return found.discovery.best.fitted, found.discovery
     work = partial(_decided, context, found, unseen)
     decided = context.budget.attempt(Question.DISCOVERY, work)
     if decided is None:
@@ -132,7 +131,7 @@ def _decided(
     context: Context, found: Selection, unseen: Floats
 ) -> tuple[Compared, Discovery | None]:
     """Return the better hypothesis, and what was discovered if it is that."""
-    discovery = found.explanation.discovery if found.explanation else None
+    discovery = found.discovery
     if discovery is None or discovery.beside is not found.best:
         discovery = discover(context, found, unseen)
     best = discovery.best
@@ -187,17 +186,22 @@ def _with_one(context: Context, discovered: Compared, unseen: Floats) -> Compare
 def _one_beside(context: Context, fitted: Hypothesis) -> Hypothesis | None:
     """Return the best known effect beside a hypothesis; None where none pays its penalty."""
     best = next(iter(extend(context, fitted).alternatives), None)
-    return None if best is None or _criterion(context, best) > _criterion(context, fitted) else best
+    return (
+        None
+        if best is None or criterion_of(context, best) > criterion_of(context, fitted)
+        else best
+    )
 
 
-def _criterion(context: Context, fitted: Hypothesis) -> float:
+def criterion_of(context: Context, fitted: Hypothesis) -> float:
+    """Return a hypothesis' score and what its effects must gain, in a selection."""
     return criterion(fitted, context.events, len(context.catalogue))
 
 
 def _cost(context: Context, fitted: Hypothesis) -> float:
     """Return what a hypothesis and the noise that it leaves cost together."""
     sizes = float(context.fitter(fitted.model).part @ fitted.model.log_size)
-    return _criterion(context, fitted) + sizes
+    return criterion_of(context, fitted) + sizes
 
 
 def _compared(context: Context, fitted: Hypothesis, unseen: Floats) -> Compared:
@@ -251,7 +255,7 @@ def against(worse: float, *, unseen: bool = False) -> str:
     return f"{text}, and parts that no fit has seen worse too" if unseen else text
 
 
-def _others_discovered(effect: Candidate, tried: Tried) -> Sequence[tuple[str, float]]:
+def _others_discovered(effect: Candidate, tried: DictionaryFits) -> Sequence[tuple[str, float]]:
     """Return other effects of the dictionary, and how much more each costs; the best of a name."""
     every = [(f.effects[-1], c) for f, c in zip(tried.found, tried.criteria, strict=True)]
     mine = next((c for one, c in every if one is effect), math.inf)

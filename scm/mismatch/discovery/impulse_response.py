@@ -112,11 +112,6 @@ def respond(fitter: Fitter, base: Hypothesis, cells: Cells, channel: str) -> Res
     e, _ = model([values, *sets])
     changes = (e[:, 1:] - e[:, :1]) / amount
     weights, jacobian = fitter.weights(base.innovations), base.jacobian
-    prior = np.zeros(jacobian.shape[1])
-    prior[: len(base.z)] = 1.0
-    normal = (jacobian.T * weights) @ jacobian + np.diag(prior + 1e-6)
-    tilt = (jacobian.T * weights) @ base.innovations
-    tilt[: len(base.z)] += base.z
     own = np.zeros((jacobian.shape[1], len(cells)))
     slope, bend = np.zeros(len(cells)), np.zeros((len(cells), len(cells)))
     for rows, places, felt in _windows(model, cells, count, changes):
@@ -124,8 +119,32 @@ def respond(fitter: Fitter, base: Hypothesis, cells: Cells, channel: str) -> Res
         slope[places] += weighed.T @ base.innovations[rows]
         own[:, places] += jacobian[rows].T @ weighed
         bend[np.ix_(places, places)] += felt.T @ weighed
-    held = np.linalg.solve(normal, own)
-    return Response(slope - held.T @ tilt, bend - own.T @ held)
+    return _refitted(fitter, base, Response(slope, bend), own)
+
+
+def beside(fitter: Fitter, base: Hypothesis, felt: Floats) -> Response:
+    """Return what amounts of what is felt, (events, n), would explain beside a hypothesis."""
+    weighed = felt.T * fitter.weights(base.innovations)
+    alone = Response(weighed @ base.innovations, weighed @ felt)
+    return _refitted(fitter, base, alone, (weighed @ base.jacobian).T)
+
+
+def _refitted(fitter: Fitter, base: Hypothesis, alone: Response, own: Floats) -> Response:
+    """Return a response where all that is fitted already follows linearly.
+
+    Args:
+        fitter: Of the hypothesis.
+        base: Which it stands beside.
+        alone: The response where nothing follows.
+        own: How what is fitted and what is felt go together, (fitted, felt).
+    """
+    weighed = base.jacobian.T * fitter.weights(base.innovations)
+    prior = np.full(len(weighed), 1e-6)
+    prior[: len(base.z)] = 1.0
+    tilt = weighed @ base.innovations
+    tilt[: len(base.z)] += base.z
+    held = np.linalg.solve(weighed @ base.jacobian + np.diag(prior), own)
+    return Response(alone.slope - held.T @ tilt, alone.bend - own.T @ held)
 
 
 def _windows(
@@ -154,7 +173,8 @@ def by_turn() -> DictionaryEffect:
 
 def ripples(fitter: Fitter, base: Hypothesis) -> Iterator[tuple[Values, float]]:
     """Yield the best torque of each number of waves in a turn, and what it would explain."""
-    slope, bend = waves_response(fitter, base)
+    response = waves_response(fitter, base)
+    slope, bend = response.slope, response.bend
     for i, waves in enumerate(WAVES):
         both = slice(2 * i, 2 * i + 2)
         sine, cosine = map(float, -np.linalg.pinv(bend[both, both]) @ slope[both])
@@ -162,27 +182,10 @@ def ripples(fitter: Fitter, base: Hypothesis) -> Iterator[tuple[Values, float]]:
         yield (math.hypot(sine, cosine), waves, math.atan2(cosine, sine)), gain
 
 
-def waves_response(fitter: Fitter, base: Hypothesis) -> tuple[Floats, Floats]:
-    """Return slope and bend of the objective by a sine and a cosine [N*m] of each of `WAVES`."""
+def waves_response(fitter: Fitter, base: Hypothesis) -> Response:
+    """Return the response to a sine and a cosine [N*m] of each of `WAVES`."""
     model, values = fitter.model, base.numbers
     amount = SIZE * 9.81 * model.car.value("body.mass_kg") * model.car.value("wheel.radius_m")
     waves = [by_turn().numbers((amount, n, half)) for n in WAVES for half in _HALVES]
     e, _ = model([values, *(values | wave for wave in waves)])
     return beside(fitter, base, (e[:, 1:] - e[:, :1]) / amount)
-
-
-def beside(fitter: Fitter, base: Hypothesis, felt: Floats) -> tuple[Floats, Floats]:
-    """Return slope and bend of the objective by amounts of what is felt, (events, n).
-
-    All that is fitted already follows linearly.
-    """
-    weights, jacobian = fitter.weights(base.innovations), base.jacobian
-    weighted = jacobian.T * weights
-    prior = np.full(jacobian.shape[1], 1e-6)
-    prior[: len(base.z)] = 1.0
-    tilt = weighted @ base.innovations
-    tilt[: len(base.z)] += base.z
-    own = weighted @ felt
-    held = np.linalg.solve(weighted @ jacobian + np.diag(prior), own)
-    mine = felt.T * weights
-    return mine @ base.innovations - held.T @ tilt, mine @ felt - own.T @ held

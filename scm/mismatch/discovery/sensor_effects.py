@@ -22,7 +22,9 @@ PREFIX = "sensed."
 GYROS = ("imu.gyro_z", "yaw_rate")
 ENCODERS = ("encoder.left", "encoder.right")
 Known = Mapping[str, Floats]
-Reads = Mapping[str, Floats]
+"""What is known on a drive's edges, or an error of each channel there."""
+Reads = Callable[[Known], Known]
+_SIDES = {"left": "rl", "right": "rr"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +37,7 @@ class SensorEffect(Candidate):
     """
 
     formula_text: str
-    reads: Callable[[Known], Reads]
+    reads: Reads
 
     @property
     def fault(self) -> str:
@@ -55,31 +57,25 @@ IN_FILE: Mapping[str, str] = {
     "measured = true * (1 + {} * (x^2 + y^2))": "measure.camera_lens_per_m2",
 }
 """Errors of the camera that are numbers of the sensor fault `LENS`."""
-_Row = tuple[str, str, str, str, float, str, str, Callable[[Known], Reads]]
+_Row = tuple[str, str, str, str, float, str, str, Reads]
 
 
-def _gyro(value: Callable[[Known], Floats]) -> Callable[[Known], Reads]:
+def _gyro(value: Callable[[Known], Floats]) -> Reads:
     return lambda now: dict.fromkeys(GYROS, value(now))
 
 
-def _pose(scale: Callable[[Known], Floats]) -> Callable[[Known], Reads]:
+def _pose(scale: Callable[[Known], Floats]) -> Reads:
     return lambda now: {"pose.x": scale(now) * now["x"], "pose.y": scale(now) * now["y"]}
 
 
-def _counted(share: Callable[[Known], Floats]) -> Callable[[Known], Reads]:
-    def reads(now: Known) -> Reads:
-        return {
-            f"encoder.{side}": -STEP_S * np.cumsum(share(now) * now[f"rate.{side}"])
-            for side in ("left", "right")
-        }
+def _counted(share: Callable[[Known], Floats], right: float = 1.0) -> Reads:
+    """Return counts lost at a share of the wheels' rate; `right` times as many on the right."""
+
+    def reads(now: Known) -> Known:
+        lost = {side: STEP_S * np.cumsum(share(now) * now[f"rate.{side}"]) for side in _SIDES}
+        return {"encoder.left": -lost["left"], "encoder.right": -right * lost["right"]}
 
     return reads
-
-
-def _one_side(now: Known) -> Reads:
-    left = -STEP_S * np.cumsum(now["rate.left"])
-    right = STEP_S * np.cumsum(now["rate.right"])
-    return {"encoder.left": left, "encoder.right": right}
 
 
 _TABLE: tuple[_Row, ...] = (
@@ -122,7 +118,8 @@ _TABLE: tuple[_Row, ...] = (
      "counted = true * (1 - {} * t / 60 s)", _counted(lambda now: now["time"] / 60.0)),
     ("encoders", "side", "share", "1", 0.01,
      "The left encoder loses {share} of its counts and the right one counts as much too many",
-     "counted = true * (1 - {}) left, (1 + the same) right", _one_side),
+     "counted = true * (1 - {}) left, (1 + the same) right",
+     _counted(lambda now: np.ones_like(now["time"]), right=-1.0)),
 )  # fmt: skip
 
 
@@ -165,12 +162,12 @@ def _known(drive: Drive, motion: Motions) -> dict[str, Floats]:
     counts = 0.0
     if any(s.name in ENCODERS for s in drive.streams):
         counts = drive.car.value("encoder.counts_per_revolution") / (2.0 * np.pi)
-    for side, wheel in (("left", "rl"), ("right", "rr")):
+    for side, wheel in _SIDES.items():
         now[f"rate.{side}"] = counts * np.gradient(motion[f"wheel_angle.{wheel}"][:, 0], STEP_S)
     return now
 
 
-def _read(drive: Drive, reads: Reads) -> list[Floats]:
+def _read(drive: Drive, reads: Known) -> list[Floats]:
     """Return what each stream reads too much at its samples; zero where it reads right."""
     return [
         np.interp(s.taps, drive.edges, reads[s.name]).mean(axis=1)

@@ -39,7 +39,7 @@ _FLIPPED_BY = ("toward_rad", "phase_rad")
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
+class DictionaryFits:
     """Effects of the dictionary that were tried, refitted by free run, best first.
 
     Attributes:
@@ -72,7 +72,9 @@ def _entries() -> int:
     return len(dictionary()) + len(sensor_effects())
 
 
-def try_dictionary(base: Hypothesis, part: Floats, notify: Notify = lambda _: None) -> Tried:
+def try_dictionary(
+    base: Hypothesis, part: Floats, notify: Notify = lambda _: None
+) -> DictionaryFits:
     """Return effects of the dictionary beside a fitted hypothesis, each refitted by free run.
 
     Args:
@@ -102,7 +104,9 @@ def try_dictionary(base: Hypothesis, part: Floats, notify: Notify = lambda _: No
     found = _refitted(fitter, base, begun[:MAX_STARTS], notify)
     events = int(part.sum())
     ranked = sorted(map(tidied, found), key=lambda f: criterion(f, events))
-    return Tried(base, tuple(ranked), tuple(criterion(f, events) for f in ranked), part, cells)
+    return DictionaryFits(
+        base, tuple(ranked), tuple(criterion(f, events) for f in ranked), part, cells
+    )
 
 
 def _penalty(effect: Candidate, part: Floats) -> float:
@@ -130,13 +134,13 @@ def _of_sensors(
         base.model.weigh([[-r[:, None] for r in one] for one in signatures[e.parameters[0].key]])
         for e in effects
     ]
-    slope, bend = beside(fitter, base, np.concatenate(changes, axis=1))
+    response = beside(fitter, base, np.concatenate(changes, axis=1))
     found = list[_Begun]()
     for i, effect in enumerate(effects):
-        least = max(float(bend[i, i]), 1e-12)
-        gain = float(slope[i]) ** 2 / least
+        slope, bend = float(response.slope[i]), max(float(response.bend[i, i]), 1e-12)
+        gain = slope**2 / bend
         if gain > _penalty(effect, part) - LINEAR_ERROR:
-            found.append((effect, (-float(slope[i]) / least,), gain))
+            found.append((effect, (-slope / bend,), gain))
     return found
 
 

@@ -107,7 +107,7 @@ class Fitter:
             dz = -base.z * ~mine  # a number that an effect sets is not the car's to move
             low, high = (np.where(mine, limit - base.z, 0.0) for limit in (-FARTHEST, FARTHEST))
             own_normal = normal * np.outer(mine, mine)
-            dz += _bounded(own_normal, slopes[:, i] * mine, low, high)
+            dz += bounded_step(own_normal, slopes[:, i] * mine, low, high)
             alike = mine.tobytes()  # trials that set the same numbers share one large array
             if alike not in masked:
                 masked[alike] = jacobian if mine.all() else jacobian * mine
@@ -301,12 +301,12 @@ class _Plan:
         self.start = start
         self._normal, self._slope, self._low, self._high = normal, slope, low, high
         self._scales = scales
-        self.whole = _bounded(normal, slope, low, high)
+        self.whole = bounded_step(normal, slope, low, high)
 
     def others(self) -> list[Floats]:
         """Return shorter and more damped steps."""
         damped = [
-            _bounded(
+            bounded_step(
                 self._normal + np.diag(damping * self._normal.diagonal()), self._slope, self._low,
                 self._high,
             )
@@ -343,7 +343,7 @@ def _normal(jacobian: Floats, weights: Floats) -> Floats:
     return np.asarray(rooted.T @ rooted)
 
 
-def _bounded(normal: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
+def bounded_step(normal: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
     """Return the step that minimises a quadratic within bounds that hold 0: active sets."""
     n = len(slope)
     step, held = np.zeros(n), np.zeros(n, dtype=np.bool_)

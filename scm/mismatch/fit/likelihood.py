@@ -75,7 +75,7 @@ def prior_precision(car: Car, keys: Sequence[str]) -> Floats:
     return found
 
 
-class _Recent:
+class RecentSets:
     """Residuals of the sets of one drive that were requested last.
 
     They share one block: each alone would lie between large arrays that come and go, and leave
@@ -136,7 +136,7 @@ class Simulator:
         self.car, self.drives, self.budget = car, drives, budget or Budget()
         self.tiles = tiles or Tiles(car)
         self.rollouts = [Rollouts(drive, car, self.tiles) for drive in drives]
-        self._recent = [_Recent(sum(len(s.t) for s in drive.streams)) for drive in drives]
+        self._recent = [RecentSets(sum(len(s.t) for s in drive.streams)) for drive in drives]
         self.nominal = nominal_parameters(car, self.rollouts[0].params)
         self._predictions = [Prediction(drive) for drive in drives]
         self.runs = 0

@@ -81,7 +81,7 @@ class Tiles:
         return self if any(more & numbers.keys() for numbers in sets) else self.smaller
 
 
-def _shares(sets: int) -> list[list[range]]:
+def shares_of(sets: int) -> list[list[range]]:
     """Return which sets each thread drives, tile by tile.
 
     A last tile without another beside it is cut in two, where each half is one vector of it.
@@ -136,7 +136,7 @@ class Rollouts:
         places = {one: k for k, one in enumerate(dict.fromkeys(moving))}
         at = [places[one] for one in moving]
         different = [dict(one) for one in places]
-        shares = _shares(len(different))
+        shares = shares_of(len(different))
 
         def share(thread: int) -> list[_Used]:
             found = list[_Used]()

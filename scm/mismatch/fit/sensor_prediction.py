@@ -10,7 +10,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.mismatch.fit.rollouts import Motions
-from scm.replay.drive import STEP_S, WHEELS, Drive, Stream
+from scm.replay.drive import STEP_S, WHEELS, Drive
 from scm.replay.numbers import COMMAND_CLOCK, NEUTRAL, POSE_CLOCK, Numbers
 from scm.vehicles.jit import array_kernel
 
@@ -20,28 +20,12 @@ _POSE = (*_LATE, "measure.clock_rate", "measure.pose_scale", "measure.camera_til
          "measure.camera_tilt_y_per_m", "measure.pose_heading_rad")  # fmt: skip
 
 
-class _Taps:
-    """Takes variables given on a grid at a stream's sample times, by straight lines between."""
-
-    def __init__(self, stream: Stream, edges: Floats) -> None:
-        self._at = (stream.taps - edges[0]) / STEP_S
-
-    def __call__(self, variable: Floats, late_s: Floats) -> Floats:
-        """Return means over the taps of a variable (edges, sets): (samples, sets).
-
-        `late_s` says by how much each set's car does everything later, (sets,).
-        """
-        sampled = np.empty((len(self._at), len(late_s)))
-        _tapped(self._at, late_s / STEP_S, variable, sampled)
-        return sampled
-
-
 class Prediction:
     """Predicts every stream of a drive."""
 
     def __init__(self, drive: Drive) -> None:
         self.drive = drive
-        self._taps = {s.name: _Taps(s, drive.edges) for s in drive.streams}
+        self._taps = {s.name: (s.taps - drive.edges[0]) / STEP_S for s in drive.streams}
         x, y, yaw = (drive.smoothed[name] for name in POSES)
         values = np.stack((x.at(yaw.t), y.at(yaw.t), yaw.value))
         self._seen = yaw.t, values, np.stack((x.rate_at(yaw.t), y.rate_at(yaw.t), yaw.rate))
@@ -58,7 +42,9 @@ class Prediction:
             predicted = path.get(stream.name)
             if predicted is None:
                 variable = self.sensor(stream.name, motions, now)
-                predicted = self._taps[stream.name](variable, now[COMMAND_CLOCK])
+                at, late = self._taps[stream.name], now[COMMAND_CLOCK]
+                predicted = np.empty((len(at), len(late)))
+                _tapped(at, late / STEP_S, variable, predicted)
             found.append(stream.values[:, None] - predicted)
         return found
 

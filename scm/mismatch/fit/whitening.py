@@ -100,7 +100,7 @@ def _system(drive: Drive, noise: Noise) -> _System:
     )  # fmt: skip
 
 
-class _Events:
+class Events:
     """What a drive's innovations are, whatever the noise model.
 
     Attributes:
@@ -140,9 +140,9 @@ class Whitener:
             is beyond what numbers can hold.
     """
 
-    def __init__(self, drive: Drive, noise: Noise, events: _Events | None = None) -> None:
+    def __init__(self, drive: Drive, noise: Noise, events: Events | None = None) -> None:
         self.drive, self.noise = drive, noise
-        self._events = its = events or _Events(drive)
+        self._events = its = events or Events(drive)
         self.t, self.stream = its.t, its.stream
         jolt = np.array([noise.own.get(s.name, 0.0) for s in drive.streams])
         jolt *= [s.name.startswith("imu.") for s in drive.streams]

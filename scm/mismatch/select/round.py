@@ -202,8 +202,7 @@ def _extended(context: Context, base: Hypothesis) -> Round:
     begun = [_best_of_each(fits, SPOTS if amplifies else 1) for fits in every]
 
     def cost(fitted: Hypothesis) -> float:
-        at_limit = AT_LIMIT * bool(_at_limit(fitted.effects[-1], base))
-        return context.criterion(fitted) - at_limit
+        return context.criterion(fitted) - AT_LIMIT * bool(at_limit(fitted.effects[-1], base))
 
     near, far = (sorted(fits, key=cost)[:MAX_REFITTED] for fits in begun)
     near += [f for one in near[:MAX_OTHER_STARTS] for f in next_starts(one, every[0])]
@@ -222,7 +221,7 @@ def _extended(context: Context, base: Hypothesis) -> Round:
         near, rest = fitter.refine(near[:6], rounds=3, fresh=True), [*near[6:], *rest]
     ranked = sorted([*near, *rest], key=cost)
     ranked = _lighter(context, _finals(context, ranked, base, cost))
-    costs = [cost(f) + _let_go(context, f, ranked, base) for f in ranked]
+    costs = [cost(f) + let_go(context, f, ranked, base) for f in ranked]
     order = sorted(range(len(ranked)), key=costs.__getitem__)
     return Round(base, tuple(ranked[i] for i in order), tuple(costs[i] for i in order))
 
@@ -250,7 +249,7 @@ def _finals(
     return list(ranked)
 
 
-def _at_limit(effect: Candidate, base: Hypothesis) -> list[int]:
+def at_limit(effect: Candidate, base: Hypothesis) -> list[int]:
     """Return which of the car's own numbers that an effect means are at their limit.
 
     A number that the recording pulls as far as its prior allows is most likely the cause.
@@ -260,16 +259,16 @@ def _at_limit(effect: Candidate, base: Hypothesis) -> list[int]:
     return [j for j, (o, z) in own if o.key in keys and abs(z) > 0.85 * FARTHEST]
 
 
-def _let_go(
+def let_go(
     context: Context, fitted: Hypothesis, others: Sequence[Hypothesis], base: Hypothesis
 ) -> float:
     """Return what does not speak for an effect after all: another may have pulled its number.
 
     That is so where one that explains the recordings better brings the number back.
     """
-    at_limit, mine = _at_limit(fitted.effects[-1], base), context.criterion(fitted)
-    gone = (context.criterion(f) < mine and np.all(np.abs(f.z[at_limit]) < BACK) for f in others)
-    return AT_LIMIT * (bool(at_limit) and any(gone))
+    own, mine = at_limit(fitted.effects[-1], base), context.criterion(fitted)
+    gone = (context.criterion(f) < mine and np.all(np.abs(f.z[own]) < BACK) for f in others)
+    return AT_LIMIT * (bool(own) and any(gone))
 
 
 def _not_worse(fitted: Hypothesis, base: Hypothesis) -> Hypothesis:

@@ -42,19 +42,6 @@ TIMES_FITTED_FAR = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Explanation:
-    """What else may explain recordings in which effects of the catalogue hardly do.
-
-    Attributes:
-        ends: Whether it does so well that no further effect need be searched for.
-        discovery: The effect outside the catalogue that does, with those it was compared with.
-    """
-
-    ends: bool
-    discovery: "Discovery | None" = None
-
-
-@dataclass(frozen=True, slots=True)
 class Selection:
     """What a selection has found so far.
 
@@ -62,13 +49,15 @@ class Selection:
         best: The hypothesis that explains the recordings best.
         retuned: The car with its own numbers refitted alone.
         rounds: What was tried, round by round.
-        explanation: What else may explain the recordings; None: there was no cause to ask.
+        discovery: What the dictionary offers, with what it was compared with; None: not computed.
+        is_explained: Whether it explains so much that no further effect need be searched for.
     """
 
     best: Hypothesis
     retuned: Hypothesis
     rounds: tuple[Round, ...] = ()
-    explanation: Explanation | None = None
+    discovery: "Discovery | None" = None
+    is_explained: bool = False
 
     def round_of(self, effect: Candidate) -> Round | None:
         """Return the round in which an effect was found."""
@@ -85,7 +74,7 @@ def retune(context: Context, model: Likelihood) -> Hypothesis:
 def select(
     context: Context,
     retuned: Hypothesis,
-    explain: Callable[[Selection], Explanation],
+    explain: Callable[[Selection], "tuple[bool, Discovery | None]"],
     is_over: Callable[[Selection], bool] = lambda _: False,
 ) -> Selection:
     """Return the hypothesis that explains the recordings best without inventing anything.
@@ -95,8 +84,8 @@ def select(
     Args:
         context: What to work with.
         retuned: To begin from.
-        explain: Returns what else may explain the recordings, where the last effect hardly paid
-            its penalty.
+        explain: Returns whether something outside the catalogue explains all, and what; it is
+            called where the last effect hardly paid its penalty.
         is_over: Whether no further effect is to be searched for.
     """
     found = Selection(retuned, retuned)
@@ -109,9 +98,10 @@ def select(
         found, margin = tried
         first = not before.effects
         if margin < DOUBTFUL and (margin >= 0.0 or first):
-            explanation = attempt(Question.DISCOVERY, partial(explain, found))
-            found = replace(found, explanation=explanation or found.explanation)
-            if explanation and explanation.ends:
+            explained = attempt(Question.DISCOVERY, partial(explain, found))
+            if explained is not None:
+                found = replace(found, is_explained=explained[0], discovery=explained[1])
+            if found.is_explained:
                 break
         if first and margin < DOUBTFUL:
             work = partial(_under_low_noise, context, found, learned)
@@ -129,14 +119,14 @@ def question_beside(best: Hypothesis) -> Question:
 def _one_round(context: Context, found: Selection) -> tuple[Selection, float]:
     """Return the selection after one round more, and the margin of its best effect."""
     tried = extend(context, found.best)
-    best, margin = tried.base, _margin(context, tried)
+    best, margin = tried.base, margin_of(context, tried)
     retuned = found.retuned if found.best.effects else tried.base
     if margin >= 0.0:
         best = prune(context, fit_with_noise(context, tried.alternatives[0]), retuned)
     return replace(found, best=best, retuned=retuned, rounds=(*found.rounds, tried)), margin
 
 
-def _margin(context: Context, tried: Round) -> float:
+def margin_of(context: Context, tried: Round) -> float:
     """Return by how much the best effect of a round gains more than its penalty."""
     if not tried.alternatives:
         return -math.inf

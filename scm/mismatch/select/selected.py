@@ -18,7 +18,6 @@ from scm.mismatch.select.confirm import confirmed
 from scm.mismatch.select.round import Context, Notify
 from scm.mismatch.select.search import (
     TIMES_FITTED_FAR,
-    Explanation,
     Selection,
     by_windows,
     is_far,
@@ -71,8 +70,8 @@ class Selected:
     parts: Parts
     selection: Selection
     tried: tuple[Tried, ...]
-    offered: Offered | None
-    discovery: Discovery | None
+    offered: Offered | None = None
+    discovery: Discovery | None = None
 
     @property
     def best(self) -> Hypothesis:
@@ -119,39 +118,28 @@ def _select(nominal: Nominal) -> Selected:
     if far:  # maybe for one large effect, which the re-tuned car takes for disturbances
         context = replace(context, times_fitted=TIMES_FITTED_FAR)
         found = select(
-            context, nominal.retuned, lambda found: Explanation(strays(found.best.model)),
+            context, nominal.retuned, lambda found: (strays(found.best.model), None),
             lambda found: bool(found.rounds) and strays(found.best.model),
         )  # fmt: skip
     else:
         found = select(context, nominal.retuned, partial(decide.explain, context, unseen))
-    tried = tried_of(context, found)
+    start = Selected(
+        nominal.recordings, nominal.drives, nominal.car, context, parts, found,
+        tried_of(context, found),
+    )  # fmt: skip
     if not (far and strays(found.best.model)):
         offered = decide.offered(context, found, has_unseen=bool(unseen.any()))
         best, discovery = decide.decide(context, found, unseen)
         if not strays(best.model):
             found = replace(found, best=best)
-            return _selected(nominal, context, parts, found, tried, offered, discovery)
+            return replace(start, selection=found, offered=offered, discovery=discovery)
     work = partial(by_windows, context, nominal.drives, nominal.kernel_car)
     many = context.budget.attempt(Question.WINDOWS, work)
     if many is None:  # the first fit is all that is sure
-        found = replace(found, best=found.retuned)
-        return _selected(nominal, context, parts, found, tried)
+        return replace(start, selection=replace(found, best=found.retuned))
     found = select_many(many.context, many.retuned)
     tried = tried_of(many.context, found)
-    return _selected(nominal, many.context, many.parts, found, tried)
-
-
-def _selected(
-    nominal: Nominal,
-    context: Context,
-    parts: Parts,
-    found: Selection,
-    tried: tuple[Tried, ...],
-    offered: Offered | None = None,
-    discovery: Discovery | None = None,
-) -> Selected:
-    recordings, drives, car = nominal.recordings, nominal.drives, nominal.car
-    return Selected(recordings, drives, car, context, parts, found, tried, offered, discovery)
+    return replace(start, context=many.context, parts=many.parts, selection=found, tried=tried)
 
 
 def tried_of(context: Context, found: Selection) -> tuple[Tried, ...]:

@@ -15,7 +15,7 @@ from scm.errors import RecordingError
 from scm.mismatch.fit.data_split import NAMES
 from scm.mismatch.report.car_file import FILE
 from scm.mismatch.report.write import FIELDS, GIVEN, WINDOWS
-from scm.mismatch.usable_data import usable_of
+from scm.mismatch.usable_data import check
 from scm.recording.read import Recording
 from scm.replay.free_run import free_run
 from scm.vehicles.car import Car, load_car
@@ -61,7 +61,7 @@ def check_report(folder: Path, recordings: Sequence[Recording]) -> list[Figure]:
     if fit is None:
         return []
     given, found = (load_car(folder / name) for name in (GIVEN, FILE))
-    usable = usable_of(recordings, given, math.inf if compared_s is None else compared_s)
+    usable = check(recordings, given, math.inf if compared_s is None else compared_s).recordings
     rows = _windows(folder, len(usable))
     figures = list[Figure]()
     for car, name, side in ((given, GIVEN, "before"), (found, FILE, "after")):

@@ -102,10 +102,10 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
     By windows, effects go until the car strays no farther than those without; a car without
     effects keeps the numbers of its file where refitted ones bring it no nearer.
     """
-    best, context = selected.best, selected.context
+    best, context, given = selected.best, selected.context, selected.best.model.car
     while True:
         effects, car = _written(selected, files, best)
-        fit, free_runs = _judged(selected, car)
+        fit, free_runs = _judged(selected, given, car)
         if not context.by_windows or not best.effects or fit is None:
             break
         if not strays_more(selected, fit, retuned_car, car):
@@ -113,7 +113,7 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
         best = without_one(context, best, selected.retuned)
     if not best.effects and fit is not None and gained_nothing(fit):
         best, car = as_given(context, best), selected.car
-        fit, free_runs = _judged(selected, car)
+        fit, free_runs = _judged(selected, given, car)
     return _Validated(best, effects, car, fit, free_runs)
 
 
@@ -128,13 +128,15 @@ def _written(
         return effects, None
 
 
-def _judged(selected: Selected, car: Car | None) -> tuple[Fit | None, FreeRuns | None]:
-    """Return free runs before and after; nothing where no part has a whole window, or no file."""
-    if car is None:
+def _judged(
+    selected: Selected, before: Car | None, after: Car | None
+) -> tuple[Fit | None, FreeRuns | None]:
+    """Return free runs of two cars; nothing where no part has a whole window, or a car no file."""
+    if before is None or after is None:
         return None, None
-    before = selected.best.model.car
+    base = selected.best.model.car
     try:
-        return judge(selected.drives, before, on(before, car), selected.parts)
+        return judge(selected.drives, on(base, before), on(base, after), selected.parts)
     except RecordingError:
         return None, None
 
@@ -144,7 +146,7 @@ def retuned_error(selected: Selected, retuned: Car | None, found: Car | None) ->
 
     None where no part has a whole window, or a car has no file.
     """
-    fit = _beside_retuned(selected, retuned, found)
+    fit, _ = _judged(selected, retuned, found)
     return None if fit is None else fit.confirm.before.get(POSE[0])
 
 
@@ -157,20 +159,9 @@ def strays_more(selected: Selected, fit: Fit, retuned: Car | None, found: Car | 
         retuned: With the given car's own numbers refitted, and nothing else.
         found: With effects.
     """
-    beside = _beside_retuned(selected, retuned, found)
+    beside, _ = _judged(selected, retuned, found)
     fits = (fit,) if beside is None else (fit, beside)
     return any(POSE[0] in nothing_got_worse(one) for one in fits)
-
-
-def _beside_retuned(selected: Selected, retuned: Car | None, found: Car | None) -> Fit | None:
-    """Return free runs of the re-tuned car and of the one found, as of `before` and `after`."""
-    if retuned is None or found is None:
-        return None
-    base = selected.best.model.car
-    try:
-        return judge(selected.drives, on(base, retuned), on(base, found), selected.parts)[0]
-    except RecordingError:
-        return None
 
 
 def gained_nothing(fit: Fit) -> bool:

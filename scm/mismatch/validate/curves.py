@@ -9,6 +9,7 @@ of any form: one that is right runs through their bands.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from scm.arrays import Floats
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, Values
 from scm.mismatch.discovery.impulse_response import WAVES, Cells, by_turn, respond, waves_response
 from scm.mismatch.discovery.screen import amount, shape, variable
-from scm.mismatch.discovery.try_dictionary import Tried
+from scm.mismatch.discovery.try_dictionary import DictionaryFits
 from scm.mismatch.effect_catalogue import Candidate, identifications
 from scm.mismatch.evidence import Curve
 from scm.mismatch.findings import Equation
@@ -233,7 +234,7 @@ def _binned(x: Floats, y: Floats, band: Floats) -> tuple[Floats, Floats, Floats]
     )
 
 
-def discovered_curves(fitted: Hypothesis, tried: Tried) -> tuple[Curve, ...]:
+def discovered_curves(fitted: Hypothesis, tried: DictionaryFits) -> tuple[Curve, ...]:
     """Return a discovered effect as the recordings show it in bins, and as it was fitted."""
     first = 0
     for effect in fitted.effects:
@@ -245,7 +246,7 @@ def discovered_curves(fitted: Hypothesis, tried: Tried) -> tuple[Curve, ...]:
 
 
 def _in_bins(
-    effect: DictionaryEffect, mine: slice, fitted: Hypothesis, tried: Tried
+    effect: DictionaryEffect, mine: slice, fitted: Hypothesis, tried: DictionaryFits
 ) -> tuple[Curve, Curve]:
     values = tuple(float(v) for v in fitted.values[mine])
     n, cells = len(effect.channel.parameters), tried.cells
@@ -255,60 +256,53 @@ def _in_bins(
     place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, DISCOVERED_BINS - 1)
     used = [b for b in range(DISCOVERED_BINS) if np.count_nonzero(place == b) >= LEAST_CELLS]
     courses = np.stack([np.where(place == b, unit, 0.0) for b in used], axis=1)
-    more, covariance = _left_over(effect, mine, fitted, tried, courses)
+    fitter = Fitter(fitted.model, tried.part)
+    response = respond(fitter, _without(fitted, mine), cells, effect.channel.response)
+    covariance = _inverse(courses.T @ response.bend @ courses)
     fit = values[0] * shape(effect.curve.numbers(values[n:]), cells)
-    y = np.array([fit[place == b].mean() for b in used]) + more
+    y = np.array([fit[place == b].mean() for b in used])
+    y = y - covariance @ (courses.T @ response.slope)
     band = NINETY * np.sqrt(np.maximum(covariance.diagonal(), 0.0))
-    middle = np.array([x[place == b].mean() for b in used])
-    order = np.argsort(x)
-    names = {"x_name": x_name, "x_unit": x_unit, "y_name": effect.channel.word,
-             "y_unit": _UNITS[effect.channel.response]}  # fmt: skip
+    middle, order = np.array([x[place == b].mean() for b in used]), np.argsort(x)
+    draw = partial(
+        Curve, effect=effect.name, x_name=x_name, x_unit=x_unit, y_name=effect.channel.word,
+        y_unit=_UNITS[effect.channel.response],
+    )  # fmt: skip
+    line = fit[order]
     return (
-        Curve(effect=effect.name, x=middle, y=y, low=y - band, high=y + band, **names),
-        Curve(
-            effect=effect.name, x=x[order], y=fit[order], low=fit[order], high=fit[order], **names
-        ),
+        draw(x=middle, y=y, low=y - band, high=y + band),
+        draw(x=x[order], y=line, low=line, high=line),
     )
 
 
 def _round_a_turn(
-    effect: DictionaryEffect, mine: slice, fitted: Hypothesis, tried: Tried
+    effect: DictionaryEffect, mine: slice, fitted: Hypothesis, tried: DictionaryFits
 ) -> tuple[Curve, Curve]:
     """Return a torque over a wheel's turn as the sum of all waves, and as it was fitted."""
     torque, waves, phase = (float(v) for v in fitted.values[mine])
-    own = np.arange(len(fitted.z) + mine.start, len(fitted.z) + mine.stop)
-    held = replace(fitted, jacobian=np.delete(fitted.jacobian, own, axis=1))
-    slope, bend = waves_response(Fitter(fitted.model, tried.part), held)
-    covariance = np.linalg.inv(bend + 1e-9 * np.trace(bend) * np.eye(len(bend)))
+    response = waves_response(Fitter(fitted.model, tried.part), _without(fitted, mine))
+    covariance = _inverse(response.bend)
     x: Floats = np.linspace(0.0, 2.0 * math.pi, TURN_POINTS)
     shapes = np.stack([f(n * x) for n in WAVES for f in (np.sin, np.cos)], axis=1)
     fit = torque * np.sin(waves * x + phase)
-    y = fit - shapes @ (covariance @ slope)
+    y = fit - shapes @ (covariance @ response.slope)
     band = NINETY * np.sqrt(np.einsum("ij,jk,ik->i", shapes, covariance, shapes))
-    names = {
-        "x_name": "wheel turn",
-        "x_unit": "rad",
-        "y_name": effect.channel.word,
-        "y_unit": "N*m",
-    }
-    return (
-        Curve(effect=effect.name, x=x, y=y, low=y - band, high=y + band, **names),
-        Curve(effect=effect.name, x=x, y=fit, low=fit, high=fit, **names),
-    )
+    draw = partial(
+        Curve, effect=effect.name, x_name="wheel turn", x_unit="rad", y_name=effect.channel.word,
+        y_unit="N*m", x=x,
+    )  # fmt: skip
+    return draw(y=y, low=y - band, high=y + band), draw(y=fit, low=fit, high=fit)
 
 
-def _left_over(
-    effect: DictionaryEffect, mine: slice, fitted: Hypothesis, tried: Tried, courses: Floats
-) -> tuple[Floats, Floats]:
-    """Return what each course explains beyond the effect as found, and how sure that is."""
+def _without(fitted: Hypothesis, mine: slice) -> Hypothesis:
+    """Return a hypothesis in which an effect's numbers, `mine` of its values, do not move."""
     own = np.arange(len(fitted.z) + mine.start, len(fitted.z) + mine.stop)
-    held = replace(fitted, jacobian=np.delete(fitted.jacobian, own, axis=1))
-    fitter = Fitter(fitted.model, tried.part)
-    response = respond(fitter, held, tried.cells, effect.channel.response)
-    bend = courses.T @ response.bend @ courses
-    bend += 1e-9 * np.trace(bend) * np.eye(len(bend))
-    covariance: Floats = np.linalg.inv(bend).astype(np.float64)
-    return -covariance @ (courses.T @ response.slope), covariance
+    return replace(fitted, jacobian=np.delete(fitted.jacobian, own, axis=1))
+
+
+def _inverse(bend: Floats) -> Floats:
+    """Return the covariance of amounts; finite where a course shows nothing."""
+    return np.asarray(np.linalg.inv(bend + 1e-9 * np.trace(bend) * np.eye(len(bend))))
 
 
 def axis_of(effect: DictionaryEffect, values: Values, cells: Cells) -> tuple[Floats, str, str]:

@@ -222,12 +222,9 @@ def _judged(
         "position_m": np.hypot(noise["x"], noise["y"])[..., None],
         "yaw_rad": _wrapped(noise["yaw"])[..., None],
     }
-    for name, miss, chance in zip(
-        sides[_AFTER].names, _sensor_misses(sides), sides[_AFTER].chances, strict=True
-    ):
-        mine, draws = miss
-        _join(errors, name, mine)
-        _join(floor, name, np.sqrt((draws - mine[_AFTER]) ** 2 + chance))
+    for (name, was, _), (_, now, chance) in zip(*(side.sensors for side in sides), strict=True):
+        _join(errors, name, np.stack([was[0], now[0]]))
+        _join(floor, name, np.sqrt((now[1:] - now[0]) ** 2 + chance))
     measured = sides[_BEFORE].measured
     shown = {
         name: np.stack([measured[name], *(measured[name] + one[0] for one in apart[name])])
@@ -251,16 +248,14 @@ class _Driven:
         ok: Whether all stayed within physical bounds, (windows,).
         apart: Simulated minus measured x, y [m] and yaw [rad], each (sides, windows, times).
         measured: What was measured, each (windows, times).
-        names: Of the other sensors' errors; `misses` and `chances` of each: the error at a window's
-            end, (sides, windows), and its own variance.
+        sensors: Name, error at a window's end, (sides, windows), and its own variance of the other
+            sensors.
     """
 
     ok: Bools
     apart: Mapping[str, Floats]
     measured: Mapping[str, Floats]
-    names: Sequence[str]
-    misses: Sequence[Floats]
-    chances: Sequence[float]
+    sensors: Sequence[tuple[str, Floats, float]]
 
 
 def _driven(replay: Replay, starts: Floats, t_s: Floats, cameras: Sequence[Camera]) -> _Driven:
@@ -280,19 +275,7 @@ def _driven(replay: Replay, starts: Floats, t_s: Floats, cameras: Sequence[Camer
     measured = {name: getattr(seen[0], name).reshape(at.shape) for name in variables}
     since = (np.tile(at[:, 0] - edges, (sides, 1)), np.tile(at[:, -1] - edges, (sides, 1)))
     ok: Bools = np.asarray(runs.ok.all(axis=0), dtype=np.bool_)
-    found = list(sensor_errors(replay.drive, runs, begun, since))
-    return _Driven(
-        ok, apart, measured, [name for name, _, _ in found],
-        [miss for _, miss, _ in found], [chance for _, _, chance in found],
-    )  # fmt: skip
-
-
-def _sensor_misses(sides: Sequence[_Driven]) -> list[tuple[Floats, Floats]]:
-    """Return, of each sensor, both cars' errors, (2, windows), and those of noisy starts."""
-    return [
-        (np.stack([before[0], after[0]]), after[1:])
-        for before, after in zip(sides[_BEFORE].misses, sides[_AFTER].misses, strict=True)
-    ]
+    return _Driven(ok, apart, measured, list(sensor_errors(replay.drive, runs, begun, since)))
 
 
 def _draws(drive: Drive) -> Iterator[dict[str, Smooth]]:

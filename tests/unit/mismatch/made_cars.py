@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scm.mismatch.effect_catalogue import by_name, candidates
+from scm.mismatch.effect_catalogue import candidates
 from scm.mismatch.fit.data_split import split
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.select.round import Context, Round
@@ -12,6 +12,7 @@ from scm.mismatch.select.search import Selection
 from scm.mismatch.select.selected import Selected
 from scm.replay.drive import Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive, nigel
+from tests.unit.mismatch.made_fit import by_name
 
 CATALOGUE = ("camera_tilt", "pose_point", "pose_heading", "pose_latency", "steer_trim", "grade")
 

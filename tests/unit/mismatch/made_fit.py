@@ -4,10 +4,15 @@ from functools import cache
 
 import numpy as np
 
-from scm.mismatch.effect_catalogue import by_name, candidates
+from scm.mismatch.effect_catalogue import candidates
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.likelihood import Likelihood
 from tests.unit.mismatch.made_drive import big_nigel, driven
+
+
+def by_name(found, name):
+    """A candidate among some."""
+    return next(one for one in found if one.name == name)
 
 
 def candidate(name):

@@ -16,7 +16,7 @@ from scm.mismatch.pipeline import diagnose_car
 from scm.mismatch.report.panels import panels_of
 from scm.mismatch.select import search, selected
 from scm.mismatch.select.round import Context
-from scm.mismatch.select.search import Explanation, Selection, retune, select
+from scm.mismatch.select.search import Selection, retune, select
 from scm.records.mismatch import BUDGET_S
 from tests.unit.mismatch.discovery import made_effect
 from tests.unit.mismatch.made_drive import big_nigel, driven, made_drive, nigel
@@ -142,7 +142,7 @@ def trimmed():
 
 
 def nothing_else(_):
-    return Explanation(ends=False)
+    return False, None
 
 
 def a_context(drive):

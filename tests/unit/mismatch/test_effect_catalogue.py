@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.effect_catalogue import by_name, candidates, placed, shown_by, terms_needed
+from scm.mismatch.effect_catalogue import candidates, placed, shown_by, terms_needed
 from scm.mismatch.findings import Estimate
 from scm.mismatch.validate.explain import sentence_of
 from scm.replay.drive import Drive
 from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import big_nigel, made_drive, nigel
+from tests.unit.mismatch.made_fit import by_name
 
 PROMISED = (
     "accel_bias", "aero_drag", "battery_sag", "camera_tilt", "clock_drift", "clock_offset",

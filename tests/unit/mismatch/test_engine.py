@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.effect_catalogue import by_name, candidates
-from scm.mismatch.fit.fitter import Fitter, _bounded
+from scm.mismatch.effect_catalogue import candidates
+from scm.mismatch.fit.fitter import Fitter, bounded_step
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import fit_noise, usual_noise
-from scm.mismatch.fit.rollouts import Rollouts, _shares
-from scm.mismatch.fit.whitening import Whitener, _Events
+from scm.mismatch.fit.rollouts import Rollouts, shares_of
+from scm.mismatch.fit.whitening import Events, Whitener
 from scm.mismatch.select.round import Context, extend
 from scm.mismatch.select.search import retune
 from scm.replay.drive import Drive
 from scm.replay.numbers import COMMAND_CLOCK, THROTTLE_CLOCK
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
+from tests.unit.mismatch.made_fit import by_name
 
 
 @pytest.fixture(scope="module")
@@ -39,14 +40,14 @@ def test_rows_do_not_feel_each_other(healthy):
     ("sets", "longest"), [(5, [5]), (16, [8]), (17, [16]), (40, [16, 8]), (48, [16, 8]), (64, [32])]
 )
 def test_both_threads_drive_about_as_much(sets, longest):
-    shares = _shares(sets)
-    driven = [k for share in shares for tile in share for k in tile]
+    every = shares_of(sets)
+    driven = [k for share in every for tile in share for k in tile]
     assert sorted(driven) == list(range(sets))
-    assert max(sum(map(len, share)) for share in shares) == sum(longest)
+    assert max(sum(map(len, share)) for share in every) == sum(longest)
 
 
 def test_samples_of_one_moment_are_weighed_as_if_one_followed_at_once(healthy):
-    noise, apart = usual_noise([healthy]), _Events(healthy)
+    noise, apart = usual_noise([healthy]), Events(healthy)
     same = np.diff(apart.t, prepend=-1.0) == 0.0
     assert same.any()
     apart.t = apart.t + 1e-9 * np.where(same, np.arange(len(same)) % 3, 0)
@@ -147,7 +148,7 @@ def test_a_fault_of_measurement_changes_what_its_sensor_is_expected_to_say(
 def test_a_step_within_bounds_is_the_best_there():
     normal = np.array([[2.0, 1.9], [1.9, 2.0]])
     slope = np.array([-4.0, -3.0])
-    step = _bounded(normal, slope, np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    step = bounded_step(normal, slope, np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
     tried = np.stack(np.meshgrid(np.linspace(-1, 1, 81), np.linspace(-1, 1, 81)), -1).reshape(-1, 2)
     values = 0.5 * np.einsum("ni,ij,nj->n", tried, normal, tried) + tried @ slope
     assert 0.5 * step @ normal @ step + slope @ step <= values.min() + 1e-3

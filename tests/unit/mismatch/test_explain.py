@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scm.mismatch.effect_catalogue import by_name, candidates
+from scm.mismatch.effect_catalogue import candidates
 from scm.mismatch.findings import Estimate
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.select.round import Context
-from scm.mismatch.select.search import Explanation, Selection, retune, select
+from scm.mismatch.select.search import Selection, retune, select
 from scm.mismatch.select.selected import Selected, tried_of
 from scm.mismatch.validate.explain import (
     effect_of,
@@ -21,6 +21,7 @@ from scm.mismatch.validate.explain import (
 from scm.replay.drive import Drive
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
+from tests.unit.mismatch.made_fit import by_name
 
 
 def test_what_was_taken_is_shown_with_the_gain_for_which_it_was_taken():
@@ -30,7 +31,7 @@ def test_what_was_taken_is_shown_with_the_gain_for_which_it_was_taken():
     model = Likelihood.of([Drive(replace(made, channels=early), big_nigel())], big_nigel())
     listed = [c for c in candidates(big_nigel()) if c.name in {"steer_delay", "steer_trim"}]
     context = Context(np.ones(len(model.t)), tuple(listed))
-    found = select(context, retune(context, model), lambda _: Explanation(ends=False))
+    found = select(context, retune(context, model), lambda _: (False, None))
     assert found.best.names == ("steer_delay",)
     first = tried_of(context, found)[0]
     assert first.name == "steer_delay"

@@ -56,11 +56,6 @@ def left(model, *numbers):
     return np.concatenate(streams)
 
 
-def remembered(model):
-    every = {n: frozenset(*(s.items() for s in trims(n))) for n in range(9)}
-    return {n for n, key in every.items() if key in model.simulator._recent[0]}
-
-
 def test_a_set_has_the_same_residuals_however_often_and_whenever_it_is_asked_for(model):
     alone = {n: left(model, n)[:, 0] for n in range(6)}
     for asked in ((0, 1, 2), (2, 2, 0, 4, 4), (5, 4, 3, 2, 1, 0), (1, 5, 1), (3, 0, 3, 1)):
@@ -76,17 +71,18 @@ def test_what_is_done_to_residuals_is_not_remembered(model):
     np.testing.assert_array_equal(left(model, 1), before)
 
 
-def test_the_sets_asked_for_last_are_remembered(model):
-    left(model, 1, 2, 3)
-    left(model, 4, 1)
-    assert remembered(model) == {3, 4, 1}
-    left(model, 5)
-    left(model, 6)
-    assert remembered(model) == {1, 5, 6}
-    left(model, 5, 2, 7, 8, 6)
-    assert remembered(model) == {7, 8, 6}
-    left(model, 1, 2, 1, 3)
-    assert remembered(model) == {2, 1, 3}
+def test_the_sets_stored_last_are_remembered(monkeypatch):
+    monkeypatch.setattr(likelihood, "MAX_CACHED", CACHED)
+    recent = likelihood.RecentSets(events=2)
+    keys = [frozenset({("steering.trim_rad", 0.01 * n)}) for n in range(9)]
+    for stored, remembered in (
+        ((1, 2, 3), {1, 2, 3}), ((4, 1), {3, 4, 1}), ((5,), {4, 1, 5}), ((6,), {1, 5, 6}),
+        ((5, 2, 7, 8, 6), {7, 8, 6}), ((1, 2, 1, 3), {2, 1, 3}),
+    ):  # fmt: skip
+        residuals = np.tile(np.array(stored, dtype=float), (2, 1))
+        recent.store([keys[n] for n in stored], residuals, np.ones(len(stored), dtype=bool))
+        assert {n for n, key in enumerate(keys) if key in recent} == remembered
+        assert all((recent.of(keys[n])[0] == n).all() for n in remembered)
 
 
 def test_two_cars_that_are_physical_and_one_that_is_not_are_remembered_as_such(model):

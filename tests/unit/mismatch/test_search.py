@@ -28,7 +28,7 @@ from scm.mismatch.select.round import (
     next_starts,
     penalty,
 )
-from scm.mismatch.select.search import TIMES_FITTED_FAR, Explanation, _margin, select
+from scm.mismatch.select.search import TIMES_FITTED_FAR, margin_of, select
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 
@@ -76,7 +76,7 @@ def test_of_a_number_at_its_limit_half_counts_where_the_alternative_is_nothing(
     score = base.score - context.penalty((effect,)) + short_by
     found = replace(base, effects=(effect,), score=score)
     tried = Round(base, (found,), (context.criterion(found) - AT_LIMIT,))
-    assert (_margin(context, tried) > 0.0) == accepted
+    assert (margin_of(context, tried) > 0.0) == accepted
 
 
 def test_low_noise_is_no_larger_than_a_cars_usual_times_a_few(model):
@@ -129,7 +129,7 @@ def test_an_effect_does_not_earn_what_a_fit_without_it_missed(model):
 def test_a_selection_ends_where_something_else_explains_all(model):
     context, seen = context_of(model, "steer_trim", "battery_sag"), []
     retuned = fit_with_noise(context, context.fitter(model).unfitted())
-    explain = lambda found: seen.append(found.best.names) or Explanation(ends=True)  # noqa: E731
+    explain = lambda found: seen.append(found.best.names) or (True, None)  # noqa: E731
     found = select(context, retuned, explain)
     assert found.best.names == ()
     assert len(found.rounds) == 1
@@ -159,8 +159,8 @@ def at_limits(model, still_at, score):
 
 def test_the_effect_of_a_number_at_its_limit_is_noticed(model):
     base, mine, other = at_limits(model, 0.0, 0.0)
-    assert rounds._at_limit(mine.effects[-1], base)
-    assert not rounds._at_limit(other.effects[-1], base)
+    assert rounds.at_limit(mine.effects[-1], base)
+    assert not rounds.at_limit(other.effects[-1], base)
 
 
 @pytest.mark.parametrize(
@@ -173,8 +173,8 @@ def test_a_number_at_its_limit_speaks_for_no_effect_where_a_better_one_pulled_it
 ):
     context = context_of(model, "steer_rate", "steer_lag")
     base, mine, other = at_limits(model, still_at, -better_by)
-    assert rounds._let_go(context, mine, [mine, other], base) == lost
-    assert rounds._let_go(context, other, [mine, other], base) == 0.0
+    assert rounds.let_go(context, mine, [mine, other], base) == lost
+    assert rounds.let_go(context, other, [mine, other], base) == 0.0
 
 
 def test_a_far_cars_hypothesis_is_settled_from_where_the_first_time_left_it(model):

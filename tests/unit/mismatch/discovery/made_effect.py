@@ -11,7 +11,7 @@ from scm.mismatch.discovery.dictionary import dictionary
 from scm.mismatch.discovery.general_effect import learned_terms
 from scm.mismatch.discovery.sensor_effects import sensor_effects, signatures_of
 from scm.mismatch.discovery.try_dictionary import try_dictionary
-from scm.mismatch.effect_catalogue import by_name, candidates
+from scm.mismatch.effect_catalogue import candidates
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
@@ -20,6 +20,7 @@ from scm.mismatch.select.search import Selection, retune
 from scm.mismatch.select.selected import Selected
 from scm.replay.drive import Drive
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
+from tests.unit.mismatch.made_fit import by_name
 
 GUST = (1.0, 0.9, 4.0, 0.5)
 GUST_NAME = "floor force against time"

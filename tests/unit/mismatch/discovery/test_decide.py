@@ -27,9 +27,10 @@ def test_only_what_is_better_by_far_ends_a_selection(by_far, ends, monkeypatch):
     context, found, unseen, discovery = made_effect.discovered()
     monkeypatch.setattr(decide, "discover", lambda *_: discovery)
     monkeypatch.setattr(decide, "BY_FAR", by_far)
-    why = decide.explain(context, unseen, found)
-    assert why.ends is ends
-    best, tried = decide.decide(context, Selection(found.best, found.retuned, (), why), unseen)
+    all_of_it, offered = decide.explain(context, unseen, found)
+    assert all_of_it is ends
+    found = Selection(found.best, found.retuned, (), offered, is_explained=ends)
+    best, tried = decide.decide(context, found, unseen)
     assert best.names == (made_effect.GUST_NAME,)
     assert tried is not None
 
@@ -38,10 +39,10 @@ def test_what_leaves_something_to_a_known_effect_does_not_end_a_selection(monkey
     context, found, unseen, discovery = made_effect.discovered()
     monkeypatch.setattr(decide, "discover", lambda *_: discovery)
     monkeypatch.setattr(decide, "BY_FAR", 100.0)
-    really = decide._criterion
+    really = decide.criterion_of
     worth = lambda context, fitted: really(context, fitted) - 1e4 * (len(fitted.effects) > 1)  # noqa: E731
-    monkeypatch.setattr(decide, "_criterion", worth)
-    assert not decide.explain(context, unseen, found).ends
+    monkeypatch.setattr(decide, "criterion_of", worth)
+    assert decide.explain(context, unseen, found)[0] is False
 
 
 def test_a_dictionary_that_was_tried_in_vain_is_not_tried_again(monkeypatch):
@@ -52,9 +53,9 @@ def test_a_dictionary_that_was_tried_in_vain_is_not_tried_again(monkeypatch):
         decide, "try_dictionary", lambda *given: (tries.append(1), really(*given))[1]
     )
     found = Selection(retuned, retuned)
-    why = decide.explain(context, unseen, found)
-    assert not why.ends
-    found = Selection(retuned, retuned, (), why)
-    assert not decide.explain(context, unseen, found).ends  # it is asked once
+    ends, offered = decide.explain(context, unseen, found)
+    assert not ends
+    found = Selection(retuned, retuned, (), offered)
+    assert decide.explain(context, unseen, found) == (False, offered)  # it is computed once
     assert decide.decide(context, found, unseen) == (retuned, None)
     assert len(tries) == 1

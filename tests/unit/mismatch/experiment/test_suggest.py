@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scm.mismatch.effect_catalogue import by_name, candidates, terms_needed
+from scm.mismatch.effect_catalogue import candidates, terms_needed
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES, Floor, pace_of
 from scm.mismatch.experiment.plan import Explanation, Leg, place, planned
 from scm.mismatch.experiment.scenario import write_scenario
@@ -24,6 +24,7 @@ from scm.recorder.play import read_drive
 from scm.recording.read import Channel, Recording
 from scm.replay.drive import Drive
 from scm.vehicles.car import load_car
+from tests.unit.mismatch.made_fit import by_name
 
 FLOOR = Floor((0.0, 3.0), (0.0, 2.0))
 
