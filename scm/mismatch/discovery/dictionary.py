@@ -1,12 +1,12 @@
-"""The dictionary of effects: every channel with every curve that makes sense there."""
+"""The dictionary of effects: every channel with every shape that makes sense there."""
 
 import math
 from functools import cache
 
 from scm.mismatch.discovery.dictionary_effect import (
     Channel,
-    Curve,
     DictionaryEffect,
+    Shape,
     ToNumbers,
     Values,
     Written,
@@ -177,129 +177,129 @@ _PLACE = "x_cog * cosine_of(way_rad) + y_cog * sine_of(way_rad)"
 _WAY = _angle("way_rad")
 _XY = ("x_cog", "y_cog")
 _SPOT = "x cos({way_rad}) + y sin({way_rad})"
-SWING = Curve(
+SWING = Shape(
     "swing", "time", (_PERIOD, _PHASE), _in_time, "swinging in time with a period of {period_s}",
     "sin(2 pi t / {period_s} + {phase_rad})", ("time",),
     "g = sine_of(2.0 * math.pi * time / period_s + phase_rad)",
 )  # fmt: skip
-SINCE = Curve(
+SINCE = Shape(
     "since", "time", (_FROM,), _since, "from {from_s} on", "(t > {from_s})", ("time",),
     f"g = min(max((time - from_s) / {EDGE_S} + 0.5, 0.0), 1.0)",
 )  # fmt: skip
-DRIFT = Curve(
+DRIFT = Shape(
     "drift", "time", (), _fixed(by_time=1.0 / 60.0, line=1.0), "more with every minute",
     "t / 60 s", ("time",), "g = time / 60.0",
 )  # fmt: skip
-ONE_WAY = Curve(
+ONE_WAY = Shape(
     "one way", "heading", (_angle("against_rad"),), _one_way,
     "most when it drives towards {against_rad} and not at all the other way",
     "(1 + cos(heading - {against_rad})) / 2", ("yaw",),
     "g = 0.5 + 0.5 * cosine_of(yaw - against_rad)",
 )  # fmt: skip
-ROUND = Curve(
+ROUND = Shape(
     "round", "heading", (_angle("against_rad"),), _round,
     "depending on the way it drives, most towards {against_rad}", "cos(heading - {against_rad})",
     ("yaw",), "g = cosine_of(yaw - against_rad)",
 )  # fmt: skip
-BOTH_WAYS = Curve(
+BOTH_WAYS = Shape(
     "both ways", "heading", (_angle("against_rad"),), _both_ways,
     "most when it drives along {against_rad}, either way", "cos(2 (heading - {against_rad}))",
     ("yaw",), "g = cosine_of(2.0 * (yaw - against_rad))",
 )  # fmt: skip
 _WAVES = (_LENGTH, _WAY, _PHASE)
-WAVE = Curve(
+WAVE = Shape(
     "wave", "position", _WAVES, _wave,
     "in waves over the floor, {length_m} long towards {way_rad}",
     f"sin(2 pi ({_SPOT}) / {{length_m}} + {{phase_rad}})", _XY,
     f"g = sine_of(2.0 * math.pi * ({_PLACE}) / length_m + phase_rad)", Equation.SURFACE,
 )  # fmt: skip
-TILES = Curve(
+TILES = Shape(
     "tiles", "position", _WAVES, _tiles,
     "on stripes of the floor, {length_m} apart towards {way_rad}",
     f"(1 + sin(2 pi ({_SPOT}) / {{length_m}} + {{phase_rad}})) / 2", _XY,
     f"g = 0.5 + 0.5 * sine_of(2.0 * math.pi * ({_PLACE}) / length_m + phase_rad)",
     Equation.SURFACE,
 )  # fmt: skip
-BEYOND = Curve(
+BEYOND = Shape(
     "beyond", "position", (_AT, _WAY), _beyond,
     "on the part of the floor beyond {beyond_m} towards {way_rad}", f"({_SPOT} > {{beyond_m}})",
     _XY, f"g = min(max(({_PLACE} - beyond_m) / {EDGE_M} + 0.5, 0.0), 1.0)", Equation.SURFACE,
 )  # fmt: skip
-SLOPE = Curve(
+SLOPE = Shape(
     "slope", "position", (_WAY,), _slope, "for each metre that it is further towards {way_rad}",
     f"({_SPOT}) / 1 m", _XY, f"g = {_PLACE}", Equation.SURFACE,
 )  # fmt: skip
-SPEED = Curve(
+SPEED = Shape(
     "in proportion", "speed", (), _fixed(by_speed=1.0, line=1.0),
     "for each metre a second that it drives", "speed / (1 m/s)", ("vx",), "g = vx",
 )  # fmt: skip
-SPEED_SQUARED = Curve(
+SPEED_SQUARED = Shape(
     "squared", "speed", (), _fixed(by_speed=1.0, square=1.0), "growing with its speed squared",
     "speed^2 / (1 m/s)^2", ("vx",), "g = vx * vx",
 )  # fmt: skip
-SPEED_CUBED = Curve(
+SPEED_CUBED = Shape(
     "cubed", "speed", (), _fixed(by_speed=1.0, heavy=1.0), "growing with its speed cubed",
     "|speed|^3 / (1 m/s)^3", ("vx",), "g = vx * vx * abs(vx)",
 )  # fmt: skip
-FASTER = Curve(
+FASTER = Shape(
     "above", "speed", (_ABOVE,), _faster, "for each metre a second above {above_mps}",
     "max(speed - {above_mps}, 0) / (1 m/s)", ("vx",), "g = max(vx - above_mps, 0.0)",
 )  # fmt: skip
-TURNED = Curve(
+TURNED = Shape(
     "turned", "steering angle", (), _fixed(by_steer=1.0, size=1.0),
     "for each radian that the wheels are turned", "|wheel angle| / 1 rad", ("linkage_angle",),
     "g = abs(linkage_angle)",
 )  # fmt: skip
-TURNED_SQUARED = Curve(
+TURNED_SQUARED = Shape(
     "turned, squared", "steering angle", (), _fixed(by_steer=1.0, square=1.0),
     "growing with the wheels' angle squared", "wheel angle^2 / (1 rad)^2", ("linkage_angle",),
     "g = linkage_angle * linkage_angle",
 )  # fmt: skip
-TURNED_CUBED = Curve(
+TURNED_CUBED = Shape(
     "turned, cubed", "steering angle", (), _fixed(by_steer=1.0, heavy=1.0),
     "growing with the wheels' angle cubed", "|wheel angle|^3 / (1 rad)^3", ("linkage_angle",),
     "g = linkage_angle * linkage_angle * abs(linkage_angle)",
 )  # fmt: skip
-SIDE = Curve(
+SIDE = Shape(
     "side", "steering sign", (), _fixed(by_steer=1.0, size=1.0),
     "for each radian to the left, and as much less to the right", "|angle asked for| / 1 rad",
     ("steer_demand",), "g = abs(steer_demand)",
 )  # fmt: skip
-LEFT = Curve(
+LEFT = Shape(
     "left", "steering sign", (), _fixed(by_steer=1.0, ramp=1.0),
     "for each radian to the left", "max(wheel angle, 0) / 1 rad", ("linkage_angle",),
     "g = max(linkage_angle, 0.0)", rare=2.0,
 )  # fmt: skip
-RIGHT = Curve(
+RIGHT = Shape(
     "right", "steering sign", (), _fixed(by_steer=-1.0, ramp=1.0),
     "for each radian to the right", "max(-wheel angle, 0) / 1 rad", ("linkage_angle",),
     "g = max(-linkage_angle, 0.0)", rare=2.0,
 )  # fmt: skip
-BENT = Curve(
+BENT = Shape(
     "bent", "steering angle", (), _fixed(by_steer=1.0, cube=1.0),
     "growing with the angle asked for cubed", "angle asked for^3 / (1 rad)^3", ("steer_demand",),
     "g = steer_demand * steer_demand * steer_demand",
 )  # fmt: skip
-DRIVEN = Curve(
+DRIVEN = Shape(
     "driven", "throttle", (), _fixed(by_throttle=1.0, line=1.0), "in proportion to the throttle",
     "throttle", ("throttle_command",), "g = throttle_command",
 )  # fmt: skip
-REVERSED = Curve(
+REVERSED = Shape(
     "reversed", "throttle", (), _fixed(by_throttle=-20.0, phase=-0.5, step=1.0),
     "while the throttle is reversed", "(throttle < 0)", ("throttle_command",),
     "g = min(max(-20.0 * throttle_command, 0.0), 1.0)",
 )  # fmt: skip
-LOAD = Curve(
+LOAD = Shape(
     "load", "load", (), _fixed(by_side=1.0, size=1.0),
     "for each m/s^2 across, which loads the outer wheels", "|acceleration across| / (1 m/s^2)",
     ("accel_y",), "g = abs(accel_y)",
 )  # fmt: skip
-TURNING = Curve(
+TURNING = Shape(
     "turning", "yaw rate", (), _fixed(by_rate=1.0, size=1.0),
     "for each radian a second that it turns", "|yaw rate| / (1 rad/s)", ("yaw_rate",),
     "g = abs(yaw_rate)",
 )  # fmt: skip
-WORKED = Curve(
+WORKED = Shape(
     "worked", "throttle's past", (_parameter("memory_s", "s", (0.2, 120.0), 0.1),), _worked,
     "for full throttle over the last {memory_s}", "|mean throttle of the last {memory_s}|",
     ("throttle_memory",), "g = abs(throttle_memory)",
@@ -309,7 +309,7 @@ WORKED = Curve(
         "Mean throttle of late, which fades.", "_memory", keeps=0.0,
     ),
 )  # fmt: skip
-PHASE = Curve(
+PHASE = Shape(
     "phase", "phase", (_parameter("per_turn", "1", (0.2, 40.0), 0.002), _PHASE), _around,
     "in so many waves a turn: {per_turn}", "sin({per_turn} * wheel turn + {phase_rad})",
     ("wheel_angle",),
@@ -341,4 +341,4 @@ _ROWS = (
 @cache
 def dictionary() -> tuple[DictionaryEffect, ...]:
     """Return every effect that may be tried."""
-    return tuple(dictionary_effect(channel, curve) for channel, curves in _ROWS for curve in curves)
+    return tuple(dictionary_effect(channel, shape) for channel, shapes in _ROWS for shape in shapes)

@@ -40,8 +40,8 @@ class Channel:
         parameters: How much; the first is the amount.
         numbers: Of the general effect, from the parameters' values.
         sentence: The sentence's beginning; braces take the parameters.
-        formula: Of the effect; braces take the parameters, `{g}` the curve.
-        text: Of the written effect, by the sum or variable it acts on; `g` is the curve.
+        formula: Of the effect; braces take the parameters, `{g}` the shape.
+        text: Of the written effect, by the sum or variable it acts on; `g` is the shape.
     """
 
     word: str
@@ -60,7 +60,7 @@ class Written:
 
     Attributes:
         target: `adds force_x` or `sets steer_trimmed`.
-        variables: It reads, beside the curve's.
+        variables: It reads, beside the shape's.
         returns: The expression.
         about: What it returns.
         suffix: Of the function's name.
@@ -78,7 +78,7 @@ class Written:
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class Shape:
     """What an effect depends on, and how.
 
     Attributes:
@@ -107,21 +107,21 @@ class DictionaryEffect(Candidate):
     """An effect outside the catalogue, a candidate like those in it.
 
     Attributes:
-        channel: Where it acts; `curve`: what it depends on. Their parameters follow each other.
+        channel: Where it acts; `shape`: what it depends on. Their parameters follow each other.
     """
 
     channel: Channel
-    curve: Curve
+    shape: Shape
 
     @property
     def written(self) -> tuple[Written, ...]:
         """The functions that its file holds."""
-        return (*self.channel.text, *filter(None, (self.curve.also,)))
+        return (*self.channel.text, *filter(None, (self.shape.also,)))
 
     def numbers(self, values: Values) -> dict[str, float]:
         """Return the general effect's numbers, by key, at these values of the parameters."""
         n = len(self.channel.parameters)
-        found = {**self.curve.numbers(values[n:]), **self.channel.numbers(values[:n])}
+        found = {**self.shape.numbers(values[n:]), **self.channel.numbers(values[:n])}
         return {PREFIX + name: value for name, value in found.items()}
 
     def formula(self, values: Values) -> str:
@@ -130,22 +130,22 @@ class DictionaryEffect(Candidate):
             parameter.name: f"{value:.3g}" + ("" if parameter.unit == "1" else f" {parameter.unit}")
             for parameter, value in zip(self.parameters, values, strict=True)
         }
-        text = self.channel.formula.format(**words, g=self.curve.formula.format(**words))
+        text = self.channel.formula.format(**words, g=self.shape.formula.format(**words))
         return text.replace("--", "").replace("- -", "+ ").replace("+ -", "- ")
 
 
-def dictionary_effect(channel: Channel, curve: Curve) -> DictionaryEffect:
-    """Return the effect that a channel and a curve make."""
+def dictionary_effect(channel: Channel, shape: Shape) -> DictionaryEffect:
+    """Return the effect that a channel and a shape make."""
     return DictionaryEffect(
-        name=f"{channel.word} against {curve.word}",
-        equation=curve.equation or channel.equation,
-        depends_on=(curve.word,),
-        parameters=(*channel.parameters, *curve.parameters),
+        name=f"{channel.word} against {shape.word}",
+        equation=shape.equation or channel.equation,
+        depends_on=(shape.word,),
+        parameters=(*channel.parameters, *shape.parameters),
         starts=(),
-        sentence=f"{channel.sentence} {curve.sentence}.",
-        rare=curve.rare,
+        sentence=f"{channel.sentence} {shape.sentence}.",
+        rare=shape.rare,
         channel=channel,
-        curve=curve,
+        shape=shape,
     )
 
 
@@ -199,7 +199,7 @@ def _docstring(effect: DictionaryEffect, values: Values) -> str:
         f"{part.target.split()[1]} {'+=' if _adds(part) else '='} {_plain(part.returns)}"
         for part in effect.written
     ]
-    rows = [*equations, _plain(effect.curve.text), f"found as {effect.formula(values)}"]
+    rows = [*equations, _plain(effect.shape.text), f"found as {effect.formula(values)}"]
     body = [
         f'"""{first}', "", *(_wrapped(row, "    ") for row in rows), "", _wrapped(sentence, ""),
         "Holds: within what the recording showed; the form is the best of a dictionary.",
@@ -253,9 +253,9 @@ def _param(effect: DictionaryEffect, p: Parameter) -> str:
 
 
 def _function(effect: DictionaryEffect, part: Written) -> str:
-    curve = f"{effect.curve.text}\n" if part.keeps is None else ""
-    body, names = _straight(f"{curve}result = {part.returns}")
-    variables = [s for s in dict.fromkeys((*part.variables, *effect.curve.variables)) if s in names]
+    shape = f"{effect.shape.text}\n" if part.keeps is None else ""
+    body, names = _straight(f"{shape}result = {part.returns}")
+    variables = [s for s in dict.fromkeys((*part.variables, *effect.shape.variables)) if s in names]
     arguments = [*variables, *(k.name for k in effect.parameters if k.name in names)]
     arguments += [_WITH[part.target][0]] if part.target in _WITH else []
     wrapped = textwrap.wrap(", ".join(f"{a}: float" for a in arguments) + ",", _WIDE - 4)

@@ -168,7 +168,7 @@ def _windows(
 @cache
 def by_turn() -> DictionaryEffect:
     """Return the effect of a torque over a wheel's turn."""
-    return next(effect for effect in dictionary() if effect.curve is PHASE)
+    return next(effect for effect in dictionary() if effect.shape is PHASE)
 
 
 def ripples(fitter: Fitter, base: Hypothesis) -> Iterator[tuple[Values, float]]:

@@ -18,25 +18,25 @@ from scm.vehicles.jit import array_kernel
 def pushes(effect: DictionaryEffect, cells: Cells, values: Values) -> Floats:
     """Return an effect's force, angle, throttle or moment at each moment, (cells,)."""
     n = len(effect.channel.parameters)
-    curve, channel = effect.curve.numbers(values[n:]), effect.channel.numbers(values[:n])
-    return shape(curve, cells) * amount(channel, cells)
+    numbers, channel = effect.shape.numbers(values[n:]), effect.channel.numbers(values[:n])
+    return shape(numbers, cells) * amount(channel, cells)
 
 
-def shape(curve: Mapping[str, float], cells: Cells) -> Floats:
-    """Return a curve at each moment, as `learned` has it, (cells,)."""
-    q = np.full(len(cells), curve.get("phase", 0.0))
+def shape(numbers: Mapping[str, float], cells: Cells) -> Floats:
+    """Return a shape at each moment, as `learned` has it, (cells,)."""
+    q = np.full(len(cells), numbers.get("phase", 0.0))
     for name in WEIGHTS:
-        if f"by_{name}" in curve:
-            q += curve[f"by_{name}"] * variable(name, curve, cells)
-    parts = (curve[name] * part(q) for name, part in _SHAPES.items() if name in curve)
+        if f"by_{name}" in numbers:
+            q += numbers[f"by_{name}"] * variable(name, numbers, cells)
+    parts = (numbers[name] * part(q) for name, part in _SHAPES.items() if name in numbers)
     return sum(parts, np.zeros(len(cells)))
 
 
-def variable(name: str, curve: Mapping[str, float], cells: Cells) -> Floats:
+def variable(name: str, numbers: Mapping[str, float], cells: Cells) -> Floats:
     """Return one of `learned.WEIGHTS`' variables at each moment, (cells,)."""
     if name != "memory":
         return cells.driven[name]
-    share = -math.expm1(-cells.wide / curve["memory_s"])
+    share = -math.expm1(-cells.wide / numbers["memory_s"])
     return remembered(cells.driven["throttle"], cells.drive, share)
 
 
@@ -148,16 +148,16 @@ def screen(
 ) -> list[list[Start]]:
     """Return the best starts of each effect, best first, from all that a drive could show."""
     waves, found = dict[str, list[Start]](), list[list[Start]]()
-    for effect in sorted(effects, key=lambda effect: effect.curve is TILES):
+    for effect in sorted(effects, key=lambda effect: effect.shape is TILES):
         word = effect.channel.response
         if word not in responses:
             continue
-        if effect.curve is TILES:  # a wave that never turns round: it begins where waves explain
+        if effect.shape is TILES:  # a wave that never turns round: it begins where waves explain
             grid = [(*s.values[:-1], float(p)) for s in waves[word] for p in _PHASES]
             found.append(_best(effect, grid, cells, responses[word]))
         elif any(parameter.name == "phase_rad" for parameter in effect.parameters):
             starts = _waves(effect, list(grid_of(effect, cells)), cells, responses[word])
-            if effect.curve is WAVE:
+            if effect.shape is WAVE:
                 waves[word] = starts
             found.append(starts[:MAX_STARTS])
         else:
@@ -200,7 +200,7 @@ def _waves(
     size = np.maximum(size, 1e-6 * ss * cc + 1e-30)
     a, b = (cc * top[0] - sc * top[1]) / size, (ss * top[1] - sc * top[0]) / size
     gains = a * top[0] + b * top[1]
-    most = MAX_WAVES if effect.curve is WAVE else MAX_STARTS
+    most = MAX_WAVES if effect.shape is WAVE else MAX_STARTS
     found, chosen = list[Start](), list[Floats]()
     for i in np.argsort(-gains)[:400]:
         course = a[i] * halves[0][:, i] + b[i] * halves[1][:, i]

@@ -176,7 +176,7 @@ def tidied(fitted: Hypothesis) -> Hypothesis:
     names = [parameter.name for parameter in effect.parameters]
     known = len(fitted.values) - len(names)
     values = dict(zip(names, map(float, fitted.values[known:]), strict=True))
-    wave = effect.curve.name in ("swing", "wave", "round")
+    wave = effect.shape.name in ("swing", "wave", "round")
     by = [name for name in (*_FLIPPED_BY, "against_rad") if name in values]
     sign = np.ones(len(fitted.z) + len(fitted.values))  # of what was differentiated
     if values[names[0]] < 0.0 and by and (wave or by[0] == "toward_rad"):

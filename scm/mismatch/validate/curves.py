@@ -259,7 +259,7 @@ def _in_bins(
     fitter = Fitter(fitted.model, tried.part)
     response = respond(fitter, _without(fitted, mine), cells, effect.channel.response)
     covariance = _inverse(courses.T @ response.bend @ courses)
-    fit = values[0] * shape(effect.curve.numbers(values[n:]), cells)
+    fit = values[0] * shape(effect.shape.numbers(values[n:]), cells)
     y = np.array([fit[place == b].mean() for b in used])
     y = y - covariance @ (courses.T @ response.slope)
     band = NINETY * np.sqrt(np.maximum(covariance.diagonal(), 0.0))
@@ -307,19 +307,19 @@ def _inverse(bend: Floats) -> Floats:
 
 def axis_of(effect: DictionaryEffect, values: Values, cells: Cells) -> tuple[Floats, str, str]:
     """Return what an effect depends on at each moment; waves and turns are laid over each other."""
-    known = dict(zip((k.name for k in effect.curve.parameters), values, strict=True))
-    if effect.curve.word == "position":
+    known = dict(zip((k.name for k in effect.shape.parameters), values, strict=True))
+    if effect.shape.word == "position":
         way = known.get("way_rad", 0.0)
         x = cells.driven["x"] * math.cos(way) + cells.driven["y"] * math.sin(way)
         length = known.get("length_m")
         if length is None:
             return x, f"position towards {way:.2f} rad", "m"
         return np.mod(x, length), f"position within a wave towards {way:.2f} rad", "m"
-    name, unit = _AXES[effect.curve.word]
-    x = variable(name, effect.curve.numbers(values), cells)
+    name, unit = _AXES[effect.shape.word]
+    x = variable(name, effect.shape.numbers(values), cells)
     if name == "yaw":  # turns of the same heading fill the same bin
         x = np.arctan2(np.sin(x), np.cos(x))
     period = known.get("period_s")
     if period is not None:
         return np.mod(x, period), "time within a swing", unit
-    return x, effect.curve.word, unit
+    return x, effect.shape.word, unit

@@ -32,7 +32,7 @@ def lawful_nigel():
 
 
 def law(name, curve):
-    return next(x for x in dictionary() if x.name == name and x.curve.name == curve)
+    return next(x for x in dictionary() if x.name == name and x.shape.name == curve)
 
 
 def gust():

@@ -39,7 +39,7 @@ def general(law, values):
     return {term.target: value(term.function, given) for term in TERMS}
 
 
-@pytest.mark.parametrize("law", dictionary(), ids=lambda law: f"{law.name}, {law.curve.name}")
+@pytest.mark.parametrize("law", dictionary(), ids=lambda law: f"{law.name}, {law.shape.name}")
 def test_a_written_law_does_what_the_general_effect_did(law, tmp_path):
     values = tuple(0.3 + 0.4 * i for i in range(len(law.parameters)))
     term, numbers = as_term(law, values, tmp_path)
