@@ -14,7 +14,6 @@ from scm.mismatch.discovery import decide
 from scm.mismatch.effect_catalogue import candidates
 from scm.mismatch.pipeline import diagnose_car, write
 from scm.mismatch.select import selected
-from scm.mismatch.select.search import Explanation
 from scm.mismatch.validate.check_report import check_report
 from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import made_drive, nigel
@@ -57,9 +56,7 @@ def test_every_figure_of_a_report_is_that_of_its_car_file(case, tmp_path, monkey
     if "finds" in how:
         few = [effect for effect in candidates(nigel()) if effect.name in FEW]
         monkeypatch.setattr(selected, "candidates", lambda _car: few)
-        monkeypatch.setattr(
-            decide, "explain", lambda _context, _unseen, _found: Explanation(ends=False)
-        )
+        monkeypatch.setattr(decide, "explain", lambda _context, _unseen, _found: (False, None))
         monkeypatch.setattr(decide, "decide", lambda _context, found, _unseen: (found.best, None))
     limited = made(how.get("budget_s", 600.0), WallClock())
     found = diagnose_car([recording], nigel(), budget=limited)
