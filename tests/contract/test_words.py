@@ -51,15 +51,16 @@ def defined_in(tree: ast.AST) -> Iterator[tuple[str, int]]:
     A field of a record is not among them: its name can be part of a contract, and
     `test_interfaces` holds those.
     """
-    fields = {
-        id(statement.target)
-        for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
-        for statement in node.body if isinstance(statement, ast.AnnAssign)
-        if any(ast.unparse(base).endswith(RECORDS) for base in node.bases)
-    }  # fmt: skip
-    for node in ast.walk(tree):
+    fields = set()
+    for node in ast.walk(tree):  # a class comes before what is in it
         match node:
-            case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
+            case ast.ClassDef():
+                if any(ast.unparse(base).endswith(RECORDS) for base in node.bases):
+                    fields |= {
+                        id(one.target) for one in node.body if isinstance(one, ast.AnnAssign)
+                    }
+                yield node.name, node.lineno
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
                 yield node.name, node.lineno
             case ast.arg():
                 yield node.arg, node.lineno
@@ -69,13 +70,19 @@ def defined_in(tree: ast.AST) -> Iterator[tuple[str, int]]:
                 yield node.attr, node.lineno
 
 
+@cache
+def is_retired(name: str) -> bool:
+    """Return whether an identifier is made of a retired word."""
+    return name not in STANDARD and not retired().isdisjoint(words_of(name))
+
+
 def faults(place: Path) -> list[str]:
     """Return the places of retired words in the names of one module, its own among them."""
     names = [(place.stem, 1), *defined_in(tree_of(place))]
     return sorted({
         f"{place.relative_to(ROOT)}:{line}: {name}"
         for name, line in names
-        if name not in STANDARD and retired().intersection(words_of(name))
+        if is_retired(name)
     })  # fmt: skip
 
 
