@@ -51,7 +51,7 @@ def defined_in(tree: ast.AST) -> Iterator[tuple[str, int]]:
     A field of a record is not among them: its name can be part of a contract, and
     `test_interfaces` holds those.
     """
-    fields = set()
+    fields: set[int] = set()
     for node in ast.walk(tree):  # a class comes before what is in it
         match node:
             case ast.ClassDef():
