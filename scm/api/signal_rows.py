@@ -45,18 +45,7 @@ def status_rows(picture: Picture) -> tuple[StatusRow, ...]:
 
 def status_row(status: SignalStatus) -> StatusRow:
     """Return what runs at one junction."""
-    return StatusRow(
-        junction=status.junction,
-        policy=status.policy,
-        plan=status.plan,
-        pending=status.pending,
-        wishes=status.wishes,
-        detectors=status.detectors,
-        turns=status.turns,
-        failure=status.failure,
-        stages=status.stages,
-        offset_s=status.offset_s,
-    )
+    return StatusRow(**{name: getattr(status, name) for name in StatusRow.__struct_fields__})
 
 
 def _row(

@@ -1,5 +1,7 @@
 """Vehicles as they are shown: the world's truth with trip, own report and the Eye's residual."""
 
+from typing import Any
+
 from scm.api.picture import Picture, SeenPose, once_a_picture
 from scm.camera.optics import fitted
 from scm.records.eye import Residual
@@ -8,6 +10,13 @@ from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 POSE_SHOWN_S = 2.0
 TRIP_SHOWN_S = 10.0
+AS_SENT = (
+    "vehicle", "kind", "car", "tag_id", "owner", "epoch", "mode", "alive", "lights", "stuck",
+)  # fmt: skip
+DIGITS = {
+    "x_m": 4, "y_m": 4, "yaw_rad": 4, "speed_mps": 4, "steering_rad": 4, "throttle": 3,
+    "battery_v": 2, "battery_charge": 4,
+}  # fmt: skip
 
 
 @once_a_picture
@@ -19,12 +28,7 @@ def vehicles_topic(picture: Picture) -> VehiclesTopic:
     residuals = _residuals(picture)
     since_ms = 1000.0 * held.age_s(picture.now_ns)
     rows = [
-        _row(
-            car,
-            since_ms,
-            _trip(picture, car.vehicle),
-            residuals.get(car.vehicle),
-        )
+        _row(car, since_ms, _trip(picture, car.vehicle), residuals.get(car.vehicle))
         for car in sorted(held.message.vehicles, key=lambda car: car.vehicle)
     ]
     return VehiclesTopic(
@@ -37,39 +41,23 @@ def vehicles_topic(picture: Picture) -> VehiclesTopic:
 
 
 def _row(
-    car: SnapshotVehicle,
-    since_ms: float,
-    trip: TripRow | None,
-    eye: Residual | None,
+    car: SnapshotVehicle, since_ms: float, trip: TripRow | None, eye: Residual | None
 ) -> VehicleRow:
+    command_age_ms = None if car.command_age_ms is None else car.command_age_ms + since_ms
     return VehicleRow(
-        vehicle=car.vehicle,
-        kind=car.kind,
-        car=car.car,
+        **{name: getattr(car, name) for name in AS_SENT},
+        **{name: _rounded(getattr(car, name), digits) for name, digits in DIGITS.items()},
         cameras=tuple(fitted(car.car)),
-        tag_id=car.tag_id,
-        x_m=round(car.x_m, 4),
-        y_m=round(car.y_m, 4),
-        yaw_rad=round(car.yaw_rad, 4),
-        speed_mps=round(car.speed_mps, 4),
-        steering_rad=round(car.steering_rad, 4),
-        owner=car.owner,
-        epoch=car.epoch,
         lease_left_ms=None if car.lease_left_ms is None else round(car.lease_left_ms),
-        battery_v=None if car.battery_v is None else round(car.battery_v, 2),
-        battery_charge=None if car.battery_charge is None else round(car.battery_charge, 4),
-        command_age_ms=None
-        if car.command_age_ms is None
-        else round(car.command_age_ms + since_ms, 1),
-        mode=car.mode,
+        command_age_ms=_rounded(command_age_ms, 1),
         age_ms=round(car.age_ms + since_ms, 1),
-        alive=car.alive,
-        lights=car.lights,
-        throttle=None if car.throttle is None else round(car.throttle, 3),
-        stuck=car.stuck,
         trip=trip,
         eye=eye,
     )
+
+
+def _rounded(value: float | None, digits: int) -> Any:
+    return None if value is None else round(value, digits)
 
 
 def _trip(picture: Picture, vehicle: str) -> TripRow | None:
@@ -81,7 +69,7 @@ def _trip(picture: Picture, vehicle: str) -> TripRow | None:
     return TripRow(
         trip_id=trip.trip_id,
         done_m=round(trip.done_m, 2),
-        length_m=None if trip.length_m is None else round(trip.length_m, 2),
+        length_m=_rounded(trip.length_m, 2),
         arrived=trip.arrived_ns is not None,
         waiting_for=trip.waiting_for,
         route=trip.route,

@@ -49,7 +49,7 @@ from scm.records.city_map import CityMap, MapTag
 from scm.records.eye import TagSeen
 from scm.runtime.part import IsWanted, Service, Subscription
 from scm.scenery.bodies import NIGEL, CarBody, car_body
-from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
+from scm.v2x.exchange import Answer, Incoming, Outgoing, PersistedState
 from scm.v2x.key import is_name
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.calibration_request import CalibrationReply, CalibrationRequest
@@ -200,7 +200,7 @@ class EyePart:
         self._due_ns[EyeStatus] = now_ns
         status = self._calibration.status()
         return [
-            Keep("calibrations", self.camera, self._calibration.record),
+            PersistedState("calibrations", self.camera, self._calibration.record),
             Answer(item, CalibrationReply(camera=self.camera, in_force=status)),
             self._event("calibration_in_force", description(self.camera, status), now_ns),
         ]
@@ -212,7 +212,7 @@ class EyePart:
             f"camera {self.camera} uses the map file: the calibration put in force before is of "
             "another map file or lens"
         )
-        forget = Keep("calibrations", self.camera, None)
+        forget = PersistedState("calibrations", self.camera, None)
         return [forget, self._event("calibration_lapsed", text, now_ns, "warning")]
 
     def _event(

@@ -32,7 +32,7 @@ def cut(run: Path, part: Path, from_s: float = 0.0, to_s: float | None = None) -
     """Copy the messages of a run between two times to a new file.
 
     The file begins with earlier messages that are still valid, such as the map, as they reach every
-    station that joins late (`Message.KEEP`).
+    station that joins late (`Message.HISTORY_DEPTH`).
 
     Args:
         run: The recording; it is not changed, and may be truncated or still growing.
@@ -65,7 +65,7 @@ def _still_true(index: RunIndex, begin_ns: int, damage: list[str]) -> list[Recor
     """Return the last events of each key before a time, in order."""
     schemas = SchemaTable(index.city)
     most = {
-        key: kind.KEEP
+        key: kind.HISTORY_DEPTH
         for key in index.topics.values()
         if (kind := schemas.kind_of(key)) is not None and kind.DELIVERY is Delivery.EVENT
     }

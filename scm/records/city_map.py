@@ -141,6 +141,8 @@ class Group(Record, kw_only=True, frozen=True):
 class PlanStage(Record, kw_only=True, frozen=True):
     """Groups that are green together in a junction's own plan, and for how long.
 
+    A record beside `SignalStage`: of the map file's format, which refuses unknown keys.
+
     Attributes:
         green_s: How long they are green [s].
     """

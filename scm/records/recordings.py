@@ -69,6 +69,8 @@ class RecordingRow(msgspec.Struct, kw_only=True, frozen=True):
 class CarAt(msgspec.Struct, kw_only=True, frozen=True, array_like=True):
     """One car in one frame, without names: `[car, x_m, y_m, yaw_rad, ...]`.
 
+    A record beside `SnapshotVehicle`: without names and with less, as a page loads many frames.
+
     Attributes:
         car: Number of its entry in `cars`.
         lights: Names of those that are on.

@@ -25,6 +25,8 @@ from scm.records.fields import (
 class SignalStage(msgspec.Struct, kw_only=True, frozen=True):
     """Groups that are green together, for how long, and how much later the next stage begins.
 
+    Messages, answers and the store share it. `StageBody` stays apart: it bounds what people send.
+
     Groups of the next stage as well stay green between them; all others are red meanwhile.
 
     Attributes:
@@ -146,7 +148,10 @@ class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class StageBody(Body, kw_only=True, frozen=True):
-    """One stage of the cycle; yellow and red clear after it are the kernel's."""
+    """One stage of the cycle; yellow and red clear after it are the kernel's.
+
+    A record beside `SignalStage`, whose bounds would refuse a stage that was stored before them.
+    """
 
     groups: Annotated[
         tuple[Annotated[str, Meta(max_length=64)], ...],

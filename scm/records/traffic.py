@@ -77,14 +77,19 @@ class ApproachCount(msgspec.Struct, kw_only=True, frozen=True):
     saturation: float | None = None
 
 
-class TrackPoint(msgspec.Struct, kw_only=True, frozen=True):
-    """Where the car was estimated to be: rear axle, map frame; `source` reported it."""
+class EvidencePose(msgspec.Struct, kw_only=True, frozen=True):
+    """Where a car was seen: the rear axle, map frame."""
 
     t_ns: TNs
     x_m: XM
     y_m: YM
     yaw_rad: YawRad
     speed_mps: SpeedMps
+
+
+class TrackPoint(EvidencePose, kw_only=True, frozen=True):
+    """Where the car was estimated to be; `source` reported it."""
+
     source: SourceName
 
 

@@ -66,6 +66,9 @@ class TripRow(msgspec.Struct, kw_only=True, frozen=True):
 class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
     """One car; pose of the rear axle's centre in the map frame.
 
+    A record beside the world's `SnapshotVehicle`: what pages and programs see of a car, with its
+    trip and the Eye's residual, changes without the message.
+
     Attributes:
         cameras: Those that its file gives it; may be empty.
         steering_rad: Angle of the front wheels, + = left [rad].

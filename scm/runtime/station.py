@@ -18,7 +18,7 @@ from scm.store.audit import Deed
 from scm.store.repository import Table
 from scm.v2x.answers import AnswerCache
 from scm.v2x.bus import Bus, Mailbox, RawMailbox, check_reply
-from scm.v2x.exchange import Answer, Call, Incoming, Keep, Outgoing, RawSample
+from scm.v2x.exchange import Answer, Call, Incoming, Outgoing, PersistedState, RawSample
 from scm.v2x.mailbox import drain_all
 from scm.v2x.message import Delivery, Message, Refused, Request, encode
 from scm.v2x.write_ahead import Batch, BatchStore
@@ -116,7 +116,7 @@ class Station:
 
     def send(self, outgoing: Iterable[Outgoing]) -> None:
         """Deliver what a step returned, in its order; answers wait until they are stored."""
-        stored: list[Keep] = []
+        stored: list[PersistedState] = []
         answers: list[Answer] = []
         for item in outgoing:
             if isinstance(item, Call):
@@ -128,7 +128,7 @@ class Station:
                 else:
                     check_reply(item)
                     answers.append(item)
-            elif isinstance(item, Keep):
+            elif isinstance(item, PersistedState):
                 stored.append(item)
             else:
                 self._bus.publish(item)
@@ -147,7 +147,9 @@ class Station:
             return ""
         return self._keeper.stuck
 
-    def _store(self, keeper: BatchStore, stored: Sequence[Keep], answers: Sequence[Answer]) -> None:
+    def _store(
+        self, keeper: BatchStore, stored: Sequence[PersistedState], answers: Sequence[Answer]
+    ) -> None:
         values: list[tuple[Table, str, bytes | None]] = [
             (item.table, item.key, None if item.value is None else msgspec.json.encode(item.value))
             for item in stored

@@ -16,6 +16,7 @@ from typing import TypeVar
 import msgspec
 
 from scm.errors import StoreError
+from scm.records.signal_plans import SignalStage
 from scm.store.repository import Repository, Table
 
 R = TypeVar("R", bound=msgspec.Struct)
@@ -60,14 +61,6 @@ class EpochRecord(msgspec.Struct, kw_only=True, frozen=True):
     highest: int
 
 
-class StageRecord(msgspec.Struct, kw_only=True, frozen=True):
-    """A stage of a person's plan."""
-
-    groups: tuple[str, ...]
-    green_s: float
-    extra_red_s: float = 0.0
-
-
 class PlanRecord(msgspec.Struct, kw_only=True, frozen=True):
     """What a junction was last asked for.
 
@@ -82,7 +75,7 @@ class PlanRecord(msgspec.Struct, kw_only=True, frozen=True):
     plan: str
     flash: bool = False
     by: str = ""
-    stages: tuple[StageRecord, ...] = ()
+    stages: tuple[SignalStage, ...] = ()
     offset_s: float | None = None
 
 

@@ -241,7 +241,7 @@ class MemoryBus:
         """Send a message on its own key."""
         self._check_open()
         self._network.expire()
-        self._send(message, keep=message.KEEP if message.DELIVERY is Delivery.EVENT else 0)
+        self._send(message, keep=message.HISTORY_DEPTH if message.DELIVERY is Delivery.EVENT else 0)
 
     def _send(self, message: Message, keep: int) -> None:
         body, attachment = encode(message)

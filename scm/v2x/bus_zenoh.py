@@ -147,7 +147,7 @@ class ZenohBus:
         if kind.DELIVERY is Delivery.EVENT:
             again = requery_interval(kind, REQUERY_EVERY)
             subscriber = declare_event_subscriber(
-                self._session, expression, callback, kind.KEEP, again
+                self._session, expression, callback, kind.HISTORY_DEPTH, again
             )
         else:
             subscriber = self._session.declare_subscriber(expression, callback)
@@ -464,7 +464,7 @@ def requery_interval(kind: type[Message] | None, every: timedelta) -> timedelta 
 
 def _declare_publisher(session: zenoh.Session, kind: type[Message], key: str) -> _Publisher:
     if kind.DELIVERY is Delivery.EVENT:
-        events: _Publisher = declare_event_publisher(session, key, kind.KEEP)
+        events: _Publisher = declare_event_publisher(session, key, kind.HISTORY_DEPTH)
         return events
     if kind.DELIVERY is Delivery.COMMAND:
         priority = zenoh.Priority.REAL_TIME

@@ -57,7 +57,7 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
-class Keep:
+class PersistedState:
     """State that must outlive the process: stored before any answer of the same step is sent.
 
     A runner without a store ignores it.
@@ -73,4 +73,4 @@ class Keep:
     value: msgspec.Struct | None
 
 
-Outgoing = Message | Call | Answer | Keep
+Outgoing = Message | Call | Answer | PersistedState

@@ -40,13 +40,13 @@ class Message(msgspec.Struct, kw_only=True, frozen=True, gc=False):
         KEY: Below `scm/@v1/<city>/`; `{field}` chunks are fields of the message.
         RATE_HZ: Nominal rate; None: sent on occasion.
         DELIVERY: How it is delivered.
-        KEEP: With EVENT, how many last messages a late joiner gets.
+        HISTORY_DEPTH: With EVENT, how many last messages a late joiner gets.
     """
 
     KEY: ClassVar[str] = ""
     RATE_HZ: ClassVar[float | None] = None
     DELIVERY: ClassVar[Delivery] = Delivery.STREAM
-    KEEP: ClassVar[int] = 1
+    HISTORY_DEPTH: ClassVar[int] = 1
 
 
 class Request(Message, kw_only=True, frozen=True):

@@ -7,7 +7,7 @@ their own drivers drive are decided for in one call.
 
 import numpy as np
 
-from scm.v2x.exchange import Keep, Outgoing
+from scm.v2x.exchange import Outgoing, PersistedState
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.vehicles.guard import Guard
 from scm.world import lease as rules
@@ -36,7 +36,7 @@ def steer(world: World, now_ns: int) -> list[Outgoing]:
     return out
 
 
-def hand_over(world: World, car: HostedCar, lease: rules.Lease, now_ns: int) -> Keep:
+def hand_over(world: World, car: HostedCar, lease: rules.Lease, now_ns: int) -> PersistedState:
     """Put a car under another lease, and return its record.
 
     Its trip is over, and older commands are refused.

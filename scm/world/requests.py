@@ -14,7 +14,7 @@ from scm.maps.room import AHEAD_S, CLEARANCE_M
 from scm.maps.vehicle_tags import LAST_TAG_ID
 from scm.runtime.part import Service
 from scm.store.records import StopRecord
-from scm.v2x.exchange import Keep, Outgoing
+from scm.v2x.exchange import Outgoing, PersistedState
 from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.boxes_request import BoxesReply, BoxesRequest
@@ -200,7 +200,7 @@ def _stop(world: World, request: StopRequest, now_ns: int, out: list[Outgoing]) 
     reason = f": {request.reason}" if request.reason else ""
     out.append(city_event("warning", "city_stop", f"{request.by} {verb}{reason}", now_ns))
     record = StopRecord(engaged=request.engaged, by=request.by, reason=request.reason)
-    out += [world.stop, Keep("latches", "stop", record)]
+    out += [world.stop, PersistedState("latches", "stop", record)]
     return world.stop
 
 

@@ -1,9 +1,9 @@
 """Restore the state of the world that outlives its process: hosted cars, leases, emergency stop.
 
-Changes leave a step as `Keep`, and come back at the next start as `RestoredState`. A hosted car
-comes back at its old place, or the first free one; its leaseholder keeps the lease, under the same
-epoch and with the full time to live, since nobody could renew it meanwhile. Cars of agents join
-again by themselves, under a newer epoch.
+Changes leave a step as `PersistedState`, and return at the next start as `RestoredState`. A hosted
+car comes back at its old place, or the first free one; its leaseholder keeps the lease, under the
+same epoch and with the full time to live, since nobody could renew it meanwhile. Cars of agents
+join again by themselves, under a newer epoch.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.store.records import CarRecord, EpochRecord, StopRecord, record, records
 from scm.store.repository import Repository
-from scm.v2x.exchange import Keep, Outgoing
+from scm.v2x.exchange import Outgoing, PersistedState
 from scm.world.driving import hand_over
 from scm.world.hosted import HostedCar
 from scm.world.lease import Lease
@@ -60,9 +60,9 @@ def restore(world: World, restored: RestoredState, now_ns: int) -> list[Outgoing
         if car.hosted:
             out += _restore_car(world, name, car, now_ns)
         else:
-            out.append(Keep("leases", name, None))
+            out.append(PersistedState("leases", name, None))
     epochs = EpochRecord(highest=world.identities.highest_epoch)
-    return [*out, Keep("latches", "epochs", epochs)]
+    return [*out, PersistedState("latches", "epochs", epochs)]
 
 
 def _restore_car(world: World, name: str, record: CarRecord, now_ns: int) -> list[Outgoing]:
@@ -71,7 +71,7 @@ def _restore_car(world: World, name: str, record: CarRecord, now_ns: int) -> lis
         world.identities.highest_epoch = max(world.identities.highest_epoch, record.epoch)
         text = f"{name} could not be put back onto the map: no place is free"
         event = city_event("warning", "vehicle_removed", text, now_ns, name)
-        return [Keep("leases", name, None), event]
+        return [PersistedState("leases", name, None), event]
     car = world.host(name, record.car_file, pose, now_ns, record.tag_id)
     out = world.arrival(car, now_ns, record.tag_id)
     car.lease = Lease(record.home, record.home, record.epoch)

@@ -19,7 +19,7 @@ from scm.maps.segments import wall_segments
 from scm.maps.vehicle_tags import bound_tag, reserved_tags
 from scm.records.city_map import CityMap, Point
 from scm.store.records import CarRecord, EpochRecord
-from scm.v2x.exchange import Keep, Outgoing
+from scm.v2x.exchange import Outgoing, PersistedState
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
@@ -95,7 +95,7 @@ def city_event(
     )
 
 
-def lease_record(car: AnyCar) -> Keep:
+def lease_record(car: AnyCar) -> PersistedState:
     """Return a car and its lease, to be stored."""
     x, y, yaw = car.pose
     lease = car.lease
@@ -111,7 +111,7 @@ def lease_record(car: AnyCar) -> Keep:
         ttl_ms=lease.ttl_ms,
         tag_id=car.tag_id,
     )
-    return Keep("leases", car.name, record)
+    return PersistedState("leases", car.name, record)
 
 
 class World:
@@ -423,8 +423,8 @@ class World:
         self.identities.unnamed = 0
         self.vehicles.remove(index)
         return [
-            Keep("leases", car.name, None),
-            Keep("latches", "epochs", EpochRecord(highest=self.identities.highest_epoch)),
+            PersistedState("leases", car.name, None),
+            PersistedState("latches", "epochs", EpochRecord(highest=self.identities.highest_epoch)),
         ]
 
     def _offset(self, kind: str) -> float:

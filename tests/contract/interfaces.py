@@ -64,7 +64,7 @@ def _message(kind: type[Message]) -> Any:
         "key": kind.KEY,
         "delivery": kind.DELIVERY.value,
         "rate_hz": kind.RATE_HZ,
-        "keep": kind.KEEP,
+        "keep": kind.HISTORY_DEPTH,
         "reply": kind.REPLY.__name__ if is_request else None,
         "has_effect": kind.HAS_EFFECT if is_request else None,
         "required": definitions[kind.__name__]["required"],

@@ -252,10 +252,10 @@ def test_a_station_can_receive_its_own_messages(city):
 def test_a_late_joiner_gets_the_last_events_of_each_key_and_then_the_new_ones(city):
     sender, received = city.bus("world"), Mailbox(1000)
     city.bus("eye").subscribe(CityEvent, {}, received)
-    for n in range(CityEvent.KEEP + 5):
+    for n in range(CityEvent.HISTORY_DEPTH + 5):
         sender.publish(news(f"e{n}"))
     sender.publish(news("other", source="gate"))
-    missing = {f"e{CityEvent.KEEP + 4}", "other"}  # till then it would join amid them
+    missing = {f"e{CityEvent.HISTORY_DEPTH + 4}", "other"}  # till then it would join amid them
 
     def all_sent():
         missing.difference_update(item.message.name for item in received.drain())
@@ -264,10 +264,10 @@ def test_a_late_joiner_gets_the_last_events_of_each_key_and_then_the_new_ones(ci
     settles(city, all_sent)
     mailbox = Mailbox(1000)
     city.bus("api").subscribe(CityEvent, {}, mailbox)
-    names = [i.message.name for i in gather(city, mailbox, CityEvent.KEEP + 1)]
+    names = [i.message.name for i in gather(city, mailbox, CityEvent.HISTORY_DEPTH + 1)]
     sender.publish(news("new"))
     names += [i.message.name for i in gather(city, mailbox, 1)]
-    kept = [f"e{n}" for n in range(5, CityEvent.KEEP + 5)]
+    kept = [f"e{n}" for n in range(5, CityEvent.HISTORY_DEPTH + 5)]
     assert [name for name in names if name != "other"] == [*kept, "new"]
     assert names.count("other") == 1
 

@@ -256,7 +256,7 @@ def test_its_rate_and_delivery_fit_together(kind):
     if kind.DELIVERY is Delivery.STREAM:
         assert kind.RATE_HZ is not None
         assert 0.1 <= kind.RATE_HZ <= 100.0
-    assert kind.KEEP >= 1
+    assert kind.HISTORY_DEPTH >= 1
 
 
 @every_sent

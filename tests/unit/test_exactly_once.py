@@ -16,7 +16,7 @@ from scm.store.audit import AuditLog
 from scm.store.memory import MemoryStore
 from scm.store.records import PlanRecord, records
 from scm.v2x.bus_memory import MemoryNetwork
-from scm.v2x.exchange import Answer, Incoming, Keep
+from scm.v2x.exchange import Answer, Incoming, PersistedState
 from scm.v2x.faults import FaultRates, Faults
 from scm.v2x.message import Refused
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
@@ -76,7 +76,7 @@ class Shop(BasePart):
             self.done[request.request_id] += 1
             count = PlanRecord(plan=str(self.done[request.request_id]))
             reply = PlanReply(junction=request.junction, plan=request.plan)
-            out += [Answer(item, reply), Keep("plans", request.request_id, count)]
+            out += [Answer(item, reply), PersistedState("plans", request.request_id, count)]
         return out
 
     def finish(self, now_ns):

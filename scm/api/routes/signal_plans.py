@@ -204,10 +204,7 @@ def _file(site: SignalSite, plan: str, stages: Sequence[StageBody]) -> PlanFile:
     return PlanFile(
         junction=site.junction,
         plan=plan,
-        stages=tuple(
-            SignalStage(groups=tuple(one.groups), green_s=one.green_s, extra_red_s=one.extra_red_s)
-            for one in stages
-        ),
+        stages=msgspec.convert(stages, tuple[SignalStage, ...], from_attributes=True),
         phases=site.phases,
         conflicts=site.conflicts,
     )

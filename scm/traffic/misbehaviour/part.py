@@ -12,6 +12,7 @@ from scm.errors import CarError
 from scm.log import event
 from scm.records.city_map import CityMap
 from scm.records.misbehaviour import StationScore
+from scm.records.traffic import EvidencePose
 from scm.runtime.part import BasePart, Subscription
 from scm.traffic.car_facts import facts_of, outline_of
 from scm.traffic.misbehaviour.check import Sender
@@ -26,7 +27,6 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.misbehaviour_report import (
     EvidenceCam,
-    EvidencePose,
     MisbehaviourReport,
     Observation,
 )

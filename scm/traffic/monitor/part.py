@@ -16,7 +16,7 @@ from scm.runtime.part import BasePart, Service, Subscription
 from scm.store.records import FaultRecord
 from scm.traffic.monitor.checks import OVERLOAD, Monitor
 from scm.traffic.monitor.conflict_table import conflict_table_of, table_hash
-from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
+from scm.v2x.exchange import Answer, Incoming, Outgoing, PersistedState
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.monitor_reset import MonitorReset
@@ -136,7 +136,7 @@ class _Watch:
         if fault != self._published:
             ends_by_itself = fault in (None, OVERLOAD)
             record = None if ends_by_itself else FaultRecord(fault=str(fault))
-            news.append(Keep("latches", self.monitor.table.junction, record))
+            news.append(PersistedState("latches", self.monitor.table.junction, record))
             news += self._event_of(fault, now_ns)
         due = (
             self._published_ns is None

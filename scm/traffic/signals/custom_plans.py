@@ -10,7 +10,6 @@ from collections.abc import Collection, Sequence
 
 from scm.errors import PlanError
 from scm.records.signal_plans import PlanProof, SignalPhase, SignalStage
-from scm.store.records import StageRecord
 from scm.traffic.signals import kernel
 from scm.traffic.signals.green_wave import Wave
 from scm.traffic.signals.kernel import GroupTimes, Program
@@ -105,20 +104,6 @@ def stages_of(table: Timetable, program: Program) -> tuple[SignalStage, ...]:
             )
         )
     return tuple(made)
-
-
-def records_of(stages: Sequence[SignalStage]) -> tuple[StageRecord, ...]:
-    """Return stages as they are stored."""
-    return tuple(
-        StageRecord(groups=s.groups, green_s=s.green_s, extra_red_s=s.extra_red_s) for s in stages
-    )
-
-
-def stages_from_records(records: Sequence[StageRecord]) -> tuple[SignalStage, ...]:
-    """Return stages that were stored."""
-    return tuple(
-        SignalStage(groups=r.groups, green_s=r.green_s, extra_red_s=r.extra_red_s) for r in records
-    )
 
 
 def prove_file(file: PlanFile) -> PlanProof:

@@ -12,8 +12,6 @@ from scm.traffic.signals.controller import Controller
 from scm.traffic.signals.controller_state import Observations
 from scm.traffic.signals.custom_plans import (
     check_plan_name,
-    records_of,
-    stages_from_records,
     table_of,
     wave_of,
 )
@@ -98,8 +96,7 @@ class JunctionSignals:
         """
         request = PlanRequest(junction=self.junction.name, plan=record.plan, by=record.by)
         if record.plan:
-            stages = stages_from_records(record.stages)
-            self.serve_plan(replace(request, stages=stages, offset_s=record.offset_s))
+            self.serve_plan(replace(request, stages=record.stages, offset_s=record.offset_s))
         if record.flash:
             self.serve_plan(replace(request, plan=FLASH))
 
@@ -124,9 +121,8 @@ class JunctionSignals:
             self._accepted = f"takes plan {request.plan} ({who})"
         else:
             controller.request_plan(request.plan)
-        stages = records_of(request.stages)
         self.record = PlanRecord(
-            plan=request.plan, by=request.by, stages=stages, offset_s=request.offset_s
+            plan=request.plan, by=request.by, stages=request.stages, offset_s=request.offset_s
         )
         self._plan_reason = self._why_restart = who
         self._flash("person", who, on=False)

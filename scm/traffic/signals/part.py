@@ -34,7 +34,7 @@ from scm.traffic.signals.timetables import Tables
 from scm.traffic.signals.timing import NIGEL, CarFacts
 from scm.v2x.etsi.convert import roadside_station
 from scm.v2x.etsi.topology import mapem_of
-from scm.v2x.exchange import Answer, Incoming, Keep, Outgoing
+from scm.v2x.exchange import Answer, Incoming, Outgoing, PersistedState
 from scm.v2x.message import Refused
 from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.eye_track import EyeTrack
@@ -174,7 +174,7 @@ class TrafficPart(BasePart):
             if isinstance(request, SignalRequest):
                 return [Answer(item, signals.serve_override(request, now_ns))]
             reply = signals.serve_plan(request)
-            return [Keep("plans", request.junction, signals.record), Answer(item, reply)]
+            return [PersistedState("plans", request.junction, signals.record), Answer(item, reply)]
         except PlanError as refusal:
             is_override = isinstance(request, SignalRequest) or request.stages
             code = "invalid" if is_override else "not_found"

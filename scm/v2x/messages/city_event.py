@@ -16,7 +16,7 @@ class CityEvent(Message, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "event/{severity}/{source}"
     DELIVERY: ClassVar[Delivery] = Delivery.EVENT
-    KEEP: ClassVar[int] = 50
+    HISTORY_DEPTH: ClassVar[int] = 50
 
     severity: Literal["info", "warning", "error"]
     source: str

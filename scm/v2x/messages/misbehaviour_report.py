@@ -5,7 +5,8 @@ from typing import Annotated, ClassVar, Literal
 import msgspec
 from msgspec import Meta
 
-from scm.records.fields import XM, YM, SpeedMps, TNs, YawRad
+from scm.records.fields import TNs
+from scm.records.traffic import EvidencePose
 from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.message import Delivery, Message
 
@@ -37,16 +38,6 @@ class EvidenceCam(msgspec.Struct, kw_only=True, frozen=True):
     body: CamBody
 
 
-class EvidencePose(msgspec.Struct, kw_only=True, frozen=True):
-    """Where the Eye saw the station's own tag: the rear axle, map frame."""
-
-    t_ns: TNs
-    x_m: XM
-    y_m: YM
-    yaw_rad: YawRad
-    speed_mps: SpeedMps
-
-
 class MisbehaviourReport(Message, kw_only=True, frozen=True):
     """After ETSI TS 103 759: who, since when, which classes of observations, and the evidence.
 
@@ -64,7 +55,7 @@ class MisbehaviourReport(Message, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "misbehaviour/{suspect}/report"
     DELIVERY: ClassVar[Delivery] = Delivery.EVENT
-    KEEP: ClassVar[int] = 5
+    HISTORY_DEPTH: ClassVar[int] = 5
 
     suspect: Annotated[str, Meta(examples=["n5"])]
     suspect_id: int

@@ -11,7 +11,7 @@ class Violation(traffic.Violation, Message, kw_only=True, frozen=True):
 
     KEY: ClassVar[str] = "violation/{vehicle}"
     DELIVERY: ClassVar[Delivery] = Delivery.EVENT
-    KEEP: ClassVar[int] = 20
+    HISTORY_DEPTH: ClassVar[int] = 20
 
 
 MESSAGE = Violation

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scm.api.planned_path import AHEAD_M, path_ahead
+from scm.api.routes.planned_path import AHEAD_M, path_ahead
 from scm.geometry import Pose2
 from scm.maps.route import Roads
 from scm.v2x.messages.trip import Trip

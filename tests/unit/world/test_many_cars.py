@@ -5,7 +5,7 @@ from collections import Counter
 import pytest
 
 from scm.maps.load import load_map
-from scm.v2x.exchange import Keep
+from scm.v2x.exchange import PersistedState
 from scm.v2x.message import Message
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.lidar_scan import LidarScan
@@ -82,7 +82,7 @@ def test_what_nobody_hears_is_not_made():
 
     _, said = run(60, cars(5), is_wanted=nobody)
     made = {type(item) for tick in said for item in tick}
-    assert made - {Keep} <= {CityEvent, PartStatus, RadioStatus, Trip, WorldDefinition}
+    assert made - {PersistedState} <= {CityEvent, PartStatus, RadioStatus, Trip, WorldDefinition}
     assert {VehicleState, WorldSnapshot, LidarScan} <= set(asked)
 
 

@@ -14,8 +14,6 @@ from scm.store.records import PlanRecord
 from scm.traffic.signals.controller import Controller
 from scm.traffic.signals.custom_plans import (
     prove_file,
-    records_of,
-    stages_from_records,
     stages_of,
     table_of,
     wave_of,
@@ -79,10 +77,6 @@ def test_an_offset_outside_the_cycle_is_refused(offset_s):
 def test_the_stages_of_a_timetable_make_it_again(name):
     table = load_timetable(name, PROGRAM)
     assert table_of(name, stages_of(table, PROGRAM), PROGRAM) == table
-
-
-def test_stored_stages_are_recalled_as_they_were():
-    assert stages_from_records(records_of(RUSH)) == RUSH
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -158,7 +152,7 @@ def test_a_plan_of_the_bus_is_run_told_and_comes_back_after_a_restart(city):
     said = [event.text for event in messages(events)]
     assert any("takes plan rush (ada asked: school)" in text for text in said)
     assert any("runs plan rush, before brisk" in text for text in said)
-    kept = PlanRecord(plan="rush", by="ada", stages=records_of(RUSH))
+    kept = PlanRecord(plan="rush", by="ada", stages=RUSH)
     with Lockstep([TrafficPart(MAP, "brisk", restored={"crossing": kept})]) as again:
         spats = again.subscribe(Subscription(Spat))
         again.run_for(8.0)
@@ -184,7 +178,7 @@ def test_a_plan_with_an_offset_begins_its_cycles_in_step_with_the_clock_also_aft
     city.run_for(6.0)
     cycle_s, offset_s = 20.5, 7.3
     assert ask(city, "rush", RUSH, offset_s=offset_s).pending == "rush"
-    kept = PlanRecord(plan="rush", by="ada", stages=records_of(RUSH), offset_s=offset_s)
+    kept = PlanRecord(plan="rush", by="ada", stages=RUSH, offset_s=offset_s)
     with Lockstep([TrafficPart(MAP, "brisk", restored={"crossing": kept})]) as again:
         for running in (city, again):
             told = running.subscribe(Subscription(SignalStatus))
