@@ -21,7 +21,6 @@ from scm.api.operations import Cancelled, ProgressReporter
 from scm.api.problem import RefusedError
 from scm.errors import RunError
 from scm.runtime.parent_watch import with_parent
-from scm.v2x.message import Refused
 
 LARGEST_PICTURE = 8 * 1024 * 1024
 MOST_VIEWS = 60
@@ -83,17 +82,17 @@ class CalibrationJobs:
         there = self.views(camera)
         if len(there) >= MOST_VIEWS:
             detail = f"pictures of {camera}: {MOST_VIEWS} are kept; delete some first"
-            raise RefusedError(Refused(code="full", detail=detail))
+            raise RefusedError.of("full", detail)
         if there:
             first = size_of(there[0].read_bytes())
             if size != first:
                 wanted = f"{first[0]} x {first[1]} px as {there[0].name}"
                 detail = f"picture: expected {wanted}, got {size[0]} x {size[1]} px"
-                raise RefusedError(Refused(code="invalid", detail=detail))
+                raise RefusedError.of("invalid", detail)
         folder = self._views / camera
         if not folder.exists() and sum(1 for _ in self._views.glob("*")) >= MOST_CAMERAS:
             detail = f"pictures of {MOST_CAMERAS} cameras are kept; delete those of one first"
-            raise RefusedError(Refused(code="full", detail=detail))
+            raise RefusedError.of("full", detail)
         folder.mkdir(parents=True, exist_ok=True)
         number = int(there[-1].stem) + 1 if there else 1
         ending = "jpg" if picture.startswith(_JPEG) else "png"
@@ -205,8 +204,7 @@ def size_of(picture: bytes) -> tuple[int, int]:
             return _jpeg_size(picture)
     except struct.error:
         pass
-    detail = "picture: expected a JPEG or PNG file, got something else"
-    raise RefusedError(Refused(code="invalid", detail=detail))
+    raise RefusedError.of("invalid", "picture: expected a JPEG or PNG file, got something else")
 
 
 def _jpeg_size(picture: bytes) -> tuple[int, int]:

@@ -17,7 +17,6 @@ from scm.api.city import not_found
 from scm.api.problem import RefusedError
 from scm.records.city_map import Camera
 from scm.records.eye_calibrations import CalibrationFile, CalibrationRow
-from scm.v2x.message import Refused
 from scm.v2x.messages.calibration_request import MeasuredLens
 
 NAME = re.compile(r"[a-z0-9_-]{1,48}")
@@ -109,7 +108,7 @@ class CalibrationRepository:
         self.folder.mkdir(parents=True, exist_ok=True)
         if not self.path(name).exists() and len(self.rows()) >= MAX_CALIBRATIONS:
             detail = f"calibrations: {MAX_CALIBRATIONS} are kept; delete some first"
-            raise RefusedError(Refused(code="full", detail=detail))
+            raise RefusedError.of("full", detail)
         whole = self.path(name).with_suffix(".part")
         whole.write_text(toml, "utf-8")
         whole.replace(self.path(name))
@@ -159,10 +158,10 @@ def checked(toml: str) -> _Lens | Camera:
             f"toml: expected a lens or one [[cameras]] block: {error}; `scm eye convert` makes one "
             "of a lens of ROS or OpenCV"
         )
-        raise RefusedError(Refused(code="invalid", detail=detail)) from error
+        raise RefusedError.of("invalid", detail) from error
     if len(place.cameras) != 1:
         detail = f"toml: expected one [[cameras]] block, got {len(place.cameras)}"
-        raise RefusedError(Refused(code="invalid", detail=detail))
+        raise RefusedError.of("invalid", detail)
     return place.cameras[0]
 
 

@@ -108,7 +108,7 @@ class City:
             raise RefusedError(answer)
         if not isinstance(answer, reply):
             kind = type(answer).__name__
-            raise RefusedError(Refused(code="invalid_reply", detail=f"got a {kind} as the answer"))
+            raise RefusedError.of("invalid_reply", f"got a {kind} as the answer")
         return answer
 
 
@@ -126,4 +126,4 @@ def json_response(
 
 def not_found(what: str, name: str) -> RefusedError:
     """Return the error for a name that the city does not know."""
-    return RefusedError(Refused(code="not_found", detail=f"there is no {what} named {name!r}"))
+    return RefusedError.of("not_found", f"there is no {what} named {name!r}")

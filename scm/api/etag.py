@@ -8,7 +8,6 @@ from fastapi import Depends, Header, Request, Response
 from scm.api.city import json_response
 from scm.api.encoding import encode
 from scm.api.problem import RefusedError
-from scm.v2x.message import Refused
 
 _READS = frozenset({"GET", "HEAD"})
 
@@ -45,7 +44,7 @@ class Condition(NamedTuple):
             detail = (
                 "send If-Match with the ETag that you edited, or If-None-Match: * for a new one"
             )
-            raise RefusedError(Refused(code="precondition_required", detail=detail))
+            raise RefusedError.of("precondition_required", detail)
         if body is None:
             if self.if_match is not None:
                 raise _stale("If-Match", self.if_match, "none: it does not exist")
@@ -91,4 +90,4 @@ def has_tag(header: str, tag: str) -> bool:
 
 def _stale(header: str, got: str, have: str) -> RefusedError:
     detail = f"{header}: got {got}, have {have}; read it again and redo your change"
-    return RefusedError(Refused(code="precondition_failed", detail=detail))
+    return RefusedError.of("precondition_failed", detail)

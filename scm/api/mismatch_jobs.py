@@ -23,7 +23,6 @@ from scm.errors import RecordingError, RunError
 from scm.recorder.run_index import read_index
 from scm.records.mismatch import Job
 from scm.records.operations import Operation
-from scm.v2x.message import Refused
 from scm.v2x.messages.route_request import RouteReply
 from scm.v2x.messages.trip import Trip
 
@@ -58,7 +57,7 @@ class MismatchJobs:
         """
         if self._city.folders.reports is None:
             detail = "this city keeps no reports: start `scm api` with --data FOLDER"
-            raise RefusedError(Refused(code="not_kept", detail=detail))
+            raise RefusedError.of("not_kept", detail)
         self._city.folders.reports.mkdir(parents=True, exist_ok=True)
         return self._city.folders.reports
 
@@ -101,12 +100,12 @@ class MismatchJobs:
         job = self.reports.job(folder)
         if job is None:
             detail = f"{report}: nobody noted what it was made from; start from the recording"
-            raise RefusedError(Refused(code="conflict", detail=detail))
+            raise RefusedError.of("conflict", detail)
         before = (*job.recordings, *job.told)
         gone = next((path for path in map(Path, before) if not path.exists()), None)
         if gone is not None:
             detail = f"{report}: the recording it was made from is gone: {gone.name}"
-            raise RefusedError(Refused(code="conflict", detail=detail))
+            raise RefusedError.of("conflict", detail)
         driven = tuple(map(str, self.reports.recorded_drives(folder)))
         _, _, car = report.partition(".")
         return msgspec.structs.replace(
@@ -147,12 +146,10 @@ class MismatchJobs:
         if folder is None or drive not in self.reports.drives(folder):
             raise not_found("drive", f"{report}/{drive}")
         if not self._bus:
-            detail = "this server reaches no city to drive in"
-            raise RefusedError(Refused(code="offline", detail=detail))
+            raise RefusedError.of("offline", "this server reaches no city to drive in")
         plans = sorted((folder / drive).glob("*.yaml"))
         if part > len(plans):
-            detail = f"part: got {part}, expected 1 to {len(plans)}"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", f"part: got {part}, expected 1 to {len(plans)}")
 
         def work(progress: ProgressReporter) -> str:
             progress(f"{vehicle} comes to rest and drives")

@@ -19,7 +19,6 @@ from scm.api.problem import RefusedError
 from scm.clock import Clock
 from scm.errors import ScmError
 from scm.records.operations import Operation, State
-from scm.v2x.message import Refused
 
 _LOGGER = logging.getLogger(__name__)
 
@@ -86,7 +85,7 @@ class Operations:
             )
             if waiting >= MOST_WAITING:
                 detail = f"operations of kind {kind!r}: {waiting} wait, expected fewer; try later"
-                raise RefusedError(Refused(code="busy", detail=detail))
+                raise RefusedError.of("busy", detail)
             row = Operation(
                 id=f"{kind}-{next(self._numbers)}",
                 kind=kind,

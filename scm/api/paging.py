@@ -17,7 +17,6 @@ from fastapi import Query, Request, Response
 from scm.api.city import json_response
 from scm.api.problem import RefusedError
 from scm.records.page import Page, T
-from scm.v2x.message import Refused
 
 MOST = 500
 _CURSOR = re.compile(r"k([1-9][0-9]{0,5})?:(.*)", re.DOTALL)
@@ -106,4 +105,4 @@ def _read(cursor: str) -> tuple[str, int]:
 
 def _bad(cursor: str, why: str) -> RefusedError:
     detail = f"cursor: got {cursor!r}, expected `next` of the page before: {why}"
-    return RefusedError(Refused(code="invalid", detail=detail))
+    return RefusedError.of("invalid", detail)

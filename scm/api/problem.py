@@ -73,6 +73,11 @@ class RefusedError(Exception):
         super().__init__(refused.detail)
         self.refused = refused
 
+    @classmethod
+    def of(cls, code: str, detail: str) -> Self:
+        """Return the refusal with a code and a sentence."""
+        return cls(Refused(code=code, detail=detail))
+
 
 class InvalidError(Exception):
     """What a caller sent is wrong; becomes a problem at the edge.

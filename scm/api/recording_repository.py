@@ -17,7 +17,6 @@ from scm.clock import NS_PER_S, Clock, WallClock
 from scm.errors import RecordingError
 from scm.recorder.run_index import RunIndex, read_index
 from scm.records.recordings import Notes, RecordingRow, State
-from scm.v2x.message import Refused
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
 SUFFIX, NOTES = ".mcap", ".notes.json"
@@ -157,7 +156,7 @@ class RecordingRepository:
         path = self.path(name)
         if not self._is_quiet(path) and not self._is_whole(name):
             detail = f"{name} is being written: stop the recorder first"
-            raise RefusedError(Refused(code="being_written", detail=detail))
+            raise RefusedError.of("being_written", detail)
         try:
             path.unlink()
             path.with_name(name + NOTES).unlink(missing_ok=True)
@@ -196,7 +195,7 @@ def natural(name: str) -> list[tuple[int, str]]:
 def unreadable(error: RecordingError) -> RefusedError:
     """Return the refusal for a recording that cannot be read; without the server's folders."""
     where, _, why = str(error).partition(": ")
-    return RefusedError(Refused(code="unreadable", detail=f"{Path(where).name}: {why}"))
+    return RefusedError.of("unreadable", f"{Path(where).name}: {why}")
 
 
 def _trouble(state: State, index: RunIndex) -> str:
@@ -219,4 +218,4 @@ def _written_s(path: Path) -> float:
 
 def _not_written(path: Path, cause: OSError) -> RefusedError:
     detail = f"{path.name}: cannot be changed: {cause.strerror or cause}"
-    return RefusedError(Refused(code="not_written", detail=detail))
+    return RefusedError.of("not_written", detail)

@@ -30,7 +30,6 @@ from scm.api.problem import RefusedError
 from scm.errors import ScmError
 from scm.records.operations import Operation
 from scm.records.scenarios import Lines, Scenario
-from scm.v2x.message import Refused
 
 NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,59}$"
 MAX_LINES, MAX_RUNS, LINE_CHARACTERS = 2000, 50, 2000
@@ -100,7 +99,7 @@ class ScenarioRepository:
             line = f", line {error.lineno}" if isinstance(error, SyntaxError) else ""
             text = error.msg if isinstance(error, SyntaxError) else str(error)
             detail = f"{name}.py{line}: expected a Python script: {text}"
-            raise RefusedError(Refused(code="invalid", detail=detail)) from None
+            raise RefusedError.of("invalid", detail) from None
         assert self._folder is not None  # noqa: S101  or it would not be one's own
         file = self._folder / f"{name}.py"
         try:
@@ -128,11 +127,11 @@ class ScenarioRepository:
     def _check_own(self, name: str) -> None:
         if self._folder is None:
             detail = "this city keeps no scenarios: start it with a folder (scm api --data FOLDER)"
-            raise RefusedError(Refused(code="not_kept", detail=detail))
+            raise RefusedError.of("not_kept", detail)
         found = self.find(name)
         if found is not None and found.shipped:
             detail = f"{name} came with the program: save it under another name"
-            raise RefusedError(Refused(code="shipped", detail=detail))
+            raise RefusedError.of("shipped", detail)
 
     def _file(self, name: str) -> Path | None:
         if not re.fullmatch(NAME, name):
@@ -313,4 +312,4 @@ def _end(process: "subprocess.Popen[str]") -> None:
 
 def _not_written(name: str, cause: OSError) -> RefusedError:
     detail = f"{name}.py: cannot be changed: {cause.strerror or cause}"
-    return RefusedError(Refused(code="not_written", detail=detail))
+    return RefusedError.of("not_written", detail)

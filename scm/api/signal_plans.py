@@ -18,7 +18,6 @@ from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.errors import PlanError
 from scm.records.signal_plans import PlanProof
-from scm.v2x.message import Refused
 from scm.v2x.plan_file import PlanFile
 
 MOST_PLANS = 50
@@ -60,7 +59,7 @@ class PlanRepository:
             return msgspec.json.decode(path.read_bytes(), type=PlanFile)
         except (OSError, msgspec.MsgspecError) as cause:
             detail = f"plan file {path.name} of {junction}: {cause}"
-            raise RefusedError(Refused(code="unreadable", detail=detail)) from cause
+            raise RefusedError.of("unreadable", detail) from cause
 
     def write(self, file: PlanFile) -> None:
         """Save a plan.

@@ -24,7 +24,6 @@ from scm.recording.description import FILE_NAME, Description, read_description
 from scm.recording.table import KINDS
 from scm.records.mismatch import Upload
 from scm.runtime.parent_watch import with_parent
-from scm.v2x.message import Refused
 
 FOLDER = "uploads"
 MOST_BYTES = 64 * 2**20
@@ -235,7 +234,7 @@ def _forget(folder: Path) -> None:
 
 
 def _refused(detail: str) -> RefusedError:
-    return RefusedError(Refused(code="invalid", detail=f"upload: {detail}"))
+    return RefusedError.of("invalid", f"upload: {detail}")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,6 @@ from scm.errors import StoreError
 from scm.records.audit import AuditRow, ChainVerdict
 from scm.store.audit import AuditLog, Head
 from scm.store.repository import Repository
-from scm.v2x.message import Refused
 
 
 def _wanted(
@@ -72,7 +71,7 @@ def router(store: Repository) -> APIRouter:
     ) -> Response:
         if bool(number) != bool(digest):
             detail = "number, digest: got one of them, expected both of an entry noted before"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", detail)
         noted = Head(number, digest) if number else None
         log = AuditLog(store)
         try:

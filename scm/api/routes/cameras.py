@@ -13,7 +13,6 @@ from scm.api.schemas import answer, answer_file
 from scm.api.stream import Stream
 from scm.camera.optics import fitted
 from scm.records.cameras import Cameras
-from scm.v2x.message import Refused
 from scm.v2x.messages.camera_frame import CameraFrame
 
 LOOK_S = 0.02
@@ -100,5 +99,4 @@ def _check(city: City, name: str, camera: str) -> None:
     cameras = _cameras(city, name)
     if camera not in cameras:
         has = f"cameras {' and '.join(cameras)}" if cameras else "no cameras"
-        detail = f"there is no camera named {camera!r}: {name} has {has}"
-        raise RefusedError(Refused(code="not_found", detail=detail))
+        raise RefusedError.of("not_found", f"there is no camera named {camera!r}: {name} has {has}")

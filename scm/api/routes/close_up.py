@@ -110,8 +110,7 @@ async def _reports(
 
 def _measured(city: City, car: SnapshotVehicle) -> LinkRow:
     if city.wire is None:
-        detail = "this interface has no wire to measure"
-        raise RefusedError(Refused(code="offline", detail=detail))
+        raise RefusedError.of("offline", "this interface has no wire to measure")
     clock = WallClock()
     sent_ns = clock.now_ns()
     reply = city.wire.request_once(EchoRequest(vehicle=car.vehicle), ECHO_TIMEOUT_S)

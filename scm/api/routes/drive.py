@@ -15,7 +15,6 @@ from scm.api.stream import Stream
 from scm.api.teleop import DriveSession
 from scm.clock import WallClock
 from scm.records.drive import PROTOCOL
-from scm.v2x.message import Refused
 
 
 def router(city: City, stream: Stream, known_keys: KnownKeys | None) -> APIRouter:
@@ -25,11 +24,10 @@ def router(city: City, stream: Stream, known_keys: KnownKeys | None) -> APIRoute
     @routes.websocket("/{name}/drive")
     async def drive(socket: WebSocket, name: Name) -> None:
         if city.wire is None:
-            detail = "this interface has no wire to say commands on"
-            raise RefusedError(Refused(code="offline", detail=detail))
+            raise RefusedError.of("offline", "this interface has no wire to say commands on")
         if PROTOCOL not in socket.scope["subprotocols"]:
             detail = f"Sec-WebSocket-Protocol: expected {PROTOCOL} among those offered"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", detail)
         await socket.accept(subprotocol=PROTOCOL)
         owner = f"{socket.scope['scm_owner']} #{secrets.token_hex(2)}"
         key = str(socket.scope["scm_key"])

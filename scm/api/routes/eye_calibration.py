@@ -29,7 +29,6 @@ from scm.records.eye_calibrations import (
     Views,
 )
 from scm.records.operations import Operation
-from scm.v2x.message import Refused
 
 _MEDIA = {".jpg": "image/jpeg", ".png": "image/png"}
 _PICTURES = {
@@ -64,7 +63,7 @@ def router(city: City, operations: Operations) -> APIRouter:
     def there() -> CalibrationJobs:
         if jobs is None:
             detail = "this city keeps no calibrations: start its interface with --data FOLDER"
-            raise RefusedError(Refused(code="not_found", detail=detail))
+            raise RefusedError.of("not_found", detail)
         return jobs
 
     _add_views(routes, city, there)
@@ -169,7 +168,7 @@ def _add_measuring(routes: APIRouter, city: City, there: Any, operations: Operat
         _check_free(jobs, body.save_as)
         if body.lens and jobs.repository.get(body.lens).row.kind != "lens":
             detail = f"lens: expected a lens, got {body.lens!r}, which is a place"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", detail)
         tags = _floor_tags(body)
         job = jobs.locate(name, _newest(city, name), body.lens or "", tags, body.save_as)
         return accepted(
@@ -276,7 +275,7 @@ def _newest(city: City, camera: str) -> bytes:
 def _check_free(jobs: CalibrationJobs, name: str) -> None:
     if name and jobs.repository.path(name).exists():
         detail = f"save_as: there is a calibration named {name!r}; choose another name"
-        raise RefusedError(Refused(code="exists", detail=detail))
+        raise RefusedError.of("exists", detail)
 
 
 def _board_words(body: LensBody) -> list[str]:
@@ -295,4 +294,4 @@ def _floor_tags(body: PlaceBody) -> tuple[FloorTag, ...]:
     try:
         return msgspec.convert(body.tags, tuple[FloorTag, ...], strict=False)
     except msgspec.ValidationError as error:
-        raise RefusedError(Refused(code="invalid", detail=f"tags: {error}")) from error
+        raise RefusedError.of("invalid", f"tags: {error}") from error

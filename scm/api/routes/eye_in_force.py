@@ -9,7 +9,6 @@ from scm.api.problem import RefusedError
 from scm.api.roles import ENGINEER, Signer
 from scm.api.schemas import answer
 from scm.records.eye_calibrations import BackBody, InForceBody
-from scm.v2x.message import Refused
 from scm.v2x.messages.calibration_request import CalibrationReply, CalibrationRequest
 
 
@@ -32,8 +31,7 @@ def router(city: City) -> APIRouter:
         place, lens = CalibrationRepository(folder).holds(body.calibration)
         if place is not None and place.name != name:
             got = f"calibration: {body.calibration!r} is the place of camera {place.name!r}"
-            detail = f"{got}, expected one of {name!r}"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", f"{got}, expected one of {name!r}")
         request = CalibrationRequest(
             request_id=key,
             camera=name,

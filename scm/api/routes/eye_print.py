@@ -11,7 +11,6 @@ from scm.api.problem import RefusedError
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer_file
 from scm.errors import EyeError
-from scm.v2x.message import Refused
 
 PDF = "application/pdf"
 Paper = Annotated[
@@ -85,7 +84,7 @@ def _refusing() -> Iterator[None]:
     try:
         yield
     except EyeError as error:
-        raise RefusedError(Refused(code="invalid", detail=str(error))) from error
+        raise RefusedError.of("invalid", str(error)) from error
 
 
 def _pdf(content: bytes, name: str) -> Response:

@@ -10,7 +10,6 @@ from scm.api.roles import VIEWER
 from scm.api.schemas import answer_file
 from scm.api.stream import Stream
 from scm.errors import nearest
-from scm.v2x.message import Refused
 
 
 def router(stream: Stream) -> APIRouter:
@@ -59,4 +58,4 @@ def _check(named: list[str], known: tuple[str, ...]) -> None:
     for name in named:
         if name not in known:
             detail = f"topics: got {name!r}, expected some of {known}{nearest(name, known)}"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", detail)

@@ -15,7 +15,6 @@ from scm.api.problem import RefusedError
 from scm.api.roles import VIEWER
 from scm.api.schemas import Responses
 from scm.errors import nearest
-from scm.v2x.message import Refused
 
 JSON_LD, JSON = "application/ld+json", "application/json"
 _TYPE = "http://www.w3.org/ns/json-ld#context"
@@ -109,7 +108,7 @@ def _types(kind: str) -> list[str]:
     for name in wanted:
         if name not in TYPES:
             detail = f"type: got {name!r}, expected some of {TYPES}{nearest(name, TYPES)}"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", detail)
     return wanted
 
 
@@ -118,7 +117,7 @@ def _check_heeded(request: Request) -> None:
     for name in request.query_params:
         if name not in _HEEDED:
             detail = f"{name}: there are no such queries; expected some of {sorted(_HEEDED)}"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", detail)
 
 
 def _neighbours(request: Request, offset: int, limit: int, count: int) -> list[str]:

@@ -42,7 +42,6 @@ from scm.records.recordings import (
     RecordingRow,
     Summary,
 )
-from scm.v2x.message import Refused
 
 MCAP = "application/octet-stream"
 MOST_S = 120.0
@@ -161,14 +160,14 @@ def _add_downloads(routes: APIRouter, repository: RecordingRepository) -> None:
         index = repository.index(name)
         if to_s is not None and to_s < from_s:
             detail = f"to_s: got {to_s:g}, expected from_s ({from_s:g}) or later"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", detail)
         if vehicle and vehicle not in cars_of(index):
             raise not_found(f"car of {name}", vehicle)
         file = f"{name}{f'-{vehicle}' if vehicle else ''}{_span(from_s, to_s)}.csv"
         table = replay.csv_of(index, vehicle, from_s, to_s)
         if table is None:
             detail = f"{name}: {replay.no_rows(index, vehicle, from_s, to_s)}"
-            raise RefusedError(Refused(code="not_found", detail=detail))
+            raise RefusedError.of("not_found", detail)
         return StreamingResponse(table, 200, _named(file), "text/csv")
 
 
@@ -216,7 +215,7 @@ def _add_moments(routes: APIRouter, repository: RecordingRepository) -> None:
     ) -> Response:
         if not from_s <= to_s <= from_s + MOST_S:
             detail = f"to_s: got {to_s:g}, expected from_s ({from_s:g}) to {MOST_S:g} s after it"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", detail)
         return json_response(replay.frames_of(_readable(repository, name), from_s, to_s, hz))
 
     @routes.get(
@@ -317,7 +316,7 @@ def _add_parts(routes: APIRouter, repository: RecordingRepository, operations: O
         if not body.from_s < to_s:
             detail = f"from_s, to_s: got {body.from_s:g} to {to_s:g} s, expected a part of "
             detail += f"the {length_s:.1f} s of {name}"
-            raise RefusedError(Refused(code="invalid", detail=detail))
+            raise RefusedError.of("invalid", detail)
 
         def do(progress: ProgressReporter) -> str:
             target = repository.free_path(f"{name[:80]}{_span(body.from_s, to_s)}")
@@ -362,7 +361,7 @@ def _picture(name: str, index: RunIndex, camera: str, t_s: float, vehicle: str =
     if found is None:
         whose = f"{vehicle}'s camera" if vehicle else "camera"
         detail = f"{name}: {whose} {camera!r} has no picture of {t_s:g} s or before"
-        raise RefusedError(Refused(code="not_found", detail=detail))
+        raise RefusedError.of("not_found", detail)
     t_ns, jpeg = found
     headers = {"Cache-Control": PICTURE_CACHING, "X-Time-Ns": str(t_ns)}
     return Response(jpeg, 200, headers, "image/jpeg")

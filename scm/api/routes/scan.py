@@ -14,7 +14,6 @@ from scm.api.scan_watch import scan_row, scanner_of
 from scm.api.schemas import answer, answer_file
 from scm.api.stream import Stream
 from scm.records.scans import ScanRow
-from scm.v2x.message import Refused
 
 LOOK_S = 0.02
 PATIENCE_S = 3.0
@@ -29,8 +28,7 @@ def router(city: City, stream: Stream) -> APIRouter:
     async def one(name: Name) -> Response:
         scanner = _scanner(city, name)
         if scanner is None:
-            detail = f"{name} has no LIDAR: its car file names none"
-            raise RefusedError(Refused(code="not_found", detail=detail))
+            raise RefusedError.of("not_found", f"{name} has no LIDAR: its car file names none")
         with city.view.watching_scan(name):
             for _ in range(round(PATIENCE_S / LOOK_S)):
                 row = _newest(city, name, scanner)

@@ -29,7 +29,6 @@ from scm.records.signal_plans import (
     StageBody,
     StagesBody,
 )
-from scm.v2x.message import Refused
 from scm.v2x.messages.signal_site import SignalSite
 from scm.v2x.plan_file import PlanFile, fits
 
@@ -165,7 +164,7 @@ def _keep(
     proof = repository.proof_of(file.digest) or (before.proof if before is not None else None)
     if proof is None or proof.digest != file.digest:
         detail = f"plan {file.plan!r}: these stages are not proven; POST them to .../proofs first"
-        raise RefusedError(Refused(code="unproven", detail=detail))
+        raise RefusedError.of("unproven", detail)
     _check_offset(file.plan, body.offset_s, proof.cycle_s)
     named = {"about": body.about, "by": by, "reason": body.reason}
     made = {"offset_s": body.offset_s, "saved_ns": WallClock().now_ns(), "proof": proof}
@@ -173,7 +172,7 @@ def _keep(
     try:
         repository.write(file)
     except PlanError as refusal:
-        raise RefusedError(Refused(code="full", detail=str(refusal))) from refusal
+        raise RefusedError.of("full", str(refusal)) from refusal
     return file
 
 
@@ -186,7 +185,7 @@ def _check_own(site: SignalSite, plan: str) -> None:
     reserved = {"flash", *(one.plan for one in site.plans), *(one.policy for one in site.policies)}
     if plan in reserved:
         detail = f"plan {plan!r}: the junction has one of that name; save it under another"
-        raise RefusedError(Refused(code="name_taken", detail=detail))
+        raise RefusedError.of("name_taken", detail)
 
 
 def _check_offset(plan: str, offset_s: float | None, cycle_s: float) -> None:
@@ -197,7 +196,7 @@ def _check_offset(plan: str, offset_s: float | None, cycle_s: float) -> None:
     """
     if offset_s is not None and offset_s >= cycle_s:
         detail = f"plan {plan!r}: offset_s: got {offset_s:g}, expected less than {cycle_s:g}"
-        raise RefusedError(Refused(code="invalid", detail=f"{detail}, its cycle"))
+        raise RefusedError.of("invalid", f"{detail}, its cycle")
 
 
 def _file(site: SignalSite, plan: str, stages: Sequence[StageBody]) -> PlanFile:

@@ -33,7 +33,6 @@ from scm.records.signals import (
     StatusRow,
     Verb,
 )
-from scm.v2x.message import Refused
 from scm.v2x.messages.monitor_reset import MonitorReset
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
@@ -81,8 +80,7 @@ def site_of(city: City, name: str) -> SignalSite:
     junction_of(city, name)
     site = city.view.picture().sites.get(name)
     if site is None:
-        detail = f"the controller of junction {name!r} was not heard yet"
-        raise RefusedError(Refused(code="offline", detail=detail))
+        raise RefusedError.of("offline", f"the controller of junction {name!r} was not heard yet")
     return site
 
 
@@ -328,5 +326,5 @@ def _plan_request(city: City, repository: PlanRepository, name: str, plan: str) 
         return request
     if not file.is_proven or not fits(file, site_of(city, name)):
         detail = f"plan {plan!r} is not proven for junction {name!r} as it is now: prove it again"
-        raise RefusedError(Refused(code="unproven", detail=detail))
+        raise RefusedError.of("unproven", detail)
     return msgspec.structs.replace(request, stages=file.stages, offset_s=file.offset_s)

@@ -16,7 +16,6 @@ from scm.api.problem import RefusedError
 from scm.api.roles import OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer
 from scm.records.stop import StopBody
-from scm.v2x.message import Refused
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.stop_request import StopRequest
 
@@ -48,7 +47,7 @@ def router(city: City) -> APIRouter:
     ) -> Response:
         if not (body.engaged or request_.scope.get("scm_is_sure", True)):
             detail = "the store of API keys cannot be read now: it must know your key for that"
-            raise RefusedError(Refused(code="offline", detail=detail))
+            raise RefusedError.of("offline", detail)
         by, reason = signer(body.by), body.reason
         request = StopRequest(request_id=key, engaged=body.engaged, by=by, reason=reason)
         loop = asyncio.get_running_loop()
