@@ -7,8 +7,8 @@ from pathlib import Path
 from scm.command import Command
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("recording", type=Path, metavar="FILE", help="the .mcap of a run")
+def span_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add which part of a run is meant."""
     parser.add_argument(
         "--from-s",
         type=float,
@@ -19,6 +19,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--to-s", type=float, metavar="S", help="end, likewise; default: the end of the run"
     )
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("recording", type=Path, metavar="FILE", help="the .mcap of a run")
+    span_arguments(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="the new .mcap")
 
 

@@ -3,6 +3,7 @@
 import argparse
 
 from scm.command import Command
+from scm.commands.cut import span_arguments
 from scm.commands.export_foxglove import export_arguments, write_blocks
 
 LONGEST_S = 1e7  # four months
@@ -16,16 +17,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="export this car's own reports; default: all cars as the world saw them",
     )
-    parser.add_argument(
-        "--from-s",
-        type=float,
-        default=0.0,
-        metavar="S",
-        help="start, in seconds since the run began (%(default)s)",
-    )
-    parser.add_argument(
-        "--to-s", type=float, metavar="S", help="end, likewise; default: the end of the run"
-    )
+    span_arguments(parser)
 
 
 def _run(arguments: argparse.Namespace) -> int:

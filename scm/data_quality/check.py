@@ -45,11 +45,9 @@ ACCELEROMETER = ("imu.accel_x", "imu.accel_y")
 
 
 def check(recording: Recording, car: Car | None = None) -> Quality:
-    """Return what is wrong with a recording, or with its sensors against each other.
+    """Return what is wrong with a screened recording, or with its sensors against each other.
 
-    Args:
-        recording: Screened row by row; it is not changed, see `corrected.corrected`.
-        car: Gives wheel radius, counts a turn and track; without it wheels are not compared.
+    Without a car its wheels are not compared.
     """
     state = Repairs(recording)
     problems = list(row_problems(recording))
@@ -119,10 +117,7 @@ def mirrored(problems: Iterable[DataProblem]) -> DataProblem | None:
 def usable(recording: Recording, problems: Iterable[DataProblem], car: Car | None = None) -> Usable:
     """Return the usable spans of each channel, and what keeps the recording from being used.
 
-    Args:
-        recording: After repair.
-        problems: Found in it.
-        car: Says what drives it; None takes a throttle for granted.
+    The recording is repaired, the problems were found in it; without a car a throttle drives it.
     """
     known = list(problems)
     driver = drive_name(recording, car) if car else COMMANDS[0]
@@ -186,12 +181,9 @@ def _lacks(
 def no_verdict(
     lacks: Sequence[str], relations: Sequence[Relation], suspicions: Sequence[Suspicion]
 ) -> DataProblem:
-    """Return why there is no verdict, what the sensors say nevertheless, and what to record.
+    """Return why there is no verdict, what the sensors show nevertheless, and what to record.
 
-    Args:
-        lacks: What keeps the recording from being driven again.
-        relations: Sensors that were held against each other.
-        suspicions: What that made suspicious, most certain first.
+    Suspicions come with the most certain first.
     """
     return DataProblem(
         channel="*",
@@ -221,12 +213,8 @@ def compare_all(
 ) -> tuple[list[Relation], list[Suspicion]]:
     """Return all relations, and the faults that would explain those that are off.
 
-    Args:
-        recording: Repaired.
-        car: Says how long the car is.
-        poses: Of the recording.
-        found: Sensors of distance.
-        problems: Found so far: copies are no witnesses, and frozen spans witness nothing.
+    The recording is repaired. Of the problems found so far, copies are no witnesses, and frozen
+    spans witness nothing.
     """
     not_own = no_witnesses(problems)
     wheelbase = car.value("body.wheelbase_m") if car else suspected_faults.DEFAULT_WHEELBASE_M

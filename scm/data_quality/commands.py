@@ -143,13 +143,9 @@ def _rescaled(now: Repairs, name: str, factor: float, text: str) -> DataProblem:
 def command_problems(
     recording: Recording, movement: Series | None, poses: Track | None, car: Car | None = None
 ) -> Iterator[DataProblem]:
-    """Yield what is wrong with the commands and with what they do.
+    """Yield what is wrong with a repaired recording's commands and with what they do.
 
-    Args:
-        recording: Repaired.
-        movement: As the poses show it; None where the car stands or nothing shows it.
-        poses: Likewise.
-        car: Says how long it is.
+    `movement` and `poses` are None where the car stands or nothing shows that it moves.
     """
     yield from _missing(recording)
     for name in ("command.throttle", "command.steering", *COMMANDED_SPEEDS):

@@ -24,9 +24,7 @@ INSTEAD = "Write the counts as they add up, in an integer that is wide enough."
 def repaired_counters(recording: Recording, limits: Limits) -> tuple[Recording, list[DataProblem]]:
     """Return a recording whose encoders add up from the first row to the last.
 
-    Args:
-        recording: With stamps that go forward.
-        limits: Of its car.
+    Its stamps go forward.
     """
     channels, problems = dict(recording.channels), list[DataProblem]()
     for name in COUNTERS:

@@ -37,13 +37,10 @@ def frozen_problems(
     movement: Series | None,
     clipped: Collection[Span] = (),
 ) -> Iterator[DataProblem]:
-    """Yield channels whose values cannot be what a sensor of a moving car says.
+    """Yield channels of a repaired recording whose values no sensor of a moving car has.
 
-    Args:
-        recording: Repaired.
-        found: Sensors of distance.
-        movement: As the poses show it; None where the car stands or nothing shows it.
-        clipped: Spans in which a sensor stays at the end of its range.
+    `movement` is None where the car stands or nothing shows it; in the spans `clipped` a sensor
+    stays at the end of its range.
     """
     yield from _held(recording)
     coarse = list(_coarse(recording))

@@ -84,8 +84,7 @@ class Track:
 def long_gaps(*times: Floats) -> list[Span]:
     """Return the spans without rows that are too long to be bridged, those that overlap as one.
 
-    Args:
-        times: Stamps of channels, each rising, shape `(n,)`.
+    The stamps of each channel rise.
     """
     gaps = sorted((float(t[i - 1]), float(t[i])) for t in times for i in _after_gaps(t))
     merged: list[Span] = []
@@ -116,13 +115,7 @@ def between_gaps_s(start: float, end: float, gaps: Iterable[Span]) -> float:
 
 
 def cut_at_gaps(starts: Sequence[int], t: Floats, other: Floats) -> tuple[int, ...]:
-    """Return the first rows of stretches, where another channel's long gaps end them too.
-
-    Args:
-        starts: First row of each stretch so far.
-        t: Stamps of the rows.
-        other: Stamps of the other channel.
-    """
+    """Return the first rows of stretches of `t`, which another channel's long gaps end too."""
     gaps = long_gaps(other)
     rows = np.searchsorted(t, [moment for gap in gaps for moment in gap])
     return tuple(sorted({*starts, *(int(row) for row in rows if row < len(t))}))

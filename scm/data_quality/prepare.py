@@ -144,12 +144,7 @@ class Screened:
 
 
 def screen(recording: Recording, car: Car) -> Screened:
-    """Return a recording with its rows in order, each possible for its car.
-
-    Args:
-        recording: As it was read; it is not changed.
-        car: Says how fast it can go and turn.
-    """
+    """Return a recording with its rows in order, each possible for its car; it is not changed."""
     limits = limits_of(car)
     now, problems = with_numbers(recording)
     for step in (
@@ -193,16 +188,11 @@ class Stretches:
 
 
 def stretches(recording: Recording, car: Car, jumps: Sequence[Span] = ()) -> Stretches:
-    """Cut a recording where its poses or the commands that drive the car are missing for long.
+    """Cut a repaired recording where its poses or what drives the car are missing for long.
 
-    All its tables are cut at the same moments. Other sensors may pause: they are compared where
-    they are. A stretch that is too short to be driven again is left out, with a problem that says
-    which rows.
-
-    Args:
-        recording: With stamps on one clock that go forward, see `corrected.corrected`.
-        car: Says which command drives it.
-        jumps: Further spans to cut at, over which the poses jump.
+    All its tables are cut at the same moments, and where the poses jump. Other sensors may pause:
+    they are compared where they are. A stretch that is too short to be driven again is left out,
+    with a problem that says which rows.
     """
     needed = (drive_name(recording, car), STEERING, *POSE)
     if any(len(_stamps(recording, name)) == 0 for name in needed):

@@ -173,13 +173,8 @@ def _together(t: Floats, usual_s: float) -> Bools:
 def _are_late(recording: Recording, table: Table, even: Floats, *, usual: bool) -> bool:
     """Return whether rows of one moment are late, by the motion that they show.
 
-    Copies of a row are not, nor is what is sent: it holds from when it is sent.
-
-    Args:
-        recording: As read.
-        table: With bursts.
-        even: Stamps of its rows, spread.
-        usual: Most rows come so: then noise may hide what the motion says.
+    Copies of a row are not, nor is what is sent: it holds from when it is sent. Where most rows
+    come so (`usual`), noise may hide what the motion says. `even` are the stamps, spread.
     """
     changing, left = list[tuple[float, float]](), list[float]()
     for name in table.names:

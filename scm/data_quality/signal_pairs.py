@@ -273,10 +273,8 @@ class MotionSignal:
 def compare(first: MotionSignal, second: MotionSignal, clipped: Sequence[Span] = ()) -> Pair | None:
     """Hold two signals of one motion against each other; None where either hardly moves.
 
-    Args:
-        first: One signal, the pose's wherever it takes part.
-        second: The other.
-        clipped: Spans in which the second was at the end of its range: its size is taken outside.
+    The first is the pose's wherever it takes part. The second's size is taken outside spans in
+    which it was `clipped` at the end of its range.
     """
     a, b, shift = first.signal, second.signal, 0.0
     overlap = min(a.t[-1], b.t[-1]) - max(a.t[0], b.t[0])
@@ -321,11 +319,7 @@ def heading_fault(poses: Track, raw: Floats) -> float:
     """Return the factor by which a pose's yaw is wrong against its own direction of travel.
 
     57.3 where degrees were taken for radians, -1 where it turns the other way, 1 where it is right
-    or cannot be told.
-
-    Args:
-        poses: With positions that can be trusted.
-        raw: Yaw as it was recorded, at the poses' stamps.
+    or cannot be told. `raw` is the yaw as it was recorded, at the poses' stamps.
     """
     step_s, width_s = max(STEP_S, 0.5 * poses.period_s), max(0.1, 1.5 * poses.period_s)
     on = grid(poses.t[0], poses.t[-1], step_s, width_s, long_gaps(poses.t))

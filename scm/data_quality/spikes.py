@@ -41,9 +41,7 @@ def without_spikes(
 ) -> tuple[Recording, list[DataProblem], tuple[Span, ...]]:
     """Return a recording without rows that its car cannot explain, and where its poses jump.
 
-    Args:
-        recording: With stamps that go forward.
-        limits: Of its car.
+    Its stamps go forward.
     """
     channels, problems, jumps = _screened_poses(recording, limits)
     for name, channel in channels.items():
@@ -143,10 +141,8 @@ def held_since(t: Floats, *columns: Floats) -> Floats:
 def single(t: Floats, off: Callable[[Ints, Ints, Ints], Floats], bound: Floats) -> Bools:
     """Return which rows alone are off the way between their neighbours, `(n,)`.
 
-    Args:
-        t: Stamps, `(n,)`.
-        off: How far rows are off the line between two others each.
-        bound: What motion and noise explain, `(n - 2,)`.
+    `off` gives how far rows are off the line between two others each; motion and noise explain
+    `bound`, `(n - 2,)`.
     """
     n, found = len(t), np.zeros(len(t), dtype=np.bool_)
     i = np.arange(1, n - 1)

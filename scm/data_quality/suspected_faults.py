@@ -76,11 +76,8 @@ def from_travel(
 ) -> Iterator[Suspicion]:
     """Yield faults of scale, camera, marker and heading from positions against distance.
 
-    Args:
-        found: Positions against that way.
-        way: Where the distance came from.
-        wheelbase_m: A yardstick for how far a marker may seem to be off.
-        push: The pose against the accelerometer, which knows a metre too.
+    The wheelbase is a yardstick for how far a marker may seem to be off; the accelerometer (`push`)
+    knows a metre too.
     """
     if _slides(found):
         return
@@ -109,9 +106,7 @@ def follows(push: Relation) -> bool:
 def from_push(found: Relation, heading_rad: float = 0.0) -> Iterator[Suspicion]:
     """Yield accelerometer faults from the pose's acceleration.
 
-    Args:
-        found: The pose against the accelerometer.
-        heading_rad: By which the pose's yaw is known to be turned; the sensor seems turned back.
+    Where the pose's yaw is known to be turned by `heading_rad`, the sensor seems turned back.
     """
     if not follows(found):
         return

@@ -86,7 +86,7 @@ class Pace:
         return min(math.atan(self.wheelbase_m / radius_m) / self.limit_rad, 0.95)
 
     def radius(self, steering: float) -> float:
-        """Return the radius that a steering command only_for for [m]."""
+        """Return the radius that a steering command gives [m]."""
         return self.wheelbase_m / math.tan(abs(steering) * self.limit_rad)
 
 
@@ -335,16 +335,9 @@ def long_laps(pace: Pace) -> Manoeuvre:
 
 
 MANOEUVRES: Mapping[str, Callable[[Pace], Manoeuvre]] = {
-    "shuttle": shuttle,
-    "straight_steps": straight_steps,
-    "throttle_noise": throttle_noise,
-    "pulse_and_coast": pulse_and_coast,
-    "launches": launches,
-    "circles": circles,
-    "steering_steps": steering_steps,
-    "slalom": slalom,
-    "small_reversals": small_reversals,
-    "steer_then_go": steer_then_go,
-    "out_and_back": out_and_back,
-    "long_laps": long_laps,
-}
+    build.__name__: build
+    for build in (
+        shuttle, straight_steps, throttle_noise, pulse_and_coast, launches, circles, steering_steps,
+        slalom, small_reversals, steer_then_go, out_and_back, long_laps,
+    )
+}  # fmt: skip

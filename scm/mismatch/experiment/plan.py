@@ -130,12 +130,9 @@ def _fitted_in(leg: Leg, manoeuvre: Manoeuvre, path: Floats, pace: Pace) -> Plac
 
 
 def planned(model: Likelihood, legs: Sequence[Placed], truth: Numbers) -> Likelihood:
-    """Return the likelihood of noise-free recordings that nobody has made yet.
+    """Return the likelihood of noise-free recordings of legs that nobody has made yet.
 
-    Args:
-        model: Of a recording that was made: its sensors, car and noise.
-        legs: The drives.
-        truth: Numbers of the car that would make them.
+    Sensors, car and noise are those of a recording that was made; `truth` would drive the legs.
     """
     return Likelihood(_PlannedSimulator(model, legs, truth), model.noise)
 

@@ -44,10 +44,7 @@ pose = [{start.x:.4f}, {start.y:.4f}, {start.yaw:.4f}]
 def write_scenario(suggestion: Suggestion, car: str, folder: Path) -> list[Path]:
     """Write the files of every leg of the best experiment; return their descriptions.
 
-    Args:
-        suggestion: What to do next.
-        car: The car's name or file; a file is named by its whole path.
-        folder: Is made where it is missing.
+    A car given by its file is named by its whole path.
     """
     if suggestion.best is None:
         return []

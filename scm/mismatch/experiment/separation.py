@@ -44,9 +44,7 @@ class Separation:
 def linear_separation(planned: Likelihood, explanations: Sequence[Explanation]) -> Separation:
     """Return how far explanations come apart by one linear refit of each.
 
-    Args:
-        planned: Of the first explanation's motion.
-        explanations: All of them.
+    `planned` is of the first explanation's motion.
     """
     own, parameters = planned.nominal, [_parameters(r) for r in explanations]
     n, e = len(explanations), np.nan_to_num(planned(_sets(planned, explanations))[0])
@@ -75,10 +73,8 @@ def refitted_separation(
 ) -> Separation:
     """Return how far explanations come apart when each is refitted with all that is not linear.
 
-    Args:
-        plan: Gives the recordings that a right explanation would leave.
-        explanations: All of them.
-        start: From the linear refit; what it could explain counts as explained.
+    `plan` gives the recordings that a right explanation would leave. What the linear refit `start`
+    could explain counts as explained.
     """
     lambdas = start.lambdas.copy()
     for i, right in enumerate(explanations):

@@ -164,13 +164,8 @@ def cooled(_car: Car) -> Experiment:
 
 
 CHANGED: Mapping[str, Callable[[Car], Experiment]] = {
-    "ramp": ramp,
-    "slope": slope,
-    "known_mass": known_mass,
-    "ramp_and_mass": ramp_and_mass,
-    "rotated": rotated,
-    "other_wheels": other_wheels,
-    "cooled": cooled,
+    build.__name__: build
+    for build in (ramp, slope, known_mass, ramp_and_mass, rotated, other_wheels, cooled)
 }
 
 
@@ -218,7 +213,7 @@ def suggest(
         model: Of the recording that leaves them undecided: its sensors, noise and car.
         explanations: Two or more explanations with their fitted values; the four likeliest count.
         floor: Free to drive on; None: where the recording was made, 0.3 m around it.
-        notify: Hears what is being tried.
+        notify: Receives what is being tried.
     """
     counted = explanations[:MAX_EXPLANATIONS]
     pace = pace_of(model.car, model.drives, floor)

@@ -11,7 +11,15 @@ from scm.maps.svg import element
 from scm.mismatch.findings import Diagnosis, Estimate
 from scm.mismatch.report.page import around, document, figure, panel_html, section, table, tag
 from scm.mismatch.report.panels import Panel
-from scm.mismatch.report.plot import TEXT_PX, Picture, frame, picture_svg, text, ticks_across
+from scm.mismatch.report.plot import (
+    TEXT_PX,
+    Picture,
+    frame,
+    picture_svg,
+    text,
+    ticks_across,
+    whiskers,
+)
 from scm.mismatch.report.record import plain
 from scm.mismatch.report.sentences import advice_of, can_judge, count, verdict_sentence
 from scm.mismatch.report.wording import (
@@ -202,26 +210,17 @@ def _picture(common: Common, name: str, shared: Estimate) -> Picture | None:
     rows = [(one.car, one.own[name]) for one in common.cars if name in one.own]
     if not all(math.isfinite(v) for _, e in rows for v in (e.value, e.low, e.high)):
         return None
-    low, high = _span([shared, *(e for _, e in rows)])
+    span = _span([shared, *(e for _, e in rows)])
     left = min(_MAX_LABEL, 14.0 + TEXT_PX * max(len(car) for car, _ in rows))
     height = 30.0 + _ROW * len(rows) + 44.0
-    room = frame((low, high), (0.0, 1.0), (_WIDTH, height), margins=(left, 14, 26, 44))
-
-    def at(value: float) -> float:
-        return room.across.at(min(high, max(low, value)))
-
-    begin, end = at(shared.low), at(shared.high)
+    room = frame(span, (0.0, 1.0), (_WIDTH, height), margins=(left, 14, 26, 44))
+    begin, end = (room.across.at(min(span[1], max(span[0], v))) for v in (shared.low, shared.high))
     parts = [
         element("rect", x=begin, y=room.top, width=max(end - begin, 1.0),
                 height=room.bottom - room.top, class_="prior-core")
     ]  # fmt: skip
     parts += ticks_across(room)
-    for i, (car, own) in enumerate(rows):
-        y = 40.0 + _ROW * i
-        across = f"M{at(own.low):.1f} {y:.1f}H{at(own.high):.1f}"
-        parts += [text(left - 8, y + 4, car, "end", "title")]
-        parts += [element("path", d=across, class_="whisker")]
-        parts += [element("circle", cx=f"{at(own.value):.1f}", cy=f"{y:.1f}", r="5", class_="dot")]
+    parts += whiskers(room, [(car, e.low, e.value, e.high) for car, e in rows], 40.0, _ROW)
     unit = f" [{unit_text(shared.unit)}]" if unit_text(shared.unit) else ""
     words = f"{name_of(name, shared.unit)}{unit}"
     parts += [text(room.right, height - 8, words, "end", "title")]

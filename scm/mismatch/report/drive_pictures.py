@@ -159,14 +159,10 @@ def time_line(
     after: str,
     clock: str,
 ) -> Picture | None:
-    """Return the picture; None where there is nothing to draw.
+    """Return a panel for each of the first residuals; None where there is nothing to draw.
 
-    Args:
-        residuals: One panel each, the first few.
-        located: When the error acts.
-        runs: Which part of the recording was used for what; None: that is not shown.
-        after: In the legend.
-        clock: What the times are, below their axis.
+    Without free runs it is not shown which part of the recording was used for what. `after` stands
+    in the legend, `clock` below the axis.
     """
     shown = [r for r in residuals if len(r.t_s)][:_MAX_PANELS]
     if not shown:

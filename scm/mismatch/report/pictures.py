@@ -22,6 +22,7 @@ from scm.mismatch.report.plot import (
     span_of,
     text,
     ticks_across,
+    whiskers,
 )
 from scm.mismatch.report.wording import capital, quantities, title_of, unit_text
 
@@ -88,9 +89,7 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Pict
 def _better(diagnosis: Diagnosis, retuned_m: float | None = None) -> Picture | None:
     """Return position errors on the part that the fit did not see; None without an effect.
 
-    Args:
-        diagnosis: Its errors before and after.
-        retuned_m: Of the car with its own numbers refitted alone; None: not shown.
+    `retuned_m` is that of the car with its own numbers refitted alone; None: not shown.
     """
     if diagnosis.fit is None or not diagnosis.effects:
         return None
@@ -194,15 +193,11 @@ def _numbers(refitted: Sequence[RefittedParameter]) -> Picture | None:
                     height=room.bottom - room.top, class_=kind)
         ]  # fmt: skip
     parts += ticks_across(room)
-    for i, o in enumerate(shown):
-        y = 40.0 + _ROW * i
-        low, at, high = (
-            room.across.at(min(wide, max(-wide, _moved(o, v))))
-            for v in (o.found.low, o.found.value, o.found.high)
-        )
-        parts += [text(left - 8, y + 4, o.key, "end", "title")]
-        parts += [element("path", d=f"M{low:.1f} {y:.1f}H{high:.1f}", class_="whisker")]
-        parts += [element("circle", cx=f"{at:.1f}", cy=f"{y:.1f}", r="5", class_="dot")]
+    rows = [
+        (o.key, _moved(o, o.found.low), _moved(o, o.found.value), _moved(o, o.found.high))
+        for o in shown
+    ]
+    parts += whiskers(room, rows, 40.0, _ROW)
     words = "moved [standard deviations of the car file]"
     parts += [text(room.right, height - 8, words, "end", "title")]
     return Picture(

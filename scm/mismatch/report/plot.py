@@ -89,12 +89,8 @@ def picture_svg(
 ) -> str:
     """Return the whole SVG.
 
-    Args:
-        width: Of the view box, as `height`.
-        height: In pixels.
-        parts: Elements.
-        label: Read out to people who do not see the picture.
-        axes: Written down for pages that mark a moment in the picture; None: nothing to mark.
+    `label` is read out to people who do not see it. `axes` are written down for pages that mark a
+    moment in the picture; None: nothing to mark.
     """
     data = ""
     for name, axis in (("across", axes.across), ("up", axes.up)) if axes else ():
@@ -229,6 +225,21 @@ def _unbroken(known: Bools) -> Iterator[slice]:
     """Yield runs of known values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(np.int8)))
     yield from (slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))
+
+
+def whiskers(
+    of: Frame, rows: Sequence[tuple[str, float, float, float]], first_y: float, row_px: float
+) -> Iterator[str]:
+    """Yield rows of a name left of the axes, and a dot with its interval: (name, low, at, high)."""
+
+    def at(value: float) -> float:
+        return of.across.at(min(of.across.high, max(of.across.low, value)))
+
+    for i, (name, low, value, high) in enumerate(rows):
+        y = first_y + row_px * i
+        yield text(of.left - 8, y + 4, name, "end", "title")
+        yield element("path", d=f"M{at(low):.1f} {y:.1f}H{at(high):.1f}", class_="whisker")
+        yield element("circle", cx=f"{at(value):.1f}", cy=f"{y:.1f}", r="5", class_="dot")
 
 
 def legend(x: float, y: float, entries: Sequence[tuple[str, str]]) -> Iterator[str]:

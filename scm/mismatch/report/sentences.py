@@ -160,9 +160,7 @@ def can_judge(diagnosis: Diagnosis) -> bool:
 def better_sentence(diagnosis: Diagnosis, retuned_m: float | None = None) -> str:
     """Return how much better the simulator got; empty if nothing was fitted.
 
-    Args:
-        diagnosis: What was found.
-        retuned_m: Error of the car with only its own numbers refitted; None: not mentioned.
+    `retuned_m` is the error of the car with only its own numbers refitted; None: not mentioned.
     """
     fit = diagnosis.fit
     if fit is None:

@@ -94,10 +94,7 @@ def _is_changed(car: Car, patched: Car) -> bool:
 def summary(diagnosis: Diagnosis, out: Path, retuned_m: float | None = None) -> str:
     """Return the verdict, each effect, how much better, and where the page is.
 
-    Args:
-        diagnosis: What was found.
-        out: Folder of the report.
-        retuned_m: Error of the car with its own numbers refitted alone; None: not mentioned.
+    `retuned_m` is the error of the car with its own numbers refitted alone; None: not mentioned.
     """
     return "\n".join(_lines(diagnosis, out, retuned_m))
 

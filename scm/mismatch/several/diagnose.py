@@ -104,13 +104,7 @@ def diagnose_one(
 ) -> Result:
     """Return what a simulator lacks to explain one car, by the file that its recordings name.
 
-    Args:
-        recordings: As they were read.
-        budget_s: As in `diagnose`.
-        budget: One that began with the reading, in place of `budget_s`.
-        strict: As in `diagnose`, like `notify` and `clock`.
-        notify: Receives what is being tried.
-        clock: For the time it takes.
+    Arguments are those of `diagnose`; a `budget` that began with the reading replaces `budget_s`.
 
     Raises:
         ScmError: when a recording or the car file cannot be used.
@@ -136,13 +130,8 @@ def diagnose_several(
 ) -> Several:
     """Return what a simulator lacks to explain each of several cars, and what they share.
 
-    Args:
-        cars: Recordings by car, as `cars_of` returns them.
-        budget_s: For each car, as in `diagnose`.
-        strict: As in `diagnose`.
-        notify: Receives what is being tried; `turn` for whom, which turn it is, and of how many.
-        turn: None of both matters to the result.
-        clock: For the time it took.
+    Arguments are those of `diagnose`, with recordings by car as `cars_of` returns them, and a
+    budget for each. `turn` receives which car is next, its number, and of how many.
 
     Raises:
         ScmError: when no car's recording or file can be used.
@@ -176,10 +165,7 @@ def diagnose_several(
 def write_all(several: Several, out: Path, check: Callable[[str], str] = lambda _: "") -> None:
     """Write each car's report into its folder, and the page and `cars.json` of them all.
 
-    Args:
-        several: To be written.
-        out: The folder.
-        check: Gives, by a car's name, the command that computes its figures again.
+    `check` gives, by a car's name, the command that computes its figures again.
 
     Raises:
         ScmError: when a folder cannot be written.

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
+from typing import NamedTuple
 
 from msgspec import Struct, field
 
@@ -71,28 +72,37 @@ class Common(Struct, kw_only=True, frozen=True):
     cars: tuple[CarAgreement, ...]
 
 
-WHOSE: Mapping[Cause, str] = {
-    Cause.CAMERA: "it is the camera, not the cars",
-    Cause.TAGS: "the tags sit alike on all of them, or the description's point is wrong; or the "
-                "camera is off by as much",
-    Cause.FLOOR: "it is the floor, or what acts on all cars there",
+class Wording(NamedTuple):
+    """What is written of a cause: whose an effect is if it is shared, if it is not, and if unsure.
+
+    Attributes:
+        verb: What cars do with it; `alike`: how several of them do.
+    """
+
+    whose: str
+    own: str
+    unsure: str
+    alike: str
+    verb: str
+
+
+WORDING: Mapping[Cause, Wording] = {
+    Cause.CAMERA: Wording(
+        "it is the camera, not the cars",
+        "it is that car's own (its tag, its mounting, its clock), not the camera",
+        "whether it is the camera or that car's own", "seen by the same camera", "see",
+    ),
+    Cause.TAGS: Wording(
+        "the tags sit alike on all of them, or the description's point is wrong; or the camera is "
+        "off by as much",
+        "it is that car's own tag or its mounting, not the camera",
+        "whether it is that car's tag or the camera", "seen alike by the same camera", "see",
+    ),
+    Cause.FLOOR: Wording(
+        "it is the floor, or what acts on all cars there", "it is that car's own, not the floor",
+        "whether it is the floor or that car's own", "on the same floor", "feel",
+    ),
 }  # fmt: skip
-OWN: Mapping[Cause, str] = {
-    Cause.CAMERA: "it is that car's own (its tag, its mounting, its clock), not the camera",
-    Cause.TAGS: "it is that car's own tag or its mounting, not the camera",
-    Cause.FLOOR: "it is that car's own, not the floor",
-}
-UNSURE: Mapping[Cause, str] = {
-    Cause.CAMERA: "whether it is the camera or that car's own",
-    Cause.TAGS: "whether it is that car's tag or the camera",
-    Cause.FLOOR: "whether it is the floor or that car's own",
-}
-ALIKE: Mapping[Cause, str] = {
-    Cause.CAMERA: "seen by the same camera", Cause.TAGS: "seen alike by the same camera",
-    Cause.FLOOR: "on the same floor",
-}  # fmt: skip
-TWO = 2
-VERBS: Mapping[Cause, str] = {Cause.CAMERA: "see", Cause.TAGS: "see", Cause.FLOOR: "feel"}
 
 
 def conclusion(cause: Cause, cars: Sequence[CarAgreement], *, shared: bool) -> str:
@@ -100,7 +110,7 @@ def conclusion(cause: Cause, cars: Sequence[CarAgreement], *, shared: bool) -> s
     seeing = [c.car for c in cars if c.agreement in (Agreement.CONFIRMS, Agreement.SUPPORTS)]
     against = [c.car for c in cars if c.agreement is Agreement.CONTRADICTS]
     silent = [c.car for c in cars if c.agreement is Agreement.UNDECIDED]
-    verb = VERBS[cause]
+    words = WORDING[cause]
     if not shared:
         return _of_one(cause, cars, against, silent)
     if against:
@@ -109,44 +119,40 @@ def conclusion(cause: Cause, cars: Sequence[CarAgreement], *, shared: bool) -> s
         also = [f"{joined(none)} {_would(none)}"] if none else []
         also += [f"{joined(by_others)} by another amount"] if by_others else []
         return (
-            f"{joined(seeing)} {verb} it alike, {joined(also)}: it is something that only "
+            f"{joined(seeing)} {words.verb} it alike, {joined(also)}: it is something that only "
             f"{joined(seeing)} have in common."
         )
     if silent:
-        drives = "the drives of" if len(silent) > 1 else "the drive of"
         return (
-            f"{joined(seeing)} {verb} it alike: {WHOSE[cause]}. {drives.capitalize()} "
-            f"{joined(silent)} cannot tell, and {_do(silent)} not contradict."
+            f"{joined(seeing)} {words.verb} it alike: {words.whose}. {capital(_drives_of(silent))} "
+            f"cannot tell, and {'do' if len(silent) > 1 else 'does'} not contradict."
         )
-    every = "both cars" if len(cars) == TWO else f"all {len(cars)} cars"
+    every = "both cars" if len(cars) == 2 else f"all {len(cars)} cars"
     if any(c.agreement is Agreement.SUPPORTS for c in cars):
-        return f"Too weak for one car alone, {every} together show it: {WHOSE[cause]}."
-    return f"{capital(every)} {verb} it alike: {WHOSE[cause]}."
+        return f"Too weak for one car alone, {every} together show it: {words.whose}."
+    return f"{capital(every)} {words.verb} it alike: {words.whose}."
 
 
 def _of_one(
     cause: Cause, cars: Sequence[CarAgreement], against: Sequence[str], silent: Sequence[str]
 ) -> str:
     finders = [c.car for c in cars if c.alone]
-    verb = VERBS[cause]
+    words = WORDING[cause]
     if len(finders) > 1:
         return (
-            f"{joined(finders)} {verb} it each by another amount: it is each car's own, nothing "
-            "that they have in common."
+            f"{joined(finders)} {words.verb} it each by another amount: it is each car's own, "
+            "nothing that they have in common."
         )
     who = joined(finders) or "one car"
     others = [name for name in against if name not in finders]
     if others:
-        return f"Only {who} {verb}s it, {joined(others)} {_would(others)}: {OWN[cause]}."
-    drives = "the drives of" if len(silent) > 1 else "the drive of"
-    return (
-        f"Only {who} {verb}s it; {drives} {joined([n for n in silent if n not in finders])} cannot "
-        f"tell {UNSURE[cause]}."
-    )
+        return f"Only {who} {words.verb}s it, {joined(others)} {_would(others)}: {words.own}."
+    unsure = [name for name in silent if name not in finders]
+    return f"Only {who} {words.verb}s it; {_drives_of(unsure)} cannot tell {words.unsure}."
 
 
-def _do(names: Sequence[str]) -> str:
-    return "do" if len(names) > 1 else "does"
+def _drives_of(names: Sequence[str]) -> str:
+    return ("the drives of " if len(names) > 1 else "the drive of ") + joined(names)
 
 
 def _would(names: Sequence[str]) -> str:
@@ -159,4 +165,4 @@ def all_alike(common: Common, name: str) -> str:
     others = [c.car for c in common.cars if c.agreement in seeing and c.car != name]
     alone = any(c.alone for c in common.cars if c.car == name)
     found = "" if alone else " This car alone would not have shown it for sure."
-    return f"Estimated together with {joined(others)}, {ALIKE[common.cause]}.{found}"
+    return f"Estimated together with {joined(others)}, {WORDING[common.cause].alike}.{found}"

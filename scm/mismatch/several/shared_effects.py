@@ -52,12 +52,7 @@ def compared(
 ) -> tuple[list[Common], dict[str, Selected]]:
     """Return every effect of what cars share that one found, or that all find only together.
 
-    Args:
-        cars: Selections by the cars' names.
-        notify: Receives what is being tried.
-
-    Returns:
-        The effects, and the selections with the shared ones in their hypotheses.
+    With them come the selections with the shared ones in their hypotheses.
     """
     now, found = dict(cars), list[Common]()
     for effect, start in _found_by_any(cars):
@@ -133,14 +128,9 @@ def _try_in_all(
     *,
     searched_for: bool,
 ) -> Shared | None:
-    """Return an effect tried in all cars; None where no two share it.
+    """Return an effect tried in all cars from the values that somebody found; None where no two do.
 
-    Args:
-        cars: Selections by name.
-        effect: Of a shared thing.
-        start: Its values where somebody found it.
-        notify: Receives what is being tried.
-        searched_for: Whether no car found it: then the sum must pay for the whole catalogue.
+    If it was `searched_for`, no car found it: then the sum must pay for the whole catalogue.
     """
     in_cars = dict[str, EffectInCar]()
     for name, selected in cars.items():
