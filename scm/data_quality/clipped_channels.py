@@ -27,7 +27,6 @@ TOGETHER_ROWS = 5
 LONGEST_SPIKE_S = 1.5  # where nothing but the sensor's own usual value tells a spike
 WHOLE_TURN = 0.35  # of a turn, by which the area of spikes may differ from whole ones
 AROUND_ROWS = 51
-SHOWN = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,16 +84,14 @@ def wrapped_rows(now: Repairs) -> Iterator[DataProblem]:
         for first, last in spikes:
             rows[first : last + 1] = True
         spans = _spans(channel.t, rows)
-        now.repair(Repair(channels=(name,), out_s=spans))
         largest = float(np.abs(channel.values[rows]).max())
-        yield DataProblem(
-            channel=name,
-            name="wrapped",
-            text=f"{int(rows.sum())} of {len(rows)} rows in {len(spikes)} spikes of up to "
+        yield now.repair(
+            Repair(channels=(name,), out_s=spans),
+            "wrapped",
+            f"{int(rows.sum())} of {len(rows)} rows in {len(spikes)} spikes of up to "
             f"{largest:.3g} rad/s: it is the slope of an angle that wraps there by a whole turn.",
-            when_s=spans[:SHOWN],
-            corrected="These rows are left out.",
-            record_instead="Unwrap an angle before taking its slope.",
+            "These rows are left out.",
+            "Unwrap an angle before taking its slope.",
         )
 
 

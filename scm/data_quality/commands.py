@@ -18,7 +18,7 @@ from scm.data_quality.pose_track import (
     recorded_s,
 )
 from scm.data_quality.quality import DataProblem, Repair
-from scm.data_quality.repairs import DESCRIBE, Repairs, forward_speed
+from scm.data_quality.repairs import Repairs, forward_speed
 from scm.recording.read import Recording
 from scm.vehicles.car import Car
 from scm.vehicles.drive_channel import COMMANDED_SPEEDS
@@ -130,14 +130,8 @@ def _often(now: Repairs, name: str) -> bool:
 
 
 def _rescaled(now: Repairs, name: str, factor: float, text: str) -> DataProblem:
-    now.repair(Repair(channels=(name,), factor=factor))
-    return DataProblem(
-        channel=name,
-        name="sign" if factor == -1.0 else "unit",
-        text=text,
-        corrected=f"Multiplied by {factor:.4g}.",
-        record_instead=DESCRIBE,
-    )
+    repair, fault = Repair(channels=(name,), factor=factor), "sign" if factor == -1.0 else "unit"
+    return now.repair(repair, fault, text, f"Multiplied by {factor:.4g}.")
 
 
 def command_problems(

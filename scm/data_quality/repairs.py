@@ -47,6 +47,7 @@ from scm.vehicles.car import Car
 
 GYROS = ("imu.gyro_z", "yaw_rate")
 SHORTEST_S = 4.0
+SHOWN = 50  # spans of a problem
 DESCRIBE = "Give the unit and sign of the column in the recording's description."
 WIDTH_S = 0.1
 STEP_S = 0.02
@@ -63,10 +64,17 @@ class Repairs:
     recording: Recording
     repairs: list[Repair] = field(default_factory=list)
 
-    def repair(self, repair: Repair) -> None:
-        """Apply one more."""
+    def repair(
+        self, repair: Repair, name: str, text: str, corrected: str, instead: str = DESCRIBE,
+        channel: str = "",
+    ) -> DataProblem:  # fmt: skip
+        """Apply one more, and return the problem that it repairs."""
         self.recording = repaired(self.recording, [repair])
         self.repairs.append(repair)
+        return DataProblem(
+            channel=channel or called(repair.channels), name=name, text=text, corrected=corrected,
+            record_instead=instead, when_s=repair.out_s[:SHOWN] or None,
+        )  # fmt: skip
 
     def left_out_s(self, channels: Iterable[str]) -> list[Span]:
         """Return the spans whose rows are left out of any of these channels."""
@@ -92,16 +100,15 @@ def repair_heading(now: Repairs) -> Iterator[DataProblem]:
         return
     mirrored = factor == -1.0 and _turns_with_gyro(now.recording, poses)
     channel = "pose.y" if mirrored else "pose.yaw"
-    now.repair(Repair(channels=(channel,), factor=1.0 / factor))
     text = "The heading turns the other way than the pose moves: one axis is mirrored."
     if abs(factor) != 1.0:
         text = f"The heading is {abs(factor):.3g} times too large for the way the pose moves."
-    yield DataProblem(
-        channel=channel,
-        name="sign" if abs(factor) == 1.0 else "unit",
-        text=text,
-        corrected=f"Multiplied by {1.0 / factor:.4g}.",
-        record_instead="Record yaw counter-clockwise, x and y on a right-handed floor.",
+    yield now.repair(
+        Repair(channels=(channel,), factor=1.0 / factor),
+        "sign" if abs(factor) == 1.0 else "unit",
+        text,
+        f"Multiplied by {1.0 / factor:.4g}.",
+        "Record yaw counter-clockwise, x and y on a right-handed floor.",
     )
 
 
@@ -117,14 +124,13 @@ def repair_unsigned_speed(now: Repairs) -> Iterator[DataProblem]:
     if min(back.mean(), ahead.mean()) < 0.05 or fast < 0.02:
         return
     if np.median(speed.at(movement.t)[back]) > 0.2 * fast:
-        now.repair(Repair(channels=("speed",), signed=True))
-        yield DataProblem(
-            channel="speed",
-            name="sign",
-            text=f"Stays positive while the pose drives backwards ({100.0 * back.mean():.0f} % of "
-            "the time).",
-            corrected="Takes the sign of the pose's motion.",
-            record_instead="Record speed with its sign.",
+        yield now.repair(
+            Repair(channels=("speed",), signed=True),
+            "sign",
+            f"Stays positive while the pose drives backwards ({100.0 * back.mean():.0f} % of the "
+            "time).",
+            "Takes the sign of the pose's motion.",
+            "Record speed with its sign.",
         )
 
 
@@ -283,14 +289,10 @@ def _length_by_commands(
 
 def _length(now: Repairs, length: float, than: str) -> DataProblem:
     """Repair the pose's metre and say so."""
-    now.repair(Repair(channels=("pose.x", "pose.y"), factor=length))
-    return DataProblem(
-        channel="pose.x, pose.y",
-        name="unit",
-        text=f"The pose moves {1.0 / length:g} times as far as {than}.",
-        corrected=f"Multiplied by {length:g}.",
-        record_instead=DESCRIBE,
-    )
+    repair = Repair(channels=("pose.x", "pose.y"), factor=length)
+    text = f"The pose moves {1.0 / length:g} times as far as {than}."
+    corrected = f"Multiplied by {length:g}."
+    return now.repair(repair, "unit", text, corrected, channel="pose.x, pose.y")
 
 
 def _only_then(top: float | None, fast: float, factor: float) -> bool:
@@ -318,13 +320,12 @@ def _backwards(now: Repairs, car: Car | None, pairs: Sequence[Pair]) -> Iterator
     driven_back = throttle < -0.3 * sizes
     if not (driven_back and (going or len(against) == 2)) and not (going and len(against) == 2):
         return
-    now.repair(Repair(channels=("pose.yaw",), offset=math.pi))
-    yield DataProblem(
-        channel="pose.yaw",
-        name="sign",
-        text="The heading points to the back of the car: it drives backwards all the time.",
-        corrected="Half a turn added.",
-        record_instead="Fix the marker with its x axis ahead.",
+    yield now.repair(
+        Repair(channels=("pose.yaw",), offset=math.pi),
+        "sign",
+        "The heading points to the back of the car: it drives backwards all the time.",
+        "Half a turn added.",
+        "Fix the marker with its x axis ahead.",
     )
 
 
@@ -353,18 +354,14 @@ def _size(now: Repairs, pair: Pair) -> Iterator[DataProblem]:
 
 def _divided(now: Repairs, channels: tuple[str, ...], factor: float, what: str) -> DataProblem:
     """Repair channels by a factor and say so."""
-    now.repair(Repair(channels=channels, factor=1.0 / factor))
     unit = unit_of(factor, what)
     if channels[0].startswith("encoder.") != ("counts" in unit):
         unit = ""
     text = "Its sign is turned" if factor == -1.0 else f"Shows {factor:.4g} times the pose's {what}"
-    return DataProblem(
-        channel=called(channels),
-        name="sign" if factor == -1.0 else "unit",
-        text=text + (f": it looks like {unit}." if unit else "."),
-        corrected=f"Divided by {factor:.4g}.",
-        record_instead=DESCRIBE,
-    )
+    text += f": it looks like {unit}." if unit else "."
+    repair = Repair(channels=channels, factor=1.0 / factor)
+    name = "sign" if factor == -1.0 else "unit"
+    return now.repair(repair, name, text, f"Divided by {factor:.4g}.")
 
 
 def _offsets(now: Repairs, car: Car | None, pairs: list[Pair]) -> Iterator[DataProblem]:
@@ -388,14 +385,13 @@ def _offsets(now: Repairs, car: Car | None, pairs: list[Pair]) -> Iterator[DataP
         done.update(fresh)
         if not fresh:
             continue
-        now.repair(Repair(channels=fresh, shift_s=shift))
-        yield DataProblem(
-            channel=called(fresh),
-            name="clock",
-            text=f"Stamped {abs(shift):.3f} s {'later' if shift < 0.0 else 'earlier'} than the "
-            "other sensors stamp the same moment.",
-            corrected=f"Stamps moved by {shift:+.3f} s.",
-            record_instead="Stamp all sensors with one clock, or with clocks kept together.",
+        yield now.repair(
+            Repair(channels=fresh, shift_s=shift),
+            "clock",
+            f"Stamped {abs(shift):.3f} s {'later' if shift < 0.0 else 'earlier'} than the other "
+            "sensors stamp the same moment.",
+            f"Stamps moved by {shift:+.3f} s.",
+            "Stamp all sensors with one clock, or with clocks kept together.",
         )
 
 

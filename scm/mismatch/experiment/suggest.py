@@ -20,8 +20,18 @@ from scm.mismatch.experiment.manoeuvres import (
     shuttle,
     straight_steps,
 )
-from scm.mismatch.experiment.plan import Change, Explanation, Leg, Numbers, Placed, place, planned
-from scm.mismatch.experiment.separation import Separation, linear_separation, refitted_separation
+from scm.mismatch.experiment.plan import (
+    Change,
+    Explanation,
+    Leg,
+    Numbers,
+    Placed,
+    Separation,
+    linear_separation,
+    place,
+    planned,
+    refitted_separation,
+)
 from scm.mismatch.findings import Undecided
 from scm.mismatch.fit.hypothesis import numbers_of
 from scm.mismatch.fit.likelihood import Likelihood

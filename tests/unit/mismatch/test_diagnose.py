@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES, Floor, pace_of
-from scm.mismatch.experiment.plan import place
-from scm.mismatch.experiment.separation import Separation
+from scm.mismatch.experiment.plan import Separation, place
 from scm.mismatch.experiment.suggest import Suggestion, Weighed, drive_alone
 from scm.mismatch.findings import Undecided, Verdict
 from scm.mismatch.fit.data_split import split

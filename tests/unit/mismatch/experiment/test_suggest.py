@@ -8,9 +8,8 @@ import pytest
 
 from scm.mismatch.effect_catalogue import candidates, terms_needed
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES, Floor, pace_of
-from scm.mismatch.experiment.plan import Explanation, Leg, place, planned
+from scm.mismatch.experiment.plan import Explanation, Leg, linear_separation, place, planned
 from scm.mismatch.experiment.scenario import write_scenario
-from scm.mismatch.experiment.separation import linear_separation
 from scm.mismatch.experiment.suggest import (
     MIN_LAMBDA,
     SURE_LAMBDA,
