@@ -21,6 +21,27 @@ SHARED = ROOT.parent / "shared"
 
 os.environ["SCM_CARS"] = ""  # no car files of whoever runs the tests
 
+AT_ANY_PACE = {
+    f"tests/e2e/{name}.py"
+    for name in (
+        "pages/test_mismatch_page",
+        "pages/test_recordings_page",
+        "pages/test_shell",
+        "pages/test_signals_of_a_town",
+        "test_first_car",
+        "test_mismatch_report",
+        "test_own_car_example",
+    )
+}
+"""Files of `tests/e2e` that nothing binds to real time: their cities run in lockstep, or not."""
+
+
+def is_bound_to_real_time(nodeid: str) -> bool:
+    """Return whether a test fails where other processes take its time."""
+    path = nodeid.partition("::")[0]
+    return path.startswith("tests/e2e/") and path not in AT_ANY_PACE
+
+
 # How long an example takes says nothing on a machine that others use as well.
 settings.register_profile(
     "busy_machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
@@ -29,12 +50,18 @@ settings.load_profile("busy_machine")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark every test of `tests/e2e` as such, and let them come first.
+    """Mark every test of `tests/e2e` as such; first those bound to real time, then the others.
 
     Last come those of the whole tree: one that checks its types takes a core for a minute, and
     would hardly get one beside the cities.
     """
-    items.sort(key=lambda item: ("e2e" not in item.path.parts, item.path.name == "test_project.py"))
+    items.sort(
+        key=lambda item: (
+            not is_bound_to_real_time(item.nodeid),
+            "e2e" not in item.path.parts,
+            item.path.name == "test_project.py",
+        )
+    )
     for item in items:
         if "e2e" in item.path.parts:
             item.add_marker(pytest.mark.e2e)
@@ -53,11 +80,11 @@ def pytest_collection(session: pytest.Session) -> None:
     Pytest rewrites the assertions of every test file, which takes longer than to load it; in one
     order all would do the same work at the same time. What fails here fails again when collected.
     """
-    told = getattr(session.config, "workerinput", None)
-    if told is None or sys.dont_write_bytecode or session.config.args != ["tests"]:
+    worker = getattr(session.config, "workerinput", None)
+    if worker is None or sys.dont_write_bytecode or session.config.args != ["tests"]:
         return
     files = sorted(TESTS.rglob("test_*.py"))
-    begin = len(files) * int(told["workerid"].removeprefix("gw")) // told["workercount"]
+    begin = len(files) * int(worker["workerid"].removeprefix("gw")) // worker["workercount"]
     for path in (*files[begin:], *files[:begin]):
         if not (path.parent / "__init__.py").exists():  # pytest names what is in one otherwise
             with suppress(Exception, pytest.skip.Exception):
@@ -71,8 +98,8 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     As far as a search does that a city starts: it would wait for all other tests to end otherwise.
     In a session of its own, for the kernel may weigh sessions, and processes only within one.
     """
-    is_worker = "PYTEST_XDIST_WORKER" in os.environ
-    if is_worker and "e2e" not in item.path.parts and os.getpriority(os.PRIO_PROCESS, 0) < NICER:
+    is_worker, is_bound = "PYTEST_XDIST_WORKER" in os.environ, is_bound_to_real_time(item.nodeid)
+    if is_worker and not is_bound and os.getpriority(os.PRIO_PROCESS, 0) < NICER:
         with suppress(OSError):
             os.setsid()
         stand_back(os.getpid())
@@ -80,7 +107,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Let one process run all of `tests/e2e`, and one process all tests of any other file.
+    """Let one process run all tests that are bound to real time, and one all of any other file.
 
     The first mostly wait for cities, two of which would starve each other; the others stay
     together for what they share.
@@ -89,8 +116,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            path = nodeid.partition("::")[0]
-            return "tests/e2e" if path.startswith("tests/e2e/") else path
+            return "tests/e2e" if is_bound_to_real_time(nodeid) else nodeid.partition("::")[0]
 
     return ByFile(config, log)
 

@@ -10,8 +10,8 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "own_car"
 
 def test_the_example_shows_what_the_own_effect_does():
     command = [sys.executable, str(EXAMPLE / "drive.py")]
-    said = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
-    slow, fast, plain, _ = (float(number) for number in re.findall(r"\d\.\d+", said))
+    text = subprocess.run(command, capture_output=True, text=True, check=True, timeout=280).stdout
+    slow, fast, plain, _ = (float(number) for number in re.findall(r"\d\.\d+", text))
     assert slow < 0.8 * fast
     assert fast < plain
 

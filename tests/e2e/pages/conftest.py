@@ -1,7 +1,10 @@
-"""A whole city as a user starts it, and a real browser that looks at its pages.
+"""A whole city, and a real browser that looks at its pages.
 
-One city serves all tests of this folder: each leaves it as it found it (no stop engaged, cars of
-its own taken off). Set SCM_PICTURES to a folder to keep what `look` photographs.
+`running` is a city as a user starts it. Tests that nothing binds to real time (no process that is
+killed, no bus, no hands at a wheel) look at `town_city` instead, the same in lockstep: it takes a
+third of the time, and slows down where the machine is busy; `tests/conftest.py` lists their files.
+One city serves all tests that one process runs: each leaves it as it found it (no stop engaged,
+cars of its own taken off). Set SCM_PICTURES to a folder to keep what `look` photographs.
 """
 
 import os
@@ -14,6 +17,7 @@ import pytest
 
 from scm.maps.load import MAPS_DIR
 from tests.e2e.city_process import CityProcess, city, wait_for
+from tests.e2e.pages.town import Town, town
 from tests.e2e.pages.visiting import LOOKS, SIZES, Visit, in_both_themes, judge, photograph
 
 HERE = Path(__file__).parent
@@ -45,22 +49,33 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="package")
-def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
-    """`scm up driving_school`: four hosted cars, two agents, signals, Eye and recorder.
-
-    The Eye looks a fifth as often as it does there: it takes the most time of all parts.
-    """
+def slow_eye(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The map of both cities: its Eye looks a fifth as often, as it takes the most time."""
     text = (MAPS_DIR / "driving_school.toml").read_text("utf-8")
     assert text.count("rate_hz = 10.0") == 1
     path = tmp_path_factory.mktemp("map") / "driving_school.toml"
     path.write_text(text.replace("rate_hz = 10.0", "rate_hz = 2.0"), "utf-8")
-    with city(tmp_path_factory.mktemp("pages"), city_map=str(path)) as process:
+    return str(path)
+
+
+@pytest.fixture(scope="package")
+def running(slow_eye: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
+    """`scm up driving_school`: four hosted cars, two agents, signals, Eye and recorder."""
+    with city(tmp_path_factory.mktemp("pages"), city_map=slow_eye) as process:
         wait_for(lambda: len(process.get("/vehicles")["vehicles"]) == 6, 90.0, "six cars are there")
         yield process
 
 
+@pytest.fixture(scope="package")
+def town_city(slow_eye: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Town]:
+    """The same in lockstep, with all parts."""
+    with town(slow_eye, tmp_path_factory.mktemp("town"), cars=4, whole=True) as process:
+        assert len(process.get("/vehicles")["vehicles"]) == 6
+        yield process
+
+
 @pytest.fixture(autouse=True)
-def in_order(running: CityProcess) -> None:
+def in_order(running: CityProcess | Town) -> None:
     """Begin each test in a city that drives, whatever the one before it left.
 
     A starved machine makes the monitor latch a fault; a test that failed may leave it stopped.
@@ -95,7 +110,7 @@ def windows() -> list[Any]:
 
 @pytest.fixture
 def visit(
-    browser: Any, windows: list[Any], running: CityProcess, request: pytest.FixtureRequest
+    browser: Any, windows: list[Any], running: CityProcess | Town, request: pytest.FixtureRequest
 ) -> Iterator[Callable[..., Visit]]:
     """Open an address of the dashboard in a window of its own, and wait until it is live."""
     opened, failed = [], request.session.testsfailed

@@ -1,60 +1,37 @@
-"""Page 6: reports are read, a drive is sent to a car and stopped, a search runs to its report."""
+"""Page 6: reports are read, and a search runs to its report."""
 
 import shutil
 import time
 from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
 from scm.fleet import LockstepLink
 from scm.maps.load import load_map
-from scm.mismatch.report.cars_page import write_several
-from scm.mismatch.report.write import write_report
 from scm.recorder.play import play, write_recording
 from scm.runtime.lockstep import Lockstep
 from scm.world.part import WorldPart
 from tests.e2e.city_process import wait_for
+from tests.e2e.pages.made_reports import made_reports, write_fleet
 from tests.e2e.pages.visiting import LOOKS, judge
-from tests.unit.mismatch import made_up_findings as made_up
 
 SEARCH_S = 240.0  # on a busy machine
-REPORTS = {
-    "two-effects": "pair",
-    "undecided": "undecided",
-    "healthy": "none",
-    "hurried": "cut_short",
-}
-COMMANDS = "t_s,throttle,steering\n0,0,0\n0.2,0.02,0\n40,0,0\n"
-WAY = "t_s,x_m,y_m,yaw_rad\n0,0,0,0\n40,0.01,0,0\n"
 TABLE = "recording: 1\nvehicle: nigel\ntables:\n  - file: a.csv\n    time: {column: t, unit: s}\n"
 CHANNELS = "    channels: {command.throttle: {column: u}, pose.x: {column: x, unit: m}}\n"
 
 
 @pytest.fixture(scope="module")
-def shelf(running):
-    """Return the shelf of reports with three on it; the second asks for a drive."""
-    folder = running.folder / "reports"
-    for name, case in REPORTS.items():
-        found, *rest = made_up.CASES[case]()
-        if found.undecided:
-            more = replace(
-                found.undecided[0], between=("motor_gain", "aero_drag"), expected_separation=1.0
-            )
-            found = replace(found, undecided=(*found.undecided, more))
-        write_report(found, *rest, folder / name)
-    cars = {car: made_up.CASES["none"]() for car in ("n1", "n2")}
-    for car, made in cars.items():
-        write_report(*made, folder / "fleet" / car)
-    found = {car: made[0] for car, made in cars.items()}
-    write_several(found, dict.fromkeys(cars, ("run",)), [], 3.0, folder / "fleet")
-    drive = folder / "undecided" / "next_drive"
-    drive.mkdir()
-    (drive / "next_drive.yaml").write_text("drive: 1\ncommands: next_drive.csv\n", "utf-8")
-    (drive / "next_drive.csv").write_text(COMMANDS, "utf-8")
-    (drive / "next_drive_way.csv").write_text(WAY, "utf-8")
-    yield folder
-    shutil.rmtree(folder)
+def running(town_city):
+    """The city in lockstep: nothing here is bound to real time."""
+    return town_city
+
+
+@pytest.fixture(scope="module")
+def reports(running):
+    """The folder of reports, with some in it."""
+    with made_reports(running.folder / "reports") as folder:
+        write_fleet(folder / "fleet")
+        yield folder
 
 
 def arcs():
@@ -67,7 +44,7 @@ def arcs():
 
 
 @pytest.fixture(scope="module")
-def searching(running, shelf, tmp_path_factory):
+def searching(running, reports, tmp_path_factory):
     """Send a drive of a simulated car and start a real search of it; it runs meanwhile."""
     folder = tmp_path_factory.mktemp("sent")
     with Lockstep([WorldPart(load_map("parking_school"), hosted=(("n1", "nigel"),))]) as city:
@@ -82,11 +59,11 @@ def searching(running, shelf, tmp_path_factory):
 
 
 @pytest.mark.parametrize(("size", "theme"), LOOKS)
-def test_the_report_can_be_looked_at(look, shelf, size, theme):
+def test_the_report_can_be_looked_at(look, reports, size, theme):
     look("/mismatch/two-effects", "mismatch", size, theme, ready="#runs svg path.band-after")
 
 
-def test_the_list_finds_a_report_and_opens_it(look, shelf, searching):
+def test_the_list_finds_a_report_and_opens_it(look, reports, searching):
     page = look("/mismatch", "mismatch_list", "wide", "light", ready=".jobs progress").page
     page.route("**/operations?*", lambda route: (time.sleep(1.0), route.continue_()))
     page.reload()  # a server that takes longer than the page waits until it asks anew
@@ -100,7 +77,7 @@ def test_the_list_finds_a_report_and_opens_it(look, shelf, searching):
     assert page.url.endswith("/mismatch/healthy")
 
 
-def test_a_report_that_time_cut_short_says_what_it_left_and_gives_no_clean_bill(visit, shelf):
+def test_a_report_that_time_cut_short_says_what_it_left_and_gives_no_clean_bill(visit, reports):
     visited = visit("/mismatch/hurried")
     page = visited.page
     page.wait_for_selector(".card >> text=What it does not hold was not sought to the end")
@@ -111,7 +88,7 @@ def test_a_report_that_time_cut_short_says_what_it_left_and_gives_no_clean_bill(
     page.wait_for_selector("li[data-verdict=undecided] a[href$='/hurried'] >> text=Time ran out")
 
 
-def test_cars_of_one_search_tell_what_they_share_and_lead_to_each_other(visit, shelf):
+def test_cars_of_one_search_tell_what_they_share_and_lead_to_each_other(visit, reports):
     visited = visit("/mismatch/fleet.n1")
     page = visited.page
     page.wait_for_selector(".card >> text=Nothing that the cars have in common was found.")
@@ -121,7 +98,7 @@ def test_cars_of_one_search_tell_what_they_share_and_lead_to_each_other(visit, s
     assert page.url.endswith("/mismatch/fleet.n2")
 
 
-def test_maps_and_time_line_show_the_same_moment(visit, shelf):
+def test_maps_and_time_line_show_the_same_moment(visit, reports):
     page = visit("/mismatch/two-effects").page
     page.locator("#when svg").hover(position={"x": 300, "y": 120})
     page.wait_for_selector("#when svg path.moment", state="attached")
@@ -141,7 +118,7 @@ def test_maps_and_time_line_show_the_same_moment(visit, shelf):
     assert not page.locator("#where .side-before").first.is_visible()
 
 
-def test_alternatives_and_files_can_be_read(visit, shelf, running):
+def test_alternatives_and_files_can_be_read(visit, reports, running):
     visited = visit("/mismatch/two-effects")
     page = visited.page
     page.wait_for_selector("#tried >> text=The error does not grow with time.")
@@ -153,53 +130,12 @@ def test_alternatives_and_files_can_be_read(visit, shelf, running):
     judge(visited)
 
 
-def test_a_report_that_is_not_there_is_said(visit, shelf):
+def test_a_report_that_is_not_there_is_said(visit, reports):
     visited = visit("/mismatch/nothing-here")
     visited.page.wait_for_selector("[role=alert] >> text=nothing-here")
 
 
-def owner_of(running, vehicle):
-    rows = {row["vehicle"]: row["owner"] for row in running.get("/vehicles")["vehicles"]}
-    return rows[vehicle]
-
-
-def test_a_suggested_drive_is_sent_to_a_car_and_stopped(visit, shelf, running):
-    visited = visit("/mismatch/undecided")
-    page = visited.page
-    page.wait_for_selector(".drive select")
-    asked = page.locator(".panel.question h2").all_inner_texts()
-    assert [text.removeprefix("Undecided").strip() for text in asked] == [
-        "Motor gain or payload?", "Motor gain or aero drag?",
-    ]  # fmt: skip
-    page.wait_for_selector(".card.question dd code:text-is('scm play')")
-    page.select_option(".drive select", "n2")
-    page.click("button:has-text('Drive this with n2')")
-    page.keyboard.press("Escape")
-    page.wait_for_selector("dialog", state="detached")
-    assert owner_of(running, "n2") == "world"
-    page.click("button:has-text('Drive this with n2')")
-    page.click("dialog .primary")
-    visited.until(lambda: owner_of(running, "n2") == "script", "the drive has the car")
-    judge(visited)
-    page.click("button:has-text('Stop the drive')")
-    visited.until(lambda: owner_of(running, "n2") == "world", "the car is given back")
-    page.wait_for_selector(".driving >> text=The drive was stopped.")
-    rows = running.get("/vehicles")["vehicles"]
-    assert next(row for row in rows if row["vehicle"] == "n2")["trip"], "it goes on"
-    assert running.get("/mismatch/reports/undecided")["told"] == 0
-
-
-def test_a_drive_that_leads_off_the_floor_is_refused_in_words(visit, shelf, running):
-    way = shelf / "undecided" / "next_drive" / "next_drive_way.csv"
-    way.write_text("t_s,x_m,y_m,yaw_rad\n0,0,0,0\n40,50,0,0\n", "utf-8")
-    page = visit("/mismatch/undecided").page
-    page.wait_for_selector(".drive .warn >> text=off the floor")
-    page.click("button:has-text('Drive this with')")
-    page.click("dialog .primary")
-    page.wait_for_selector(".driving[data-state=failed] >> text=expected room for all of it")
-
-
-def test_a_recording_of_ones_own_is_sent_and_searched(visit, shelf, running, tmp_path):
+def test_a_recording_of_ones_own_is_sent_and_searched(visit, reports, running, tmp_path):
     folder = tmp_path / "short drive"
     folder.mkdir()
     (folder / "recording.yaml").write_text(TABLE + CHANNELS, "utf-8")
@@ -216,7 +152,6 @@ def test_a_recording_of_ones_own_is_sent_and_searched(visit, shelf, running, tmp
     page.wait_for_selector(".jobs li:has-text('short-drive')")
 
     def report():
-        running.hasten()
         rows = running.get("/mismatch/reports")["items"]
         return next((row for row in rows if row["name"].startswith("short-drive")), None)
 
@@ -230,9 +165,8 @@ def test_a_recording_of_ones_own_is_sent_and_searched(visit, shelf, running, tmp
     assert visited.complaints == []
 
 
-def test_a_real_search_ends_in_a_report_that_can_be_read(visit, shelf, running, searching):
+def test_a_real_search_ends_in_a_report_that_can_be_read(visit, reports, running, searching):
     def ended():
-        running.hasten()
         row = running.get(f"/operations/{searching}")
         return row if row["state"] not in ("waiting", "running") else None
 

@@ -5,9 +5,15 @@ from urllib.parse import urlsplit
 import pytest
 
 from tests.e2e.pages.town import town
-from tests.e2e.pages.visiting import Visit, judge, photograph
+from tests.e2e.pages.visiting import Visit, judge
 
 PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
+
+
+@pytest.fixture(scope="module")
+def running(town_city):
+    """The city in lockstep: nothing here is bound to real time."""
+    return town_city
 
 
 def release(running):
@@ -193,55 +199,6 @@ def test_a_reason_that_comes_after_the_release_stops_nobody_again(visit, running
     page.keyboard.press("Enter")
     page.wait_for_selector("text=The stop was released meanwhile")
     assert not running.get("/stop")["engaged"]
-
-
-def test_a_silent_world_greys_the_page_then_says_so_and_comes_back_by_itself(visit, running):
-    visited = visit("/map")
-    page = visited.page
-    with running.frozen("world"):
-        page.wait_for_selector('.page[data-link="stale"]')
-        page.wait_for_selector('.page[data-link="lost"] .banner.lost')
-        page.click("#city-stop")
-        page.wait_for_selector(".banner.lost >> text=The stop is not confirmed")
-        photograph(visited, "stop_not_confirmed")
-        page.click(".banner.lost >> text=Dismiss")
-        page.wait_for_selector("text=The stop is not confirmed", state="detached")
-    try:
-        running.web.put("/stop", json={"engaged": True, "by": "tests"}).raise_for_status()
-        page.wait_for_selector(".banner.stopped >> text=all cars stand")
-        page.wait_for_selector(".banner.lost", state="detached")
-    finally:
-        release(running)
-    assert [one for one in visited.complaints if "status of 50" not in one] == []
-
-
-def test_signals_that_are_silent_are_said_to_be_and_come_back_by_themselves(visit, running):
-    visited = visit("/signals/crossing")
-    page = visited.page
-    with running.frozen("traffic"):
-        page.wait_for_selector(".banner.lost >> text=The signals of crossing are silent")
-        page.wait_for_selector("text=its controller is silent")
-        judge(visited)
-        photograph(visited, "signals_silent")
-    page.wait_for_selector(".banner.lost", state="detached")
-    page.wait_for_selector("text=its controller is silent", state="detached")
-
-
-def test_a_server_that_comes_back_is_heard_again_and_another_city_s_read_anew(visit, running):
-    page = visit("/map").page
-    page.evaluate("() => { window.sameDocument = true }")
-
-    def rename(route):
-        told = running.get("/map")
-        route.fulfill(json=told | {"title": "Another town"})
-
-    page.route("**/api/v1/map", rename)
-    running.kill("api")
-    page.wait_for_selector("h1 >> text=Another town")
-    page.wait_for_selector('.page[data-link="live"]')
-    page.wait_for_function("() => !document.querySelector('.banner.lost')")
-    assert not page.evaluate("() => window.sameDocument")
-    page.unroute("**/api/v1/map")
 
 
 def test_the_red_stop_works_though_all_connections_of_the_browser_are_taken(visit, running):

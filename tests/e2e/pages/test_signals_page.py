@@ -200,32 +200,6 @@ def test_flash_is_shown_at_once_with_its_letter_and_ended_with_a_reason(visit, r
     page.wait_for_selector('.runs:not([data-mode="flash"])')
 
 
-def test_a_fault_of_the_monitor_is_shown_kept_and_cleared_with_a_reason(visit, running):
-    visited = visit(AT)
-    page = visited.page
-
-    def fault():
-        return running.get("/signals/crossing")["monitor"]["fault"]
-
-    with running.frozen("traffic"):
-        page.wait_for_selector('.monitor[data-state="fault"]')
-        page.wait_for_selector(".runs[data-mode=unheard]")
-        visited.until(lambda: fault() == "stale", "the fault is latched")
-    wait_for(lambda: running.get("/signals/crossing")["fresh"], 90.0, "the controller is back")
-    page.click(".monitor .danger")
-    page.fill("dialog input[name=reason]", "it was frozen by a test")
-    page.keyboard.press("Enter")
-    visited.until(lambda: fault() is None, "the fault is cleared")
-    page.wait_for_selector(".lately >> text=it was frozen by a test")
-    page.click(".monitor >> text=History")
-    page.wait_for_selector("dialog .said >> text=stale")
-    page.keyboard.press("Escape")
-    page.wait_for_selector('.monitor[data-state="ok"]')
-    wait_for(
-        lambda: running.get("/signals/crossing")["mode"] == "plan", 30.0, "the plan runs again"
-    )
-
-
 def test_what_was_told_is_judged_and_no_promise_was_broken(visit, running):
     wait_for(lambda: running.get("/signals/crossing/promises")["judged"] >= 2, 60.0, "some ended")
     told = running.get("/signals/crossing/promises")

@@ -18,37 +18,65 @@ from scm.api.based import Site
 from scm.api.folders import folders_in
 from scm.api.server import serve
 from scm.api.view import CityView
+from scm.camera.part import CameraPart
+from scm.clock import nanoseconds
+from scm.eye.part import EyePart
 from scm.maps.load import load_map
+from scm.recorder.part import RecorderPart
+from scm.records.city_map import CityMap
 from scm.registry import names
 from scm.runtime.lockstep import Lockstep
+from scm.store.memory import MemoryStore
+from scm.traffic.misbehaviour.part import MisbehaviourPart
 from scm.traffic.monitor.part import MonitorPart
+from scm.traffic.observation.part import ObserverPart
 from scm.traffic.signals.part import TrafficPart
 from scm.v2x.message import Message, Request
 from scm.world.part import WorldPart
+from vehicle_agent.agent import AgentPart
 
 BEFORE_S = 150.0  # for the signals alone: what the pages show of the past
+ALONE_S = 1.0  # recorded without a car or a picture, as while a real city starts
+DRIVEN_S = 15.0  # by all cars, before anybody looks: it is recorded and pictured
 PIECE_S = 0.05
 BEGIN_NS = 1_800_000_000_000_000_000
+BEFORE_NS = nanoseconds(BEFORE_S + ALONE_S + DRIVEN_S)
 
 
 class Town:
-    """Signals, monitor, world and pages of a map."""
+    """Signals, monitor, world and pages of a map.
 
-    def __init__(self, map_name: str, folder: Path, cars: int, base: str) -> None:
-        city_map, view = load_map(map_name), CityView()
+    A `whole` one has all parts that `scm up` starts, two agents, and its file of recordings.
+    """
+
+    def __init__(
+        self, city_map: CityMap, folder: Path, cars: int, base: str, *, whole: bool
+    ) -> None:
+        self.folder, view, store = folder, CityView(), MemoryStore()
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._ready = threading.Event()
-        signals = TrafficPart(city_map)
-        self.city = Lockstep([signals, MonitorPart(city_map), view], start_ns=BEGIN_NS)
+        begin_ns = time.time_ns() - BEFORE_NS if whole else BEGIN_NS  # the audit has two clocks
+        self.city = Lockstep(start_ns=begin_ns, parts=())
+        for part in (TrafficPart(city_map), MonitorPart(city_map)):
+            self.city.add(part, store)
+        self.city.add(view)
         self.city.run_for(BEFORE_S)
+        if whole:
+            self.city.add(RecorderPart(folder / "city.mcap"))
+            self.city.run_for(ALONE_S)
         hosted = tuple((f"n{number}", "nigel") for number in range(1, cars + 1))
-        self.city.add(WorldPart(city_map, hosted=hosted))
+        self.city.add(WorldPart(city_map, hosted=hosted), store)
+        if whole:
+            self._add_others(city_map, cars, store)
+            self.city.run_for(DRIVEN_S)
         plans = {
             junction.name: names("scm.traffic.signals.plans") for junction in city_map.junctions
         }
         folders, site = folders_in(folder), Site(base)
-        app = create_app(view, self._ask, city_map, folders=folders, plans=plans, site=site)
+        app = create_app(
+            view, self._ask, city_map, folders=folders, plans=plans, site=site, state=store
+        )
         self._threads = [
             threading.Thread(target=self._drive),
             threading.Thread(
@@ -59,7 +87,18 @@ class Town:
         ]
         for thread in self._threads:
             thread.start()
-        assert self._ready.wait(30.0), "the pages are not served"
+        assert self._ready.wait(120.0), "the pages are not served"
+
+    def _add_others(self, city_map: CityMap, cars: int, store: MemoryStore) -> None:
+        for part in (
+            EyePart(city_map),
+            CameraPart(city_map),
+            ObserverPart(city_map),
+            MisbehaviourPart(city_map),
+        ):
+            self.city.add(part, store)
+        for number in (cars + 1, cars + 2):
+            self.city.add(AgentPart(f"n{number}"))
 
     def get(self, path: str) -> Any:
         """Return the JSON of a resource."""
@@ -77,7 +116,7 @@ class Town:
 
     def _served(self, url: str) -> None:
         self.url = url
-        self.web = httpx.Client(base_url=url + "/api/v1", timeout=10.0)
+        self.web = httpx.Client(base_url=url + "/api/v1", timeout=60.0)
         self._ready.set()
 
     def _ask(self, request: Request, timeout_s: float) -> Message:
@@ -94,9 +133,11 @@ class Town:
 
 
 @contextmanager
-def town(map_name: str, folder: Path, cars: int = 2, base: str = "") -> Iterator[Town]:
-    """Run a town for tests, its pages below the path `base`."""
-    running = Town(map_name, folder, cars, base)
+def town(
+    map_name: str, folder: Path, cars: int = 2, base: str = "", *, whole: bool = False
+) -> Iterator[Town]:
+    """Run a town for tests, of a map's name or file, its pages below the path `base`."""
+    running = Town(load_map(map_name), folder, cars, base, whole=whole)
     try:
         yield running
     finally:
