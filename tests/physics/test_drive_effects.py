@@ -16,8 +16,9 @@ from scm.vehicles.lipo import cell_voltage, loaded_voltage, pack_current
 BATTERY = ["battery_charge", "battery_curve", "battery_resistance"]
 # one kernel for all tests: whatever a test does not name stays neutral
 DRIVE = [
-    "drive_lag", "drive_deadband", "drive_gain", "motor_gain", "drive_asymmetry",
-    "battery_sag", "motor_fade", "motor_heating", "motor_warmth", "stiction",
+    "drive_curve", "drive_saturation", "drive_delay", "drive_lag", "drive_deadband", "drive_gain",
+    "motor_gain", "drive_asymmetry", "battery_sag", "motor_fade", "motor_heating", "motor_warmth",
+    "stiction",
 ]  # fmt: skip
 
 

@@ -15,7 +15,7 @@ LIMIT = 0.5235988
 GENESIS = Path(__file__).parents[2] / "recordings/cars/genesis.toml"
 # one kernel for all tests: whatever a test does not name stays neutral
 STEERING = [
-    "steer_saturation", "steer_gain", "steer_lag", "servo_torque", "steer_rate",
+    "steer_saturation", "steer_gain", "steer_delay", "steer_lag", "servo_torque", "steer_rate",
     "steer_backlash", "steer_trim", "steer_compliance",
 ]  # fmt: skip
 

@@ -136,10 +136,10 @@ def mutants():
     for node in list(ast.walk(whole)):
         for what, change in changes(node) if id(node) not in skipped else ():
             name = f"{texts[id(node)]}: {ast.unparse(node).splitlines()[0]} -> {what}"
-            kept = {k: [*v] if isinstance(v, list) else v for k, v in vars(node).items()}
+            before = {k: [*v] if isinstance(v, list) else v for k, v in vars(node).items()}
             change(node)
             yield name, compile(ast.fix_missing_locations(whole), "mutant", "exec")
-            vars(node).update(kept)
+            vars(node).update(before)
 
 
 def module_of(code, **more):
@@ -149,12 +149,18 @@ def module_of(code, **more):
     return module
 
 
+LATEST_FIRST = list(CLAIMS)  # what caught a mutant catches its neighbours
+
+
 def is_caught(code):
+    one = LATEST_FIRST[0]
     try:
         module = module_of(code)
-        for one in CLAIMS:
+        for one in tuple(LATEST_FIRST):
             one(module)
     except (Exception, pytest.fail.Exception):  # noqa: BLE001 whatever shows that it is wrong
+        LATEST_FIRST.remove(one)
+        LATEST_FIRST.insert(0, one)
         return True
     return False
 

@@ -1,6 +1,7 @@
-"""A view that has heard a little, a city that answers from a list, and a client without sockets."""
+"""A view that received a little, a city that answers from a list, and a client without sockets."""
 
 import asyncio
+import json
 import threading
 from functools import lru_cache
 
@@ -8,6 +9,7 @@ import httpx
 import pytest
 from fastapi.dependencies import utils
 
+from scm.api import openapi
 from scm.api.acknowledgements import Acknowledgements
 from scm.api.app import create_app
 from scm.api.keys import KeyRing
@@ -28,7 +30,7 @@ HERE = "http://127.0.0.1:8000"
 
 
 class FakeCity:
-    """Answers by the class of the request, and remembers what it was asked."""
+    """Answers by the class of the request, and remembers the requests."""
 
     def __init__(self):
         self.asked = []
@@ -36,7 +38,7 @@ class FakeCity:
         self._news = threading.Condition()
 
     def wait_for(self, count):
-        """Wait until so much was asked: a server may ask after its client has gone."""
+        """Wait for so many requests: a server may send one after its client has gone."""
         with self._news:
             assert self._news.wait_for(lambda: len(self.asked) >= count, 20.0)
 
@@ -65,15 +67,34 @@ class Client:
 
 
 @pytest.fixture(scope="package", autouse=True)
-def parameters_read_once():
-    """Let FastAPI find out once what a parameter is: hundreds of applications have the same."""
-    found = lru_cache(maxsize=1024, typed=True)(utils.analyze_param)
+def routes_read_once():
+    """Let FastAPI read each route once: hundreds of applications here have the same routes."""
+    analyze = lru_cache(maxsize=1024, typed=True)(utils.analyze_param)
+    read, describe = utils._get_signature, openapi.get_openapi
+    signatures, documents = {}, {}
 
-    def analyze(*, path_param_names, **parameter):
-        return found(path_param_names=frozenset(path_param_names), **parameter)
+    def analyze_param(*, path_param_names, **parameter):
+        return analyze(path_param_names=frozenset(path_param_names), **parameter)
+
+    def signature_of(call):
+        code, hints = getattr(call, "__code__", None), getattr(call, "__annotations__", {})
+        if code is None or call.__defaults__ or call.__kwdefaults__ or hasattr(call, "__wrapped__"):
+            return read(call)
+        key = (code, *map(id, hints.values()))
+        if key not in signatures:
+            signatures[key] = read(call), tuple(hints.values())  # which keeps their ids
+        return signatures[key][0]
+
+    def get_openapi(*, routes, servers, **words):
+        key = repr((servers, len(routes)))
+        if key not in documents:
+            documents[key] = json.dumps(describe(routes=routes, servers=servers, **words))
+        return json.loads(documents[key])
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(utils, "analyze_param", analyze)
+        patch.setattr(utils, "analyze_param", analyze_param)
+        patch.setattr(utils, "_get_signature", signature_of)
+        patch.setattr(openapi, "get_openapi", get_openapi)
         yield
 
 

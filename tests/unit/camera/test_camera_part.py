@@ -174,7 +174,7 @@ def test_drop_out_loses_some_frames_and_no_others_change(city_map, car, own_fact
         own_facts(drop_out=drop_out, read_noise=2.0)
         with Lockstep([Stage(car), CameraPart(city_map, seed=4)]) as city:
             frames = city.subscribe(wanted)
-            city.run_for(3.0)
+            city.run_for(2.0)
             got = [item.message for item in frames.drain()]
         return {frame.t_ns: frame.payload for frame in got if frame.camera == "front"}
 

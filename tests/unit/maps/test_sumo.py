@@ -32,7 +32,7 @@ from scm.world.part import WorldPart
 from tests.unit.maps.sumo_nets import OSM, grid, made, stadium, tee
 
 CARS = 8
-SPAN_S = 40.0
+SPAN_S = 30.0
 BESIDE_CAR_M = 0.0219  # a lane of 0.2186 m leaves that on each side of a Nigel of 0.175 m
 
 NETS = {
@@ -111,14 +111,24 @@ def test_cars_go_round_in_their_lanes(imported):
     assert way.max() > 6.0
 
 
-def lit(tmp_path, layout):
-    """Import a grid of SUMO whose lights serve opposite, or single, approaches together."""
-    out = tmp_path / "g.net.xml"
-    return import_sumo(grid(out, "traffic_light", "--tls.layout", layout))
+@pytest.fixture(scope="module")
+def one_approach_at_a_time(tmp_path_factory):
+    """A grid of SUMO whose lights serve single approaches."""
+    out = tmp_path_factory.mktemp("incoming") / "g.net.xml"
+    return import_sumo(grid(out, "traffic_light", "--tls.layout", "incoming"))
 
 
-def test_a_signal_program_of_the_network_runs_at_its_junction(tmp_path):
-    imported = lit(tmp_path, "incoming")
+@pytest.fixture(scope="module")
+def osm_city(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("osm")
+    source = folder / "town.osm"
+    source.write_text(OSM)
+    net = made("netconvert", "--osm-files", str(source), out=folder / "o.net.xml")
+    return import_sumo(net).city_map
+
+
+def test_a_signal_program_of_the_network_runs_at_its_junction(one_approach_at_a_time, tmp_path):
+    imported = one_approach_at_a_time
     city, why_not = adopted(imported.city_map)
     assert (imported.unread, why_not) == ({}, {})
     assert {junction.plan for junction in city.junctions} == {"own"}
@@ -127,10 +137,10 @@ def test_a_signal_program_of_the_network_runs_at_its_junction(tmp_path):
     with Lockstep([TrafficPart(load_map(path))]) as lockstep:
         spats = lockstep.subscribe(Subscription(Spat, {"junction": "b1"}))
         lockstep.run_for(200.0)
-        told = [item.message for item in spats.drain()]
-    greens = [tuple(g.group for g in spat.groups if g.colour == "green") for spat in told]
+        published = [item.message for item in spats.drain()]
+    greens = [tuple(g.group for g in spat.groups if g.colour == "green") for spat in published]
     runs = [(groups, len(list(run))) for groups, run in itertools.groupby(greens) if groups]
-    assert {spat.plan for spat in told} == {"own"}
+    assert {spat.plan for spat in published} == {"own"}
     stages = next(j for j in city.junctions if j.name == "b1").stages
     assert [groups for groups, _ in runs[: len(stages)]] == [stage.groups for stage in stages]
     for (_, steps), stage in zip(runs, stages, strict=False):
@@ -138,7 +148,8 @@ def test_a_signal_program_of_the_network_runs_at_its_junction(tmp_path):
 
 
 def test_a_signal_program_that_lets_ways_cross_is_left_out_and_says_why(tmp_path):
-    imported = lit(tmp_path, "opposites")
+    out = tmp_path / "g.net.xml"
+    imported = import_sumo(grid(out, "traffic_light", "--tls.layout", "opposites"))
     city, why_not = adopted(imported.city_map)
     assert imported.unread.keys() | why_not.keys() == {j.name for j in city.junctions}
     assert "conflict but share a stage" in why_not["b1"]
@@ -172,8 +183,8 @@ def test_phases_that_cannot_be_shown_are_refused(lights, words):
         stages_of(phases, {"a": [0], "b": [1]})
 
 
-def test_a_green_of_the_network_too_short_for_our_cars_is_refused(tmp_path):
-    imported = lit(tmp_path, "incoming")
+def test_a_green_of_the_network_too_short_for_our_cars_is_refused(one_approach_at_a_time):
+    imported = one_approach_at_a_time
     first = imported.city_map.junctions[0]
     short = tuple(msgspec.structs.replace(stage, green_s=1.0) for stage in first.stages)
     junctions = (msgspec.structs.replace(first, stages=short), *imported.city_map.junctions[1:])
@@ -206,12 +217,8 @@ def test_kinds_of_junctions_become_signals_or_signs(tmp_path, kind, signs):
         assert len([line for line in city.stop_lines if line.group == group.name]) == 1
 
 
-def test_signals_of_osm_are_kept(tmp_path):
-    source = tmp_path / "town.osm"
-    source.write_text(OSM)
-    net = made("netconvert", "--osm-files", str(source), out=tmp_path / "o.net.xml")
-    city = import_sumo(net).city_map
-    assert [len(junction.groups) for junction in city.junctions] == [4]
+def test_signals_of_osm_are_imported(osm_city):
+    assert [len(junction.groups) for junction in osm_city.junctions] == [4]
 
 
 def test_lengths_follow_the_scale_and_speeds_the_car(tmp_path):
@@ -227,11 +234,8 @@ def test_lengths_follow_the_scale_and_speeds_the_car(tmp_path):
         assert lane.speed_limit_mps == way.speed_limit_mps == 0.25
 
 
-def test_a_slower_street_keeps_its_share_of_the_limit(tmp_path):
-    source = tmp_path / "town.osm"
-    source.write_text(OSM)
-    net = made("netconvert", "--osm-files", str(source), out=tmp_path / "o.net.xml")
-    limits = {round(lane.speed_limit_mps, 3) for lane in import_sumo(net).city_map.lanes}
+def test_a_slower_street_keeps_its_share_of_the_limit(osm_city):
+    limits = {round(lane.speed_limit_mps, 3) for lane in osm_city.lanes}
     assert sorted(limits) == pytest.approx([0.15, 0.25], abs=2e-4)
 
 
@@ -285,7 +289,7 @@ def test_other_files_are_refused_with_what_to_do(tmp_path):
         import_sumo(tmp_path / "c.net.xml")
 
 
-def test_a_missing_library_is_said(tmp_path, monkeypatch):
+def test_a_missing_library_is_named(tmp_path, monkeypatch):
     path = tmp_path / "b.net.xml"
     path.write_text("<net/>")
     monkeypatch.setitem(__import__("sys").modules, "sumolib", None)
@@ -400,12 +404,12 @@ def test_a_lane_without_a_speed_is_refused(tmp_path):
 
 
 def test_sizes_are_known_before_anything_is_computed(tmp_path):
-    path, told = tmp_path / "t.net.xml", []
+    path, lines = tmp_path / "t.net.xml", []
     path.write_text(tee())
     with pytest.raises(MapError, match="wide at 1:20"):
-        import_sumo(path, scale=20.0, report=told.append)
-    assert told[0] == "120 x 120 m at full size; at 1:20 a floor of some 7 x 7 m"
-    assert told[1] == "5 lanes, 3 ways over junctions"
+        import_sumo(path, scale=20.0, report=lines.append)
+    assert lines[0] == "120 x 120 m at full size; at 1:20 a floor of some 7 x 7 m"
+    assert lines[1] == "5 lanes, 3 ways over junctions"
 
 
 def test_what_cannot_be_imported_leaves_the_file_as_it_was(tmp_path, capsys):
@@ -423,14 +427,14 @@ def test_the_command_writes_a_map_that_can_be_shown(tmp_path, capsys):
     net = grid(tmp_path / "g.net.xml", "traffic_light")
     out, picture = tmp_path / "city.toml", tmp_path / "city.svg"
     assert main(["import", "sumo", str(net), "--out", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert "5 junctions with signals" in said
-    assert "signal programs kept at 0 of 5 junctions" in said
-    assert "a1, b0, b2, c1 (4) run plan 'calm' instead; at 'a1': phase " in said
-    assert "b1 runs plan 'calm' instead: plan 'own': " in said
-    assert said.count("instead") == 2
-    assert "--tls.layout incoming" in said
-    assert "left out where no ways of cars meet: traffic lights A0, A2, C0, C2" in said
-    assert "turns back left out" in said
+    output = capsys.readouterr().out
+    assert "5 junctions with signals" in output
+    assert "signal programs kept at 0 of 5 junctions" in output
+    assert "a1, b0, b2, c1 (4) run plan 'calm' instead; at 'a1': phase " in output
+    assert "b1 runs plan 'calm' instead: plan 'own': " in output
+    assert output.count("instead") == 2
+    assert "--tls.layout incoming" in output
+    assert "left out where no ways of cars meet: traffic lights A0, A2, C0, C2" in output
+    assert "turns back left out" in output
     assert main(["show", "map", str(out), "--out", str(picture)]) == 0
     assert "<svg" in picture.read_text()

@@ -29,7 +29,7 @@ def tilted(recording, tilt_x, tilt_y):
 
 
 def tagged(recording, ahead_m, left_m):
-    """The same drive by a tag that is not where it is said to be."""
+    """The same drive by a tag that is not where its car file has it."""
     x, y, yaw = (recording.channels[f"pose.{name}"] for name in ("x", "y", "yaw"))
     c, s = np.cos(yaw.values), np.sin(yaw.values)
     seen = {

@@ -227,7 +227,7 @@ def test_a_round_of_several_effects_that_is_cut_leaves_no_trace(monkeypatch):
 
 @pytest.fixture(scope="module")
 def no_time():
-    return diagnose_car([made_drive(seconds=12.0)], nigel(), budget=Budget(0.0, StepClock()))
+    return diagnose_car([made_drive(seconds=8.0)], nigel(), budget=Budget(0.0, StepClock()))
 
 
 def test_a_diagnosis_without_time_is_fitted_and_judged_and_says_what_it_left(no_time):
@@ -252,7 +252,7 @@ def test_a_car_that_differs_in_many_ways_keeps_its_first_fit_where_windows_come_
     monkeypatch, no_time
 ):
     far_and_straying(monkeypatch)
-    found = diagnose_car([made_drive(seconds=12.0)], nigel(), budget=Budget(0.0, StepClock()))
+    found = diagnose_car([made_drive(seconds=8.0)], nigel(), budget=Budget(0.0, StepClock()))
     assert names(found.diagnosis.unanswered) == ["effects", "strides"]
     assert not found.selected.context.by_windows
     assert found.best.z.tolist() == no_time.best.z.tolist()
@@ -268,7 +268,7 @@ def test_where_windows_come_too_late_only_they_are_named_as_left(monkeypatch):
     monkeypatch.setattr(selected, "select", lambda _, retuned, *__: Selection(retuned, retuned))
     monkeypatch.setattr(selected, "by_windows", too_late)
     far_and_straying(monkeypatch)
-    found = diagnose_car([made_drive(seconds=12.0)], nigel(), budget=Budget(60.0, clock))
+    found = diagnose_car([made_drive(seconds=8.0)], nigel(), budget=Budget(60.0, clock))
     assert names(found.diagnosis.unanswered) == ["strides"]
 
 
@@ -289,5 +289,5 @@ def test_as_long_as_the_first_fit_took_is_reserved_for_what_follows_a_selection(
     monkeypatch.setattr(selected, "select", chosen)
     far_and_straying(monkeypatch)
     monkeypatch.setattr(selected, "by_windows", lambda context, *_: context.budget.check())
-    diagnose_car([made_drive(seconds=12.0)], nigel(), budget=Budget(60.0, clock))
+    diagnose_car([made_drive(seconds=8.0)], nigel(), budget=Budget(60.0, clock))
     assert seen == [False, True]

@@ -88,26 +88,26 @@ def city_pose(car):
 
 
 def colour_at(spats, t_ns, group):
-    heard = [spat for spat in spats if spat.t_ns <= t_ns]
-    return next(g.colour for g in heard[-1].groups if g.group == group)
+    received = [spat for spat in spats if spat.t_ns <= t_ns]
+    return next(g.colour for g in received[-1].groups if g.group == group)
 
 
 @pytest.fixture(scope="module")
 def drive(city_map):
-    """What was heard in 40 s of four agents, by kind: each passes its light twice."""
+    """What was received in 30 s of four agents, by kind: most pass their light twice."""
     parts = [WorldPart(city_map), TrafficPart(city_map), MonitorPart(city_map)]
     with Lockstep(parts) as running:
         watch = Watch(running)
         for seed, name in enumerate(("n1", "n2", "n3", "n4")):
             running.add(AgentPart(name, seed=seed))
-        running.run_for(40.0)
+        running.run_for(30.0)
         return {kind: watch.all(kind) for kind in (WorldSnapshot, Spat, Contact)}
 
 
 def test_four_agents_drive_without_contact_or_red_light_violation(city_map, drive):
     snapshots, spats = drive[WorldSnapshot], drive[Spat]
     passed = list(crossings(city_map, snapshots))
-    assert len(passed) >= 8
+    assert len(passed) >= 6
     wrong = [p for p in passed if colour_at(spats, p[0], p[2].group) not in ("green", "yellow")]
     assert wrong == []
     assert drive[Contact] == []

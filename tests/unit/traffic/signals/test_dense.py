@@ -18,7 +18,7 @@ from scm.world.part import WorldPart
 
 MAP = load_map("driving_school")
 PLATOON = ("a", "c", "e")  # one behind the other on one loop: all come from one side at a time
-SPAN_S = 60.0
+SPAN_S = 45.0
 
 
 @cache

@@ -26,27 +26,31 @@ REAL = Program(
 )
 
 
-def test_every_wish_of_any_groups_keeps_its_meaning_at_a_crossing():
+def test_every_override_of_any_groups_keeps_its_meaning_at_a_crossing():
     served = prove_overrides(rings, *small_times(CROSSING))
     assert served.transitions > 1000
     assert max(served.worst_wait) < 12
 
 
 @pytest.mark.parametrize("name", ["triangle", "one", "side", "chain"])
-def test_every_wish_for_a_group_keeps_its_meaning_at_a_shape(name):
+def test_every_override_of_a_group_keeps_its_meaning_at_a_shape(name):
     assert prove_overrides(rings, *small_times(SHAPES[name]), most=1).states > 100
 
 
-def prove_all(module):
-    for shape in (CROSSING, IN_TURN, THREE, SHAPES["one"], SIDE):
+SHOWN_BY = {"omit opens the barrier": (SIDE,)}  # the other proofs take seconds and do not show it
+QUICK_FIRST = CROSSING, IN_TURN, SHAPES["one"], THREE, SIDE
+
+
+def prove_all(module, shapes):
+    for shape in shapes:
         prove_overrides(module, *small_times(shape), most=1)
 
 
 @pytest.mark.parametrize("name", sorted(RINGS_WITH_INPUTS))
-def test_a_mutant_of_the_rings_that_breaks_a_wish_is_caught(name):
+def test_a_mutant_of_the_rings_that_breaks_an_override_is_caught(name):
     mutant = mutant_of(rings, *RINGS_WITH_INPUTS[name])
     with pytest.raises(PlanError):
-        prove_all(mutant)
+        prove_all(mutant, SHOWN_BY.get(name, QUICK_FIRST))
 
 
 def test_junctions_of_one_shape_are_proven_once_and_very_large_ones_not_at_all():

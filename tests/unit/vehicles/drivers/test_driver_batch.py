@@ -42,7 +42,7 @@ def eight():
 
 
 class City:
-    """Bicycles with slow servos on a map, driven by a crowd; everybody tells all at each tick."""
+    """Bicycles with slow servos on a map, driven by a crowd; everybody publishes at each tick."""
 
     def __init__(self, roads, places, seeds=None, **options):
         n = len(places)
@@ -58,7 +58,7 @@ class City:
             self.drivers.enter(slot, NIGEL, seeds[slot] if seeds else slot)
             self.drivers.circulate(slot, lane, s)
 
-    def tell(self):
+    def publish(self):
         if self.now_ns % (100 * NS_PER_MS) == 0:
             for message in self.traffic.step(self.now_ns, []):
                 if isinstance(message, SpatemTx):
@@ -69,14 +69,14 @@ class City:
         ahead = NIGEL.front * np.cos(self.yaw), NIGEL.front * np.sin(self.yaw)
         rate = self.speed * np.tan(self.angle) / NIGEL.wheelbase
         slots = np.arange(len(self.x))
-        told = self.x + ahead[0], self.y + ahead[1], self.yaw, self.speed, rate
-        self.drivers.receive_cams(slots, self.now_ns, *told)
+        cam = self.x + ahead[0], self.y + ahead[1], self.yaw, self.speed, rate
+        self.drivers.receive_cams(slots, self.now_ns, *cam)
 
     def decide(self):
         self.drivers.decide(self.now_ns, self.x, self.y, self.yaw, self.speed, self.driven)
 
     def tick(self):
-        self.tell()
+        self.publish()
         self.decide()
         most = NIGEL.steer_rate * 0.01
         wanted = np.interp(self.drivers.throttle, np.linspace(0, 1, 11), (0.0, *NIGEL.speeds))
@@ -297,7 +297,7 @@ def test_routes_sent_again_and_again_take_no_more_room(eight):
 def test_a_silent_car_is_forgotten(eight):
     city = City(eight, [("east_loop", 0.3), ("east_loop", 1.0)])
     city.driven[1] = False
-    city.tell()
+    city.publish()
     city.now_ns += 4 * NS_PER_S
     city.decide()
     assert city.drivers.throttle[0] > 0.0
@@ -313,8 +313,8 @@ def test_where_frames_get_lost_a_silent_car_is_believed_to_stand_where_it_stood(
         drivers.enter(0, NIGEL, 0)
         drivers.show(1, 0.3, 0.175)
         for frame in range(16):
-            told = np.array([[1.0], [1.0], [0.0], [0.0], [0.0]])
-            drivers.receive_cams(np.array([1]), now_ns + frame * NS_PER_MS, *told)
+            cam = np.array([[1.0], [1.0], [0.0], [0.0], [0.0]])
+            drivers.receive_cams(np.array([1]), now_ns + frame * NS_PER_MS, *cam)
         sent_ns = now_ns + round(after_s * NS_PER_S)
         known, x, *_ = plain(estimate_for)(drivers._received, 1, 0, sent_ns, 0)
         assert known == is_known
