@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from tests.contract.javascript import own_names
+
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "CONTRIBUTING.md"
 TWIN_MEANS_CITY_TWIN = {"twin", "twins"}  # a car's versioned file; only effects may not be twins
@@ -17,10 +19,12 @@ STANDARD = {
     "__slots__",  # Python's own name
     "_slots_",  # of ctypes structures
     "calm",  # the public name of a signal plan
+    "Promise",  # of JavaScript
 }
 SECTION = re.compile(r"^( *)(Args|Attributes):\n((?:\1 +\S.*\n?)+)", re.MULTILINE)
 ENTRY = re.compile(r"^( +)(\*{0,2}\w+(?:, \*{0,2}\w+)*): ")
 Definition = ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+SCRIPTS = "scm/api/static/js"
 PUBLISHED = ("scm/client/nouns",)  # written from the interface: methods carry its operation ids
 
 
@@ -104,12 +108,27 @@ def test_no_identifier_is_made_of_a_retired_word() -> None:
     assert [fault for place in places for fault in faults(place)] == []
 
 
+def test_no_name_of_the_dashboards_scripts_is_made_of_a_retired_word() -> None:
+    """The names of their files among them."""
+    wrong = [
+        f"{place.relative_to(ROOT)}:{line}: {name}"
+        for place in sorted((ROOT / SCRIPTS).rglob("*.js"))
+        for name, line in [(place.stem, 1), *own_names(place.read_text(encoding="utf-8"))]
+        if name not in STANDARD and retired().intersection(words_of(name))
+    ]
+    assert wrong == []
+
+
 def test_words_of_an_identifier() -> None:
     """Both ways of writing are taken apart."""
     assert words_of("_TakePacket") == ["take", "packet"]
     assert words_of("told_ns") == ["told", "ns"]
     assert "told" in retired()
     assert "twins" not in retired()
+    script = "const told = `${heard} said`; row.asked = { wish: /kept/.test(a) }; f(this.shelf)"
+    assert [name for name, _ in own_names(script)] == [
+        "const", "told", "heard", "row", "a", "f", "this", "shelf"
+    ]  # fmt: skip
 
 
 def test_documented_arguments_and_attributes_exist() -> None:

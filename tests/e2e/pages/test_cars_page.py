@@ -50,8 +50,8 @@ def test_a_name_that_is_taken_is_said_before_it_is_sent(visit):
     page = visit("/cars").page
     page.wait_for_selector(MADE)
     page.fill(".new-car [name=car]", "nigel")
-    page.wait_for_selector(".new-car .trouble:has-text('named nigel already')")
+    page.wait_for_selector(".new-car .form-error:has-text('named nigel already')")
     assert page.is_disabled("text=Make the car file")
     page.fill(".new-car [name=car]", "mine")
     page.fill(".new-car [name=mass_kg]", "-3")
-    page.wait_for_selector(".new-car .trouble:has-text('mass_kg')")
+    page.wait_for_selector(".new-car .form-error:has-text('mass_kg')")

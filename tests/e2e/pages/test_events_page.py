@@ -23,7 +23,7 @@ def test_the_log_is_readable_at_every_size_and_in_both_colours(look, running, si
     stop_and_go(running, "a hand on the floor")
     visited = look("/events", "events", size, theme, ready=f"{ROWS} >> text=a hand on the floor")
     visited.page.click('.at-events .tabs a[href="/events/audit"]')
-    visited.page.wait_for_selector(".at-events [data-deed]")
+    visited.page.wait_for_selector(".at-events [data-request]")
     for shown in in_both_themes(visited, theme):
         judge(visited)
         photograph(visited, f"audit_{size}_{shown}")
@@ -52,7 +52,7 @@ def test_a_person_finds_follows_acknowledges_and_takes_back(visit, running):
     page.check("label.tick input")
     page.wait_for_selector(f"{mine} >> text=rolled away", state="detached")
     page.uncheck("label.tick input")
-    page.locator(f"{mine} >> button[aria-label^='Take back']").first.click()
+    page.locator(f"{mine} >> button[aria-label^='Withdraw']").first.click()
     visited.until(
         lambda: running.get("/events?text=marble")["items"][0]["acknowledged_by"] is None,
         "the acknowledgement is taken back",
@@ -100,8 +100,8 @@ def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
     trace = stop_and_go(running, "for the audit")
     visited = visit("/events/audit")
     page = visited.page
-    page.fill("input[aria-label='Find in deeds']", "for the audit")
-    deed = ".at-events [data-deed]:has-text('stop the city')"
+    page.fill("input[aria-label='Find in the audit trail']", "for the audit")
+    deed = ".at-events [data-request]:has-text('stop the city')"
     page.wait_for_selector(deed)
     assert "world" in page.locator(deed).first.inner_text()
     page.set_viewport_size({"width": 390, "height": 844})
@@ -111,7 +111,7 @@ def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
     page.locator(f"{deed} .name").first.click()
     assert "for the audit" in page.inner_text(".at-events .whole pre")
     page.click(".at-events .whole .trace button")
-    rows = page.locator(".at-events [data-deed]")
+    rows = page.locator(".at-events [data-request]")
     stations = rows.locator(".station")
     visited.until(lambda: stations.all_inner_texts() == ["world, api"], "one row has both")
     assert "200 in" in rows.locator(".answer").inner_text()
@@ -126,11 +126,11 @@ def test_the_audit_names_who_did_what_and_its_chain_is_whole(visit, running):
         ("world", trace),
     ], "a click, and what the world did for it"
     page.select_option("select[aria-label='Done by']", "api")  # its own entries alone
-    page.wait_for_selector(".at-events [data-deed]:has-text('engage or release')")
+    page.wait_for_selector(".at-events [data-request]:has-text('engage or release')")
     page.select_option("select[aria-label='Done by']", "")
     refused = running.web.put("/stop", json={"engaged": "perhaps"})
-    page.fill("input[aria-label='Find in deeds']", refused.headers["trace-id"])
-    page.wait_for_selector(".at-events [data-deed]:has-text('engage or') .warn >> text=422 in")
+    page.fill("input[aria-label='Find in the audit trail']", refused.headers["trace-id"])
+    page.wait_for_selector(".at-events [data-request]:has-text('engage or') .warn >> text=422 in")
     page.click("text=Check the chain")
     page.wait_for_selector(".chain >> text=whole:")
 

@@ -52,7 +52,7 @@ def test_the_place_of_the_camera_is_found_put_in_force_and_put_back(visit, runni
     page.reload()
     page.wait_for_selector("input[aria-label='Tag 1: x [m]']")
     assert page.input_value("input[aria-label='Tag 1: x [m]']") == "-0.5"
-    page.click("[aria-label='Take tag 1 off']")
+    page.click("[aria-label='Remove tag 1']")
     page.click("text=Find the place")
     page.wait_for_selector(".eye-place progress")
     page.reload()  # whoever comes back finds it where it is
@@ -75,13 +75,13 @@ def test_the_place_of_the_camera_is_found_put_in_force_and_put_back(visit, runni
     page.fill("dialog input[name=meant]", "overhead")
     page.click("dialog .danger")
     page.wait_for_selector(f".bar .in-force b:text-is('place {row['name']}')")
-    page.wait_for_selector(".eye-shelf td .good:text-is('in force')")
+    page.wait_for_selector(".eye-calibrations td .good:text-is('in force')")
     told = running.get("/eye/cameras/overhead")["state"]["in_force"]
     assert (told["by"], told["reason"]) == ("dashboard", "tried by a test")
     (deed,) = running.get("/audit?kind=CalibrationRequest")["items"]
     assert (deed["station"], deed["request"]["calibration"]) == ("eye", row["name"])
     assert running.get("/events?text=tried+by+a+test")["items"]
-    look_around(visited, ".eye-shelf", "eye_in_force")
+    look_around(visited, ".eye-calibrations", "eye_in_force")
     page.click("text=Put back…")
     page.fill("dialog input[name=reason]", "the test is over")
     back = {"by": "ada", "reason": "she was quicker"}

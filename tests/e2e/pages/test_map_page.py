@@ -264,7 +264,7 @@ def test_a_car_is_added_and_taken_off_again(visit, running):
     page.wait_for_selector('tr[data-car="guest"].chosen')
     names = [car["vehicle"] for car in running.get("/vehicles")["vehicles"]]
     assert "guest" in names
-    page.click('.acts button:text("Take off")')
+    page.click('.acts button:text("Remove")')
     page.wait_for_selector("dialog[open] .danger")
     page.keyboard.press("Enter")
     page.wait_for_selector('tr[data-car="guest"]', state="detached")

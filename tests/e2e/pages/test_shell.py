@@ -156,7 +156,7 @@ def test_one_press_stops_the_city_and_only_a_yes_lets_it_go(visit, running):
         page.keyboard.press("Enter")
         page.wait_for_selector(".banner.stopped >> text=by dashboard")
         assert running.get("/stop")["engaged"]
-        page.click("text=Say why…")
+        page.click("text=Give a reason…")
         page.fill("dialog input[name=reason]", "a hand on the floor")
         page.keyboard.press("Enter")
         page.wait_for_selector(".banner.stopped >> text=a hand on the floor")
@@ -190,7 +190,7 @@ def test_a_reason_that_comes_after_the_release_stops_nobody_again(visit, running
     page = visit("/map").page
     try:
         page.click("#city-stop")
-        page.click("text=Say why…")
+        page.click("text=Give a reason…")
         page.wait_for_selector("dialog[open]")
     finally:
         release(running)
@@ -254,7 +254,7 @@ def test_a_key_is_asked_for_once_though_two_want_it(visit):
     }""")
     visited.page.fill("dialog input[name=key]", "mumble")
     visited.page.keyboard.press("Enter")
-    visited.page.wait_for_selector("dialog .notice >> text=The city does not take this key")
+    visited.page.wait_for_selector("dialog .notice >> text=The city does not accept this key")
     visited.page.fill("dialog input[name=key]", "sesame")
     visited.page.keyboard.press("Enter")
     visited.wait("() => window.entered?.every(Boolean)")

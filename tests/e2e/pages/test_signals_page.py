@@ -91,8 +91,8 @@ def test_a_hold_is_asked_for_by_keyboard_shown_and_taken_back(visit, running):
             assert wide <= SIZES[size][0]  # whatever people write
     finally:
         page.click(".held li button")
-        wait_for(lambda: not running.get("/signals/crossing/wishes")["items"], 90.0, "taken back")
-    page.wait_for_selector(".wishes .empty >> text=No wish is in force")
+        wait_for(lambda: not running.get("/signals/crossing/wishes")["items"], 90.0, "withdrawn")
+    page.wait_for_selector(".overrides .empty >> text=No override is in force")
 
 
 def judged(visited, name):
@@ -172,11 +172,11 @@ def test_flash_is_shown_at_once_with_its_letter_and_ended_with_a_reason(visit, r
     page.wait_for_selector(READY)
 
     def answer(button, reason):
-        page.click(f".wishes >> text={button}")
+        page.click(f".overrides >> text={button}")
         page.fill("dialog input[name=reason]", reason)
         page.keyboard.press("Enter")
 
-    page.click(".wishes >> text=Flash red…")
+    page.click(".overrides >> text=Flash red…")
     judged(visited, "signals_flash")
     page.keyboard.press("Escape")
     answer("Flash red…", "works on the road")

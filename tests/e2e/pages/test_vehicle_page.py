@@ -188,7 +188,8 @@ def test_a_car_that_pushes_in_vain_is_stuck_in_table_page_and_events(visit, runn
         page.click(f"tr[data-car={TIRED}] a")
         page.wait_for_selector('.who .mode[data-mode="stuck"]')
         told = page.wait_for_selector('[data-fact="stuck"]').inner_text()
-        assert told.startswith(("told to drive and stays", "pushes against"))  # others may hit it
+        # Others may hit it.
+        assert told.startswith(("commanded to drive but does not move", "pushes against"))
         judge(visited)
         photograph(visited, "stuck")
         (event,) = running.get(f"/events?vehicle={TIRED}&name=stuck")["items"]
@@ -282,7 +283,7 @@ def test_a_wheel_on_a_dead_line_says_so_and_is_given_back(visit, running):
     page.keyboard.down("w")
     page.wait_for_selector('.now[data-why="driving"]')
     with running.frozen("api"):
-        page.wait_for_selector('.now[data-why="unheard"]')
+        page.wait_for_selector('.now[data-why="no_reply"]')
         page.wait_for_selector(".banner.lost >> text=No connection to the server")
         page.wait_for_selector('.over[data-code="cut"]')
         page.keyboard.up("w")
@@ -393,7 +394,7 @@ def test_a_second_taker_is_told_who_has_it_and_takes_it_only_with_a_reason(visit
     assert (refused.status_code, refused.json()["code"]) == (409, "owned")
     assert lease["owner"] in refused.json()["detail"]
     page.fill(".steal input", "the first one sleeps")
-    page.click("text=Take it anyway")
+    page.click("text=Take over anyway")
     page.wait_for_selector('.wheel[data-state="held"]')
     first.page.wait_for_selector('.over[data-code="lost"]')
     second.page.click(".give-back")

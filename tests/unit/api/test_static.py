@@ -78,6 +78,18 @@ def test_every_import_leads_to_a_file(path, place):
         assert place(target).is_file(), target
 
 
+NAMED_IMPORT = re.compile(r'import \{([^}]*)\} from "(scm/[^"]+)"')
+EXPORTED = re.compile(r"(?m)^export (?:async )?(?:const|let|function\*?|class) (\w+)")
+
+
+@pytest.mark.parametrize("path", OURS, ids=lambda path: path.name)
+def test_every_imported_name_is_exported(path, place):
+    for names, target in NAMED_IMPORT.findall(path.read_text("utf-8")):
+        exported = set(EXPORTED.findall(place(target).read_text("utf-8")))
+        wanted = {name.split(" as ")[0].strip() for name in names.split(",") if name.strip()}
+        assert wanted <= exported, target
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_a_page_names_every_module_that_it_will_import(page, place):
     named = set(re.findall(r'<link rel="modulepreload" href="(.*?)">', page_text(page)))
@@ -95,7 +107,7 @@ def test_a_page_names_every_module_that_it_will_import(page, place):
 
 def test_a_page_asks_for_a_reason_where_rest_needs_one_and_nowhere_else():
     needs = {"pages/eye/in_force.js": BackBody, "pages/signals/monitor.js": ResetBody}
-    offers = {"pages/signals/plans.js": PlanChoiceBody, "pages/signals/wishes.js": FlashBody}
+    offers = {"pages/signals/plans.js": PlanChoiceBody, "pages/signals/overrides.js": FlashBody}
     field = re.compile(r'<input[^>]*name="reason"[^>]*>', re.DOTALL)
     for place, body in (needs | offers).items():
         fields = field.findall((STATIC_DIR / "js" / place).read_text("utf-8"))

@@ -9,6 +9,6 @@ export function modeOf(car) {
 /** What keeps a stuck car where it is, as far as is known; empty: it is not stuck. */
 export function stuckBy({ stuck }) {
   if (!stuck) return "";
-  if (!stuck.length) return "told to drive and stays, touches nothing";
+  if (!stuck.length) return "commanded to drive but does not move, touches nothing";
   return `pushes against ${stuck.map((name) => (name === "wall" ? "a wall" : name)).join(", ")}`;
 }

@@ -7,13 +7,13 @@ const LOOK_MS = 250;
 export const isOver = ({ state }) => OVER.includes(state);
 
 /** Look at an operation until it is over; `tell` hears each state. */
-export async function finished(operation, tell = () => {}) {
+export async function finished(operation, onUpdate = () => {}) {
   let row = operation;
-  tell(row);
+  onUpdate(row);
   while (!isOver(row)) {
     await new Promise((resolve) => setTimeout(resolve, LOOK_MS));
     row = await lookedAt(row);
-    tell(row);
+    onUpdate(row);
   }
   return row;
 }

@@ -14,7 +14,7 @@ const BUDGETS = [
 export const question = (vehicle = "") => ({ vehicle, car: "", budget_s: BUDGETS.at(-1)[0], span: WHOLE });
 
 /** What `POST /mismatch/jobs` gets of a question, beside the recording. */
-export const asked = ({ vehicle, car, budget_s, span }) => ({ vehicle, car, budget_s, ...seconds(span) });
+export const searchBody = ({ vehicle, car, budget_s, span }) => ({ vehicle, car, budget_s, ...seconds(span) });
 
 /**
  * @param value of `question`; `onChange` gets the new one

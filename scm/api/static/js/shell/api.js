@@ -31,10 +31,10 @@ export function dismiss(id) {
  * @param refused what takes the sentence of a refusal instead of a notice, by the problem's code.
  * @returns the reply, or null when it was refused.
  */
-export async function change(method, path, body, done, headers = {}, patience_ms = null, refused = {}) {
+export async function change(method, path, body, done, headers = {}, timeout_ms = null, refused = {}) {
   try {
     const id = crypto.randomUUID?.() ?? String(Math.random());
-    const reply = await send(method, path, body, { ...headers, "Idempotency-Key": id }, patience_ms);
+    const reply = await send(method, path, body, { ...headers, "Idempotency-Key": id }, timeout_ms);
     if (done) notify("info", done(reply));
     return reply;
   } catch (error) {
@@ -44,7 +44,7 @@ export async function change(method, path, body, done, headers = {}, patience_ms
   }
 }
 
-async function send(method, path, body, own, patience_ms) {
+async function send(method, path, body, own, timeout_ms) {
   const headers = { ...own };
   const key = sessionStorage.getItem(KEY);
   if (key) headers.Authorization = `Bearer ${key}`;
@@ -54,11 +54,11 @@ async function send(method, path, body, own, patience_ms) {
     method,
     headers,
     body: body === undefined || isFile ? body : JSON.stringify(body),
-    signal: patience_ms && AbortSignal.timeout(patience_ms),
+    signal: timeout_ms && AbortSignal.timeout(timeout_ms),
   }).catch(unreached);
   const reply = await response.json().catch(() => ({}));
   if (response.ok) return reply;
-  if (response.status === 401 && (await askForKey())) return send(method, path, body, own, patience_ms);
+  if (response.status === 401 && (await requestKey())) return send(method, path, body, own, timeout_ms);
   const sentence = reply.detail || reply.title || `${method} ${path}: ${response.status}`;
   throw Object.assign(new Error(sentence), { code: reply.code });
 }
@@ -83,27 +83,27 @@ let entering = null;
 async function knock() {
   while ((await fetch(placed("/api/v1/session"))).status === 401) {
     const key = sessionStorage.getItem(KEY);
-    if (!key && (declined || !(await askForKey()))) return false;
+    if (!key && (declined || !(await requestKey()))) return false;
     const headers = { Authorization: `Bearer ${sessionStorage.getItem(KEY)}` };
     const reply = await fetch(placed("/api/v1/session"), { method: "PUT", headers });
     if (REFUSALS.includes(reply.status)) {
       sessionStorage.removeItem(KEY);
-      notify("error", "The city does not take this key.");
+      notify("error", "The city does not accept this key.");
     }
     if (!reply.ok && reply.status !== 401) await new Promise((resolve) => setTimeout(resolve, 5000));
   }
   return true;
 }
 
-let asking = null;
+let keyRequest = null;
 let declined = false;
 
-function askForKey() {
-  asking ??= new Promise((resolve) => (keyWanted.value = resolve)).then((key) => {
-    asking = keyWanted.value = null;
+function requestKey() {
+  keyRequest ??= new Promise((resolve) => (keyWanted.value = resolve)).then((key) => {
+    keyRequest = keyWanted.value = null;
     if (key) sessionStorage.setItem(KEY, key);
     declined = !key;
     return Boolean(key);
   });
-  return asking;
+  return keyRequest;
 }

@@ -12,7 +12,7 @@ export function KeyDialog() {
   };
   return html`
     <${Dialog} title="API key" onClose=${() => answer("")}>
-      <p>This city asks for an API key. It is kept for this tab.</p>
+      <p>This city requires an API key. It is stored for this tab.</p>
       <form onSubmit=${submit}>
         <input name="key" type="password" autocomplete="off" required aria-label="API key" />
         <div class="actions">

@@ -14,7 +14,7 @@ const NAMED = new Set(["name", "junction", "group", "lane"]);
 const ID = /(?<![\w./-])[a-z0-9]+(?:_[a-z0-9]+)+(?![\w/-]|\.\w)/gi;
 
 /** Id to what a person calls it. */
-const said = computed(() => {
+const plainNames = computed(() => {
   const found = new Map(WORDS.map((word) => [word, spaced(word)]));
   const gather = (value) => {
     for (const [key, one] of Object.entries(value)) {
@@ -28,4 +28,4 @@ const said = computed(() => {
 });
 
 /** @param {string} text a sentence of the log, an answer of the server */
-export const prose = (text) => text.replace(ID, (id) => said.value.get(id) ?? id);
+export const prose = (text) => text.replace(ID, (id) => plainNames.value.get(id) ?? id);

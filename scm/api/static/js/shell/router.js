@@ -5,10 +5,10 @@ import { placed, unplaced } from "scm/shared/base.js";
 const here = signal(unplaced(location.pathname) + location.search);
 
 /** The address that was asked for; the page at it is drawn after the bar has shown that it was heard. */
-const asked = signal(here.value);
+const requested = signal(here.value);
 
 /** Name of the page that the bar points to. */
-export const heading = computed(() => pageAt(asked.value));
+export const heading = computed(() => pageAt(requested.value));
 
 /** `{page, rest, query}`: `/vehicles/n1?tab=plots` is page `vehicles`, rest `n1`. */
 export const route = computed(() => {
@@ -32,7 +32,7 @@ function decoded(part) {
 
 /** Show another address; `replace`: without a step for the browser's back. */
 export function go(path, { replace = false } = {}) {
-  if (path === asked.value) return;
+  if (path === requested.value) return;
   history[replace ? "replaceState" : "pushState"](null, "", placed(path));
   follow(path);
 }
@@ -45,8 +45,8 @@ function pageAt(path) {
 
 /** Another page takes a while to draw: first the picture that answers the touch, then it. */
 function follow(path) {
-  asked.value = path;
-  const arrive = () => (here.value = asked.value);
+  requested.value = path;
+  const arrive = () => (here.value = requested.value);
   if (pageAt(path) === pageAt(here.value) || document.hidden) arrive();
   else requestAnimationFrame(() => setTimeout(arrive));
 }

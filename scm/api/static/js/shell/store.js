@@ -7,10 +7,10 @@
 import { batch, computed, signal, useComputed } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { enter } from "scm/shell/api.js";
-import { hear, RANKS, renew } from "scm/shell/streams.js";
+import { subscribe, RANKS, renew } from "scm/shell/streams.js";
 import { placed } from "scm/shared/base.js";
 
-const EVENTS_KEPT = 200;
+const MAX_EVENTS = 200;
 const STALE_MS = 500;
 const LOST_MS = 2000;
 const SILENT_MS = 2500; // a server that lives says so each second
@@ -50,7 +50,7 @@ export function topic(name) {
 }
 
 /** @returns the signal of when a topic was last told, on this page's clock [ms]. */
-export function toldAt(name) {
+export function updatedAt(name) {
   topic(name);
   return bodiesAt.get(name);
 }
@@ -62,13 +62,13 @@ export const pulse = computed(
 );
 export const stop = computed(() => topic("stop").value ?? { engaged: false, by: "", reason: "" });
 export const signals = computed(() => topic("signals").value ?? []);
-export const signalsAt = computed(() => toldAt("signals").value);
+export const signalsAt = computed(() => updatedAt("signals").value);
 export const boxes = computed(() => topic("boxes").value ?? []);
 export const cameras = computed(() => topic("eye").value ?? []);
 export const stations = computed(() => topic("stations").value ?? []);
 
 const connected = signal(false);
-const heardAt = signal(-Infinity);
+const receivedAt = signal(-Infinity);
 const tickAt = signal(-Infinity);
 
 /** When somebody began to look: nothing is heard while nobody does. */
@@ -86,7 +86,7 @@ export const link = computed(() => {
 export const quiet_s = computed(() => Math.max(0, (now.value - tickAt.value) / 1000));
 
 /** Whether this page hears the server, whatever the world does. */
-export const isConnected = computed(() => connected.value && now.value - heardAt.value < SILENT_MS);
+export const isConnected = computed(() => connected.value && now.value - receivedAt.value < SILENT_MS);
 
 /** Whether what came at a time of this page's clock [ms] is old. */
 export const isOld = (at) => now.value - at > STALE_MS;
@@ -113,14 +113,14 @@ export function useTopics(...names) {
 }
 
 let ending = null;
-let heard = "";
+let subscribed = "";
 let gathering = null;
 let entered = false;
 
 function gather() {
   gathering ??= setTimeout(() => {
     gathering = null;
-    if (entered && wanted() !== heard) listen();
+    if (entered && wanted() !== subscribed) listen();
   }, GATHER_MS);
 }
 
@@ -136,7 +136,7 @@ function noteTick(tick, at) {
   tickAt.value = at;
 }
 
-function takeVehicles(body, at) {
+function applyVehicles(body, at) {
   if (body.tick === null && live.topic) return; // a server that has just begun: what was heard is the newest
   if (body.tick !== null && body.t_ns !== live.t_ns) {
     live.t_ns = body.t_ns;
@@ -170,23 +170,23 @@ export function indicatorsOf(vehicle) {
   return left && right ? "hazard" : left ? "left" : right ? "right" : "off";
 }
 
-function takeEvents(list) {
+function applyEvents(list) {
   if (!list.length) return;
   const newest = events.value.length ? events.value[0].seq : 0;
   const fresh = list.filter((event) => event.seq > newest).reverse();
-  if (fresh.length) events.value = [...fresh, ...events.value].slice(0, EVENTS_KEPT);
+  if (fresh.length) events.value = [...fresh, ...events.value].slice(0, MAX_EVENTS);
 }
 
-function take(topics) {
+function apply(topics) {
   const at = performance.now();
   batch(() => {
     for (const [name, body] of Object.entries(topics)) {
       if (name === "run") continue;
-      if (name === "vehicles") takeVehicles(body, at);
-      else if (name === "events") takeEvents(body);
+      if (name === "vehicles") applyVehicles(body, at);
+      else if (name === "events") applyEvents(body);
       else {
         topic(name).value = body;
-        toldAt(name).value = at;
+        updatedAt(name).value = at;
         if (name === "pulse") noteTick(body.tick, at);
       }
     }
@@ -197,28 +197,28 @@ let run = null;
 
 function listen() {
   ending?.();
-  heard = wanted();
+  subscribed = wanted();
   lineAt = performance.now();
-  const noted = (take) => (topics) => {
-    lineAt = heardAt.value = performance.now();
-    take(topics);
+  const noted = (apply) => (topics) => {
+    lineAt = receivedAt.value = performance.now();
+    apply(topics);
   };
-  ending = hear(
-    `/api/v1/stream?topics=${heard}`,
-    { snapshot: noted(takeSnapshot), delta: noted(take), beat: noted(() => {}) },
+  ending = subscribe(
+    `/api/v1/stream?topics=${subscribed}`,
+    { snapshot: noted(applySnapshot), delta: noted(apply), beat: noted(() => {}) },
     RANKS.city,
     (isOpen) => (connected.value = isOpen),
   );
 }
 
-function takeSnapshot(topics) {
+function applySnapshot(topics) {
   // After a restart of the server its events are numbered from one again, and its city may be another.
   if (run !== null && topics.run !== run) {
     events.value = [];
     readCity();
   }
   run = topics.run;
-  take(topics);
+  apply(topics);
   if (wasDead) renew();
   wasDead = false;
 }
@@ -235,13 +235,13 @@ function keepLine() {
 }
 
 function keepTime() {
-  let beats = 0;
+  let ticks = 0;
   const look = () => batch(() => (seenAt.value = now.value = performance.now()));
   document.addEventListener("visibilitychange", look);
   setInterval(() => {
     batch(() => {
       now.value = performance.now();
-      if (beats++ % 2 === 0 && live.topic) world.value = live.topic;
+      if (ticks++ % 2 === 0 && live.topic) world.value = live.topic;
     });
     keepLine();
   }, 100);
@@ -251,10 +251,10 @@ function keepTime() {
 async function readCity() {
   for (;;) {
     const reply = await fetch(placed("/api/v1/map")).catch(() => null);
-    const told = reply?.ok ? await reply.text().catch(() => "") : "";
-    if (told && mapText && told !== mapText) location.reload();
-    if (told && !mapText) city.value = JSON.parse((mapText = told));
-    if (told) return;
+    const text = reply?.ok ? await reply.text().catch(() => "") : "";
+    if (text && mapText && text !== mapText) location.reload();
+    if (text && !mapText) city.value = JSON.parse((mapText = text));
+    if (text) return;
     await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
   }
 }

@@ -44,11 +44,11 @@ export function whileSeen(begin, rank) {
   };
   const own = { rank, look };
   all = [...all, own].sort((a, b) => a.rank - b.rank);
-  tell();
+  announce();
   return () => {
     all = all.filter((one) => one !== own);
     end?.();
-    tell();
+    announce();
   };
 }
 
@@ -57,14 +57,14 @@ export function whileSeen(begin, rank) {
  * @param onOpen is told whether the server tells it now.
  * @returns what ends it.
  */
-export function hear(address, heard, rank, onOpen = () => {}) {
+export function subscribe(address, handlers, rank, onOpen = () => {}) {
   return whileSeen(() => {
     let source = null;
     let timer = null;
     const open = () => {
       source = new EventSource(placed(address));
-      for (const [name, take] of Object.entries(heard)) {
-        source.addEventListener(name, (message) => take(JSON.parse(message.data)));
+      for (const [name, handle] of Object.entries(handlers)) {
+        source.addEventListener(name, (message) => handle(JSON.parse(message.data)));
       }
       source.onopen = () => onOpen(true);
       source.onerror = () => {
@@ -110,7 +110,7 @@ function pause(ms) {
 const isAway = () => isGone || document.hidden;
 
 /** Say what this window wishes for, and see what that changes here. */
-function tell() {
+function announce() {
   const ranks = isAway() ? [] : all.map(({ rank }) => rank);
   windows.postMessage({ number, isFirst: document.hasFocus(), ranks });
   lookAll();
@@ -128,9 +128,9 @@ function lookAll() {
 /** How many of its streams this window may have open; all windows come to the same. */
 function share() {
   const own = { number, isFirst: document.hasFocus(), ranks: all.map(({ rank }) => rank) };
-  const wishes = [own, ...others.values()].flatMap((one) => one.ranks.map((rank) => ({ rank, one })));
-  wishes.sort((a, b) => a.rank - b.rank || b.one.isFirst - a.one.isFirst || a.one.number - b.one.number);
-  return wishes.slice(0, MOST).filter(({ one }) => one === own).length;
+  const requested = [own, ...others.values()].flatMap((one) => one.ranks.map((rank) => ({ rank, one })));
+  requested.sort((a, b) => a.rank - b.rank || b.one.isFirst - a.one.isFirst || a.one.number - b.one.number);
+  return requested.slice(0, MOST).filter(({ one }) => one === own).length;
 }
 
 windows.onmessage = ({ data }) => {
@@ -138,12 +138,12 @@ windows.onmessage = ({ data }) => {
   else {
     const isNew = !others.has(data.number);
     others.set(data.number, { ...data, at: performance.now() });
-    if (isNew && all.length) tell();
+    if (isNew && all.length) announce();
     else lookAll();
   }
 };
-setInterval(() => !isAway() && tell(), WORD_MS);
-document.addEventListener("visibilitychange", tell);
-for (const name of ["focus", "blur"]) window.addEventListener(name, tell);
-window.addEventListener("pagehide", () => tell((isGone = true)));
-window.addEventListener("pageshow", () => tell((isGone = false)));
+setInterval(() => !isAway() && announce(), WORD_MS);
+document.addEventListener("visibilitychange", announce);
+for (const name of ["focus", "blur"]) window.addEventListener(name, announce);
+window.addEventListener("pagehide", () => announce((isGone = true)));
+window.addEventListener("pageshow", () => announce((isGone = false)));

@@ -1,13 +1,13 @@
 /** Light or dark: as the system says, or as the person chose for this browser. */
 import { effect, signal } from "@preact/signals";
 
-const KEPT = "scm-theme";
+const STORAGE_KEY = "scm-theme";
 const CHOICES = ["system", "light", "dark"];
 
-const kept = localStorage.getItem(KEPT);
+const stored = localStorage.getItem(STORAGE_KEY);
 
 /** `system`, `light` or `dark`. */
-export const theme = signal(CHOICES.includes(kept) ? kept : "system");
+export const theme = signal(CHOICES.includes(stored) ? stored : "system");
 
 const system = matchMedia("(prefers-color-scheme: light)");
 const systemIsLight = signal(system.matches);
@@ -19,7 +19,7 @@ export const colours = signal(0);
 effect(() => {
   const light = theme.value === "light" || (theme.value === "system" && systemIsLight.value);
   document.documentElement.dataset.theme = light ? "light" : "dark";
-  localStorage.setItem(KEPT, theme.value);
+  localStorage.setItem(STORAGE_KEY, theme.value);
   colours.value = light ? 1 : 0;
 });
 

@@ -11,13 +11,13 @@ import { isShutOut, makeRoom } from "scm/shell/streams.js";
 import { nextTheme, theme } from "scm/shell/theme.js";
 
 /** What is asked about the stop: `release`, `reason`; null: nothing. */
-const asking = signal(null);
+const openDialog = signal(null);
 
 /** Whether a stop was asked for and nobody said that it is engaged. */
 const unconfirmed = signal(false);
 
 const ROOM_MS = 300;
-const DOUBT_MS = 2500; // the city asks the world for 2 s
+const CONFIRM_TIMEOUT_MS = 2500; // the city asks the world for 2 s
 const PATIENCE_MS = 5000;
 
 const LINK_WORDS = { connecting: "Connecting", live: "Live", stale: "Stale", lost: "No data" };
@@ -28,10 +28,10 @@ export function TitleBar({ pages, here }) {
   const { t_ns, real_time_factor } = pulse.value;
   const nav = useRef(null);
   useEffect(() => showHere(nav.current), [here]);
-  const heard = t_ns !== null;
-  const vitals = heard
+  const isKnown = t_ns !== null;
+  const vitals = isKnown
     ? `real-time factor ${fixed(real_time_factor, 2)}: ${fixed(real_time_factor, 2)} s of each second are simulated`
-    : "the world was not heard yet";
+    : "nothing received from the world yet";
   return html`
     <header class="title-bar">
       <a class="home" href="/map" title=${city.value?.title ?? "Smart City Manager"}>
@@ -50,9 +50,9 @@ export function TitleBar({ pages, here }) {
       <span class="link-state" data-link=${link.value} role="status" title=${vitals}>
         <i></i>${LINK_WORDS[link.value]}
       </span>
-      <span class="clock ${heard && real_time_factor < 0.95 ? "warn" : ""}" title=${vitals}>
-        ${heard ? clock(t_ns) : UNKNOWN}
-        <small>×${heard ? fixed(real_time_factor, 2) : UNKNOWN}</small>
+      <span class="clock ${isKnown && real_time_factor < 0.95 ? "warn" : ""}" title=${vitals}>
+        ${isKnown ? clock(t_ns) : UNKNOWN}
+        <small>×${isKnown ? fixed(real_time_factor, 2) : UNKNOWN}</small>
       </span>
       <${ThemeButton} />
       <${StopButton} />
@@ -77,24 +77,24 @@ function ThemeButton() {
 /** One press stops, as of every emergency stop; only to let cars drive again is asked first. */
 function StopButton() {
   const engaged = stop.value.engaged;
-  const press = () => (engaged ? (asking.value = "release") : tell({ engaged: true, by: "dashboard", reason: "" }));
+  const press = () => (engaged ? (openDialog.value = "release") : sendStop({ engaged: true, by: "dashboard", reason: "" }));
   return html`
     <button id="city-stop" class="city-stop" aria-pressed=${engaged} onClick=${press}>
       ${engaged ? "Release stop" : "City stop"}
     </button>
-    ${asking.value === "release" && html`<${ReleaseDialog} />`}
-    ${asking.value === "reason" && html`<${ReasonDialog} />`}
+    ${openDialog.value === "release" && html`<${ReleaseDialog} />`}
+    ${openDialog.value === "reason" && html`<${ReasonDialog} />`}
   `;
 }
 
-const closeDialog = () => (asking.value = null);
+const closeDialog = () => (openDialog.value = null);
 
 /** Who hits the red button again and again must not release it: Enter means no here. */
 function ReleaseDialog() {
   const submit = (event) => {
     event.preventDefault();
     closeDialog();
-    tell({ engaged: false, by: "dashboard", reason: event.target.elements.reason.value });
+    sendStop({ engaged: false, by: "dashboard", reason: event.target.elements.reason.value });
   };
   return html`
     <${Dialog} title="Release the city stop?" onClose=${closeDialog}>
@@ -115,7 +115,7 @@ function ReasonDialog() {
   const submit = (event) => {
     event.preventDefault();
     closeDialog();
-    if (stop.value.engaged) tell({ engaged: true, by: "dashboard", reason: event.target.elements.reason.value });
+    if (stop.value.engaged) sendStop({ engaged: true, by: "dashboard", reason: event.target.elements.reason.value });
     else notify("error", "The stop was released meanwhile: the reason was not noted.");
   };
   return html`
@@ -132,12 +132,12 @@ function ReasonDialog() {
 }
 
 /** Whatever else the browser waits for, this goes first; an answer that does not come is as good as none. */
-async function tell(body) {
+async function sendStop(body) {
   const waits = [
     setTimeout(makeRoom, ROOM_MS),
-    setTimeout(() => (unconfirmed.value = body.engaged), DOUBT_MS),
+    setTimeout(() => (unconfirmed.value = body.engaged), CONFIRM_TIMEOUT_MS),
   ];
-  const done = ({ engaged }) => (engaged ? "All cars are told to stop." : "The stop is released.");
+  const done = ({ engaged }) => (engaged ? "All cars are ordered to stop." : "The stop is released.");
   const reply = await change("PUT", "/stop", body, done, {}, PATIENCE_MS);
   waits.forEach(clearTimeout);
   unconfirmed.value = body.engaged && reply === null;
@@ -151,7 +151,7 @@ export function Banners() {
     html`<div class="banner stopped" role="alert">
       <b>City stopped</b>
       <span>${[by && `by ${by}`, reason, obeyed()].filter(Boolean).join(" · ")}</span>
-      ${!reason && html`<button onClick=${() => (asking.value = "reason")}>Say why…</button>`}
+      ${!reason && html`<button onClick=${() => (openDialog.value = "reason")}>Give a reason…</button>`}
     </div>`}
     ${unconfirmed.value &&
     !engaged &&
@@ -167,8 +167,8 @@ export function Banners() {
         ${pulse.value.t_ns !== null
           ? `What you see is ${span(quiet_s.value)} old.`
           : isConnected.value
-            ? "It was not heard yet. Its first start on a computer compiles its physics, a minute or longer."
-            : "Nothing has been heard yet."}
+            ? "Nothing received yet. The first start on a computer compiles its physics, a minute or longer."
+            : "Nothing received yet."}
         ${isShutOut.value ? " Other windows of this browser hold all connections that it grants: close one." : ""}
       </span>
     </div>`}
@@ -193,7 +193,7 @@ function DisturbanceBanner() {
     <div class="banner void" role="status">
       <b>Measurements are void</b>
       <span>
-        ${capital(shown.map(({ text }) => text).join("; "))}, since ${clock(since_ns)}. Trips meanwhile say nothing
+        ${capital(shown.map(({ text }) => text).join("; "))}, since ${clock(since_ns)}. Trips meanwhile are void
         of the city. ${prose(advice)}
       </span>
     </div>

@@ -72,7 +72,7 @@ export function NewCar({ folder, names, onWritten }) {
           <label class="check"><input type="checkbox" name="lidar" /> LIDAR</label>
           <label class="check"><input type="checkbox" name="camera" /> Camera</label>
         </details>
-        ${preview.problem && form?.car !== written && html`<p class="trouble" role="alert">${preview.problem}</p>`}
+        ${preview.problem && form?.car !== written && html`<p class="form-error" role="alert">${preview.problem}</p>`}
         ${folder
           ? html`<button class="primary" disabled=${!preview.row || Boolean(preview.problem)}>Make the car file</button>`
           : html`<p class="hint">This city has no folder for car files: start it with <code>SCM_CARS=FOLDER</code>, or copy the text below.</p>`}
@@ -111,26 +111,26 @@ function Made({ row }) {
 function bodyOf(form) {
   const fields = new FormData(form);
   const body = { car: fields.get("car").trim(), motor: fields.get("motor"), driven: fields.get("driven") };
-  const take = (name, per_unit) => {
+  const fill = (name, per_unit) => {
     const text = fields.get(name);
     if (text) body[name] = Number(text) / per_unit;
   };
   if (fields.get("scale")) body.scale = `1:${fields.get("scale")}`;
-  for (const [name, per_unit] of [["mass_kg", 1], ["wheelbase_m", 100], ["top_speed_mps", 1], ["tag_size_m", 100]]) take(name, per_unit);
-  for (const [name, , , per_unit] of OPTIONAL) take(name, per_unit);
+  for (const [name, per_unit] of [["mass_kg", 1], ["wheelbase_m", 100], ["top_speed_mps", 1], ["tag_size_m", 100]]) fill(name, per_unit);
+  for (const [name, , , per_unit] of OPTIONAL) fill(name, per_unit);
   for (const name of ["lidar", "camera"]) body[name] = fields.has(name);
   return body;
 }
 
 async function look(body, names, signal, setPreview) {
   // A name that is taken is no reason to show nothing of the car.
-  const taken = names.includes(body.car);
-  const query = new URLSearchParams({ ...body, ...(taken && { car: "new_car" }) });
+  const exists = names.includes(body.car);
+  const query = new URLSearchParams({ ...body, ...(exists && { car: "new_car" }) });
   const reply = await fetch(placed(`/api/v1/cars/preview?${query}`), { signal }).catch(() => null);
   if (signal.aborted) return;
   const answer = await reply?.json().catch(() => null);
   if (!reply?.ok) setPreview({ problem: sentence(answer) });
-  else setPreview({ row: answer, problem: taken ? `There is a car file named ${body.car} already.` : "" });
+  else setPreview({ row: answer, problem: exists ? `There is a car file named ${body.car} already.` : "" });
 }
 
 function sentence(problem) {

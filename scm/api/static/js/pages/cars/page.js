@@ -25,7 +25,7 @@ export function Page() {
         <h2>Car files <small>${cars.length || ""}</small></h2>
         <a href="/vehicles">All vehicles</a>
       </div>
-      ${problem && html`<p class="trouble" role="alert">${problem}</p>`}
+      ${problem && html`<p class="form-error" role="alert">${problem}</p>`}
       <div class="scroll" tabindex="0" role="region" aria-label="Table of car files">
         <table>
           <thead>

@@ -2,7 +2,7 @@
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { moment } from "scm/shared/format.js";
-import { folded } from "scm/pages/events/deeds.js";
+import { folded } from "scm/pages/events/audit_calls.js";
 import { Export } from "scm/pages/events/event_log.js";
 import { useRested, useRows } from "scm/pages/events/rows.js";
 import { placed } from "scm/shared/base.js";
@@ -22,7 +22,7 @@ export function AuditTrail() {
       </select>
       <input type="search" placeholder="Asked by" aria-label="Asked by" value=${by}
         onInput=${(event) => setBy(event.target.value)} />
-      <input type="search" placeholder="Find in deeds" aria-label="Find in deeds" value=${text}
+      <input type="search" placeholder="Find in the audit trail" aria-label="Find in the audit trail" value=${text}
         onInput=${(event) => setText(event.target.value)} />
       <span class="room"></span>
       <${Chain} />
@@ -58,7 +58,7 @@ function Deed({ row, call, onTrace }) {
   const isRead = row.kind !== "unreadable";
   const entries = call ? [row, call] : [row];
   return html`
-    <tr data-deed=${row.number}>
+    <tr data-request=${row.number}>
       <td class="number">${entries.map(({ number }) => number).join(", ")}</td>
       <td class="when">${isRead && html`<time>${moment(row.t_ns)}</time>`}</td>
       <td class="what">

@@ -7,7 +7,7 @@ import { prose } from "scm/shell/prose.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { stations, topic, useTopics } from "scm/shell/store.js";
 import { folded, single } from "scm/pages/events/folding.js";
-import { acknowledgedBy, useHeard } from "scm/pages/events/heard.js";
+import { acknowledgedBy, useLiveEvents } from "scm/pages/events/live_events.js";
 import { useRested, useRows } from "scm/pages/events/rows.js";
 
 const SEVERITIES = [
@@ -26,18 +26,18 @@ export function EventLog() {
   const [open, setOpen] = useState(false);
   const [foldsRepeats, setFolds] = useState(true);
   const [pausedAt, setPausedAt] = useState(null);
-  const [asking, setAsking] = useState(null);
+  const [acknowledging, setAcknowledging] = useState(null);
   const wanted = { severity, source, text: useRested(text) };
   const list = useRows("/events", { ...wanted, open: open ? "true" : "" });
-  const heard = useHeard();
+  const liveEvents = useLiveEvents();
   useEffect(() => {
-    if (pausedAt === null && heard.missed()) list.reload();
+    if (pausedAt === null && liveEvents.missed()) list.reload();
   });
   const acknowledged = useMemo(
     () => acknowledgedBy(topic("acknowledgements").value ?? []),
     [topic("acknowledgements").value],
   );
-  const rows = merged(list.rows, heard.rows, wanted, acknowledged, open, pausedAt);
+  const rows = merged(list.rows, liveEvents.rows, wanted, acknowledged, open, pausedAt);
   const groups = foldsRepeats ? folded(rows) : single(rows);
   const waiting = rows.filter((row) => !row.acknowledged_by);
   return html`
@@ -76,10 +76,10 @@ export function EventLog() {
       </label>
       <span class="room"></span>
       <button class="small" aria-pressed=${pausedAt !== null} onClick=${() =>
-        setPausedAt(pausedAt === null ? (heard.rows[0]?.seq ?? 0) : null)}>
+        setPausedAt(pausedAt === null ? (liveEvents.rows[0]?.seq ?? 0) : null)}>
         ${pausedAt === null ? "Pause" : "Follow"}
       </button>
-      <button class="small" disabled=${!waiting.length} onClick=${() => setAsking(waiting)}>
+      <button class="small" disabled=${!waiting.length} onClick=${() => setAcknowledging(waiting)}>
         Acknowledge all ${waiting.length}
       </button>
       <${Export} path="/events" query=${list.query} />
@@ -89,7 +89,7 @@ export function EventLog() {
     <div class="scroll" tabindex="0" role="log" aria-label="Log of events, newest first">
       <ol class="entries">
         ${groups.map(
-          (group) => html`<${Group} key=${group.key} group=${group} onAcknowledge=${setAsking} />`,
+          (group) => html`<${Group} key=${group.key} group=${group} onAcknowledge=${setAcknowledging} />`,
         )}
       </ol>
       ${!groups.length && !list.more &&
@@ -97,11 +97,11 @@ export function EventLog() {
       ${list.more &&
       html`<button class="more" disabled=${list.loading} onClick=${list.loadMore}>Older events</button>`}
     </div>
-    ${asking && html`<${AcknowledgeDialog} rows=${asking} onClose=${() => setAsking(null)} />`}
+    ${acknowledging && html`<${AcknowledgeDialog} rows=${acknowledging} onClose=${() => setAcknowledging(null)} />`}
   `;
 }
 
-/** What was read and what came since, newest first, each once, with what was acknowledged since. */
+/** Rows read and rows that came since, newest first, each once, with the newest acknowledgements. */
 function merged(read, live, wanted, acknowledged, open, pausedAt) {
   const rows = new Map();
   for (const row of [...live.filter((row) => passes(row, wanted)), ...read]) {
@@ -113,11 +113,11 @@ function merged(read, live, wanted, acknowledged, open, pausedAt) {
 }
 
 function passes(row, { severity, source, text }) {
-  const said = spaced(`${row.text} ${row.name} ${row.source}`.toLowerCase());
+  const words = spaced(`${row.text} ${row.name} ${row.source}`.toLowerCase());
   return (
     (!severity || row.severity === severity) &&
     (!source || row.source === source) &&
-    said.includes(spaced(text.toLowerCase()))
+    words.includes(spaced(text.toLowerCase()))
   );
 }
 
@@ -142,7 +142,7 @@ function Group({ group, onAcknowledge }) {
     <li data-severity=${newest.severity} data-open=${open.length > 0} data-name=${newest.name} data-count=${events.length}>
       <time>${moment(newest.t_ns)}</time>
       <i class="sign" role="img" aria-label=${newest.severity}>${SIGNS[newest.severity]}</i>
-      <span class="said">
+      <span class="event-text">
         ${prose(newest.text)}
         ${events.length > 1 &&
         html`
@@ -179,11 +179,11 @@ function Group({ group, onAcknowledge }) {
 }
 
 function Seen({ event }) {
-  const said = event.note ? `${event.acknowledged_by}: ${event.note}` : `seen by ${event.acknowledged_by}`;
-  const takeBack = () => change("DELETE", `/events/acknowledgements/${event.id}`);
+  const words = event.note ? `${event.acknowledged_by}: ${event.note}` : `seen by ${event.acknowledged_by}`;
+  const withdraw = () => change("DELETE", `/events/acknowledgements/${event.id}`);
   return html`
-    <small title=${said}>✓ ${said}</small>
-    <button class="plain" aria-label="Take back: ${prose(event.text)}" title="Take it back" onClick=${takeBack}>↶</button>
+    <small title=${words}>✓ ${words}</small>
+    <button class="plain" aria-label="Withdraw: ${prose(event.text)}" title="Withdraw the acknowledgement" onClick=${withdraw}>↶</button>
   `;
 }
 

@@ -14,8 +14,8 @@ export function folded(events) {
   for (const event of events) {
     const { severity, source, name, vehicle, text } = event;
     const isOfCar = vehicle !== null && vehicle !== undefined;
-    const slot = isOfCar ? [severity, source, name].join("/") : source;
-    const group = severity === "error" ? undefined : open.get(slot);
+    const groupKey = isOfCar ? [severity, source, name].join("/") : source;
+    const group = severity === "error" ? undefined : open.get(groupKey);
     const isAgain = isOfCar || (group?.newest.text === text && group?.newest.severity === severity);
     if (group && isAgain && group.oldest.t_ns - event.t_ns <= GAP_NS) {
       group.events.push(event);
@@ -26,7 +26,7 @@ export function folded(events) {
     const vehicles = isOfCar ? [vehicle] : [];
     const begun = { key: event.id, newest: event, oldest: event, events: [event], vehicles };
     groups.push(begun);
-    open.set(slot, begun);
+    open.set(groupKey, begun);
   }
   return groups;
 }

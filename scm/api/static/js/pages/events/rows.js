@@ -11,7 +11,7 @@ const PAGE = 200;
  * @returns `{rows, more, error, loading, loadMore, reload}`; `more` tells whether there are older ones
  */
 export function useRows(path, query) {
-  const asked = new URLSearchParams(Object.entries(query).filter(([, value]) => value)).toString();
+  const search = new URLSearchParams(Object.entries(query).filter(([, value]) => value)).toString();
   const [state, setState] = useState({ rows: [], next: null, error: "", loading: true });
   const turn = useRef(0);
 
@@ -20,7 +20,7 @@ export function useRows(path, query) {
     setState((state) => ({ ...state, loading: true, error: "" }));
     const more = cursor ? `&cursor=${encodeURIComponent(cursor)}` : "";
     try {
-      const response = await fetch(placed(`/api/v1${path}?limit=${PAGE}&${asked}${more}`));
+      const response = await fetch(placed(`/api/v1${path}?limit=${PAGE}&${search}${more}`));
       const body = await response.json();
       if (own !== turn.current) return; // another filter was chosen meanwhile
       if (!response.ok) throw new Error(body.detail || body.title);
@@ -30,11 +30,11 @@ export function useRows(path, query) {
     }
   }
 
-  useEffect(() => void load(null, []), [path, asked]);
+  useEffect(() => void load(null, []), [path, search]);
   return {
     ...state,
     more: state.next !== null,
-    query: asked,
+    query: search,
     loadMore: () => load(state.next, state.rows),
     reload: () => load(null, []),
   };

@@ -2,7 +2,7 @@
 import { drawTag } from "scm/pages/eye/tag_shape.js";
 import { placed } from "scm/shared/base.js";
 
-const TAGS_KEPT = 16; // frames: three seconds
+const MAX_TAGS = 16; // frames: three seconds
 const AHEAD_NS = 5_000_000_000n; // what was fetched is never so much newer than what was named
 const CLOSEST = 12;
 
@@ -36,7 +36,7 @@ export class EyePicture {
   }
 
   /** Take what the stream tells of the camera's newest frame. */
-  hear({ frame_t_ns, tags_t_ns, tags, known }) {
+  update({ frame_t_ns, tags_t_ns, tags, known }) {
     if (frame_t_ns === null) return;
     this.#named = frame_t_ns;
     this.#known = new Map(known.map((one) => [one.tag_id, one]));
@@ -45,8 +45,8 @@ export class EyePicture {
       this.#shown.tags = tags; // they came after their picture
       this.draw();
     }
-    if (this.#tags.size > TAGS_KEPT) this.#tags.delete(this.#tags.keys().next().value);
-    this.#takeWaiting();
+    if (this.#tags.size > MAX_TAGS) this.#tags.delete(this.#tags.keys().next().value);
+    this.#drawWaiting();
     this.#follow();
   }
 
@@ -118,11 +118,11 @@ export class EyePicture {
     const image = await createImageBitmap(await response.blob());
     this.#fetched = t_ns;
     this.#waiting = { t_ns, image };
-    this.#takeWaiting();
+    this.#drawWaiting();
   }
 
   /** Draw what was fetched once its tags are known, or never will be. */
-  #takeWaiting() {
+  #drawWaiting() {
     if (this.#waiting === null) return;
     const { t_ns, image } = this.#waiting;
     const tags = this.#tags.get(t_ns);

@@ -3,10 +3,10 @@ import { useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
 import { Sure } from "scm/shared/sure.js";
-import { keptBy, read, usePolled, useUnfinished } from "scm/pages/eye/asking.js";
+import { savedBy, read, usePolled, useUnfinished } from "scm/pages/eye/polling.js";
 import { finished } from "scm/shared/operation.js";
 import { Coverage } from "scm/pages/eye/coverage.js";
-import { filledIn, freeName, Progress, useKept } from "scm/pages/eye/progress.js";
+import { filledIn, freeName, Progress, useStored } from "scm/pages/eye/progress.js";
 import { change, notify } from "scm/shell/api.js";
 
 const WANTED = 15;
@@ -15,32 +15,32 @@ const BOARDS = { chessboard: "Chessboard", charuco: "ChArUco", tags: "Grid of ta
 
 const FIRST = { board: "chessboard", columns: 9, rows: 6, square_mm: 30, marker_mm: 22, first_id: 0, fisheye: false };
 
-export function LensStep({ camera, kept, done, put }) {
+export function LensStep({ camera, saved, done, put }) {
   const root = `/eye/cameras/${camera.camera}`;
   const { body, error, again } = usePolled(`${root}/views`, 0);
-  const [board, setBoard] = useKept(`board ${camera.camera}`, FIRST);
+  const [board, setBoard] = useStored(`board ${camera.camera}`, FIRST);
   const [row, setRow] = useState(null);
   const [lens, setLens] = useState(null);
   const [sure, setSure] = useState(false);
   const step = useRef(null);
   const busy = row !== null && ["waiting", "running"].includes(row.state);
-  const name = freeName(`${camera.camera}-lens`, kept);
+  const name = freeName(`${camera.camera}-lens`, saved);
 
-  const follow = async (asked) => {
-    const over = await finished(asked, setRow);
+  const follow = async (operation) => {
+    const over = await finished(operation, setRow);
     again();
-    const called = keptBy(over);
+    const called = savedBy(over);
     if (!called) return;
     const report = await read(`/eye/calibrations/${called}/report`).catch(() => null);
     setLens(report && { ...report.lens, called });
-    notify("info", `The lens is kept as ${called}.`);
+    notify("info", `The lens is saved as ${called}.`);
     done();
   };
   useUnfinished([`lens of ${camera.camera}`, `board in pictures of ${camera.camera}`], follow);
   const run = async (save_as) => {
     if (!filledIn(step.current)) return;
-    const asked = await change("POST", `${root}/lens`, { ...bodyOf(board), save_as });
-    if (asked) await follow(asked);
+    const operation = await change("POST", `${root}/lens`, { ...bodyOf(board), save_as });
+    if (operation) await follow(operation);
   };
   const add = async (files) => {
     for (const file of files) if (!(await change("POST", `${root}/views`, file))) break;
@@ -68,7 +68,7 @@ export function LensStep({ camera, kept, done, put }) {
       ${sure &&
       html`
         <${Sure} title="Throw all pictures away?" yes="Throw away" act=${throwAway} onClose=${() => setSure(false)}>
-          ${`All ${views.length} pictures that were taken with ${camera.camera} are deleted for everybody. What was measured by them stays.`}
+          ${`All ${views.length} pictures from ${camera.camera} are deleted for everybody. Calibrations computed from them remain.`}
         <//>
       `}
       ${error && html`<p class="failed" role="alert">${error}</p>`}
@@ -84,7 +84,7 @@ export function LensStep({ camera, kept, done, put }) {
           <button class="primary" disabled=${busy || !views.some((one) => one.found)} onClick=${() => run(name)}>
             Measure the lens
           </button>
-          <small>${`will be kept as ${name}`}</small>
+          <small>${`will be saved as ${name}`}</small>
         </div>
       `}
       ${lens?.numbers && html`<${Lens} lens=${lens} put=${put} />`}
@@ -173,7 +173,7 @@ function ViewList({ views, root, again }) {
       ${views.map((view) => html`
         <li key=${view.name} class=${view.found ? "" : "warn"}>
           <img src=${`/api/v1${root}/views/${view.name}`} alt="" loading="lazy" />
-          <span><b>${view.name.slice(0, 4)}</b> ${saidOf(view, typical)}</span>
+          <span><b>${view.name.slice(0, 4)}</b> ${textOf(view, typical)}</span>
           <button
             class="plain"
             aria-label="Throw picture ${view.name} away"
@@ -185,7 +185,7 @@ function ViewList({ views, root, again }) {
   `;
 }
 
-function saidOf({ found }, typical) {
+function textOf({ found }, typical) {
   if (!found) return "no board found";
   const words = [`${found.points} points`];
   if (found.tilt_rad !== null) words.push(`leans ${Math.round((found.tilt_rad * 180) / Math.PI)}°`);

@@ -15,13 +15,13 @@ export function Page() {
   if (!list.length) {
     return html`
       <section class="panel" aria-label="Eye">
-        <p class="empty">No camera has been heard yet. The Eye is a part of its own: <code>scm eye</code>.</p>
+        <p class="empty">No camera has reported yet. The Eye is a part of its own: <code>scm eye</code>.</p>
       </section>
     `;
   }
   const { query, rest } = route.value;
   const camera = query.camera ? list.find((one) => one.camera === query.camera) : list[0];
-  if (!camera || !["", "calibrate"].includes(rest)) return html`<${Astray} list=${list} />`;
+  if (!camera || !["", "calibrate"].includes(rest)) return html`<${NotFound} list=${list} />`;
   return html`
     <${Bar} list=${list} camera=${camera} />
     ${rest === "calibrate"
@@ -36,12 +36,12 @@ export function Page() {
 }
 
 /** What an address is answered that leads to no camera. */
-function Astray({ list }) {
-  const asked = route.value.query.camera;
+function NotFound({ list }) {
+  const requested = route.value.query.camera;
   return html`
     <section class="panel" aria-label="Eye">
       <p class="empty">
-        ${asked ? `There is no camera called ${asked}.` : "There is no such page of the Eye."} Cameras of the city:
+        ${requested ? `There is no camera called ${requested}.` : "There is no such page of the Eye."} Cameras of the city:
         ${list.map(({ camera }) => html` <a key=${camera} href=${`/eye?camera=${camera}`}>${camera}</a>`)}
       </p>
     </section>
@@ -59,7 +59,7 @@ function Bar({ list, camera }) {
         </select>
       </label>
       <span class="state" data-good=${String(camera.good)}>
-        ${camera.good === false ? "do not trust its poses" : camera.good ? "good" : "says nothing of itself"}
+        ${camera.good === false ? "do not trust its poses" : camera.good ? "good" : "reports no state"}
       </span>
       <${InForce} camera=${camera} />
       <nav aria-label="Eye">

@@ -21,7 +21,7 @@ export function Picture({ camera }) {
     watcher.observe(canvas.current);
     return () => watcher.disconnect();
   }, []);
-  useEffect(() => picture.current.hear(camera), [camera.frame_t_ns, camera.tags_t_ns]);
+  useEffect(() => picture.current.update(camera), [camera.frame_t_ns, camera.tags_t_ns]);
   useEffect(() => picture.current.show(layers, chosenTag.value), [layers, chosenTag.value]);
   const act = (change) => {
     change(picture.current);
@@ -40,7 +40,7 @@ export function Picture({ camera }) {
         </span>
       </div>
       ${camera.complaints.map(
-        (said) => html`<p key=${said} class="complaint ${camera.good ? "" : "warn"}" role="status">${said}</p>`,
+        (fault) => html`<p key=${fault} class="camera-fault ${camera.good ? "" : "warn"}" role="status">${fault}</p>`,
       )}
       <canvas
         ref=${canvas}

@@ -2,38 +2,38 @@
 import { useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
-import { keptBy, read, useUnfinished } from "scm/pages/eye/asking.js";
+import { savedBy, read, useUnfinished } from "scm/pages/eye/polling.js";
 import { finished } from "scm/shared/operation.js";
-import { filledIn, freeName, Progress, useKept } from "scm/pages/eye/progress.js";
+import { filledIn, freeName, Progress, useStored } from "scm/pages/eye/progress.js";
 import { change, notify } from "scm/shell/api.js";
 
 const VAGUE_M = 0.01;
 const TURNS = ["yaw_rad", "tilt_x_rad", "tilt_y_rad"];
 const WORDS = { x_m: "x", y_m: "y", z_m: "height", yaw_rad: "yaw", tilt_x_rad: "tilt about x", tilt_y_rad: "tilt about y" };
 
-export function PlaceStep({ camera, kept, lenses, done, put }) {
+export function PlaceStep({ camera, saved, lenses, done, put }) {
   const [lens, setLens] = useState("");
-  const [tags, setTags] = useKept(`floor-tags ${camera.camera}`, []);
+  const [tags, setTags] = useStored(`floor-tags ${camera.camera}`, []);
   const [row, setRow] = useState(null);
   const [found, setFound] = useState(null);
   const step = useRef(null);
   const busy = row !== null && ["waiting", "running"].includes(row.state);
-  const name = freeName(`${camera.camera}-place`, kept);
+  const name = freeName(`${camera.camera}-place`, saved);
   const seen = camera.known.filter((one) => one.what === "map" && one.seen_s < 2);
-  const follow = async (asked) => {
-    const called = keptBy(await finished(asked, setRow));
+  const follow = async (operation) => {
+    const called = savedBy(await finished(operation, setRow));
     if (!called) return;
     const report = await read(`/eye/calibrations/${called}/report`).catch(() => null);
     setFound(report && { ...report, name: called });
-    notify("info", `The place is kept as ${called}.`);
+    notify("info", `The place is saved as ${called}.`);
     done();
   };
   useUnfinished([`place of ${camera.camera}`], follow);
   const run = async () => {
     if (!filledIn(step.current)) return;
     const body = { lens: lens || null, tags: tags.map(inNumbers), save_as: name };
-    const asked = await change("POST", `/eye/cameras/${camera.camera}/place`, body);
-    if (asked) await follow(asked);
+    const operation = await change("POST", `/eye/cameras/${camera.camera}/place`, body);
+    if (operation) await follow(operation);
   };
   return html`
     <section ref=${step} class="panel eye-place" aria-label="Place">
@@ -54,7 +54,7 @@ export function PlaceStep({ camera, kept, lenses, done, put }) {
       <${FloorTags} tags=${tags} set=${setTags} />
       <div class="row">
         <button class="primary" disabled=${busy || (!seen.length && !tags.length)} onClick=${run}>Find the place</button>
-        <small>${`will be kept as ${name}`}</small>
+        <small>${`will be saved as ${name}`}</small>
       </div>
       <${Progress} row=${row} cancel=${() => change("DELETE", `/operations/${row.id}`)} />
       ${found && html`<${Found} found=${found} put=${put} />`}
@@ -92,7 +92,7 @@ function FloorTags({ tags, set }) {
                   />
                 </td>
               `)}
-              <td><button class="plain" aria-label="Take tag ${i + 1} off" onClick=${() => set(tags.filter((_, j) => j !== i))}>×</button></td>
+              <td><button class="plain" aria-label="Remove tag ${i + 1}" onClick=${() => set(tags.filter((_, j) => j !== i))}>×</button></td>
             </tr>
           `)}
         </tbody>

@@ -2,7 +2,7 @@
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
-import { usePolled } from "scm/pages/eye/asking.js";
+import { usePolled } from "scm/pages/eye/polling.js";
 import { ResidualFloor } from "scm/pages/eye/residual_floor.js";
 
 const WINDOWS = { 30: "30 s", 120: "2 min", 300: "5 min" };

@@ -1,13 +1,13 @@
 /** Where all cameras together take each car to be, with what is wrong with it. */
 import { html } from "scm/shared/html.js";
 import { fixed, span } from "scm/shared/format.js";
-import { usePolled } from "scm/pages/eye/asking.js";
+import { usePolled } from "scm/pages/eye/polling.js";
 
-const ASK_MS = 500;
+const POLL_MS = 500;
 const DEG = 180 / Math.PI;
 
 export function Tracks() {
-  const { body, error } = usePolled("/eye/tracks", ASK_MS);
+  const { body, error } = usePolled("/eye/tracks", POLL_MS);
   const rows = body?.tracks ?? [];
   return html`
     <section class="panel wide eye-tracks" aria-label="Tracks">
@@ -17,7 +17,7 @@ export function Tracks() {
       </div>
       ${rows.length
         ? html`<div class="scroll" tabindex="0" role="region" aria-label="Table of tracks"><${Table} rows=${rows} /></div>`
-        : html`<p class="empty">${error || "No track is heard."}</p>`}
+        : html`<p class="empty">${error || "No track."}</p>`}
     </section>
   `;
 }

@@ -8,17 +8,17 @@ import { change } from "scm/shell/api.js";
 import { city } from "scm/shell/store.js";
 import { placed } from "scm/shared/base.js";
 
-const asking = signal(false);
+const isOpen = signal(false);
 
 export function AddCar() {
   return html`
-    <button class="small" onClick=${() => (asking.value = true)}>Add a car</button>
-    ${asking.value && html`<${Question} />`}
+    <button class="small" onClick=${() => (isOpen.value = true)}>Add a car</button>
+    ${isOpen.value && html`<${Question} />`}
   `;
 }
 
 function Question() {
-  const close = () => (asking.value = false);
+  const close = () => (isOpen.value = false);
   const submit = (event) => {
     event.preventDefault();
     const { car, vehicle } = event.target.elements;
@@ -39,7 +39,7 @@ function Question() {
             ${files.map(({ car }) => html`<option key=${car}>${car}</option>`)}
           </select>
         </label>
-        ${misfit && html`<p class="trouble" role="status">On this map: ${misfit}.</p>`}
+        ${misfit && html`<p class="form-error" role="status">On this map: ${misfit}.</p>`}
         <p class="hint">Another one? <a href="/cars">Make a car file</a> from a few figures.</p>
         <label>
           Name

@@ -1,7 +1,7 @@
 /** What the chosen car sees and means to do: its LIDAR's scans and its way ahead, heard while they are shown. */
 import { effect, signal } from "@preact/signals";
 import { selected } from "scm/shared/selection.js";
-import { hear, RANKS } from "scm/shell/streams.js";
+import { subscribe, RANKS } from "scm/shell/streams.js";
 import { fleet } from "scm/pages/map/fleet.js";
 import { layers } from "scm/pages/map/layers.js";
 import { placed } from "scm/shared/base.js";
@@ -15,43 +15,43 @@ export const closeUp = { scan: null, scanAt: -Infinity, path: null };
 export const blind = signal(null);
 
 /** Begin to hear what the layers ask for; returns what ends it. */
-export function hearCloseUp() {
+export function subscribeCloseUp() {
   const ends = [
     effect(() => {
-      if (layers.value.lidar && selected.value) return hearScans(selected.value);
+      if (layers.value.lidar && selected.value) return subscribeScans(selected.value);
     }),
     effect(() => {
-      if (layers.value.path && selected.value) return askPaths(selected.value);
+      if (layers.value.path && selected.value) return pollPaths(selected.value);
     }),
   ];
   return () => ends.forEach((end) => end());
 }
 
-function hearScans(vehicle) {
-  const take = (scan) => {
+function subscribeScans(vehicle) {
+  const show = (scan) => {
     Object.assign(closeUp, { scan, scanAt: performance.now() });
     blind.value = scan ? null : vehicle;
   };
-  const end = hear(`/api/v1/vehicles/${vehicle}/scan/stream`, { scan: take }, RANKS.view);
+  const end = subscribe(`/api/v1/vehicles/${vehicle}/scan/stream`, { scan: show }, RANKS.view);
   return () => {
     end();
     closeUp.scan = blind.value = null;
   };
 }
 
-function askPaths(vehicle) {
+function pollPaths(vehicle) {
   let ended = false;
-  const ask = async () => {
+  const poll = async () => {
     if (!fleet.rows.has(vehicle)) return; // it left
     const response = await fetch(placed(`/api/v1/vehicles/${vehicle}/path`)).catch(() => null);
     const path = response?.ok ? await response.json().catch(() => null) : null;
     if (!ended) closeUp.path = path;
   };
-  ask();
-  const asking = setInterval(() => !document.hidden && ask(), PATH_MS);
+  poll();
+  const timer = setInterval(() => !document.hidden && poll(), PATH_MS);
   return () => {
     ended = true;
-    clearInterval(asking);
+    clearInterval(timer);
     closeUp.path = null;
   };
 }

@@ -17,7 +17,7 @@ const NAMES = 1;
 const HEAD_BYTES = 8;
 const STATES_HEAD_BYTES = 24;
 const COLUMNS = ["x", "y", "yaw", "speed", "steering", "age", "done", "length"];
-const BEAT_MS = 250;
+const TICK_MS = 250;
 const AGAIN_MS = 1000;
 const FIRST_LIGHT = 11;
 
@@ -40,7 +40,7 @@ export const fleet = {
 };
 
 /** Counts up four times a second while somebody looks. */
-export const fleetBeat = signal(0);
+export const fleetTick = signal(0);
 
 /** Hear the stream for as long as the component is on the page and somebody looks at it. */
 export function useFleet() {
@@ -82,11 +82,11 @@ export function ageOf(row) {
 
 function begin() {
   const aborting = new AbortController();
-  const beating = setInterval(() => (fleetBeat.value += 1), BEAT_MS);
+  const ticking = setInterval(() => (fleetTick.value += 1), TICK_MS);
   listen(aborting.signal);
   return () => {
     aborting.abort();
-    clearInterval(beating);
+    clearInterval(ticking);
   };
 }
 
@@ -105,12 +105,12 @@ async function listen(ended) {
 
 /** Read frames until the stream ends. Of several that came together only the newest states count. */
 async function readAll(reader) {
-  let kept = new Uint8Array();
+  let rest = new Uint8Array();
   for (;;) {
     const { done, value } = await reader.read();
     if (done) return;
-    kept = joined(kept, value);
-    kept = kept.slice(take(new DataView(kept.buffer, kept.byteOffset, kept.byteLength)));
+    rest = joined(rest, value);
+    rest = rest.slice(consume(new DataView(rest.buffer, rest.byteOffset, rest.byteLength)));
   }
 }
 
@@ -123,7 +123,7 @@ function joined(first, second) {
 }
 
 /** @returns how many bytes were whole frames. */
-function take(view) {
+function consume(view) {
   let at = 0;
   let states = null;
   while (view.byteLength - at >= HEAD_BYTES) {
@@ -131,25 +131,25 @@ function take(view) {
     if (end > view.byteLength) break;
     if (view.getUint8(at + 4) !== VERSION) throw new Error("the city speaks another layout");
     const body = [view.byteOffset + at + HEAD_BYTES, view.byteOffset + end];
-    if (view.getUint8(at + 5) === NAMES) takeNames(view.buffer.slice(...body));
+    if (view.getUint8(at + 5) === NAMES) applyNames(view.buffer.slice(...body));
     else states = body;
     at = end;
   }
-  if (states) takeStates(view.buffer.slice(...states));
+  if (states) applyStates(view.buffer.slice(...states));
   return at;
 }
 
-function takeNames(body) {
-  const told = JSON.parse(new TextDecoder().decode(body));
-  const { vehicles } = told;
-  Object.assign(fleet, told, {
+function applyNames(body) {
+  const names = JSON.parse(new TextDecoder().decode(body));
+  const { vehicles } = names;
+  Object.assign(fleet, names, {
     count: 0,
     rows: new Map(vehicles.map((car, row) => [car.vehicle, row])),
     order: [...vehicles.keys()].sort((a, b) => byName(vehicles[a].vehicle, vehicles[b].vehicle)),
   });
 }
 
-function takeStates(body) {
+function applyStates(body) {
   const head = new DataView(body);
   if (head.getUint32(0, true) !== fleet.generation) return;
   const count = head.getUint32(4, true);

@@ -15,7 +15,7 @@ export function gestures(element, view, onClick) {
     const { left, top } = element.getBoundingClientRect();
     return [event.clientX - left, event.clientY - top];
   };
-  const heard = {
+  const handlers = {
     pointerdown(event) {
       if (event.button) return;
       element.setPointerCapture(event.pointerId);
@@ -46,7 +46,7 @@ export function gestures(element, view, onClick) {
   };
   /** A followed car stays in the middle, whatever the mouse points at. */
   const middle = (event) => (followed.value ? [] : at(event));
-  for (const [name, take] of Object.entries(heard)) element.addEventListener(name, take, { passive: false });
+  for (const [name, handle] of Object.entries(handlers)) element.addEventListener(name, handle, { passive: false });
   // All of the map is seen: a finger scrolls the page. Part of it: a finger moves the map.
   const touch = effect(() => {
     viewChanged.value;
@@ -54,7 +54,7 @@ export function gestures(element, view, onClick) {
   });
   return () => {
     touch();
-    for (const [name, take] of Object.entries(heard)) element.removeEventListener(name, take);
+    for (const [name, handle] of Object.entries(handlers)) element.removeEventListener(name, handle);
   };
 }
 

@@ -41,10 +41,10 @@ export class Heat {
     if (fleet.t_s === null || fleet.t_s === this.t_s) return;
     const passed_s = this.t_s === null ? 0 : Math.abs(fleet.t_s - this.t_s);
     this.t_s = fleet.t_s;
-    const kept = Math.exp(-passed_s / FADE_S);
+    const retained = Math.exp(-passed_s / FADE_S);
     for (let i = 0; i < this.sum.length; i++) {
-      this.sum[i] *= kept;
-      this.weight[i] *= kept;
+      this.sum[i] *= retained;
+      this.weight[i] *= retained;
     }
     for (let row = 0; row < fleet.count; row++) {
       if (!(fleet.flags[row] & 1)) continue;

@@ -1,7 +1,7 @@
 /** What the map shows beside roads, cars and signals; kept for this browser. */
 import { effect, signal } from "@preact/signals";
 
-const KEPT = "scm-map-layers";
+const STORAGE_KEY = "scm-map-layers";
 
 /** Name to title, in the order of the menu; the last two are of the chosen car. */
 export const LAYERS = {
@@ -25,14 +25,14 @@ export const followed = signal(null);
 
 function read() {
   try {
-    const kept = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-    return Object.fromEntries(Object.entries(kept).filter(([name]) => name in LAYERS));
+    const stored = JSON.parse(localStorage.getItem(STORAGE_KEY) ?? "{}");
+    return Object.fromEntries(Object.entries(stored).filter(([name]) => name in LAYERS));
   } catch {
     return {};
   }
 }
 
-effect(() => localStorage.setItem(KEPT, JSON.stringify(layers.value)));
+effect(() => localStorage.setItem(STORAGE_KEY, JSON.stringify(layers.value)));
 
 export function show(name, on) {
   layers.value = { ...layers.value, [name]: on };

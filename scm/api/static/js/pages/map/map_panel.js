@@ -2,13 +2,13 @@
 import { computed } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { carNamed, fleet, fleetBeat } from "scm/pages/map/fleet.js";
+import { carNamed, fleet, fleetTick } from "scm/pages/map/fleet.js";
 import { readGround } from "scm/pages/map/ground.js";
 import { gestures } from "scm/pages/map/gestures.js";
 import { followed, layers } from "scm/pages/map/layers.js";
 import { LayersMenu } from "scm/pages/map/layers_menu.js";
-import { hearCloseUp } from "scm/pages/map/close_up.js";
-import { hearTracks } from "scm/pages/map/tracks.js";
+import { subscribeCloseUp } from "scm/pages/map/close_up.js";
+import { pollTracks } from "scm/pages/map/tracks.js";
 import { HeatKey, Kinds, ScaleBar } from "scm/pages/map/legend.js";
 import { Scene } from "scm/pages/map/scene.js";
 import { offer, SendChip, withdraw } from "scm/pages/map/send_to.js";
@@ -22,7 +22,7 @@ const PAN_PX = 80;
 const STALE_MS = 500;
 
 /** How fresh the map is: as the page, but stale also when only the cars' own stream is silent. */
-const sight = computed(() => {
+const linkState = computed(() => {
   const quiet = now.value - fleet.at > STALE_MS;
   return link.value === "live" && quiet ? "stale" : link.value;
 });
@@ -49,7 +49,7 @@ export function MapPanel() {
     const seen = new Viewport(ground.box);
     const scene = new Scene(canvas.current, ground, seen);
     setView(seen);
-    const ends = [scene.run(), gestures(sheet.current, seen, (x, y) => choose(scene.pick(x, y), seen, x, y)), hearCloseUp(), hearTracks()];
+    const ends = [scene.run(), gestures(sheet.current, seen, (x, y) => choose(scene.pick(x, y), seen, x, y)), subscribeCloseUp(), pollTracks()];
     return () => ends.forEach((end) => end());
   }, [ground]);
   if (ground instanceof Error) {
@@ -60,7 +60,7 @@ export function MapPanel() {
       <div
         class="sheet"
         ref=${sheet}
-        data-link=${sight.value}
+        data-link=${linkState.value}
         tabindex="0"
         role="group"
         aria-label="Map: arrows move it, plus and minus zoom, 0 shows all, F follows the chosen car"
@@ -122,7 +122,7 @@ function showAll(view) {
 /** Says what the map follows, and that a car left. */
 function FollowChip() {
   if (!followed.value) return null;
-  fleetBeat.value; // looks again whether it is still there
+  fleetTick.value; // looks again whether it is still there
   const gone = !carNamed(followed.value);
   return html`
     <button class="chip" onClick=${() => (followed.value = null)}>

@@ -4,7 +4,7 @@ import { html } from "scm/shared/html.js";
 import { selected } from "scm/shared/selection.js";
 import { route } from "scm/shell/router.js";
 import { useTopics } from "scm/shell/store.js";
-import { ChosenCard } from "scm/pages/map/chosen_card.js";
+import { ChosenVehicle } from "scm/pages/map/chosen_vehicle.js";
 import { useFleet } from "scm/pages/map/fleet.js";
 import { MapPanel } from "scm/pages/map/map_panel.js";
 import { SignalsShort } from "scm/pages/map/signals_short.js";
@@ -14,13 +14,13 @@ import { VehicleTable } from "scm/pages/map/vehicle_table.js";
 export function Page() {
   useTopics("signals", "boxes", "stations");
   useFleet();
-  const asked = route.value.query.vehicle; // `/map?vehicle=n1` shows that car
-  useEffect(() => void (asked && (selected.value = asked)), [asked]);
+  const requested = route.value.query.vehicle; // `/map?vehicle=n1` shows that car
+  useEffect(() => void (requested && (selected.value = requested)), [requested]);
   return html`
     <${MapPanel} />
     <aside aria-label="Vehicles, signals and stations">
       <${VehicleTable} />
-      <${ChosenCard} />
+      <${ChosenVehicle} />
       <${SignalsShort} />
       <${StationsPanel} />
     </aside>

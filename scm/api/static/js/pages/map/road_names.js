@@ -102,14 +102,14 @@ function place(names, held, lights) {
   const signals = new Set(heads.flatMap((head) => covered(head, scale, 2 * HEAD_PX)));
   const spawns = shown.filter(({ kind }) => kind === "spawn");
   const spots = new Set(spawns.flatMap(({ places, half }) => covered(places[0], scale, half)));
-  const taken = new Set();
-  const hindrances = { junction: [[taken]], lane: [[taken, signals, spots], [taken, signals]], spawn: [[taken, signals]] };
+  const occupied = new Set();
+  const hindrances = { junction: [[occupied]], lane: [[occupied, signals, spots], [occupied, signals]], spawn: [[occupied, signals]] };
   const placed = [];
   for (const { kind, name, places, half } of shown) {
     const isFree = (at, sets) => !covered(at, scale, half).some((cell) => sets.some((set) => set.has(cell)));
     const at = firstOf(hindrances[kind], (sets) => places.find((place) => isFree(place, sets)));
     if (!at) continue;
-    for (const cell of covered(at, scale, half)) taken.add(cell);
+    for (const cell of covered(at, scale, half)) occupied.add(cell);
     placed.push({ kind, name, at, half });
   }
   return placed;

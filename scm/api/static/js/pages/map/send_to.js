@@ -14,7 +14,7 @@ const COLOUR = "rgba(255, 209, 102, 0.75)";
 /** What a click on a lane offers: `{vehicle, lane, points}`; null: nothing. */
 const offered = signal(null);
 /** Name of the car that somebody wants to send by a lane's name; null: none. */
-const asking = signal(null);
+const openFor = signal(null);
 
 /** Offer to send the chosen car to the lane under a pixel; returns whether there is one. */
 export function offer(view, x, y) {
@@ -57,13 +57,13 @@ export function SendChip() {
 export function SendTo({ name }) {
   if (!city.value?.lanes.length) return null;
   return html`
-    <button class="small" onClick=${() => (asking.value = name)}>Send to…</button>
-    ${asking.value === name && html`<${Question} name=${name} />`}
+    <button class="small" onClick=${() => (openFor.value = name)}>Send to…</button>
+    ${openFor.value === name && html`<${Question} name=${name} />`}
   `;
 }
 
 function Question({ name }) {
-  const close = () => (asking.value = null);
+  const close = () => (openFor.value = null);
   const submit = (event) => {
     event.preventDefault();
     const { lane, then } = event.target.elements;

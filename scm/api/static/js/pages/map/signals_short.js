@@ -10,12 +10,12 @@ const WORDS = { red: "red", yellow: "yellow", green: "green", flashing_red: "fla
 
 export function SignalsShort() {
   const passed_s = Math.max(0, (now.value - signalsAt.value) / 1000);
-  const told = passed_s < KNOWN_S ? signals.value : signals.value.map(unknown);
+  const rows = passed_s < KNOWN_S ? signals.value : signals.value.map(unknown);
   return html`
     <section class="panel signals-short" aria-label="Signals">
       <div class="panel-head"><h2>Signals <small>${signals.value.length || ""}</small></h2></div>
       <div class="scroll moves" tabindex="0" role="region" aria-label="Signals by junction">
-        ${told.map((junction) => html`<${Junction} key=${junction.junction} junction=${junction} passed_s=${passed_s} />`)}
+        ${rows.map((junction) => html`<${Junction} key=${junction.junction} junction=${junction} passed_s=${passed_s} />`)}
         ${signals.value.length === 0 && signalsAt.value > 0 && html`<p class="empty">This city has no signals.</p>`}
       </div>
     </section>

@@ -20,7 +20,7 @@ export function StationsPanel() {
         <h2>Stations <small>${alive} here${lost ? html`, <span class="warn">${lost} lost</span>` : ""}</small></h2>
       </summary>
       <div class="scroll moves" tabindex="0" role="region" aria-label="List of stations">
-        <p class="heads" aria-hidden="true"><span>tells</span><span>late in the last minute</span><span>heard</span></p>
+        <p class="heads" aria-hidden="true"><span>reports</span><span>late in the last minute</span><span>received</span></p>
         <ul>
           ${stations.value.map((row) => html`<${Station} key=${row.role + row.name + row.session} row=${row} />`)}
         </ul>

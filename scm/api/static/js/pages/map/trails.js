@@ -1,6 +1,6 @@
 /** Where cars came from: the last places of each, fading; shared out so that any number can be drawn. */
 import { paintOf } from "scm/shared/car_shape.js";
-import { KeptLayer } from "scm/pages/map/kept_layer.js";
+import { CachedLayer } from "scm/pages/map/cached_layer.js";
 
 const EVERY_S = 0.15;
 const MOST_POINTS = 90;
@@ -13,7 +13,7 @@ export class Trails {
   constructor() {
     this.cars = new Map();
     this.t_s = -Infinity;
-    this.layer = new KeptLayer();
+    this.layer = new CachedLayer();
   }
 
   /** Note where all cars are, if it is time. */

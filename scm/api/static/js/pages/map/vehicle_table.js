@@ -4,7 +4,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { age, fixed } from "scm/shared/format.js";
 import { selected } from "scm/shared/selection.js";
-import { ageOf, fleet, fleetBeat, isAlive, modeOf } from "scm/pages/map/fleet.js";
+import { ageOf, fleet, fleetTick, isAlive, modeOf } from "scm/pages/map/fleet.js";
 import { AddCar } from "scm/pages/map/add_car.js";
 import { pulse } from "scm/shell/store.js";
 
@@ -28,9 +28,9 @@ const room = signal(400);
 
 /** Numbers of the rows to show, in their order. */
 const shown = computed(() => {
-  fleetBeat.value;
-  const asked = words.value.trim().toLowerCase();
-  const rows = fleet.order.filter((row) => row < fleet.count && matches(row, asked, kind.value));
+  fleetTick.value;
+  const search = words.value.trim().toLowerCase();
+  const rows = fleet.order.filter((row) => row < fleet.count && matches(row, search, kind.value));
   const column = COLUMNS.find((one) => one.name === order.value.column);
   if (column.value) {
     const keys = new Map(rows.map((row) => [row, column.value(row)]));
@@ -39,10 +39,10 @@ const shown = computed(() => {
   return order.value.turned ? rows.reverse() : rows;
 });
 
-function matches(row, asked, wantedKind) {
+function matches(row, search, wantedKind) {
   const car = fleet.vehicles[row];
   if (wantedKind && car.kind !== wantedKind) return false;
-  return !asked || [car.vehicle, car.owner, car.car, modeOf(row)].some((text) => text.toLowerCase().includes(asked));
+  return !search || [car.vehicle, car.owner, car.car, modeOf(row)].some((text) => text.toLowerCase().includes(search));
 }
 
 export function VehicleTable() {
@@ -125,7 +125,7 @@ function Head({ column }) {
 }
 
 function Car({ vehicle, row, number }) {
-  fleetBeat.value; // its properties stay the same while what `fleet` tells of it moves
+  fleetTick.value; // its properties stay the same while what `fleet` tells of it moves
   const isChosen = useComputed(() => selected.value === vehicle); // a choice draws two rows anew, not all
   if (row >= fleet.count) return null; // it left a moment ago
   const { kind: sort, owner } = fleet.vehicles[row];

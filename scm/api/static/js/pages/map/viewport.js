@@ -41,7 +41,7 @@ export class Viewport {
     if (width === this.width && height === this.height) return;
     [this.width, this.height] = [width, height];
     if (this.isWhole) this.showAll();
-    else this.#settle();
+    else this.#limit();
   }
 
   showAll() {
@@ -56,7 +56,7 @@ export class Viewport {
   zoom(factor, x = this.width / 2, y = this.height / 2) {
     const [px, py] = this.place(x, y);
     this.scale *= factor;
-    this.#settle();
+    this.#limit();
     const [qx, qy] = this.place(x, y);
     this.centre(this.cx + px - qx, this.cy + py - qy);
   }
@@ -67,10 +67,10 @@ export class Viewport {
 
   centre(x_m, y_m) {
     [this.cx, this.cy] = [x_m, y_m];
-    this.#settle();
+    this.#limit();
   }
 
-  #settle() {
+  #limit() {
     const { left, top, width, height } = this.box;
     const least = LEAST_SHARE * this.wholeScale;
     this.scale = Math.min(Math.max(MOST_PX_PER_M, least), Math.max(least, this.scale));

@@ -28,9 +28,9 @@ export function scale(low, high, a, b) {
 
 /** Round numbers between two ends, about so many. */
 export function ticks(low, high, about = 5) {
-  const rough = (high - low) / about || 1;
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].find((times) => times * power >= rough) * power;
+  const unrounded = (high - low) / about || 1;
+  const power = 10 ** Math.floor(Math.log10(unrounded));
+  const step = [1, 2, 5, 10].find((times) => times * power >= unrounded) * power;
   const first = Math.ceil(low / step - 1e-9);
   const found = [];
   for (let k = first; k * step <= high + 1e-9 * step; k++) found.push(Number((k * step).toPrecision(10)));

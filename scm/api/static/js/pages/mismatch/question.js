@@ -16,7 +16,7 @@ import { short } from "scm/pages/mismatch/words.js";
 export function Question({ question, number, report, onDriven }) {
   const { titles, folder } = report.drawn.questions[number];
   const drive = report.drives.includes(folder) ? folder : null;
-  const title = report.drawn.cards.filter((card) => card.label === "Undecided")[number]?.title ?? titles.join(" or ");
+  const title = report.drawn.cards.filter((panel) => panel.label === "Undecided")[number]?.title ?? titles.join(" or ");
   return html`
     <section class="panel question" aria-label="Undecided: ${titles.join(" or ")}">
       <div class="panel-head">
@@ -38,7 +38,7 @@ function Drive({ report, drive, onDriven }) {
   const { jobs, again } = useJobs();
   const [chosen, choose] = useState(null);
   const [number, setNumber] = useState(0);
-  const [asking, setAsking] = useState(false);
+  const [confirming, setConfirming] = useState(false);
   const cars = world.value.vehicles.toSorted((a, b) => byName(a.vehicle, b.vehicle));
   const alike = cars.filter((car) => car.car === report.drawn.vehicle);
   const car = cars.find((one) => one.vehicle === chosen) ?? alike[0] ?? cars[0] ?? null;
@@ -51,9 +51,9 @@ function Drive({ report, drive, onDriven }) {
   if (!parts) return html`<p class="empty" role=${error && "alert"}>${error ?? "Reading the drive …"}</p>`;
   const part = parts[number];
   const play = async () => {
-    setAsking(false);
-    const said = () => `${car.vehicle} begins the drive.`;
-    if (await change("POST", `${address}/play`, { vehicle: car.vehicle, part: number + 1 }, said)) again();
+    setConfirming(false);
+    const success = () => `${car.vehicle} begins the drive.`;
+    if (await change("POST", `${address}/play`, { vehicle: car.vehicle, part: number + 1 }, success)) again();
   };
   return html`
     <div class="drive">
@@ -67,14 +67,14 @@ function Drive({ report, drive, onDriven }) {
             ${cars.map((one) => html`<option key=${one.vehicle} value=${one.vehicle}>${one.vehicle} (${one.car})</option>`)}
           </select>
         </label>
-        <button class="primary" disabled=${!car || (now && isActive(now))} onClick=${() => setAsking(true)}>
+        <button class="primary" disabled=${!car || (now && isActive(now))} onClick=${() => setConfirming(true)}>
           Drive this with ${car?.vehicle ?? "a car"}
         </button>
       </div>
       <${Warnings} car=${car} report=${report} part=${part} />
       ${now && html`<${Driving} job=${now} again=${again} />`}
       ${report.told > 0 && html`<${SearchAgain} report=${report} />`}
-      ${asking && html`<${Ask} car=${car} part=${part} onNo=${() => setAsking(false)} onYes=${play} />`}
+      ${confirming && html`<${ConfirmDrive} car=${car} part=${part} onNo=${() => setConfirming(false)} onYes=${play} />`}
     </div>
   `;
 }
@@ -96,14 +96,14 @@ function Parts({ count, number, onPick }) {
 
 function Warnings({ car, report, part }) {
   if (!car) return html`<p class="warn">No car is in the city.</p>`;
-  const said = [];
+  const warnings = [];
   if (car.car !== report.drawn.vehicle) {
-    said.push(`${car.vehicle} is a ${car.car}; the question is about a ${report.drawn.vehicle}.`);
+    warnings.push(`${car.vehicle} is a ${car.car}; the question is about a ${report.drawn.vehicle}.`);
   }
   if (leavesFloor(part.way, car, city.value?.floor)) {
-    said.push(`From where ${car.vehicle} is now the drive would lead off the floor: it would be refused.`);
+    warnings.push(`From where ${car.vehicle} is now the drive would lead off the floor: it would be refused.`);
   }
-  return said.map((text) => html`<p class="warn" key=${text}>${text}</p>`);
+  return warnings.map((text) => html`<p class="warn" key=${text}>${text}</p>`);
 }
 
 /** Throttle and steering over time. */
@@ -131,7 +131,7 @@ function Commands({ rows }) {
   `;
 }
 
-function Ask({ car, part, onNo, onYes }) {
+function ConfirmDrive({ car, part, onNo, onYes }) {
   return html`
     <${Dialog} title="Let ${car.vehicle} drive this?" onClose=${onNo}>
       <p>
@@ -166,18 +166,18 @@ function Driving({ job, again }) {
 }
 
 function SearchAgain({ report }) {
-  const [asked, setAsked] = useState(false);
+  const [requested, setRequested] = useState(false);
   const search = async () => {
-    setAsked(true);
-    const said = () => "The search has begun.";
-    if (await change("POST", "/mismatch/jobs", { again: report.row.name }, said)) go("/mismatch");
-    else setAsked(false);
+    setRequested(true);
+    const success = () => "The search has begun.";
+    if (await change("POST", "/mismatch/jobs", { again: report.row.name }, success)) go("/mismatch");
+    else setRequested(false);
   };
   const drives = report.told === 1 ? "One drive was" : `${report.told} drives were`;
   return html`
     <div class="send">
       <span>${drives} recorded for this question.</span>
-      <button class="primary" disabled=${asked} onClick=${search}>Search again with ${report.told === 1 ? "it" : "them"}</button>
+      <button class="primary" disabled=${requested} onClick=${search}>Search again with ${report.told === 1 ? "it" : "them"}</button>
     </div>
   `;
 }

@@ -1,7 +1,7 @@
 /** Start a search: of a run of this city, or of a recording of one's own that is sent first. */
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { asked, question, SearchFields } from "scm/shared/search_fields.js";
+import { searchBody, question, SearchFields } from "scm/shared/search_fields.js";
 import { change, notify } from "scm/shell/api.js";
 import { useFetched } from "scm/pages/mismatch/fetched.js";
 import { zipOf } from "scm/pages/mismatch/zip.js";
@@ -16,7 +16,7 @@ export function StartForm({ onStarted }) {
   const start = async (event) => {
     event.preventDefault();
     const form = new FormData(event.target);
-    const body = asked(wanted);
+    const body = searchBody(wanted);
     if (from === "own") {
       setBusy("Sending …");
       const upload = await send(form, offers.most_upload_bytes).finally(() => setBusy(""));
@@ -25,8 +25,8 @@ export function StartForm({ onStarted }) {
     } else {
       body.recording = form.get("recording");
     }
-    const said = () => "The search has begun.";
-    if (await change("POST", "/mismatch/jobs", body, said)) onStarted();
+    const done = () => "The search has begun.";
+    if (await change("POST", "/mismatch/jobs", body, done)) onStarted();
   };
   return html`
     <section class="panel start" aria-label="Start a search">
@@ -77,7 +77,7 @@ function OfOwn() {
       <input name="file" type="file" accept=".zip,.mcap" />
     </label>
     <p class="hint">
-      Tables of commands and poses, and beside them a <code>recording.yaml</code> that says what stands where.
+      Tables of commands and poses, and beside them a <code>recording.yaml</code> that describes their columns.
     </p>
   `;
 }
@@ -93,7 +93,7 @@ async function send(form, most) {
   const name = one?.size ? one.name : folder[0].webkitRelativePath.split("/")[0];
   const blob = one?.size ? await packed([one]) : await packed(folder);
   if (blob.size > most) {
-    notify("error", `The recording is ${Math.ceil(blob.size / 2 ** 20)} MiB, at most ${most / 2 ** 20} MiB are taken.`);
+    notify("error", `The recording is ${Math.ceil(blob.size / 2 ** 20)} MiB, at most ${most / 2 ** 20} MiB are accepted.`);
     return null;
   }
   const stem = encodeURIComponent(name.replace(/\.(zip|mcap)$/i, "").slice(0, 100));

@@ -41,14 +41,14 @@ function address(recording, { vehicle, camera }) {
 }
 
 function Picture({ player, one }) {
-  const [asked_s, setAsked] = useState(null);
+  const [requested_s, setRequested] = useState(null);
   const [came, setCame] = useState({ t_s: null, good: false });
   const [large, setLarge] = useState(false);
   const at_s = player.at.value;
   const wanted = player.came.value >= 0 ? player.pictureOf(one) : null;
   useEffect(() => {
     // One at a time: at eight times the pace the one after next would else stop each on its way.
-    if (wanted && wanted.t_s !== asked_s && came.t_s === asked_s) setAsked(wanted.t_s);
+    if (wanted && wanted.t_s !== requested_s && came.t_s === requested_s) setRequested(wanted.t_s);
   });
   if (!wanted && player.has(player.t_s)) return html`<p class="empty">No picture was recorded by then.</p>`;
   const age_s = Math.max(0, at_s - came.t_s);
@@ -62,20 +62,20 @@ function Picture({ player, one }) {
       onClick=${() => setLarge(!large)}
       onKeyDown=${(event) => event.key === "Escape" && setLarge(false)}
     >
-      ${asked_s !== null &&
+      ${requested_s !== null &&
       html`<img
-        src="${address(player.name, one)}?t_s=${asked_s}"
+        src="${address(player.name, one)}?t_s=${requested_s}"
         alt="What camera ${named(one)} saw, not live"
-        onLoad=${() => setCame({ t_s: asked_s, good: true })}
-        onError=${() => setCame({ t_s: asked_s, good: false })}
+        onLoad=${() => setCame({ t_s: requested_s, good: true })}
+        onError=${() => setCame({ t_s: requested_s, good: false })}
       />`}
       <span class="stamp" aria-hidden="true">Not live</span>
     </button>
-    <p class="hint">${told(came, age_s)}</p>
+    <p class="hint">${captionOf(came, age_s)}</p>
   `;
 }
 
-function told(came, age_s) {
+function captionOf(came, age_s) {
   if (came.t_s === null) return "Reading the picture…";
   if (!came.good) return `The picture of ${minutes(came.t_s, true)} cannot be shown.`;
   const age = age_s > OLD_S ? `the newest by then, ${age_s.toFixed(0)} s old` : `${age_s.toFixed(1)} s before`;

@@ -16,7 +16,7 @@ export function RecordingsList() {
   return html`
     <${Halves} here="recordings" />
     <section class="panel list" aria-label="Recordings">
-      ${error && html`<p class="trouble" role="alert">The list could not be read: ${error}</p>`}
+      ${error && html`<p class="form-error" role="alert">The list could not be read: ${error}</p>`}
       ${!body && !error && html`<p class="empty">Reading the list…</p>`}
       ${body && html`<${Table} rows=${body.items} />`}
       ${body && !body.items.length && html`<${Nothing} />`}
@@ -61,7 +61,7 @@ function Row({ row }) {
         <a href=${path}>${row.title || row.name}</a>
         ${row.title && html`<small>${row.name}</small>`}
         <small class="slim">${row.begin_ns && `${began} · `}${counted(row.cars)} · ${size(row.size_bytes)}</small>
-        ${row.trouble && html`<small class="why">${coded(row.trouble)}</small>`}
+        ${row.form-error && html`<small class="why">${coded(row.form-error)}</small>`}
         ${row.notes && html`<small class="note">${row.notes}</small>`}
       </td>
       <td class="wide">${began}</td>

@@ -2,7 +2,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
-import { asked, question, SearchFields } from "scm/shared/search_fields.js";
+import { searchBody, question, SearchFields } from "scm/shared/search_fields.js";
 import { change } from "scm/shell/api.js";
 import { go } from "scm/shell/router.js";
 import { read } from "scm/pages/recordings/reading.js";
@@ -14,7 +14,7 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
   useEffect(() => void read("/mismatch/offers").then(({ body }) => setFiles(body.cars), () => {}), []);
   const submit = async (event) => {
     event.preventDefault();
-    const body = { recording: recording.name, ...asked(wanted) };
+    const body = { recording: recording.name, ...searchBody(wanted) };
     if (await change("POST", "/mismatch/jobs", body, () => "The search has begun.")) {
       onClose();
       go("/mismatch");
@@ -23,7 +23,7 @@ export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
   return html`
     <${Dialog} title="Start a search" onClose=${onClose}>
       <p class="hint">Drives the car's file with the recorded commands, and searches for what the two differ in.</p>
-      ${!cars.length && html`<p class="trouble">This recording tells of no car.</p>`}
+      ${!cars.length && html`<p class="form-error">This recording contains no car.</p>`}
       <form class="fields two-by-two" onSubmit=${submit}>
         <${SearchFields}
           value=${wanted}

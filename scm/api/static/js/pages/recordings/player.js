@@ -6,8 +6,8 @@ import { spoken } from "scm/pages/recordings/words.js";
 const STRETCH_S = 10; // of one answer of the server
 const HZ = 10; // drawn smoothly between
 const SLOWEST_HZ = 2; // half of it is still no gap
-const KEPT = 40; // stretches: a few minutes either way
-const TOLD_MS = 100; // how often the page's words follow
+const MAX_STRETCHES = 40; // stretches: a few minutes either way
+const TEXT_PERIOD_MS = 100; // how often the page's words follow
 const GAP_S = 1.5; // a silence longer than this is shown as one
 const GROWS_MS = 2000;
 const SKIP_SHOWN_S = 5; // of what is played after it
@@ -33,14 +33,14 @@ export class Player {
     this.came = signal(0);
     this.stretches = new Map();
     this.last_ms = null;
-    this.told_ms = -Infinity;
+    this.text_ms = -Infinity;
     this.seek(at_s ?? this.first_s);
-    this.request = requestAnimationFrame((ms) => this.beat(ms));
+    this.animation = requestAnimationFrame((ms) => this.tick(ms));
     this.growing = summary.recording.state === "being written" ? setInterval(() => this.grow(), GROWS_MS) : null;
   }
 
   end() {
-    cancelAnimationFrame(this.request);
+    cancelAnimationFrame(this.animation);
     clearInterval(this.growing);
     this.over = true;
   }
@@ -51,16 +51,16 @@ export class Player {
     if (row && row.body.state !== "being written") clearInterval(this.growing);
   }
 
-  beat(ms) {
-    this.request = requestAnimationFrame((next) => this.beat(next));
+  tick(ms) {
+    this.animation = requestAnimationFrame((next) => this.tick(next));
     const passed_s = this.last_ms === null ? 0 : Math.min(0.25, (ms - this.last_ms) / 1000);
     this.last_ms = ms;
     if (this.playing.value && this.has(this.t_s)) this.go(this.t_s + passed_s * this.speed.value);
     if (this.playing.value) this.skipPause();
     const skipped = this.skipped.value;
     if (skipped && (this.t_s < skipped.from_s || this.t_s > skipped.to_s)) this.skipped.value = null;
-    if (ms - this.told_ms > TOLD_MS && this.at.value !== this.t_s) {
-      this.told_ms = ms;
+    if (ms - this.text_ms > TEXT_PERIOD_MS && this.at.value !== this.t_s) {
+      this.text_ms = ms;
       this.at.value = this.t_s;
     }
     this.fetch();
@@ -126,14 +126,14 @@ export class Player {
       const known = this.stretches.get(number);
       // Of a recording that is being written more may be there by now.
       const grew = known?.frames && known.to_s < Math.min(start_s + STRETCH_S, this.length.value) - 0.5;
-      if (!known || grew) this.ask(number, known);
+      if (!known || grew) this.request(number, known);
     }
   }
 
-  async ask(number, known) {
-    if (known?.asking) return;
+  async request(number, known) {
+    if (known?.isLoading) return;
     const stretch = known ?? { frames: null };
-    stretch.asking = true;
+    stretch.isLoading = true;
     this.stretches.set(number, stretch);
     const start_s = number * STRETCH_S;
     const end_s = start_s + STRETCH_S;
@@ -143,12 +143,12 @@ export class Player {
       // As far as was there when it was asked: the file may go on.
       Object.assign(stretch, body, { to_s: Math.min(end_s, Math.max(start_s, length_s)) });
       this.trouble.value = body.damaged.length ? `Left out here: ${body.damaged.join("; ")}` : "";
-      stretch.asking = false;
+      stretch.isLoading = false;
       this.came.value += 1;
     } catch (error) {
       this.trouble.value = error.message;
       setTimeout(() => {
-        stretch.asking = false;
+        stretch.isLoading = false;
         if (!stretch.frames) this.stretches.delete(number);
       }, 3000);
     }
@@ -163,9 +163,9 @@ export class Player {
   }
 
   forget(newest) {
-    if (this.stretches.size <= KEPT) return;
+    if (this.stretches.size <= MAX_STRETCHES) return;
     const far = [...this.stretches.keys()].sort((a, b) => Math.abs(b - newest) - Math.abs(a - newest));
-    for (const number of far.slice(0, this.stretches.size - KEPT)) this.stretches.delete(number);
+    for (const number of far.slice(0, this.stretches.size - MAX_STRETCHES)) this.stretches.delete(number);
   }
 
   /** The city at this moment: `{cars, boxes, colours, silent}`; null while it is on its way. */
@@ -208,9 +208,9 @@ export class Player {
 
   /** The newest picture of a camera by this moment: `{t_s}`; null: there is none, or it is on its way. */
   pictureOf({ vehicle, camera }) {
-    const told = this.stretchAt(this.t_s)?.pictures ?? [];
+    const present = this.stretchAt(this.t_s)?.pictures ?? [];
     const isOf = (picture) => picture.vehicle === vehicle && picture.camera === camera;
-    return told.findLast((picture) => isOf(picture) && picture.t_s <= this.t_s + 0.05) ?? null;
+    return present.findLast((picture) => isOf(picture) && picture.t_s <= this.t_s + 0.05) ?? null;
   }
 
   /** Where each car came from: `{vehicle: [[x, y], ...]}` of the last seconds. */
@@ -248,8 +248,8 @@ function lastUpTo(frames, t_s) {
 }
 
 function boxesAt(stretch, before) {
-  const told = stretch.frames.findLast((frame) => frame.t_s <= before.t_s && frame.boxes);
-  return told?.boxes ?? before.boxes ?? [];
+  const present = stretch.frames.findLast((frame) => frame.t_s <= before.t_s && frame.boxes);
+  return present?.boxes ?? before.boxes ?? [];
 }
 
 const JUMP_M = 0.5;

@@ -16,7 +16,7 @@ export async function read(path) {
  */
 export function useReading(path, every_ms = 0) {
   const [state, setState] = useState({ body: null, error: "" });
-  const [asked, setAsked] = useState(0);
+  const [turn, setTurn] = useState(0);
   useEffect(() => {
     let over = false;
     let timer = null;
@@ -34,6 +34,6 @@ export function useReading(path, every_ms = 0) {
       over = true;
       clearTimeout(timer);
     };
-  }, [path, every_ms, asked]);
-  return { ...state, again: () => setAsked((count) => count + 1) };
+  }, [path, every_ms, turn]);
+  return { ...state, again: () => setTurn((count) => count + 1) };
 }

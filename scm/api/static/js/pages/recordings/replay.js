@@ -11,7 +11,7 @@ import { DeleteDialog, NotesDialog } from "scm/pages/recordings/notes_dialog.js"
 import { Player } from "scm/pages/recordings/player.js";
 import { read, useReading } from "scm/pages/recordings/reading.js";
 import { ReplayMap } from "scm/pages/recordings/replay_map.js";
-import { TakeHomeDialog } from "scm/pages/recordings/take_home_dialog.js";
+import { DownloadDialog } from "scm/pages/recordings/download_dialog.js";
 import { Timeline } from "scm/pages/recordings/timeline.js";
 import { minutes, moment, size } from "scm/pages/recordings/words.js";
 import { route } from "scm/shell/router.js";
@@ -22,7 +22,7 @@ const EVENTS = 500;
 const NOTHING = { disturbances: [], void: [] };
 
 /** The open dialog: `notes`, `delete`, `take`, `mismatch` or null. */
-const asking = signal(null);
+const openDialog = signal(null);
 
 export function Replay({ name }) {
   const [loaded, setLoaded] = useState({ error: "" });
@@ -30,7 +30,7 @@ export function Replay({ name }) {
   useEffect(() => {
     let player = null;
     let over = false;
-    asking.value = null;
+    openDialog.value = null;
     const at_s = Number.parseFloat(route.value.query.t);
     load(name).then(
       (found) => {
@@ -85,10 +85,10 @@ function Unreadable({ name, why }) {
       <p>${coded(why)}</p>
       <div class="tools">
         ${recording && html`<a href=${`/api/v1${address(name)}.mcap`} download>Download it</a>`}
-        ${recording && html`<button onClick=${() => (asking.value = "delete")}>Delete</button>`}
+        ${recording && html`<button onClick=${() => (openDialog.value = "delete")}>Delete</button>`}
         <a href="/recordings">All recordings</a>
       </div>
-      ${recording && asking.value === "delete" && html`<${DeleteDialog} recording=${recording} onClose=${() => (asking.value = null)} />`}
+      ${recording && openDialog.value === "delete" && html`<${DeleteDialog} recording=${recording} onClose=${() => (openDialog.value = null)} />`}
     </section>
   `;
 }
@@ -96,7 +96,7 @@ function Unreadable({ name, why }) {
 function Played({ player, summary, events, more, onChanged }) {
   const [chosen, setChosen] = useState(null);
   const { recording } = summary;
-  const close = () => (asking.value = null);
+  const close = () => (openDialog.value = null);
   const { disturbances, void: reasons } = useReading(`${address(recording.name)}/disturbances`).body ?? NOTHING;
   const { cars, eye_cameras: eye, car_cameras: own } = summary;
   return html`
@@ -105,24 +105,24 @@ function Played({ player, summary, events, more, onChanged }) {
       <section class="panel stage" aria-label="Replay">
         <${ReplayMap} player=${player} summary=${summary} chosen=${chosen} onChoose=${setChosen} />
         ${player.skipped.value && html`<p class="hint" role="status">${player.skipped.value.words}</p>`}
-        ${player.trouble.value && html`<p class="trouble" role="alert">${player.trouble.value}</p>`}
+        ${player.trouble.value && html`<p class="form-error" role="alert">${player.trouble.value}</p>`}
         <${Timeline} player=${player} events=${events} disturbances=${disturbances} begin_ns=${recording.begin_ns} />
-        ${reasons.length > 0 && html`<p class="trouble void">Measurements are void: ${reasons.join("; ")}.</p>`}
+        ${reasons.length > 0 && html`<p class="form-error void">Measurements are void: ${reasons.join("; ")}.</p>`}
       </section>
       <${Cars} player=${player} chosen=${chosen} onChoose=${setChosen} />
       ${eye.length + own.length > 0 && html`<${EyeThen} player=${player} eye=${eye} own=${own} chosen=${chosen} />`}
       <${Events} player=${player} events=${events} more=${more} />
-      ${asking.value === "take" && html`<${TakeHomeDialog} recording=${recording} cars=${cars} player=${player} onClose=${close} />`}
-      ${asking.value === "mismatch" &&
+      ${openDialog.value === "download" && html`<${DownloadDialog} recording=${recording} cars=${cars} player=${player} onClose=${close} />`}
+      ${openDialog.value === "mismatch" &&
       html`<${MismatchDialog} recording=${recording} cars=${cars} player=${player} chosen=${chosen} onClose=${close} />`}
-      ${asking.value === "notes" && html`<${NotesDialog} recording=${recording} onClose=${close} onChanged=${onChanged} />`}
-      ${asking.value === "delete" && html`<${DeleteDialog} recording=${recording} onClose=${close} />`}
+      ${openDialog.value === "notes" && html`<${NotesDialog} recording=${recording} onClose=${close} onChanged=${onChanged} />`}
+      ${openDialog.value === "delete" && html`<${DeleteDialog} recording=${recording} onClose=${close} />`}
     </div>
   `;
 }
 
 function Banner({ recording, map }) {
-  const ask = (what) => () => (asking.value = what);
+  const opens = (what) => () => (openDialog.value = what);
   const facts = [
     recording.begin_ns && moment(recording.begin_ns),
     map,
@@ -137,14 +137,14 @@ function Banner({ recording, map }) {
         <h2>${recording.title || recording.name}</h2>
         <p>${facts.join(" · ")}</p>
         <p class="hint">The bar above tells of the city now; all below is recorded.</p>
-        ${recording.trouble && html`<p>${recording.trouble}</p>`}
+        ${recording.form-error && html`<p>${recording.form-error}</p>`}
         ${recording.notes && html`<p>“${recording.notes}”</p>`}
       </div>
       <div class="tools">
-        <button onClick=${ask("take")}>Download</button>
-        <button onClick=${ask("mismatch")}>Mismatch job</button>
-        <button onClick=${ask("notes")}>Name and notes</button>
-        <button onClick=${ask("delete")}>Delete</button>
+        <button onClick=${opens("download")}>Download</button>
+        <button onClick=${opens("mismatch")}>Mismatch job</button>
+        <button onClick=${opens("notes")}>Name and notes</button>
+        <button onClick=${opens("delete")}>Delete</button>
         <a href="/recordings">All recordings</a>
       </div>
     </header>
@@ -181,7 +181,7 @@ function Cars({ player, chosen, onChoose }) {
 function absent(state, player) {
   if (!state) return "Reading this moment…";
   if (state.silent && player.t_s < player.first_s) {
-    return `The world had not begun yet: the first cars are told of at ${minutes(player.first_s, true)}.`;
+    return `The world had not started yet: the first cars appear at ${minutes(player.first_s, true)}.`;
   }
   return state.silent ? "The world was silent at this moment." : "No car was on the map.";
 }

@@ -12,7 +12,7 @@ import { BASE } from "scm/shared/base.js";
 
 const LOOK_MS = 1000;
 const LIVE = "--live --connect {connect}";
-const NEW = `"""Two cars lap the map, and their times are told."""
+const NEW = `"""Two cars lap the map; their times are printed."""
 
 import os
 
@@ -51,7 +51,7 @@ function List({ list, here }) {
         <h2>Scripts <small>${list.body?.items.length ?? ""}</small></h2>
         <button class="small" onClick=${() => setNaming(true)}>New</button>
       </div>
-      ${list.error && html`<p class="trouble" role="alert">${list.error}</p>`}
+      ${list.error && html`<p class="form-error" role="alert">${list.error}</p>`}
       <ul>
         ${list.body?.items.map(
           (row) => html`
@@ -64,19 +64,19 @@ function List({ list, here }) {
           `,
         )}
       </ul>
-      ${list.body && !list.body.items.length && html`<p class="empty">No script is kept here yet.</p>`}
-      ${naming && html`<${NameDialog} title="A new script" text=${NEW} onClose=${() => setNaming(false)} onKept=${list.again} />`}
+      ${list.body && !list.body.items.length && html`<p class="empty">No script is stored here yet.</p>`}
+      ${naming && html`<${NameDialog} title="A new script" text=${NEW} onClose=${() => setNaming(false)} onSaved=${list.again} />`}
     </section>
   `;
 }
 
-function NameDialog({ title, text, onClose, onKept }) {
+function NameDialog({ title, text, onClose, onSaved }) {
   const submit = async (event) => {
     event.preventDefault();
     const name = event.target.elements.script.value;
-    const done = () => `${name} is kept.`;
+    const done = () => `${name} is saved.`;
     if (await change("PUT", `/scenarios/${name}`, { text }, done, { "If-None-Match": "*" })) {
-      onKept();
+      onSaved();
       onClose();
       go(`/recordings/scenarios?script=${name}`);
     }
@@ -109,20 +109,20 @@ function Script({ name, again, seen }) {
   const [text, setText] = useState("");
   const [naming, setNaming] = useState(false);
   const [sure, setSure] = useState(false);
-  const take = ({ body, etag }) => {
+  const show = ({ body, etag }) => {
     setKnown({ ...body, etag });
     setText(body.text);
   };
   useEffect(() => {
-    if (name) read(`/scenarios/${name}`).then(take, (failed) => setError(failed.message));
+    if (name) read(`/scenarios/${name}`).then(show, (failed) => setError(failed.message));
   }, [name]);
-  if (error) return html`<section class="panel script"><p class="trouble" role="alert">${error}</p></section>`;
+  if (error) return html`<section class="panel script"><p class="form-error" role="alert">${error}</p></section>`;
   if (!known) return html`<section class="panel script"><p class="empty">${name ? "Reading the script…" : "Write a script: New."}</p></section>`;
   const edited = text !== known.text;
   const save = async () => {
     const done = () => `${name} is saved.`;
     if (!(await change("PUT", `/scenarios/${name}`, { text }, done, { "If-Match": known.etag }))) return;
-    take(await read(`/scenarios/${name}`));
+    show(await read(`/scenarios/${name}`));
     again();
   };
   const remove = async () => {
@@ -156,7 +156,7 @@ function Script({ name, again, seen }) {
           ${`${name}.py is deleted from the disk for everybody. There is no way back.`}
         <//>
       `}
-      ${naming && html`<${NameDialog} title="Save as" text=${text} onClose=${() => setNaming(false)} onKept=${again} />`}
+      ${naming && html`<${NameDialog} title="Save as" text=${text} onClose=${() => setNaming(false)} onSaved=${again} />`}
     </section>
   `;
 }
@@ -184,7 +184,7 @@ function Runs({ runs, chosen, error }) {
   return html`
     <section class="panel runs" aria-label="Runs">
       <div class="panel-head"><h2>Runs <small>${runs.length || ""}</small></h2></div>
-      ${error && html`<p class="trouble" role="alert">${error}</p>`}
+      ${error && html`<p class="form-error" role="alert">${error}</p>`}
       ${!runs.length && html`<p class="empty">Nothing was run since the server began. What a script prints is shown here.</p>`}
       <ul>
         ${runs.slice(0, 8).map(
@@ -198,7 +198,7 @@ function Runs({ runs, chosen, error }) {
                 <small>${clock(row.asked_ns)}</small>
               </a>
               ${["waiting", "running"].includes(row.state) &&
-              html`<button class="small" onClick=${() => change("DELETE", `/operations/${row.id}`, undefined, () => `${row.what} is told to stop.`)}>Stop</button>`}
+              html`<button class="small" onClick=${() => change("DELETE", `/operations/${row.id}`, undefined, () => `${row.what} is being stopped.`)}>Stop</button>`}
             </li>
           `,
         )}
@@ -240,8 +240,8 @@ function Log({ run }) {
     if (box.current) box.current.scrollTop = box.current.scrollHeight;
   }, [lines]);
   return html`
-    ${run.error && html`<p class="trouble">${run.error}</p>`}
-    ${error && html`<p class="trouble">${error}</p>`}
+    ${run.error && html`<p class="form-error">${run.error}</p>`}
+    ${error && html`<p class="form-error">${error}</p>`}
     <pre ref=${box} tabindex="0" role="log" aria-label="What ${run.what} prints">${lines.join("\n") || "It has said nothing yet."}</pre>
   `;
 }

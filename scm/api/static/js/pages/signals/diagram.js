@@ -45,10 +45,10 @@ export function Diagram() {
   const canvas = useRef(null);
   useEffect(() => {
     const draw = () => {
-      const told = row();
+      const current = row();
       const shown = view();
-      if (!canvas.current || !told || !shown) return;
-      paint(canvas.current, shown, { told, site: site.value, status: status(), bars: bars.of });
+      if (!canvas.current || !current || !shown) return;
+      paint(canvas.current, shown, { current, site: site.value, status: status(), bars: bars.of });
     };
     const stop = effect(() => {
       now.value, barsRead.value, colours.value, span.value, back.value, site.value;
@@ -102,7 +102,7 @@ export function Diagram() {
         <li><i data-sign="red"></i>red</li>
         <li><i data-sign="flash"></i>flashing red</li>
         <li><i data-sign="coming"></i>to come</li>
-        <li><i data-sign="promise"></i>SPaT: earliest to latest end</li>
+        <li><i data-sign="guaranteed"></i>SPaT: earliest to latest end</li>
         <li><i data-sign="likely"></i>likely end</li>
         <li><i data-sign="barrier"></i>barrier</li>
       </ul>
@@ -111,22 +111,22 @@ export function Diagram() {
 }
 
 function inWords() {
-  const told = row();
-  const shows = (told?.groups ?? []).map((one) => `${plain(one.group)} ${WORDS[one.colour] ?? "unknown"}`);
+  const current = row();
+  const shows = (current?.groups ?? []).map((one) => `${plain(one.group)} ${WORDS[one.colour] ?? "unknown"}`);
   return `Timing diagram: ${shows.join(", ")}; arrow keys move it, plus and minus zoom`;
 }
 
 /** Rings and barriers as they are drawn, for who does not see them. */
 function ringsInWords() {
   now.value, barsRead.value;
-  const [shown, told] = [view(), row()];
-  if (!site.value || !shown || !told) return "";
+  const [shown, current] = [view(), row()];
+  if (!site.value || !shown || !current) return "";
   const { rings, sections } = ringsOf(site.value);
   const sequences = rings.map(({ name }, at) => {
     const parts = sections.map((section) => (section[at] ?? []).map(plain).join(", ") || "nobody");
     return `${name}: ${parts.join(", barrier, ")}.`;
   });
-  const crossed = barriersOf(site.value, bars.of, comingOf(status(), told, shown), shown).map((t) => {
+  const crossed = barriersOf(site.value, bars.of, comingOf(status(), current, shown), shown).map((t) => {
     const whole = Math.round(Math.abs(t - shown.now));
     return t > shown.now ? `in ${whole} s` : `${whole} s ago`;
   });
@@ -135,11 +135,11 @@ function ringsInWords() {
 
 function under(event, canvas) {
   const shown = view();
-  const told = row();
-  if (!shown || !told) return "";
+  const current = row();
+  if (!shown || !current) return "";
   const box = canvas.getBoundingClientRect();
   const found = barAt(event.clientX - box.left, event.clientY - box.top, box, shown, {
-    told,
+    current,
     site: site.value,
     bars: bars.of,
   });

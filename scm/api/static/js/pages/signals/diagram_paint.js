@@ -29,20 +29,20 @@ export function ringsOf(site) {
   return { rings, sections };
 }
 
-const rowsOf = (site, told) => ringsOf(site).rings.length + (told?.groups.length ?? 2);
+const rowsOf = (site, current) => ringsOf(site).rings.length + (current?.groups.length ?? 2);
 
 /** The least height that the diagram needs; with more, its rows are higher. */
-export function heightOf(site, told) {
-  return AXIS + SPLIT + BELOW + LEAST_ROW * rowsOf(site, told);
+export function heightOf(site, current) {
+  return AXIS + SPLIT + BELOW + LEAST_ROW * rowsOf(site, current);
 }
 
-function rowOf(height, site, told) {
-  const room = (height - AXIS - SPLIT - BELOW) / rowsOf(site, told);
+function rowOf(height, site, current) {
+  const room = (height - AXIS - SPLIT - BELOW) / rowsOf(site, current);
   return Math.floor(Math.min(MOST_ROW, Math.max(LEAST_ROW, room)));
 }
 
 /** @param {{now: number, from: number, until: number}} view in seconds of the controller's clock. */
-export function paint(canvas, view, { told, site, status, bars }) {
+export function paint(canvas, view, { current, site, status, bars }) {
   const ratio = window.devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   if (!width || !height) return;
@@ -56,11 +56,11 @@ export function paint(canvas, view, { told, site, status, bars }) {
   const origin = left(width);
   const scale = (width - origin - 4) / (view.until - view.from);
   const x = (t) => origin + (t - view.from) * scale;
-  const row = rowOf(height, site, told);
+  const row = rowOf(height, site, current);
   const sheet = { paper, width, height, origin, x, view, row, bar: Math.round((2 / 3) * row), ink: inkOf(canvas) };
   const { rings } = ringsOf(site);
   const times = new Map((site?.phases ?? []).map((phase) => [phase.group, phase]));
-  const coming = comingOf(status, told, view);
+  const coming = comingOf(status, current, view);
   drawAxis(sheet);
   paper.save();
   paper.beginPath();
@@ -68,14 +68,14 @@ export function paint(canvas, view, { told, site, status, bars }) {
   paper.clip();
   rings.forEach((ring, at) => drawRing(sheet, ring, AXIS + row * at, { bars, times, coming }));
   const below = AXIS + row * rings.length + SPLIT;
-  told.groups.forEach((group, at) => {
-    drawPhase(sheet, group, below + row * at, { bars, times, coming, told });
+  current.groups.forEach((group, at) => {
+    drawPhase(sheet, group, below + row * at, { bars, times, coming, current });
   });
   drawBarriers(sheet, barriersOf(site, bars, coming, view), AXIS + row * rings.length);
   drawNow(sheet);
   paper.restore();
   rings.forEach((ring, at) => drawName(sheet, ring.name, AXIS + row * at, true));
-  told.groups.forEach((group, at) => drawName(sheet, plain(group.group), below + row * at, false));
+  current.groups.forEach((group, at) => drawName(sheet, plain(group.group), below + row * at, false));
 }
 
 function inkOf(canvas) {
@@ -101,9 +101,9 @@ function inkOf(canvas) {
  * Greens from now on, of each group: `{group, start, end}` in seconds; end null: nobody knows. A group of turns
  * that follow each other stays green between them.
  */
-export function comingOf(status, told, view) {
-  if (!told.fresh || told.mode === "flash") return [];
-  const lit = told.groups.filter(({ colour }) => colour === "green");
+export function comingOf(status, current, view) {
+  if (!current.fresh || current.mode === "flash") return [];
+  const lit = current.groups.filter(({ colour }) => colour === "green");
   let before = new Map(lit.map(({ group }) => [group, { group, start: view.now }]));
   const greens = new Set();
   for (const turn of status?.turns ?? []) {
@@ -270,24 +270,24 @@ function drawRing(sheet, ring, top, { bars, times, coming }) {
   }
 }
 
-function drawPhase(sheet, group, top, { bars, times, coming, told }) {
+function drawPhase(sheet, group, top, { bars, times, coming, current }) {
   const { view } = sheet;
   for (const bar of bars.get(group.group) ?? []) {
     const end = bar.end ?? view.now;
     if (end < view.from || bar.start > view.until) continue;
     drawBar(sheet, bar.colour, bar.start, end, top, LETTERS[bar.colour]);
   }
-  if (!told.fresh) return;
+  if (!current.fresh) return;
   for (const green of coming) {
     if (green.group === group.group) drawComing(sheet, green, top, times.get(group.group), "");
   }
-  drawPromise(sheet, group, top, told);
+  drawGuaranteedTime(sheet, group, top, current);
 }
 
 /** What SPaT promises of the present colour: from the earliest to the latest end, and the likely one. */
-function drawPromise({ paper, x, view, ink }, group, top, told) {
-  if (group.min_s === null || told.t_ns === null) return;
-  const base = told.t_ns / 1e9;
+function drawGuaranteedTime({ paper, x, view, ink }, group, top, current) {
+  if (group.min_s === null || current.t_ns === null) return;
+  const base = current.t_ns / 1e9;
   const from = x(base + group.min_s);
   const to = group.max_s === null ? x(view.until) : x(base + group.max_s);
   const y = top + 3.5;
@@ -358,15 +358,15 @@ function drawBarriers({ paper, x, view, ink }, times, bottom) {
 }
 
 /** @returns the bar under a point of the canvas, with its group; null: there is none. */
-export function barAt(px, py, { width, height }, view, { told, site, bars }) {
+export function barAt(px, py, { width, height }, view, { current, site, bars }) {
   const origin = left(width);
-  const row = rowOf(height, site, told);
+  const row = rowOf(height, site, current);
   if (px < origin) return null;
   const t = view.from + ((px - origin) / (width - origin - 4)) * (view.until - view.from);
   const { rings } = ringsOf(site);
   const below = AXIS + row * rings.length + SPLIT;
   const ring = rings[Math.floor((py - AXIS) / row)];
-  const phase = told.groups[Math.floor((py - below) / row)];
+  const phase = current.groups[Math.floor((py - below) / row)];
   const groups = py < below - SPLIT ? (ring?.phases ?? []) : phase ? [phase.group] : [];
   const wanted = py < below - SPLIT ? ["green", "yellow", "flashing_red"] : null;
   for (const group of groups) {

@@ -2,8 +2,8 @@
 import { html } from "scm/shared/html.js";
 import { city, link, now, signalsAt } from "scm/shell/store.js";
 import { status } from "scm/pages/signals/store.js";
-import { plain, promised, WORDS } from "scm/pages/signals/words.js";
-import { wishFor } from "scm/pages/signals/wishes.js";
+import { plain, guaranteed, WORDS } from "scm/pages/signals/words.js";
+import { requestFor } from "scm/pages/signals/overrides.js";
 
 const LAMPS = [
   ["red", "R"],
@@ -11,16 +11,16 @@ const LAMPS = [
   ["green", "G"],
 ];
 
-export function Heads({ told }) {
+export function Heads({ current }) {
   const detectors = new Map((status()?.detectors ?? []).map((one) => [one.group, one]));
   return html`
-    <section class="heads" data-many=${told.groups.length > 4} aria-label="Signal groups">
-      ${told.groups.map(
+    <section class="heads" data-many=${current.groups.length > 4} aria-label="Signal groups">
+      ${current.groups.map(
         (group) => html`
           <${Head}
             key=${group.group}
             group=${group}
-            junction=${told.junction}
+            junction=${current.junction}
             detector=${detectors.get(group.group)}
           />
         `,
@@ -30,20 +30,20 @@ export function Heads({ told }) {
 }
 
 function Head({ group, junction, detector }) {
-  const heard = link.value === "live" || link.value === "connecting" ? group.colour : null;
+  const shownColour = link.value === "live" || link.value === "connecting" ? group.colour : null;
   const passed_s = (now.value - signalsAt.value) / 1000;
   const lights = (city.value?.lights ?? []).filter(
     (light) => light.junction === junction && light.group === group.group,
   );
   const name = plain(group.group);
   return html`
-    <article class="panel head" data-group=${group.group} data-colour=${heard ?? "unknown"}>
-      <${Lamp} colour=${heard} name=${name} />
-      <div class="told">
+    <article class="panel head" data-group=${group.group} data-colour=${shownColour ?? "unknown"}>
+      <${Lamp} colour=${shownColour} name=${name} />
+      <div class="published">
         <h3>${name} <small>${lights.map((light) => light.light_id).join(" ")}</small></h3>
-        <p class="left"><b>${heard ? promised(group, passed_s) : "—"}</b>
-          <small>${heard ? next(group) : ""}</small></p>
-        <p class="likely">${heard ? likely(group, passed_s) : "not heard"}</p>
+        <p class="left"><b>${shownColour ? guaranteed(group, passed_s) : "—"}</b>
+          <small>${shownColour ? next(group) : ""}</small></p>
+        <p class="likely">${shownColour ? likely(group, passed_s) : "no report"}</p>
         <p class="seen">${detected(detector)}</p>
       </div>
       <div class="quick">
@@ -53,7 +53,7 @@ function Head({ group, junction, detector }) {
               key=${verb}
               class="small"
               aria-label="${verb.replace("_", " ")} ${name}"
-              onClick=${() => wishFor(verb, group.group)}
+              onClick=${() => requestFor(verb, group.group)}
             >
               ${{ call: "Call", hold: "Hold", force_off: "Force off" }[verb]}
             </button>
@@ -87,10 +87,10 @@ function next({ colour, next_colour }) {
 }
 
 function likely(group, passed_s) {
-  if (group.colour === "flashing_red") return "no promise while it flashes";
+  if (group.colour === "flashing_red") return "no guaranteed time while it flashes";
   if (group.likely_s === null) return "no forecast";
   const left = Math.max(0, group.likely_s - Math.max(0, passed_s)).toFixed(1);
-  if (group.likely_confidence >= 1) return "promised exactly";
+  if (group.likely_confidence >= 1) return "guaranteed exactly";
   return `likely ${left} s · ${Math.round(100 * group.likely_confidence)} % sure`;
 }
 

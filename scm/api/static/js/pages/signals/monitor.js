@@ -1,4 +1,4 @@
-/** What the second channel thinks of the lights, what it said before, and its reset with a reason. */
+/** What the monitor sees of the signals, what it reported before, and its reset with a reason. */
 import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { change } from "scm/shell/api.js";
@@ -10,8 +10,8 @@ import { verdicts } from "scm/pages/signals/store.js";
 const SILENT_S = 2;
 const open = signal(null);
 
-export function Monitor({ told }) {
-  const monitor = told.monitor;
+export function Monitor({ current }) {
+  const monitor = current.monitor;
   const state = !monitor
     ? "unknown"
     : monitor.fault
@@ -20,7 +20,7 @@ export function Monitor({ told }) {
         ? "stale"
         : "ok";
   const words = {
-    unknown: "Monitor not heard",
+    unknown: "No report from the monitor",
     stale: `Monitor silent for ${Math.round(monitor?.age_s ?? 0)} s`,
     ok: "Monitor sees no fault",
     fault: `Fault: ${(monitor?.fault ?? "").replaceAll("_", " ")}`,
@@ -29,25 +29,25 @@ export function Monitor({ told }) {
     <div class="monitor" data-state=${state} role="status">
       <i></i>
       <span><b>${words[state]}</b>${monitor?.detail ? html` <small>${prose(monitor.detail)}</small>` : ""}</span>
-      <button class="small" onClick=${() => (open.value = "said")}>History</button>
+      <button class="small" onClick=${() => (open.value = "history")}>History</button>
       ${state === "fault" &&
       html`<button class="small danger" onClick=${() => (open.value = "reset")}>Reset…</button>`}
     </div>
-    ${open.value === "reset" && html`<${Reset} junction=${told.junction} />`}
-    ${open.value === "said" && html`<${Said} />`}
+    ${open.value === "reset" && html`<${Reset} junction=${current.junction} />`}
+    ${open.value === "history" && html`<${History} />`}
   `;
 }
 
 const close = () => (open.value = null);
 
-function Said() {
+function History() {
   return html`
     <${Dialog} title="What the monitor said" onClose=${close}>
       <p>
         Another process watches every colour with a card of its own. A fault makes the junction flash
         red until a person resets it; an overload of this computer ends by itself.
       </p>
-      <ul class="said">
+      <ul class="history">
         ${verdicts.value.map(
           (one) => html`
             <li key=${one.t_ns}>

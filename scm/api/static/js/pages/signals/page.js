@@ -9,10 +9,10 @@ import { Heads } from "scm/pages/signals/heads.js";
 import { Monitor } from "scm/pages/signals/monitor.js";
 import { editing, PlanEditor } from "scm/pages/signals/plan_editor.js";
 import { Plans } from "scm/pages/signals/plans.js";
-import { Promises } from "scm/pages/signals/promises.js";
+import { GuaranteedTimes } from "scm/pages/signals/guaranteed_times.js";
 import { keep, look, row, status, trouble } from "scm/pages/signals/store.js";
 import { plain, toCome } from "scm/pages/signals/words.js";
-import { Wishes } from "scm/pages/signals/wishes.js";
+import { Overrides } from "scm/pages/signals/overrides.js";
 
 export function Page() {
   useTopics("signals", "signal_status", "events");
@@ -25,24 +25,24 @@ export function Page() {
   }, [wanted, known]);
   if (!names.length) return html`<${Empty} />`;
   if (!known) return html`<${Unknown} wanted=${wanted} first=${names[0]} />`;
-  const told = row();
-  if (!told) return null;
+  const current = row();
+  if (!current) return null;
   return html`
-    <${Bar} told=${told} names=${names} />
-    <${Heads} told=${told} />
+    <${Bar} current=${current} names=${names} />
+    <${Heads} current=${current} />
     <${Diagram} />
-    ${editing.value?.junction === told.junction
+    ${editing.value?.junction === current.junction
       ? html`<${PlanEditor} />`
-      : html`<${Plans} told=${told} /><${Wishes} told=${told} /><${Promises} />`}
+      : html`<${Plans} current=${current} /><${Overrides} current=${current} /><${GuaranteedTimes} />`}
   `;
 }
 
 function Empty() {
-  const said = city.value && !city.value.lights?.length;
+  const hasNone = city.value && !city.value.lights?.length;
   return html`
     <section class="panel" aria-label="Signals">
       <h2>Signals</h2>
-      <p class="empty">${said ? "This city has no signals." : "Waiting for the signals…"}</p>
+      <p class="empty">${hasNone ? "This city has no signals." : "Waiting for the signals…"}</p>
     </section>
   `;
 }
@@ -71,37 +71,37 @@ function modeOf({ mode, monitor }) {
 }
 
 /** Which junction, what runs, and what the monitor says: the line that is read first. */
-function Bar({ told, names }) {
+function Bar({ current, names }) {
   const now = status();
-  const runs = !told.fresh
-    ? "not heard"
-    : told.mode === "flash"
+  const runs = !current.fresh
+    ? "no report"
+    : current.mode === "flash"
       ? "flashing red"
-      : told.mode === "plan" || now?.policy === "fixed"
-        ? `plan ${told.plan}`
-        : `policy ${plain(now?.policy ?? told.plan)}`;
+      : current.mode === "plan" || now?.policy === "fixed"
+        ? `plan ${current.plan}`
+        : `policy ${plain(now?.policy ?? current.plan)}`;
   const choose = (event) => go(`/signals/${event.target.value}`);
   return html`
-    <section class="panel bar" aria-label="Junction ${told.junction}">
+    <section class="panel bar" aria-label="Junction ${current.junction}">
       ${names.length > 1
         ? html`
             <label>
               <span class="hidden">Junction</span>
-              <select id="junction" value=${told.junction} onChange=${choose}>
+              <select id="junction" value=${current.junction} onChange=${choose}>
                 ${names.map((name) => html`<option key=${name} value=${name}>${plain(name)}</option>`)}
               </select>
             </label>
           `
-        : html`<h2>${plain(told.junction)}</h2>`}
-      <span class="runs moves" data-mode=${told.fresh ? told.mode : "unheard"}>
+        : html`<h2>${plain(current.junction)}</h2>`}
+      <span class="runs moves" data-mode=${current.fresh ? current.mode : "silent"}>
         <b>${runs}</b>
-        <small>${told.fresh ? modeOf(told) : "its controller is silent"}</small>
+        <small>${current.fresh ? modeOf(current) : "its controller is silent"}</small>
       </span>
       ${now?.pending &&
-      html`<span class="pending" role="status">${toCome(now.pending, told.mode)}</span>`}
+      html`<span class="pending" role="status">${toCome(now.pending, current.mode)}</span>`}
       ${now?.failure && html`<span class="failure" role="alert">${now.failure}</span>`}
       ${trouble.value && html`<span class="failure" role="status">${prose(trouble.value)}</span>`}
-      <${Monitor} told=${told} />
+      <${Monitor} current=${current} />
     </section>
   `;
 }

@@ -29,7 +29,7 @@ const contentOf = (draft) => JSON.stringify(draft.stages);
 /** Open the editor: on a saved plan, on a copy of a shipped one, or on a first cycle of all groups. */
 export async function edit(plan) {
   search.value = null;
-  const own = { junction: junction.value, rival: null };
+  const own = { junction: junction.value, existing: null };
   const copy = (stages) => stages.map((stage) => ({ ...stage, groups: [...stage.groups] }));
   if (plan?.source === "saved") {
     const found = await read(`/signals/${junction.value}/plans/${plan.plan}`).catch((error) => {
@@ -97,8 +97,8 @@ function remarksOf({ stages }) {
 function nameFault(draft) {
   if (!NAME.test(draft.plan)) return "Name: small letters, digits, - and _, beginning with a letter.";
   if (!draft.isNew) return "";
-  const taken = [...plans.value.map((one) => one.plan), ...(site.value?.policies ?? []).map((one) => one.policy), "flash"];
-  return taken.includes(draft.plan) ? `There is something named ${draft.plan} already.` : "";
+  const names = [...plans.value.map((one) => one.plan), ...(site.value?.policies ?? []).map((one) => one.policy), "flash"];
+  return names.includes(draft.plan) ? `There is something named ${draft.plan} already.` : "";
 }
 
 export function PlanEditor() {
@@ -222,11 +222,11 @@ export function PlanEditor() {
             ${isProven ? "Proven" : "Prove"}
           </button>
           <button class="primary" disabled=${!isProven || Boolean(unnamed)} title=${unnamed} onClick=${() => save(draft)}>
-            ${draft.rival ? "Save over it" : "Save"}
+            ${draft.existing ? "Save over it" : "Save"}
           </button>
         </div>
       </div>
-      ${draft.rival && html`<p class="fault" role="alert">${rivalWords(draft.rival)}</p>`}
+      ${draft.existing && html`<p class="fault" role="alert">${existingText(draft.existing)}</p>`}
       ${draft.plan && unnamed && html`<p class="fault" role="status">${unnamed}</p>`}
     </section>
   `;
@@ -311,7 +311,7 @@ function Verdict({ faults, found }) {
 function proofWords(proof) {
   const many = (n) => n.toLocaleString("en").replaceAll(",", " ");
   return (
-    `Proven: ${many(proof.states)} states and ${many(proof.transitions)} steps of the kernel under any wishes, ` +
+    `Proven: ${many(proof.states)} states and ${many(proof.transitions)} steps of the kernel under any requests, ` +
     `${many(proof.plan_states)} states and ${many(proof.plan_transitions)} steps of this plan; cycle ${secs(proof.cycle_s)}.`
   );
 }
@@ -319,22 +319,22 @@ function proofWords(proof) {
 /** Let the server search; what is typed meanwhile makes its answer one of something else. */
 async function prove(draft) {
   const [of, mine] = [contentOf(draft), (tried += 1)];
-  const tell = (state, words) => mine === tried && (search.value = { of, state, words });
-  tell("running", "The search walks through every state of kernel and plan…");
+  const notifyState = (state, words) => mine === tried && (search.value = { of, state, words });
+  notifyState("running", "The search walks through every state of kernel and plan…");
   const plan = NAME.test(draft.plan) ? draft.plan : "draft";
   const begun = await change("POST", `/signals/${junction.value}/proofs`, { plan, stages: draft.stages });
-  if (!begun) return tell("failed", "The search did not begin.");
+  if (!begun) return notifyState("failed", "The search did not begin.");
   try {
     const row = await finished(begun);
-    if (row.state !== "done") return tell("failed", `Not proven: ${row.error || row.state}`);
+    if (row.state !== "done") return notifyState("failed", `Not proven: ${row.error || row.state}`);
     const { body } = await read(row.result.replace("/api/v1", ""));
-    return tell("proven", proofWords(body));
+    return notifyState("proven", proofWords(body));
   } catch (error) {
-    return tell("failed", error.message);
+    return notifyState("failed", error.message);
   }
 }
 
-function rivalWords({ plan, by, about, saved_ns }) {
+function existingText({ plan, by, about, saved_ns }) {
   const what = about ? ` (${about})` : "";
   return `${by || "Somebody"} saved ${plan}${what} at ${clock(saved_ns)}, after you began. Close to see that one, or save yours over it.`;
 }
@@ -356,9 +356,9 @@ async function catchUp(draft, path) {
   if (editing.value?.junction !== draft.junction || editing.value.plan !== draft.plan) return;
   const isGone = found.status === 404;
   if (found.body && found.tag !== draft.tag) {
-    editing.value = { ...editing.value, isNew: false, tag: found.tag, rival: found.body };
+    editing.value = { ...editing.value, isNew: false, tag: found.tag, existing: found.body };
   } else if (isGone && !draft.isNew) {
-    editing.value = { ...editing.value, isNew: true, tag: null, rival: null };
+    editing.value = { ...editing.value, isNew: true, tag: null, existing: null };
   } else if (found.body || isGone) {
     search.value = null;
   }

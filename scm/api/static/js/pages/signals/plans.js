@@ -9,10 +9,10 @@ import { plans, read, readPlans, row, site, status } from "scm/pages/signals/sto
 import { plain, secs, toCome } from "scm/pages/signals/words.js";
 
 /** `{plan}` or `{policy}` that is asked about. */
-const asking = signal(null);
+const confirming = signal(null);
 const deleting = signal(null);
 
-export function Plans({ told }) {
+export function Plans({ current }) {
   const now = status();
   const policies = (site.value?.policies ?? []).filter(
     (one) => !["fixed", "flashing"].includes(one.policy), // the plans, and the button for flash
@@ -24,12 +24,12 @@ export function Plans({ told }) {
         <button class="small" disabled=${!site.value} onClick=${() => edit(null)}>New plan…</button>
       </div>
       <ul class="choices">
-        ${plans.value.map((plan) => html`<${Plan} key=${plan.plan} plan=${plan} now=${now} told=${told} />`)}
+        ${plans.value.map((plan) => html`<${Plan} key=${plan.plan} plan=${plan} now=${now} current=${current} />`)}
         ${policies.map((one) => html`<${Policy} key=${one.policy} of=${one} now=${now} />`)}
         ${!plans.value.length && html`<li class="empty">Reading what the controller offers…</li>`}
       </ul>
-      ${asking.value && html`<${Run} junction=${told.junction} wanted=${asking.value} />`}
-      ${deleting.value && html`<${Delete} junction=${told.junction} plan=${deleting.value} />`}
+      ${confirming.value && html`<${Run} junction=${current.junction} wanted=${confirming.value} />`}
+      ${deleting.value && html`<${Delete} junction=${current.junction} plan=${deleting.value} />`}
     </section>
   `;
 }
@@ -38,12 +38,12 @@ export function Plans({ told }) {
 export function isEdited(plan, now) {
   if (!now?.stages.length) return false;
   const whole = (s) => Math.ceil(10 * s - 1e-9); // in steps of the signals, as the controller counts
-  const said = (stages) => JSON.stringify(stages.map((s) => [s.groups.toSorted(), whole(s.green_s), whole(s.extra_red_s)]));
-  return said(plan.stages) !== said(now.stages) || plan.offset_s !== now.offset_s;
+  const textOf = (stages) => JSON.stringify(stages.map((s) => [s.groups.toSorted(), whole(s.green_s), whole(s.extra_red_s)]));
+  return textOf(plan.stages) !== textOf(now.stages) || plan.offset_s !== now.offset_s;
 }
 
-function Plan({ plan, now, told }) {
-  const runs = told.fresh && told.mode !== "flash" && now?.policy === "fixed" && now.plan === plan.plan;
+function Plan({ plan, now, current }) {
+  const runs = current.fresh && current.mode !== "flash" && now?.policy === "fixed" && now.plan === plan.plan;
   const next = now?.pending === plan.plan;
   const edited = runs && !next && isEdited(plan, now);
   return html`
@@ -67,7 +67,7 @@ function Plan({ plan, now, told }) {
           class="small"
           disabled=${(runs && !next && !edited) || !plan.usable}
           aria-label="Run plan ${plan.plan}"
-          onClick=${() => (asking.value = { plan: plan.plan })}
+          onClick=${() => (confirming.value = { plan: plan.plan })}
         >
           Run…
         </button>
@@ -97,7 +97,7 @@ function Policy({ of: one, now }) {
           class="small"
           disabled=${runs}
           aria-label="Run policy ${plain(one.policy)}"
-          onClick=${() => (asking.value = { policy: one.policy })}
+          onClick=${() => (confirming.value = { policy: one.policy })}
         >
           Run…
         </button>
@@ -107,7 +107,7 @@ function Policy({ of: one, now }) {
 }
 
 function Run({ junction, wanted }) {
-  const close = () => (asking.value = null);
+  const close = () => (confirming.value = null);
   const name = wanted.plan ?? wanted.policy;
   const submit = (event) => {
     event.preventDefault();
@@ -122,7 +122,7 @@ function Run({ junction, wanted }) {
   return html`
     <${Dialog} title="Run ${plain(name)} at ${plain(junction)}?" onClose=${close}>
       <p>
-        It runs until further notice, from the next moment at which every promise already told is kept:
+        It runs until further notice, from the next moment at which every published guarantee is kept:
         within two cycles.
       </p>
       <form onSubmit=${submit}>
@@ -152,7 +152,7 @@ function Delete({ junction, plan }) {
   };
   return html`
     <${Dialog} title="Delete plan ${plan.plan}?" onClose=${close}>
-      <p>It goes from the list. Where it runs, it goes on until another one is asked for.</p>
+      <p>It disappears from the list. Where it runs, it continues until another one is requested.</p>
       <div class="actions">
         <button onClick=${close}>Cancel</button>
         <button class="danger" onClick=${remove}>Delete it</button>

@@ -17,7 +17,7 @@ export const verdicts = signal([]);
 export const trouble = signal("");
 
 const AGAIN_EVERY_MS = 5000;
-const KEPT_S = 600;
+const HISTORY_S = 600;
 
 /** Group to its bars `{colour, start, end}`, oldest first, in seconds of the controller's clock. */
 export const bars = { of: new Map(), t: null, junction: null };
@@ -32,10 +32,10 @@ export const status = () =>
 
 /** The controller's clock now [s]; null: it is not heard. */
 export function clockNow() {
-  const told = row();
-  if (!told?.fresh || told.t_ns === null) return null;
+  const current = row();
+  if (!current?.fresh || current.t_ns === null) return null;
   const passed_s = Math.min(1, Math.max(0, (performance.now() - signalsAt.value) / 1000));
-  return told.t_ns / 1e9 + passed_s;
+  return current.t_ns / 1e9 + passed_s;
 }
 
 export async function read(path) {
@@ -73,13 +73,13 @@ async function readSite(name) {
   }
 }
 
-export async function readPlans(isAsked = true) {
+export async function readPlans(isRequested = true) {
   const name = junction.value;
   try {
     const { body } = await read(`/signals/${name}/plans?limit=200`);
     if (junction.value === name) plans.value = body.items;
   } catch (error) {
-    if (isAsked) notify("error", error.message);
+    if (isRequested) notify("error", error.message);
   }
 }
 
@@ -107,36 +107,36 @@ async function readBars(name) {
 
 async function readScore(name) {
   try {
-    const [told, said] = await Promise.all([
+    const [current, faults] = await Promise.all([
       read(`/signals/${name}/promises`),
       read(`/signals/${name}/monitor`),
     ]);
     if (junction.value !== name) return;
-    score.value = told.body;
-    verdicts.value = said.body.items;
+    score.value = current.body;
+    verdicts.value = faults.body.items;
   } catch {
     // Said by the banner when the server is gone; tried again soon.
   }
 }
 
 /** Lengthen the bars by what the stream tells. */
-function extend(told) {
-  if (!told.fresh || told.t_ns === null || bars.junction !== told.junction) return;
-  const t = told.t_ns / 1e9;
+function extend(current) {
+  if (!current.fresh || current.t_ns === null || bars.junction !== current.junction) return;
+  const t = current.t_ns / 1e9;
   if (bars.t !== null && (t < bars.t - 1 || t > bars.t + 2)) {
     bars.t = t;
-    readBars(told.junction); // another controller, or a piece that was missed
+    readBars(current.junction); // another controller, or a piece that was missed
     return;
   }
   bars.t = t;
-  for (const { group, colour, since_ns } of told.groups) {
+  for (const { group, colour, since_ns } of current.groups) {
     if (!bars.of.has(group)) bars.of.set(group, []);
     const list = bars.of.get(group);
     const last = list.at(-1);
     const since = since_ns === null ? t : since_ns / 1e9;
     if (last && last.end === null && last.colour !== colour) last.end = since;
     if (!last || last.end !== null) list.push({ colour, start: since, end: null });
-    while (list.length && list[0].end !== null && list[0].end < t - KEPT_S) list.shift();
+    while (list.length && list[0].end !== null && list[0].end < t - HISTORY_S) list.shift();
   }
 }
 
@@ -144,8 +144,8 @@ function extend(told) {
 export function keep() {
   let wasLost = false;
   const live = effect(() => {
-    const told = row();
-    if (told) extend(told);
+    const current = row();
+    if (current) extend(current);
   });
   const back = effect(() => {
     const lost = link.value === "lost";

@@ -24,7 +24,7 @@ export const VERBS = {
 const NARROW_S = 0.5;
 
 /** A promise is shown as given: as one time, as a range, or as "not before". */
-export function promised({ min_s, max_s }, passed_s) {
+export function guaranteed({ min_s, max_s }, passed_s) {
   if (min_s === null) return UNKNOWN;
   const left = (seconds) => Math.max(0, seconds - Math.max(0, passed_s)).toFixed(1);
   if (max_s === null) return `≥ ${left(min_s)} s`;

@@ -6,7 +6,7 @@ import { age, fixed, span, UNKNOWN } from "scm/shared/format.js";
 import { since_ms } from "scm/shell/store.js";
 import { Battery } from "scm/pages/vehicle/battery.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
-import { doubtOf, misbehaviour, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
+import { misbehaviourOf, misbehaviour, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
 import { placed } from "scm/shared/base.js";
 
 const LINK_MS = 1000;
@@ -36,7 +36,7 @@ export function FactsPanel({ car }) {
         <dt>Last report</dt><dd class=${age_ms > STALE_MS ? "warn" : ""}>${age(age_ms)} <small>ago</small></dd>
         <dt>Round trip</dt><dd data-fact="link" title=${link?.title ?? ""}>${link?.text ?? UNKNOWN}</dd>
         <dt>Eye sees it off by</dt><dd>${eyeOf(car.eye)}</dd>
-        <dt>Misbehaviour</dt><dd class=${doubtOf(car.vehicle).suspected ? "bad" : ""}>${doubtText(car.vehicle)}</dd>
+        <dt>Misbehaviour</dt><dd class=${misbehaviourOf(car.vehicle).suspected ? "bad" : ""}>${misbehaviourText(car.vehicle)}</dd>
       </dl>
     </section>
   `;
@@ -47,7 +47,7 @@ function useLink(vehicle) {
   const [link, setLink] = useState(null);
   useEffect(() => {
     let ended = false;
-    const ask = async () => {
+    const poll = async () => {
       if (document.hidden) return;
       const reply = await fetch(placed(`/api/v1/vehicles/${vehicle}/link`)).catch(() => null);
       const body = await reply?.json().catch(() => null);
@@ -58,8 +58,8 @@ function useLink(vehicle) {
           : { text: "no answer", title: body?.detail ?? "" },
       );
     };
-    ask();
-    const timer = setInterval(ask, LINK_MS);
+    poll();
+    const timer = setInterval(poll, LINK_MS);
     return () => {
       ended = true;
       clearInterval(timer);
@@ -93,9 +93,9 @@ function eyeOf(eye) {
   return eye ? `${fixed(eye.position_mm, 1)} mm, ${fixed(eye.yaw_deg, 1, "°")}` : "not seen";
 }
 
-function doubtText(vehicle) {
+function misbehaviourText(vehicle) {
   if (!misbehaviour.value?.watched) return "nobody watches";
-  const { score, suspected, tagUnseen, reported } = doubtOf(vehicle);
+  const { score, suspected, tagUnseen, reported } = misbehaviourOf(vehicle);
   const unseen = tagUnseen ? "; the Eye cannot see its tag" : "";
   const now = score === null ? "not on the air" : `score ${fixed(score, 1)}${unseen}`;
   if (suspected) return `${now}, suspected`;

@@ -13,10 +13,10 @@ const letters = new TextDecoder("latin1");
  * @param take is lent a picture for as long as it draws it.
  * @returns what ends it.
  */
-export function watch(address, take) {
+export function watch(address, draw) {
   return whileSeen(() => {
     const ending = new AbortController();
-    follow(address, newestOnly(take, ending.signal), ending.signal);
+    follow(address, newestOnly(draw, ending.signal), ending.signal);
     return () => ending.abort();
   }, RANKS.view);
 }
@@ -35,14 +35,14 @@ async function follow(address, show, ended) {
 }
 
 async function readAll(reader, show) {
-  let kept = new Uint8Array();
+  let rest = new Uint8Array();
   for (;;) {
     const { done, value } = await reader.read();
     if (done) return;
-    const bytes = new Uint8Array(kept.length + value.length);
-    bytes.set(kept);
-    bytes.set(value, kept.length);
-    kept = bytes.slice(cut(bytes, show));
+    const bytes = new Uint8Array(rest.length + value.length);
+    bytes.set(rest);
+    bytes.set(value, rest.length);
+    rest = bytes.slice(cut(bytes, show));
   }
 }
 
@@ -63,7 +63,7 @@ function cut(bytes, show) {
 }
 
 /** Decode one picture at a time: of those that came meanwhile the newest. */
-function newestOnly(take, ended) {
+function newestOnly(draw, ended) {
   let waiting = null;
   let isBusy = false;
   return async (jpeg) => {
@@ -74,7 +74,7 @@ function newestOnly(take, ended) {
       const next = waiting;
       waiting = null;
       const picture = await createImageBitmap(next).catch(() => null);
-      if (picture && !ended.aborted) take(picture);
+      if (picture && !ended.aborted) draw(picture);
       picture?.close();
     }
     isBusy = false;

@@ -5,7 +5,7 @@ import { html } from "scm/shared/html.js";
 import { age, byName, fixed, UNKNOWN } from "scm/shared/format.js";
 import { pulse, since_ms, world } from "scm/shell/store.js";
 import { batteryState, batteryWord, BatterySign, percent } from "scm/pages/vehicle/battery.js";
-import { doubtOf, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
+import { misbehaviourOf, useMisbehaviour } from "scm/pages/vehicle/misbehaviour.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
 
 const STALE_MS = 500;
@@ -67,7 +67,7 @@ function nobody() {
 
 function Row({ car }) {
   const mode = modeOf(car);
-  const doubt = doubtOf(car.vehicle);
+  const suspicion = misbehaviourOf(car.vehicle);
   const age_ms = car.age_ms + since_ms.value;
   return html`
     <tr data-car=${car.vehicle} data-alive=${car.alive}>
@@ -84,7 +84,7 @@ function Row({ car }) {
       <td class="number wide charge" data-battery=${batteryState(car)} title=${fixed(car.battery_v, 2, " V")}>
         ${batteryWord(car)} <${BatterySign} car=${car} /> ${percent(car) || fixed(car.battery_v, 1, " V")}
       </td>
-      <td class="number wide ${doubt.suspected ? "bad" : ""}">${doubt.suspected ? "suspected" : doubt.score === null ? UNKNOWN : fixed(doubt.score, 1)}</td>
+      <td class="number wide ${suspicion.suspected ? "bad" : ""}">${suspicion.suspected ? "suspected" : suspicion.score === null ? UNKNOWN : fixed(suspicion.score, 1)}</td>
       <td class="number wide ${age_ms > STALE_MS ? "warn" : ""}">${age(age_ms)}</td>
     </tr>
   `;

@@ -14,7 +14,7 @@ const TYPED_INTO = "input:not([type=range]), select, textarea, dialog *";
 /** Begin to feel; `wish()` tells what is wished for now, `end()` lets go for good. */
 export function hands(onLetGo) {
   const held = new Set();
-  const wish = { held: false, throttle: 0, steering: 0, by: "keys" };
+  const command = { held: false, throttle: 0, steering: 0, by: "keys" };
   let last = performance.now();
   const letGo = () => {
     held.clear();
@@ -35,7 +35,7 @@ export function hands(onLetGo) {
   const onFocus = (event) => held.size && event.target.closest?.(TYPED_INTO) && letGo();
   const onMenu = (event) => !event.defaultPrevented && letGo(); // and so does a menu
   const onHidden = () => document.hidden && letGo();
-  const heard = [
+  const listeners = [
     [window, "keydown", onDown],
     [window, "keyup", onUp],
     [window, "blur", letGo],
@@ -43,7 +43,7 @@ export function hands(onLetGo) {
     [document, "focusin", onFocus],
     [document, "visibilitychange", onHidden],
   ];
-  for (const [where, name, take] of heard) where.addEventListener(name, take);
+  for (const [where, name, handle] of listeners) where.addEventListener(name, handle);
   return {
     /** A pad on the screen is pressed, or let go. */
     pad(what, down) {
@@ -53,32 +53,32 @@ export function hands(onLetGo) {
     },
     /** What keys and pads are held, by name. */
     held: () => [...held].sort().join(" "),
-    wish(most) {
+    command(most) {
       const now = performance.now();
       const passed = Math.min(0.1, (now - last) / 1000);
       last = now;
       if (!document.hasFocus()) held.clear();
       const stick = pull();
-      if (stick) Object.assign(wish, stick, { throttle: most * stick.throttle });
-      else byKeys(wish, held, most, passed);
-      return wish;
+      if (stick) Object.assign(command, stick, { throttle: most * stick.throttle });
+      else byKeys(command, held, most, passed);
+      return command;
     },
     end() {
       held.clear();
-      for (const [where, name, take] of heard) where.removeEventListener(name, take);
+      for (const [where, name, handle] of listeners) where.removeEventListener(name, handle);
     },
   };
 }
 
 /** Keys: the wheel turns and the pedal goes down in a moment, and comes up at once. */
-function byKeys(wish, held, most, passed) {
+function byKeys(command, held, most, passed) {
   const way = (held.has("ahead") ? 1 : 0) - (held.has("back") ? 1 : 0);
   const side = (held.has("left") ? 1 : 0) - (held.has("right") ? 1 : 0);
-  wish.by = "keys";
-  wish.held = held.size > 0;
-  wish.steering = towards(wish.steering, side, TURN_PER_S * passed);
-  const begun = Math.sign(wish.throttle) === way ? wish.throttle : 0;
-  wish.throttle = way ? towards(begun, way * most, RISE_PER_S * passed) : 0;
+  command.by = "keys";
+  command.held = held.size > 0;
+  command.steering = towards(command.steering, side, TURN_PER_S * passed);
+  const begun = Math.sign(command.throttle) === way ? command.throttle : 0;
+  command.throttle = way ? towards(begun, way * most, RISE_PER_S * passed) : 0;
 }
 
 /** What a gamepad says whose trigger is pulled; null: none is. */

@@ -13,17 +13,17 @@ export function LidarPanel({ car }) {
   const canvas = useRef(null);
   const [reach, setReach] = useState(2);
   const late = useOld(scannedAt);
-  const told = scan.value;
+  const newest = scan.value;
   useEffect(() => {
-    if (told && canvas.current) draw(canvas.current, told, car.car, reach);
-  }, [told, reach, colours.value]);
-  const beams = told ? told.ranges_m.length : 0;
-  const nearest = told ? told.ranges_m.reduce((least, range) => (range === null ? least : Math.min(least ?? range, range)), null) : null;
+    if (newest && canvas.current) draw(canvas.current, newest, car.car, reach);
+  }, [newest, reach, colours.value]);
+  const beams = newest ? newest.ranges_m.length : 0;
+  const nearest = newest ? newest.ranges_m.reduce((least, range) => (range === null ? least : Math.min(least ?? range, range)), null) : null;
   return html`
     <section class="panel lidar" aria-label="LIDAR">
       <div class="panel-head">
-        <h2>LIDAR ${told && html`<small>nearest ${fixed(nearest, 2, " m")}</small>`}</h2>
-        ${told !== false &&
+        <h2>LIDAR ${newest && html`<small>nearest ${fixed(nearest, 2, " m")}</small>`}</h2>
+        ${newest !== false &&
         html`
           <div class="choices" role="group" aria-label="Reach">
             ${REACHES_M.map(
@@ -32,8 +32,8 @@ export function LidarPanel({ car }) {
           </div>
         `}
       </div>
-      ${!told
-        ? html`<p class="empty">${told === false ? "This car has no LIDAR." : "Waiting for a scan."}</p>`
+      ${!newest
+        ? html`<p class="empty">${newest === false ? "This car has no LIDAR." : "Waiting for a scan."}</p>`
         : html`<canvas ref=${canvas} class="moves" data-stale=${late} role="img" aria-label="Scan from above: ${beams} beams, the nearest thing at ${fixed(nearest, 2)} m"></canvas>`}
     </section>
   `;

@@ -11,12 +11,12 @@ export const misbehaviour = signal(null);
 export function useMisbehaviour() {
   useEffect(() => {
     let ended = false;
-    const ask = async () => {
+    const poll = async () => {
       const reply = await fetch(placed("/api/v1/misbehaviour")).catch(() => null);
       if (!ended && reply?.ok) misbehaviour.value = await reply.json();
     };
-    ask();
-    const timer = setInterval(ask, EVERY_MS);
+    poll();
+    const timer = setInterval(poll, EVERY_MS);
     return () => {
       ended = true;
       clearInterval(timer);
@@ -28,13 +28,13 @@ export function useMisbehaviour() {
  * `{score, suspected, tagUnseen, reported}` of a car, now and ever; the score is null where it is not
  * heard. `tagUnseen`: the Eye cannot see its tag, which is no accusation.
  */
-export function doubtOf(vehicle) {
-  const told = misbehaviour.value;
-  const row = told?.stations.find((one) => one.station === vehicle);
+export function misbehaviourOf(vehicle) {
+  const newest = misbehaviour.value;
+  const row = newest?.stations.find((one) => one.station === vehicle);
   return {
     score: row?.score ?? null,
     suspected: row?.suspected ?? false,
     tagUnseen: row?.tag_unseen ?? false,
-    reported: told?.reported.includes(vehicle) ?? false,
+    reported: newest?.reported.includes(vehicle) ?? false,
   };
 }

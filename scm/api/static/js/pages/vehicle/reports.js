@@ -1,7 +1,7 @@
 /** The last half minute of all that a car reports, in columns, and its newest scan; heard while somebody shows it. */
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { hear, RANKS } from "scm/shell/streams.js";
+import { subscribe, RANKS } from "scm/shell/streams.js";
 
 export const SHOWN_S = 30;
 const GAP_S = 0.5;
@@ -37,13 +37,13 @@ export function useReports(vehicle) {
     columns = empty();
     fresh.value += 1;
     scan.value = null;
-    return hear(`/api/v1/vehicles/${vehicle}/reports?scan=true`, {
-      scan(told) {
-        scan.value = told ?? false;
+    return subscribe(`/api/v1/vehicles/${vehicle}/reports?scan=true`, {
+      scan(newest) {
+        scan.value = newest ?? false;
         scannedAt.value = performance.now();
       },
       reports({ samples }) {
-        samples.forEach(take);
+        samples.forEach(append);
         forget();
         fresh.value += 1;
         reportedAt.value = performance.now();
@@ -52,7 +52,7 @@ export function useReports(vehicle) {
   }, [vehicle]);
 }
 
-function take([t, throttle, steering, speed, angle, yawRate, accel]) {
+function append([t, throttle, steering, speed, angle, yawRate, accel]) {
   const last = columns.t.at(-1);
   if (last !== undefined && t <= last) {
     if (last - t < 1) return; // late

@@ -7,17 +7,17 @@ import { BASE } from "scm/shared/base.js";
 const PROTOCOL = "scm.drive.v1";
 const KEY = "scm-api-key";
 const EVERY_MS = 40;
-const UNHEARD_MS = 1000;
+const REPLY_TIMEOUT_MS = 1000;
 const GONE_MS = 5000; // the city gives the car back as soon
 
 /**
- * How it stands: `state` is `free`, `asking`, `held` or `over`; `told` is the car's answer to the newest
+ * How it stands: `state` is `free`, `asking`, `held` or `over`; `status` is the car's answer to the newest
  * packet, `round_ms` how long that took; `over` says why it ended.
  */
-const FREE = { state: "free", vehicle: null, owner: "", told: null, round_ms: null, over: null };
+const FREE = { state: "free", vehicle: null, owner: "", status: null, round_ms: null, over: null };
 export const wheel = signal(FREE);
 
-const UNHEARD = { why: "unheard", throttle: 0, steering: 0 };
+const NO_REPLY = { why: "no_reply", throttle: 0, steering: 0 };
 const ENDS = {
   closed: "The city does not let this page drive: it needs the key of an operator.",
   unreachable: "The city did not answer.",
@@ -34,22 +34,22 @@ let socket = null;
 let hand = null;
 let timer = null;
 let seq = 0;
-let heardAt = 0;
+let receivedAt = 0;
 
 /** Ask for a car; with a reason it is taken from whoever has it. */
-export function take(vehicle, reason = "") {
+export function acquire(vehicle, reason = "") {
   drop();
-  wheel.value = { ...FREE, state: "asking", vehicle };
+  wheel.value = { ...FREE, state: "requesting", vehicle };
   const key = sessionStorage.getItem(KEY);
   const own = new WebSocket(
     `${location.origin.replace(/^http/, "ws")}${BASE}/api/v1/vehicles/${vehicle}/drive`,
     key ? [PROTOCOL, `scm.key.${key}`] : [PROTOCOL],
   );
   socket = own;
-  heardAt = performance.now();
+  receivedAt = performance.now();
   timer = setInterval(notice, EVERY_MS);
   own.onopen = () => own.send(JSON.stringify({ type: "take", reason }));
-  own.onmessage = (message) => socket === own && hear(JSON.parse(message.data));
+  own.onmessage = (message) => socket === own && receive(JSON.parse(message.data));
   own.onclose = () => socket === own && ended();
 }
 
@@ -72,14 +72,14 @@ export function pad(what, down) {
   hand?.pad(what, down);
 }
 
-function hear(word) {
-  heardAt = performance.now();
+function receive(word) {
+  receivedAt = performance.now();
   if (word.type === "taken") {
     wheel.value = { ...wheel.value, state: "held", owner: word.owner };
     startHands();
   } else if (word.type === "told") {
     const round_ms = word.t_ms === null ? null : performance.now() - word.t_ms;
-    wheel.value = { ...wheel.value, told: word, round_ms };
+    wheel.value = { ...wheel.value, status: word, round_ms };
   } else if (word.type === "over") {
     wheel.value = { ...wheel.value, state: "over", over: word };
     stopHands();
@@ -88,13 +88,13 @@ function hear(word) {
 
 /** A dead line says nothing, not even that it is dead. */
 function notice() {
-  const quiet = performance.now() - heardAt;
-  const { state, told } = wheel.value;
+  const quiet = performance.now() - receivedAt;
+  const { state, status } = wheel.value;
   if (quiet > GONE_MS) {
     socket?.close();
     ended("unreachable");
-  } else if (quiet > UNHEARD_MS && state === "held" && told?.why !== "unheard") {
-    wheel.value = { ...wheel.value, told: UNHEARD, round_ms: null };
+  } else if (quiet > REPLY_TIMEOUT_MS && state === "held" && status?.why !== "no_reply") {
+    wheel.value = { ...wheel.value, status: NO_REPLY, round_ms: null };
   }
 }
 
@@ -125,7 +125,7 @@ function stopHands() {
 /** Say what is wished for now; who lets go says so at once. */
 function send() {
   if (socket?.readyState !== WebSocket.OPEN || !hand) return;
-  const { held, throttle, steering } = hand.wish(most.value);
+  const { held, throttle, steering } = hand.command(most.value);
   down.value = hand.held();
   seq += 1;
   socket.send(JSON.stringify({ type: "drive", seq, t_ms: performance.now(), held, throttle, steering }));

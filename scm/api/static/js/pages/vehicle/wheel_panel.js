@@ -5,7 +5,7 @@ import { fixed, UNKNOWN } from "scm/shared/format.js";
 import { change } from "scm/shell/api.js";
 import { city, stop } from "scm/shell/store.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
-import { down, drop, giveBack, most, pad, take, wheel } from "scm/pages/vehicle/wheel.js";
+import { down, drop, giveBack, most, pad, acquire, wheel } from "scm/pages/vehicle/wheel.js";
 
 const PADS = [
   ["ahead", "▲", "Ahead", "W"],
@@ -17,7 +17,7 @@ const WHY = {
   driving: "You drive",
   released: "No hand on the wheel: it stands",
   silent: "This page is silent: it stands",
-  unheard: "The city does not answer: the car stops by itself",
+  no_reply: "The city does not answer: the car stops by itself",
 };
 
 export function WheelPanel({ car }) {
@@ -36,18 +36,18 @@ export function WheelPanel({ car }) {
 
 function Free({ car }) {
   const { state, over } = wheel.value;
-  const taken = !isAtHome(car);
+  const isLeased = !isAtHome(car);
   return html`
     <p>
-      ${taken ? html`${car.vehicle} is driven by <b>${ownerOf(car)}</b>.` : afterwards(car)}
+      ${isLeased ? html`${car.vehicle} is driven by <b>${ownerOf(car)}</b>.` : afterwards(car)}
     </p>
-    ${over && html`<p class="over" role="status" data-code=${over.code}>${said(over)}</p>`}
-    ${taken
+    ${over && html`<p class="over" role="status" data-code=${over.code}>${reasonOf(over)}</p>`}
+    ${isLeased
       ? html`<${Steal} car=${car} />`
       : html`
           <div class="actions">
-            <button class="primary big" disabled=${state === "asking" || !car.alive} onClick=${() => take(car.vehicle)}>
-              ${state === "asking" ? "Asking …" : "Take over"}
+            <button class="primary big" disabled=${state === "requesting" || !car.alive} onClick=${() => acquire(car.vehicle)}>
+              ${state === "requesting" ? "Requesting …" : "Take over"}
             </button>
             ${stands(car) && city.value?.lanes.length > 0 &&
             html`<button class="big" disabled=${!car.alive} onClick=${() => sendOn(car)}>Let it drive</button>`}
@@ -73,29 +73,29 @@ function Steal({ car }) {
   const [reason, setReason] = useState("");
   const submit = (event) => {
     event.preventDefault();
-    take(car.vehicle, reason.trim());
+    acquire(car.vehicle, reason.trim());
   };
   return html`
     <form class="steal" onSubmit=${submit}>
-      <input aria-label="Reason" required maxlength="200" placeholder="Why you take it" value=${reason} onInput=${(event) => setReason(event.target.value)} />
-      <button class="danger" disabled=${!reason.trim()}>Take it anyway</button>
+      <input aria-label="Reason" required maxlength="200" placeholder="Why you take over" value=${reason} onInput=${(event) => setReason(event.target.value)} />
+      <button class="danger" disabled=${!reason.trim()}>Take over anyway</button>
     </form>
   `;
 }
 
 function Held({ car }) {
-  const { told, round_ms } = wheel.value;
+  const { status, round_ms } = wheel.value;
   const stopped = stop.value.engaged;
-  const why = stopped ? "The city is stopped: nothing drives" : (WHY[told?.why] ?? "Waiting for the car");
+  const why = stopped ? "The city is stopped: nothing drives" : (WHY[status?.why] ?? "Waiting for the car");
   return html`
-    <p class="now" role="status" data-why=${stopped ? "stopped" : told?.why}>${why}</p>
+    <p class="now" role="status" data-why=${stopped ? "stopped" : status?.why}>${why}</p>
     <div class="instruments">
-      <${Bar} name="Throttle" value=${told?.throttle ?? 0} />
-      <${Bar} name="Steering" value=${-(told?.steering ?? 0)} shown=${told?.steering ?? 0} />
+      <${Bar} name="Throttle" value=${status?.throttle ?? 0} />
+      <${Bar} name="Steering" value=${-(status?.steering ?? 0)} shown=${status?.steering ?? 0} />
     </div>
     <dl>
-      <dt>Speed</dt><dd>${fixed(told?.speed_mps, 2, " m/s")}</dd>
-      <dt>The car says</dt><dd>${told?.mode ?? UNKNOWN}</dd>
+      <dt>Speed</dt><dd>${fixed(status?.speed_mps, 2, " m/s")}</dd>
+      <dt>Mode of the car</dt><dd>${status?.mode ?? UNKNOWN}</dd>
       <dt>Round trip</dt><dd data-fact="latency">${round_ms === null ? UNKNOWN : `${Math.round(round_ms)} ms`}</dd>
     </dl>
     <div class="pads" role="group" aria-label="Pads: hold to drive">
@@ -154,7 +154,7 @@ function Help() {
   `;
 }
 
-function said({ code, detail }) {
-  const begins = { given_back: "Given back", lost: "You lost the wheel", owned: "Not taken", ended: "It ended", abandoned: "Given back" }[code];
+function reasonOf({ code, detail }) {
+  const begins = { given_back: "Given back", lost: "You lost the wheel", owned: "Not acquired", ended: "It ended", abandoned: "Given back" }[code];
   return begins ? `${begins}: ${detail}.` : detail;
 }

@@ -16,6 +16,6 @@ export function folded(rows) {
       open.delete(row.trace_id);
     }
   }
-  const taken = new Set(callOf.values());
-  return rows.filter((row) => !taken.has(row)).map((row) => ({ row, call: callOf.get(row) ?? null }));
+  const matched = new Set(callOf.values());
+  return rows.filter((row) => !matched.has(row)).map((row) => ({ row, call: callOf.get(row) ?? null }));
 }

@@ -1,4 +1,4 @@
-/** What SPaT told against what happened: broken promises, and how far likely ends were off. */
+/** What SPaT published against what happened: broken guarantees, and the errors of likely ends. */
 import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { fixed, UNKNOWN } from "scm/shared/format.js";
@@ -8,56 +8,56 @@ const EDGES_S = [-5, -2, -1, -0.5, -0.25, 0.25, 0.5, 1, 2, 5];
 const SHARE = (value) => (value === null ? UNKNOWN : `${Math.round(100 * value)} %`);
 const lead = signal(5);
 
-export function Promises() {
-  const told = score.value;
-  if (!told) {
+export function GuaranteedTimes() {
+  const published = score.value;
+  if (!published) {
     return html`
-      <section class="panel promises" aria-label="Promises">
-        <h2>SPaT promises</h2>
-        <p class="empty">Reading what was told…</p>
+      <section class="panel guaranteed-times" aria-label="Guaranteed times">
+        <h2>Guaranteed times</h2>
+        <p class="empty">Reading what SPaT published…</p>
       </section>
     `;
   }
-  const broken = told.early + told.late;
-  const leads = [...new Set(told.leads.map((one) => one.lead_s))];
+  const broken = published.early + published.late;
+  const leads = [...new Set(published.leads.map((one) => one.lead_s))];
   return html`
-    <section class="panel promises" aria-label="Promises">
+    <section class="panel guaranteed-times" aria-label="Guaranteed times">
       <div class="panel-head">
-        <h2>SPaT promises <small>against what happened, last ${told.kept_s / 60} min</small></h2>
+        <h2>Guaranteed times <small>of SPaT against what happened, last ${published.kept_s / 60} min</small></h2>
       </div>
       <dl class="facts">
-        <div data-state=${told.judged ? (broken ? "bad" : "good") : "none"}>
+        <div data-state=${published.judged ? (broken ? "bad" : "good") : "none"}>
           <dt>broken</dt>
-          <dd>${broken} <small>of ${told.judged}</small></dd>
+          <dd>${broken} <small>of ${published.judged}</small></dd>
         </div>
-        <div><dt>too early</dt><dd>${told.early}</dd></div>
-        <div><dt>too late</dt><dd>${told.late}</dd></div>
-        <div><dt>no latest end</dt><dd>${told.open}</dd></div>
-        <div><dt>cut by flash</dt><dd>${told.cut}</dd></div>
+        <div><dt>too early</dt><dd>${published.early}</dd></div>
+        <div><dt>too late</dt><dd>${published.late}</dd></div>
+        <div><dt>no latest end</dt><dd>${published.open}</dd></div>
+        <div><dt>cut by flash</dt><dd>${published.cut}</dd></div>
       </dl>
-      ${told.judged
-        ? html`<${Leads} told=${told} /><${Histogram} told=${told} leads=${leads} />`
-        : html`<p class="empty">No colour has ended yet since the page's server listens.</p>`}
+      ${published.judged
+        ? html`<${Leads} published=${published} /><${Histogram} published=${published} leads=${leads} />`
+        : html`<p class="empty">No colour has ended yet since the page's server began to listen.</p>`}
     </section>
   `;
 }
 
-function Leads({ told }) {
+function Leads({ published }) {
   return html`
-    <div class="scroll" tabindex="0" role="region" aria-label="Table of promises"><table>
-      <caption class="hidden">Likely ends as told before the end, against the end</caption>
+    <div class="scroll" tabindex="0" role="region" aria-label="Table of likely ends"><table>
+      <caption class="hidden">Likely ends as published before the end, against the end</caption>
       <thead>
         <tr>
           <th scope="col">Likely end</th>
-          <th scope="col" class="number">told</th>
+          <th scope="col" class="number">published</th>
           <th scope="col" class="number">mean</th>
           <th scope="col" class="number">worst</th>
           <th scope="col" class="number">within 1 s</th>
-          <th scope="col" class="number">said sure</th>
+          <th scope="col" class="number">confidence</th>
         </tr>
       </thead>
       <tbody>
-        ${told.leads
+        ${published.leads
           .filter((one) => one.errors_s.length || one.unknown)
           .map(
             (one) => html`
@@ -76,9 +76,9 @@ function Leads({ told }) {
   `;
 }
 
-/** How many likely ends were off by how much: bars as rectangles, so that the page needs no picture. */
-function Histogram({ told, leads }) {
-  const errors = told.leads.filter((one) => one.lead_s === lead.value).flatMap((one) => one.errors_s);
+/** How many likely ends were off by how much: bars as rectangles, without a picture. */
+function Histogram({ published, leads }) {
+  const errors = published.leads.filter((one) => one.lead_s === lead.value).flatMap((one) => one.errors_s);
   const counts = Array(EDGES_S.length + 1).fill(0);
   for (const error of errors) {
     const at = EDGES_S.findIndex((edge) => error < edge);
@@ -94,7 +94,7 @@ function Histogram({ told, leads }) {
   return html`
     <figure class="histogram">
       <figcaption>
-        Likely end, told too early or too late
+        Likely end, published too early or too late
         <select
           aria-label="How long before the end"
           value=${String(lead.value)}

@@ -1,21 +1,21 @@
-/** Reading from the interface, once, and again and again. */
+/** Reading from the interface, once or repeatedly. */
 import { useEffect, useState } from "preact/hooks";
 import { placed } from "scm/shared/base.js";
 import { isOver } from "scm/shared/operation.js";
 
-/** @returns the body; throws a sentence where the city says no. */
+/** @returns the body; throws a sentence when the city refuses. */
 export async function read(path) {
   const response = await fetch(placed(`/api/v1${path}`)).catch(() => {
-    throw new Error("The city's server does not answer; it is asked again.");
+    throw new Error("The city's server does not answer; trying again.");
   });
   const body = await response.json().catch(() => ({}));
   if (response.ok) return body;
   throw Object.assign(new Error(body.detail || body.title || `${path}: ${response.status}`), { status: response.status });
 }
 
-/** Read a path every so often for as long as the component is there: `{body, error, again}`. */
+/** Read a path repeatedly while the component is mounted: `{body, error, again}`. */
 export function usePolled(path, period_ms) {
-  const [told, setTold] = useState({ body: null, error: "" });
+  const [answer, setAnswer] = useState({ body: null, error: "" });
   const [turn, setTurn] = useState(0);
   useEffect(() => {
     let over = false;
@@ -23,9 +23,9 @@ export function usePolled(path, period_ms) {
     const look = async () => {
       try {
         const body = await read(path);
-        if (!over) setTold({ body, error: "" });
+        if (!over) setAnswer({ body, error: "" });
       } catch (error) {
-        if (!over) setTold((before) => ({ ...before, error: error.message }));
+        if (!over) setAnswer((before) => ({ ...before, error: error.message }));
       }
       if (!over && period_ms) timer = setTimeout(look, period_ms);
     };
@@ -35,10 +35,10 @@ export function usePolled(path, period_ms) {
       clearTimeout(timer);
     };
   }, [path, period_ms, turn]);
-  return { ...told, again: () => setTurn((before) => before + 1) };
+  return { ...answer, again: () => setTurn((before) => before + 1) };
 }
 
-/** Follow what still runs of this when the page is opened: whoever asked may have come back. */
+/** Follow an operation that still runs when the page is opened: the person who started it may have come back. */
 export function useUnfinished(titles, follow) {
   useEffect(() => {
     let over = false;
@@ -53,7 +53,7 @@ export function useUnfinished(titles, follow) {
   }, []);
 }
 
-/** Name of the calibration that work has kept; empty: it only looked, or failed. */
-export function keptBy({ state, result }) {
+/** Name of the calibration that an operation saved; empty: it saved none, or failed. */
+export function savedBy({ state, result }) {
   return state === "done" && result.includes("/calibrations/") ? result.split("/").at(-1) : "";
 }

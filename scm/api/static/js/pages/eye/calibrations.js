@@ -1,43 +1,43 @@
-/** Step 3: what was found and kept: look, download, put in force, throw away. */
+/** Step 3: saved calibrations: view, download, put in force, delete. */
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { clock, fixed } from "scm/shared/format.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { Sure } from "scm/shared/sure.js";
-import { read } from "scm/pages/eye/asking.js";
+import { read } from "scm/pages/eye/polling.js";
 import { named } from "scm/pages/eye/in_force.js";
 import { change } from "scm/shell/api.js";
 import { placed } from "scm/shared/base.js";
 
-export function Shelf({ camera, kept, known, changed, put }) {
+export function Calibrations({ camera, saved, known, changed, put }) {
   const [open, setOpen] = useState(null);
-  const [asked, setAsked] = useState(null); // to be thrown away
+  const [removing, setRemoving] = useState(null); // to be deleted
   return html`
-    <section class="panel eye-shelf" aria-label="Calibrations">
+    <section class="panel eye-calibrations" aria-label="Calibrations">
       <div class="panel-head">
-        <h2><b class="step">3</b> Use <small>what was found and kept</small></h2>
+        <h2><b class="step">3</b> Use <small>saved calibrations</small></h2>
         ${camera.in_force?.before &&
         html`<button class="small" title=${named(camera.in_force.before)} onClick=${() => put(null)}>Put back…</button>`}
       </div>
-      ${kept.length
+      ${saved.length
         ? html`
             <div class="scroll" tabindex="0" role="region" aria-label="Table of calibrations">
               <table>
                 <thead class="hidden"><tr><th scope="col">Calibration</th><th scope="col">What to do with it</th></tr></thead>
-                <tbody>${kept.map((one) => html`<${Row} key=${one.name} camera=${camera} one=${one} open=${setOpen} ask=${setAsked} put=${put} />`)}</tbody>
+                <tbody>${saved.map((one) => html`<${Row} key=${one.name} camera=${camera} one=${one} open=${setOpen} discard=${setRemoving} put=${put} />`)}</tbody>
               </table>
             </div>
           `
-        : html`<p class="empty">${known ? "Nothing is kept yet: measure a lens or find a place." : "Reads the shelf …"}</p>`}
+        : html`<p class="empty">${known ? "Nothing saved yet: measure a lens or find a place." : "Reading …"}</p>`}
       <div class="note">
-        Put in force, it holds until another one is; over a restart too where the city keeps its state. For good: a
+        A calibration in force stays until another one is put in force; after a restart too, if the city stores its state. Permanently: a
         lens by <code>scm eye MAP --calibration NAME.toml</code>, a place by its block in the map file.
       </div>
-      ${asked &&
+      ${removing &&
       html`
-        <${Sure} title="Throw ${asked.name} away?" yes="Throw away" act=${() => remove(asked).then(changed)} onClose=${() => setAsked(null)}>
+        <${Sure} title="Throw ${removing.name} away?" yes="Throw away" act=${() => remove(removing).then(changed)} onClose=${() => setRemoving(null)}>
           The calibration and how it was found are deleted for everybody.
-          ${isInForce(camera, asked) && " The camera goes on seeing by it until another one is put in force."}
+          ${isInForce(camera, removing) && " The camera continues to use it until another one is put in force."}
         <//>
       `}
       ${open && html`<${Text} file=${open} close=${() => setOpen(null)} />`}
@@ -53,7 +53,7 @@ async function remove({ name }) {
   await change("DELETE", path, undefined, () => `${name} is gone.`, { "If-Match": tag ?? "*" });
 }
 
-function Row({ camera, one, open, ask, put }) {
+function Row({ camera, one, open, discard, put }) {
   const fits = one.kind === "lens" ? one.width_px === camera.width_px && one.height_px === camera.height_px : one.camera === camera.camera;
   const path = `/eye/calibrations/${one.name}`;
   return html`
@@ -67,7 +67,7 @@ function Row({ camera, one, open, ask, put }) {
           ? html`<span class="good">in force</span>`
           : fits && html`<button class="small" aria-label="Put ${one.name} in force" onClick=${() => put(one.name)}>Put in force…</button>`}
         <a href=${`/api/v1${path}/file.toml`} download=${`${one.name}.toml`}>Download</a>
-        <button class="plain" aria-label="Throw ${one.name} away" onClick=${() => ask(one)}>×</button>
+        <button class="plain" aria-label="Throw ${one.name} away" onClick=${() => discard(one)}>×</button>
       </td>
     </tr>
   `;

@@ -1,4 +1,4 @@
-/** Wishes for groups: calls, holds, force-offs and the like, each with who, why and an end. */
+/** Overrides of groups: calls, holds, force-offs and the like, each with a name, a reason and an end. */
 import { signal } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { change, notify } from "scm/shell/api.js";
@@ -20,15 +20,15 @@ const ROUTES = {
 const MEANS = {
   call: "Serve it once; it lapses when its green begins.",
   hold: "Once green, it stays green.",
-  force_off: "End its green at its least time once others are called.",
-  omit: "It is not begun.",
-  preempt: "It comes next, out of order, and stays.",
+  force_off: "End its green at its minimum once others are called.",
+  omit: "It does not begin.",
+  preempt: "It comes next, out of order, and stays green.",
   policy: "Run a policy for a while, then go back.",
 };
 
-/** What fixed time cannot grant: the junction runs actuated meanwhile, after what it has promised. */
+/** What fixed time cannot grant: the junction runs actuated meanwhile, after the guaranteed times. */
 const LEAVES_PLAN = new Set(["hold", "force_off", "omit", "preempt"]);
-const WAITS = " The plan first keeps what it promised, up to two cycles; the time asked for runs meanwhile.";
+const WAITS = " The plan first keeps its guaranteed times, up to two cycles; the requested time runs meanwhile.";
 
 const LASTS = [
   [30, "30 s"],
@@ -38,33 +38,33 @@ const LASTS = [
   [900, "15 min"],
 ];
 
-/** What the form says now. */
+/** What the form holds now. */
 const verb = signal("hold");
 const groups = signal([]);
 const policy = signal("");
 const flashing = signal(false);
 
 /** Fill the form for a group, and let the person say why. */
-export function wishFor(what, group) {
+export function requestFor(what, group) {
   verb.value = what;
   groups.value = [group];
-  document.getElementById("wish-reason")?.focus();
+  document.getElementById("override-reason")?.focus();
 }
 
-export function Wishes({ told }) {
-  const held = status()?.wishes ?? [];
+export function Overrides({ current }) {
+  const held = status()?.overrides ?? [];
   return html`
-    <section class="panel wishes" aria-label="Wishes">
+    <section class="panel overrides" aria-label="Overrides">
       <div class="panel-head">
-        <h2>Wishes <small>the kernel decides when</small></h2>
-        <button class="small ${told.mode === "flash" ? "" : "danger"}" onClick=${() => (flashing.value = true)}>
-          ${told.mode === "flash" ? "End flash…" : "Flash red…"}
+        <h2>Overrides <small>the kernel decides when</small></h2>
+        <button class="small ${current.mode === "flash" ? "" : "danger"}" onClick=${() => (flashing.value = true)}>
+          ${current.mode === "flash" ? "End flash…" : "Flash red…"}
         </button>
       </div>
-      <${Form} junction=${told.junction} mode=${told.mode} names=${told.groups.map((one) => one.group)} />
-      <${Held} junction=${told.junction} held=${held} />
-      <${Lately} junction=${told.junction} />
-      ${flashing.value && html`<${Flash} junction=${told.junction} on=${told.mode !== "flash"} />`}
+      <${Form} junction=${current.junction} mode=${current.mode} names=${current.groups.map((one) => one.group)} />
+      <${Held} junction=${current.junction} held=${held} />
+      <${Lately} junction=${current.junction} />
+      ${flashing.value && html`<${Flash} junction=${current.junction} on=${current.mode !== "flash"} />`}
     </section>
   `;
 }
@@ -80,27 +80,27 @@ function Form({ junction, mode, names }) {
   const submit = async (event) => {
     event.preventDefault();
     const form = event.target.elements;
-    const asked = { by: "dashboard", reason: form.reason.value, expires_s: Number(form.lasts.value) };
+    const request = { by: "dashboard", reason: form.reason.value, expires_s: Number(form.lasts.value) };
     if (!isPolicy && !groups.value.length) {
       notify("error", "Choose the groups that it is for.");
       return;
     }
     const what = isPolicy ? policy.value || policies[0]?.policy : groups.value.map(plain).join(", ");
     const reply = isPolicy
-      ? await change("PUT", `/signals/${junction}/policy`, { policy: what, ...asked }, taken(what))
+      ? await change("PUT", `/signals/${junction}/policy`, { policy: what, ...request }, accepted(what))
       : await change(
           "POST",
           `/signals/${junction}/${ROUTES[verb.value]}`,
-          { groups: groups.value, ...asked },
-          taken(what),
+          { groups: groups.value, ...request },
+          accepted(what),
         );
     if (reply) form.reason.value = "";
   };
   return html`
-    <form class="wish" onSubmit=${submit}>
+    <form class="override-form" onSubmit=${submit}>
       <label>
-        <span>Wish</span>
-        <select id="wish-verb" value=${verb.value} onChange=${(event) => (verb.value = event.target.value)}>
+        <span>Override</span>
+        <select id="override-verb" value=${verb.value} onChange=${(event) => (verb.value = event.target.value)}>
           ${Object.entries(VERBS).map(([key, word]) => html`<option key=${key} value=${key}>${word}</option>`)}
         </select>
       </label>
@@ -109,7 +109,7 @@ function Form({ junction, mode, names }) {
             <label>
               <span>Policy</span>
               <select
-                id="wish-policy"
+                id="override-policy"
                 value=${policy.value}
                 onChange=${(event) => (policy.value = event.target.value)}
               >
@@ -143,39 +143,39 @@ function Form({ junction, mode, names }) {
       </label>
       <label class="why">
         <span>Why</span>
-        <input id="wish-reason" name="reason" maxlength="500" placeholder="Reason (optional)" />
+        <input id="override-reason" name="reason" maxlength="500" placeholder="Reason (optional)" />
       </label>
-      <button class="primary">Ask</button>
+      <button class="primary">Request</button>
       <p class="means">${MEANS[verb.value]}${mode === "plan" && LEAVES_PLAN.has(verb.value) ? WAITS : ""}</p>
     </form>
   `;
 }
 
-const taken = (what) => (reply) =>
+const accepted = (what) => (reply) =>
   reply.pending
-    ? `Taken: ${what}. ${toCome(reply.pending, row()?.mode)}.`
-    : `Taken: ${what}.`;
+    ? `Accepted: ${what}. ${toCome(reply.pending, row()?.mode)}.`
+    : `Accepted: ${what}.`;
 
 function Held({ junction, held }) {
   const t = clockNow();
-  const takeBack = (wish) =>
+  const withdraw = (override) =>
     change(
       "POST",
       `/signals/${junction}/clear`,
-      { verb: wish.verb, groups: wish.groups, by: "dashboard", reason: "taken back on the dashboard" },
-      () => `${VERBS[wish.verb]} is taken back.`,
+      { verb: override.verb, groups: override.groups, by: "dashboard", reason: "withdrawn on the dashboard" },
+      () => `${VERBS[override.verb]} is withdrawn.`,
     );
-  if (!held.length) return html`<p class="empty">No wish is in force.</p>`;
+  if (!held.length) return html`<p class="empty">No override is in force.</p>`;
   return html`
     <ul class="held">
       ${held.map(
-        (wish) => html`
-          <li key=${wish.verb + wish.groups.join()} data-verb=${wish.verb}>
-            <b>${VERBS[wish.verb]}</b>
-            <span>${wish.policy ? plain(wish.policy) : wish.groups.map(plain).join(", ")}</span>
-            <small>${wish.by}${wish.reason ? `: ${wish.reason}` : ""}</small>
-            <time>${t === null ? "" : `${span(Math.max(0, wish.ends_ns / 1e9 - t))} left`}</time>
-            <button class="small" onClick=${() => takeBack(wish)}>Take back</button>
+        (override) => html`
+          <li key=${override.verb + override.groups.join()} data-verb=${override.verb}>
+            <b>${VERBS[override.verb]}</b>
+            <span>${override.policy ? plain(override.policy) : override.groups.map(plain).join(", ")}</span>
+            <small>${override.by}${override.reason ? `: ${override.reason}` : ""}</small>
+            <time>${t === null ? "" : `${span(Math.max(0, override.ends_ns / 1e9 - t))} left`}</time>
+            <button class="small" onClick=${() => withdraw(override)}>Withdraw</button>
           </li>
         `,
       )}
@@ -184,19 +184,19 @@ function Held({ junction, held }) {
 }
 
 const SHOWN = 8;
-const SAYING = new Set(["traffic", "monitor"]);
+const SOURCES = new Set(["traffic", "monitor"]);
 
-/** What was asked for and what came of it, from the log. */
+/** What was requested and what came of it, from the log. */
 function Lately({ junction }) {
   const about = new RegExp(`\\b${junction}\\b`);
-  const told = events.value
-    .filter((event) => SAYING.has(event.source) && about.test(event.text))
+  const recent = events.value
+    .filter((event) => SOURCES.has(event.source) && about.test(event.text))
     .toSorted(newestFirst)
     .slice(0, SHOWN);
   return html`
     <h3>Lately <a href="/events">all events</a></h3>
     <ul class="lately">
-      ${told.map(
+      ${recent.map(
         (event) => html`
           <li key=${event.seq} data-severity=${event.severity}>
             <time>${clock(event.t_ns)}</time>
@@ -204,7 +204,7 @@ function Lately({ junction }) {
           </li>
         `,
       )}
-      ${!told.length && html`<li class="empty">Nothing was asked for and nothing changed.</li>`}
+      ${!recent.length && html`<li class="empty">Nothing was requested and nothing changed.</li>`}
     </ul>
   `;
 }
@@ -225,7 +225,7 @@ function Flash({ junction, on }) {
     <${Dialog} title=${on ? `Flash ${plain(junction)} red?` : `End flash at ${plain(junction)}?`} onClose=${close}>
       <p>
         ${on
-          ? "All lights flash red at once: every driver stops, looks, and goes in turn. No promise holds."
+          ? "All lights flash red at once: every driver stops, looks, and goes in turn. No time is guaranteed."
           : "All lights go red for the longest clearance, then the plan begins. A fault of the monitor keeps it flashing."}
       </p>
       <form onSubmit=${submit}>

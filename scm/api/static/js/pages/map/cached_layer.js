@@ -1,16 +1,16 @@
-/** A layer that is costly to draw: kept as a picture, drawn anew a few times a second and moved in between. */
+/** A layer that is costly to draw: cached as a picture, redrawn a few times a second and moved in between. */
 
 const EVERY_MS = 150;
 const MOST_SHARE = 0.2; // of the time that may go into drawing it
 
-export class KeptLayer {
+export class CachedLayer {
   constructor() {
     this.canvas = document.createElement("canvas");
     this.held = null;
     this.due = -Infinity;
   }
 
-  /** Draw the layer; `paint(paper)` makes it anew, in pixels of `view`. */
+  /** Draw the layer; `paint(paper)` redraws it, in pixels of `view`. */
   draw(paper, view, ratio, now, paint) {
     if (now >= this.due || !this.held) this.#paint(view, ratio, now, paint);
     const { cx, cy, scale, width, height } = this.held;

@@ -1,4 +1,4 @@
-/** Files to take home: the recording itself or a part of it, its cars as CSV, and what Foxglove draws. */
+/** Downloads: the recording itself or a part of it, its cars as CSV, and what Foxglove draws. */
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
@@ -9,7 +9,7 @@ import { change } from "scm/shell/api.js";
 import { go } from "scm/shell/router.js";
 import { placed } from "scm/shared/base.js";
 
-export function TakeHomeDialog({ recording, cars, player, onClose }) {
+export function DownloadDialog({ recording, cars, player, onClose }) {
   const at = `/api/v1/recordings/${encodeURIComponent(recording.name)}`;
   return html`
     <${Dialog} title="Download" onClose=${onClose}>
@@ -61,7 +61,7 @@ function Part({ recording, player }) {
   return html`
     <form name="part" class="fields two-by-two" onSubmit=${submit} onInput=${() => setRow(null)}>
       <${SpanFields} recording=${recording} player=${player} span=${span} onChange=${setSpan} />
-      ${row?.error && html`<p class="trouble" role="alert">${row.error}</p>`}
+      ${row?.error && html`<p class="form-error" role="alert">${row.error}</p>`}
       <button disabled=${isBusy}>${isBusy ? "Cutting…" : "Cut"}</button>
     </form>
   `;
@@ -74,8 +74,8 @@ function CarsAsTable({ at, recording, cars, player }) {
   const [trouble, setTrouble] = useState("");
   const submit = async (event) => {
     event.preventDefault();
-    const asked = Object.entries({ vehicle: vehicle || null, ...seconds(span) });
-    const query = new URLSearchParams(asked.filter(([, value]) => value !== null));
+    const filters = Object.entries({ vehicle: vehicle || null, ...seconds(span) });
+    const query = new URLSearchParams(filters.filter(([, value]) => value !== null));
     setTrouble(await downloaded(`${at}/csv?${query}`));
   };
   return html`
@@ -85,7 +85,7 @@ function CarsAsTable({ at, recording, cars, player }) {
         ${cars.map((car) => html`<option value=${car.vehicle}>${car.vehicle}: its own reports</option>`)}
       </select>
       <${SpanFields} most_s=${recording.length_s} player=${player} span=${span} onChange=${setSpan} />
-      ${trouble && html`<p class="trouble" role="alert">${trouble}</p>`}
+      ${trouble && html`<p class="form-error" role="alert">${trouble}</p>`}
       <button>${vehicle || "all cars"}.csv</button>
     </form>
   `;
@@ -93,14 +93,14 @@ function CarsAsTable({ at, recording, cars, player }) {
 
 /** Let the browser download a file, once the server begins to send it; else return why not. */
 async function downloaded(path) {
-  const asking = new AbortController();
+  const request = new AbortController();
   try {
-    const answer = await fetch(placed(path), { signal: asking.signal });
+    const answer = await fetch(placed(path), { signal: request.signal });
     if (!answer.ok) return (await answer.json()).detail;
   } catch (error) {
     return `The server does not answer: ${error.message}`;
   }
-  asking.abort();
+  request.abort();
   const link = Object.assign(document.createElement("a"), { href: path, download: "" });
   link.click();
   return "";

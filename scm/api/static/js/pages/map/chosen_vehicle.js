@@ -6,7 +6,7 @@ import { age, fixed, UNKNOWN } from "scm/shared/format.js";
 import { selected } from "scm/shared/selection.js";
 import { change } from "scm/shell/api.js";
 import { blind } from "scm/pages/map/close_up.js";
-import { carNamed, fleetBeat } from "scm/pages/map/fleet.js";
+import { carNamed, fleetTick } from "scm/pages/map/fleet.js";
 import { followed, layers, show } from "scm/pages/map/layers.js";
 import { SendTo } from "scm/pages/map/send_to.js";
 
@@ -15,8 +15,8 @@ const DEGREES = 180 / Math.PI;
 /** Name of the car that somebody may want to take away; null: none. */
 const removing = signal(null);
 
-export function ChosenCard() {
-  fleetBeat.value;
+export function ChosenVehicle() {
+  fleetTick.value;
   const name = selected.value;
   if (!name) return null;
   const car = carNamed(name);
@@ -70,7 +70,7 @@ function Acts({ name }) {
       ${toggle("path", "Path")} ${lidar}
       <${SendTo} name=${name} />
       <a href="/vehicles/${name}">Open</a>
-      <button class="small" onClick=${() => (removing.value = name)}>Take off</button>
+      <button class="small" onClick=${() => (removing.value = name)}>Remove</button>
     </div>
   `;
 }
@@ -83,10 +83,10 @@ function RemoveDialog({ name }) {
     if (reply && selected.value === name) followed.value = selected.value = null;
   };
   return html`
-    <${Dialog} title="Take ${name} off the map?" onClose=${close}>
+    <${Dialog} title="Remove ${name} from the map?" onClose=${close}>
       <div class="actions">
         <button onClick=${close}>Cancel</button>
-        <button class="danger" data-first onClick=${remove}>Take it off</button>
+        <button class="danger" data-first onClick=${remove}>Remove it</button>
       </div>
     <//>
   `;
