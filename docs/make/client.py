@@ -54,7 +54,7 @@ class Client:
 
     Args:
         url: Where its dashboard is: `http://127.0.0.1:8000`.
-        key: API key, where the city asks for one; empty: of the file in `SCM_API_KEY_FILE`.
+        key: API key, where the city requires one; empty: of the file in `SCM_API_KEY_FILE`.
     """
 
     def __init__(self, url: str = "http://127.0.0.1:8000", key: str = "") -> None:
@@ -62,7 +62,7 @@ class Client:
 {nouns}
 
     def wheel(self, vehicle: str, reason: str = "") -> AbstractContextManager[Wheel]:
-        """Take a car's wheel; with a reason, from whoever holds it. See `scm.client.teleop`."""
+        """Drive a car; with a reason, one that somebody else has. See `scm.client.teleop`."""
         return acquired(self.connection, vehicle, reason)
 
     def wait(

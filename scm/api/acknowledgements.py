@@ -1,6 +1,6 @@
-"""Acknowledgements: a person has seen an event, and says so once for everybody.
+"""Acknowledgements: a person has seen an event, which everybody then sees.
 
-They are kept in the city's state, so that they outlive the server; the oldest are forgotten.
+They are stored in the city's state, so that they outlive the server; the oldest are dropped.
 """
 
 import threading

@@ -32,11 +32,11 @@ MOST_LOOKED_AT = 20_000
 
 
 class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):
-    """Which deeds are wanted; what is left empty lets everything pass.
+    """Which entries are wanted; an empty field matches everything.
 
     Attributes:
         station: Who did it.
-        by: Who asked: a part of the name.
+        by: Who requested it: a part of the name.
         kind: A part of the request's class or path.
         text: To be found anywhere in the entry; case does not matter, nor underscores or spaces.
     """
@@ -47,7 +47,7 @@ class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):
     text: str = ""
 
     def passes(self, row: AuditRow) -> bool:
-        """Return whether a deed is wanted."""
+        """Return whether an entry is wanted."""
         return (
             self.station in ("", row.station)
             and self.by.casefold() in row.by.casefold()
@@ -57,7 +57,7 @@ class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def newest_first(store: Repository, words: Words) -> Iterator[AuditRow]:
-    """Yield deeds newest first, at most `MOST_LOOKED_AT`."""
+    """Yield entries newest first, at most `MOST_LOOKED_AT`."""
     log = AuditLog(store)
     last = log.head().number
     first = max(0, last - MOST_LOOKED_AT)
@@ -113,7 +113,7 @@ class Audited:
     def _note(self, deed: Deed) -> None:
         try:
             self._log.note(deed)
-        except StoreError as failure:  # the change is done: to fail its answer would tell a lie
+        except StoreError as failure:  # the change is done: a failure would be a false reply
             _LOGGER.error("audit_failed kind=%r: %s", deed.kind, failure)  # noqa: TRY400
 
 
@@ -160,7 +160,7 @@ def _row(number: int, deed: Deed, words: Words) -> AuditRow:
 
 
 def _self_named(kind: str, request: dict[str, Any]) -> str:
-    """Return who asked where an older city noted nobody: a car that joins asks for itself."""
+    """Return who made an entry of an older city that noted nobody: a joining car itself."""
     return str(request.get("vehicle", "")) if kind == "JoinRequest" else ""
 
 

@@ -1,7 +1,7 @@
 """Slow down who guesses a key: so many wrong ones an address, then one every few seconds.
 
-Only for that key, by its public part: a page left open with a key that has ended asks for ever, and
-must not keep those beside it, behind the same address, from the red button.
+Only for that key, by its public part: a page left open with an expired key keeps requesting, and
+must not block others at the same address from the city stop.
 """
 
 import ipaddress

@@ -1,4 +1,4 @@
-"""What every route is given: the view to read from, and a way to ask the city for changes."""
+"""What every route receives: the view to read from, and a way to request changes of the city."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -43,13 +43,13 @@ class Link:
         is_connected: Whether the router can be reached now.
         rejected: How many arrivals were dropped because they could not be read.
         clock: That of the view's runner; None: time stands still between its steps.
-        wire: Says commands on the bus; None: nobody can be driven from here.
+        wire: Publishes commands on the bus; None: nobody can be driven from here.
         connect: Endpoint of the city's router, for scripts run beside it; empty: not known.
-        script_credentials: File of who those scripts are; None: the city asks nobody.
-        words: What tells a program of ours where the bus is and who it is there; empty: such a
+        script_credentials: File of who those scripts are; None: an open city.
+        words: Arguments that give a program the bus's address and its identity; empty: such a
             program cannot reach the city.
         parts: Those that should be there, by name.
-        map_file: Name or path of the map, as other programs are told it; empty: its own name.
+        map_file: Name or path of the map, as passed to other programs; empty: its own name.
     """
 
     city: str = ""

@@ -1,6 +1,6 @@
 """Close-ups: what a car reports of itself, at full rate, for as long as somebody looks at it.
 
-All cars' positions come with the world's snapshot. What they are told and how they answer is heard
+All cars' positions come with the world's snapshot. Their commands and sensors are received
 of one car alone, and only while its page is open.
 """
 
@@ -22,7 +22,7 @@ class Sample(msgspec.Struct, frozen=True, array_like=True):
     Attributes:
         t_s: When it was true, on the car's clock.
         throttle: The command in force, -1 to 1, + = forward.
-        steering: The command in force, -1 to 1, + = left; None: not told.
+        steering: The command in force, -1 to 1, + = left; None: unknown.
         speed_mps: Of the rear axle along the body.
         steering_rad: Mean road-wheel angle, + = left.
         yaw_rate_radps: + = counter-clockwise.
@@ -67,7 +67,7 @@ class CloseUps:
         return (states[-1][0] if states else number), newer
 
     def subscriptions(self) -> Iterator[Subscription]:
-        """Yield what has to be heard for those who watch now."""
+        """Yield the subscriptions that present viewers need."""
         return (Subscription(VehicleState, {"vehicle": vehicle}) for vehicle in self._watched)
 
 

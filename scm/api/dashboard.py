@@ -1,10 +1,10 @@
 """The dashboard's files, answered from memory before any route is looked for.
 
-A first visit asks for some sixty files, on the processors that also run the city: each is read,
-digested and packed once, not for each who asks, and again only where it was edited. Browsers ask
+A first visit requests some sixty files, on the processors that also run the city: each is read,
+digested and compressed once, not for each request, and again only if it was edited. Browsers ask
 each time whether theirs is still the one: no stale page, and nothing is sent twice.
 
-A page is `static/index.html`, told what its address shows: its style sheet, the modules it will
+A page is `static/index.html` with what its address needs: its style sheet, the modules it will
 import, so that the browser need not find them one behind the other, and its frame, where
 `static/frames` has one, which is seen until the modules draw the page.
 """
@@ -37,7 +37,7 @@ LINKS, NEEDS, FRAME = "<!-- pages -->", "<!-- needs -->", "<main></main>"
 """What a page fills in, in `index.html`."""
 
 NO_PAGES = ("/api/", "/ngsi-ld/", "/static/")
-"""How addresses begin that only programs ask for."""
+"""Prefixes of addresses that only programs request."""
 
 _READS = frozenset({"GET", "HEAD"})
 _IMPORT = re.compile(r'(?:\bfrom|^import)\s*"([\w@./-]+)"', re.MULTILINE)
@@ -62,7 +62,7 @@ class _File(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """Where an address leads, as a route says it to who counts requests."""
+    """The route of an address, for the metrics of requests."""
 
     path_format: str
 
@@ -130,7 +130,7 @@ class Dashboard:
 
 
 async def astray(request: Request, error: Exception) -> Response:
-    """Show who mistyped an address the dashboard, which says so; programs get a problem."""
+    """Answer an unknown address: a person gets the dashboard's page, programs a problem."""
     is_read = request.method == "GET" and "text/html" in request.headers.get("accept", "")
     if is_read and not request.url.path.startswith(NO_PAGES):
         text = index_text(request.app.state.base).replace(NEEDS, "")
@@ -189,7 +189,7 @@ def index_text(base: str = "") -> str:
 
 
 def _placed(document: str, base: str) -> str:
-    """Put a base path before all addresses of a document, and tell its modules of it."""
+    """Put a base path before all addresses of a document, and pass it to its modules."""
     if not base:
         return document
     document = _ADDRESS_IN.sub(rf"\g<1>{base}/", document)

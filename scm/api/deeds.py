@@ -1,4 +1,4 @@
-"""Entries of the audit log in words: what somebody had done, as a person would say it.
+"""Entries of the audit log in words: what somebody requested, in plain language.
 
 A request on the bus is put into words by its class, a call of the interface by the summary of its
 route: a new route has words from the start, and a test looks whether every class has.
@@ -37,7 +37,7 @@ def _signal(request: Facts) -> str:
     verb, at = request["verb"], _spaced(request["junction"])
     groups, policy = _names(request.get("groups", ())), _spaced(request.get("policy", ""))
     if verb == "clear":
-        words = ["take back", _spaced(request.get("clears", "") or "requests"), groups]
+        words = ["withdraw", _spaced(request.get("clears", "") or "requests"), groups]
         return f"{' '.join(filter(None, words))} at {at}"
     lasts_s = request.get("expires_s", 60.0)
     words = [_spaced(verb), policy, groups]
@@ -85,7 +85,7 @@ _REQUESTS: dict[str, Callable[[Facts], str]] = {
 
 
 class Words:
-    """Says what an entry of the audit log was about.
+    """Puts an entry of the audit log into words.
 
     Args:
         nouns: The routers of the interface, by the prefix that they stand below.
@@ -108,7 +108,7 @@ class Words:
 
         Args:
             kind: Class of a request on the bus, or method and path of a call of the interface.
-            request: What was asked, as it was noted.
+            request: The request as it was logged.
         """
         if kind == UNREADABLE:
             return "what stands here is no entry: somebody changed it"
@@ -131,4 +131,4 @@ class Words:
                 named = _names(str(value) for value in found["path_params"].values())
                 summary = str(route.summary)
                 return summary[:1].lower() + summary[1:] + (f" ({named})" if named else "")
-        return f"ask for what the interface does not have, {method} {path}"
+        return f"request an unknown address, {method} {path}"

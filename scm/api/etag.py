@@ -1,4 +1,4 @@
-"""ETag and If-Match: who edits says which state he saw, so that nobody's work is overwritten."""
+"""ETag and If-Match: an editor sends the state it saw, so that no other edit is overwritten."""
 
 import hashlib
 from typing import Annotated, NamedTuple

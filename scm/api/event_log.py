@@ -1,8 +1,8 @@
 """The last events of the city, numbered in order of arrival, so that a reader can page on.
 
-A number counts from the start of the server. What an event is called for good, whoever heard it
-and however often, is its `id`: a server that starts again hears the last ones again. One that is
-heard twice, for the bus came back or two asked for the same in one tick, is noted once.
+A number counts from the start of the server. The permanent name of an event is
+its `id`: a restarted server receives the last ones again. One that is received twice, because the
+bus reconnected or two requested the same in one tick, is noted once.
 """
 
 import hashlib
@@ -24,7 +24,7 @@ class EventFilter(msgspec.Struct, kw_only=True, frozen=True):
         severity, source, name: One or more of each, comma between.
         vehicle: The car it is about.
         text: To be found in the sentence, the name or the source; case does not matter, nor
-            whether a name has underscores or, as pages say it, spaces.
+            whether a name has underscores or, as on pages, spaces.
         since_ns, until_ns: When it happened, both ends included [ns since 1970].
     """
 
@@ -50,7 +50,7 @@ class EventFilter(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def as_read(text: str) -> str:
-    """Return a text as it is looked for: in small letters, names in words as pages say them."""
+    """Return a text as it is looked for: in small letters, names in words as on pages."""
     return text.casefold().replace("_", " ")
 
 
@@ -82,7 +82,7 @@ class EventLog:
         return tuple(self._events[i] for i in range(start, min(start + limit, len(self._events))))
 
     def newest_first(self) -> Iterator[LoggedEvent]:
-        """Return a copy of all events that are kept."""
+        """Return a copy of all stored events."""
         return iter(tuple(reversed(self._events)))
 
 

@@ -26,7 +26,7 @@ class _Status(TypedDict):
 def camera_rows(
     picture: Picture, floor: Mapping[int, MapTag] = MappingProxyType({})
 ) -> tuple[CameraRow, ...]:
-    """Return all cameras that were heard, by name; `floor`: the map's tags, by id."""
+    """Return all cameras that have reported, by name; `floor`: the map's tags, by id."""
     names = sorted({*picture.frames, *picture.tags, *picture.eye_statuses})
     return tuple(_row(name, picture, floor) for name in names)
 
@@ -77,7 +77,7 @@ def _row(camera: str, picture: Picture, floor: Mapping[int, MapTag]) -> CameraRo
 
 
 def _status(status: Held[EyeStatus] | None, now_ns: int) -> _Status:
-    """Return what a camera says of itself; one that says nothing any more is not good."""
+    """Return what a camera reports of itself; one that no longer reports is not good."""
     if status is None:
         return {"good": None, "complaints": ()}
     age_s, complaints = status.age_s(now_ns), tuple(one.said for one in status.message.complaints)

@@ -1,4 +1,4 @@
-"""The Eye's tracks, where cars are by all cameras together, heard while somebody looks at them."""
+"""The Eye's tracks: each car by all cameras together, received while somebody requests them."""
 
 import math
 
@@ -9,27 +9,27 @@ from scm.runtime.part import Subscription
 from scm.v2x.messages.eye_track import EyeTrack
 
 WATCHED_NS = 5 * NS_PER_S
-"""So long after somebody asked tracks are heard: 20 a second of each car are many."""
+"""How long after a request tracks are received: 20 a second of each car are many."""
 SHOWN_S = 2.0
 AS_SENT = ("vehicle", "tag_id", "t_ns", "stale", "flags", "cameras")
 ROUNDED = ("x_m", "y_m", "yaw_rad", "speed_mps", "lateral_speed_mps", "yaw_rate_radps")
 
 
 class TrackWatch:
-    """Who asked for tracks lately, and the newest of each car; not safe between threads."""
+    """When tracks were last requested, and the newest of each car; not safe between threads."""
 
     def __init__(self) -> None:
         self._until_ns: int | None = None
         self._newest: dict[str, Held[EyeTrack]] = {}
 
     def subscribe(self, now_ns: int) -> bool:
-        """Hear tracks from now on; return whether they were not heard before."""
+        """Receive tracks from now on; return whether they were not received before."""
         is_new = self._until_ns is None
         self._until_ns = now_ns + WATCHED_NS
         return is_new
 
     def forget(self, now_ns: int) -> bool:
-        """Forget old tracks; return whether nobody has asked for so long that none are heard."""
+        """Drop old tracks; return whether the last request is so old that none are received."""
         shown_ns = round(SHOWN_S * NS_PER_S)
         self._newest = {
             vehicle: held
@@ -47,7 +47,7 @@ class TrackWatch:
             self._newest[track.vehicle] = Held(track, t_ns)
 
     def subscriptions(self) -> tuple[Subscription, ...]:
-        """Return what has to be heard now."""
+        """Return the subscriptions needed now."""
         return () if self._until_ns is None else (Subscription(EyeTrack),)
 
     def rows(self, now_ns: int) -> tuple[TrackRow, ...]:

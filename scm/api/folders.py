@@ -1,4 +1,4 @@
-"""Shelves: folders that the interface reads and writes, each for one kind of file."""
+"""Folders that the interface reads and writes, each for one kind of file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +24,7 @@ class Folders:
 
 
 def folders_in(folder: Path) -> Folders:
-    """Return all shelves in one folder, recordings at its top; who writes makes its folder."""
+    """Return all folders inside one, recordings at its top; writers create theirs."""
     return Folders(
         recordings=folder,
         reports=folder / "reports",

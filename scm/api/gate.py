@@ -9,7 +9,7 @@ anywhere, for none elsewhere can without our consent. With keys a change must ca
 header: the cookie, which pages have for streams and pictures, is for reading.
 A WebSocket is a change from its first byte. Pages cannot give it a header, nor may a key stand in
 an address, which is logged: they offer it as the subprotocol `scm.key.<key>`, which is not chosen.
-What is endless asks again as it goes: a key that ends takes its streams with it.
+Endless streams check again as they run: an expired key ends its streams.
 """
 
 import base64
@@ -211,8 +211,8 @@ class Gate:
     def _refuse_key(self, address: str, key: str, path: str) -> _Refusal:
         """Refuse who has no key, or a wrong one: after many of these, to wait.
 
-        A right key never comes here: whoever guesses with its public part, which is no secret, must
-        not keep its owner out. Nobody who presses the red stop is asked to wait.
+        A valid key never comes here: guesses with its public part, which is no secret, must
+        not keep its owner out. The city stop is never delayed.
         """
         if key and self._brake.wait_s(address, key) > 0.0 and path != STOP:
             detail = f"this key was wrong too often from {address}; wait a little"
@@ -228,7 +228,7 @@ class Gate:
 
 
 async def _has_ended(keys: KnownKeys, key: str) -> bool:
-    """Return whether a key is nobody's any more; a store that does not answer ends nothing."""
+    """Return whether a key has ended; a store that does not answer ends nothing."""
     try:
         return await keys.find(key) is None
     except StoreError:
@@ -236,7 +236,7 @@ async def _has_ended(keys: KnownKeys, key: str) -> bool:
 
 
 def _is_embedded_elsewhere(headers: Headers) -> bool:
-    """Return whether a page of another site asks, which could not even read what it gets.
+    """Return whether a page of another site sent this; it could not read the answer.
 
     Its pictures and frames would let us work, and use up what its reader may ask. A link that a
     person follows is none of these.
@@ -248,7 +248,7 @@ def _is_embedded_elsewhere(headers: Headers) -> bool:
 
 
 def caller_of(scope: Scope) -> str:
-    """Return what tells a caller from others: the public part of its key, or its address."""
+    """Return what identifies a caller: the public part of its key, or its address."""
     key = str(scope.get("scm_key", ""))
     return key.split("_")[1] if key.count("_") > 1 else _address(scope)
 

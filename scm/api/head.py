@@ -1,4 +1,4 @@
-"""HEAD: what GET says of an answer, without the answer (RFC 9110, 9.3.2), of every address.
+"""HEAD: the headers of GET without its body (RFC 9110, 9.3.2), of every address.
 
 What is long or endless is begun and ended again, as when its reader goes away.
 """
@@ -17,7 +17,7 @@ class Headed:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Ask for the answer, and leave it out."""
+        """Compute the answer, and leave out its body."""
         if scope["type"] != "http" or scope["method"] != "HEAD":
             await self._app(scope, receive, send)
             return

@@ -1,9 +1,9 @@
-"""Idempotency-Key: a change that is asked for twice is done once, and answered twice.
+"""Idempotency-Key: a change that is requested twice is done once, and answered twice.
 
-What was answered is kept for a caller and key, with a digest of the request. The same request again
+The answer is stored for a caller and key, with a digest of the request. The same request again
 gets the stored answer with `Idempotency-Replayed: true`; another request under the key is 422
 `idempotency_mismatch`; one that comes while the first is under way is 409 `in_flight`. A refusal
-had no effect and is not kept: trying again tries again. After a failure of the server nobody knows
+had no effect and is not stored: a retry tries again. After a failure of the server it is unknown
 whether there was an effect: the request runs again, and the key, which it carries to the bus as
 its id, keeps the effect single; but no other request may use it.
 """
@@ -139,7 +139,7 @@ def _key_of(scope: Scope) -> str:
 def _name_caller(scope: Scope, key: str) -> None:
     """Put the caller's name before a key, where callers have one.
 
-    The key goes on to the bus as the id of what is asked there, which knows of no callers: two who
+    The key is the request's id on the bus, which knows no callers: two who
     count from 1 must not get one another's answers.
     """
     if scope.get("scm_key"):
@@ -154,7 +154,7 @@ def _as_known(known: _Entry, digest: bytes, key: str, scope: Scope) -> Response:
         detail = f"Idempotency-Key {key!r}: got another request than before; expected a new key"
         return problem(422, "idempotency_mismatch", detail, instance=scope["path"])
     if known.answer is None:
-        detail = f"Idempotency-Key {key!r}: the first request is still under way; ask again"
+        detail = f"Idempotency-Key {key!r}: the first request is still under way; try again"
         refused = problem(409, "in_flight", detail, instance=scope["path"])
         refused.headers["Retry-After"] = "1"
         return refused
@@ -175,7 +175,7 @@ async def _read(receive: Receive) -> list[Message]:
 
 
 def _again(pieces: list[Message], receive: Receive) -> Receive:
-    """Return a `receive` that gives pieces already read, then goes on."""
+    """Return a `receive` that gives pieces already read, then continues."""
     left = iter(pieces)
 
     async def replay() -> Message:
@@ -187,7 +187,7 @@ def _again(pieces: list[Message], receive: Receive) -> Receive:
 
 
 def _digest(scope: Scope, pieces: list[Message]) -> bytes:
-    """Return what tells this request from others: of a large body its first MiB and its length."""
+    """Return what identifies this request: of a large body its first MiB and its length."""
     digest = hashlib.sha256(f"{scope['method']} {scope['path']}?".encode())
     digest.update(scope["query_string"] + b"\n")
     digest.update(Headers(scope=scope).get("content-length", "").encode() + b"\n")

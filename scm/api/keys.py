@@ -1,4 +1,4 @@
-"""API keys: shown once, kept as salted hashes, compared in constant time.
+"""API keys: shown once, stored as salted hashes, compared in constant time.
 
 A key reads `scm_<id>_<secret>`. The id finds its record; the secret is 256 random bits, so that one
 fast hash is enough: there is nothing to guess that a slow one would protect.
@@ -25,7 +25,7 @@ _PERSON = b"scm api key"
 
 
 class KeyRecord(msgspec.Struct, frozen=True, kw_only=True):
-    """What is kept of a key.
+    """What is stored of a key.
 
     Attributes:
         key_id: Public part of the key.
@@ -55,7 +55,7 @@ class KeyRing:
         """Make a key; return it, for it is never shown again.
 
         Raises:
-            AccessError: when there is no such role, or nobody is named.
+            AccessError: when there is no such role, or the owner's name is empty.
         """
         if not owner.strip() or len(owner) > MOST_OWNER:
             msg = f"owner: got {owner!r}, expected 1 to {MOST_OWNER} characters"
@@ -67,19 +67,19 @@ class KeyRing:
     def lend(self, key: str, doing: str) -> str:
         """Make a key for a program that works for somebody: it may do what they may.
 
-        It is kept nowhere, and ends with this process, with theirs, or when it is taken back.
+        It is not stored, and ends with this process, with theirs, or when it is revoked.
 
         Args:
             key: Theirs.
-            doing: What the program is, in a word: its deeds are signed by owner and this.
+            doing: What the program is, in a word: its requests are signed by owner and this.
 
         Raises:
-            AccessError: when their key is nobody's any more.
+            AccessError: when their key has ended.
         """
         stored = self.record(public_part(key))
         lender = None if stored is None else whose(key, stored)
         if lender is None:
-            msg = f"{doing}: the key of who asked for it has ended"
+            msg = f"{doing}: the key of its requester has ended"
             raise AccessError(msg)
         lent, record = _made(f"{lender.owner}: {doing}"[:MOST_OWNER], lender.role, lender.made_s)
         self._lent[record.key_id] = record, lender.key_id
@@ -91,13 +91,13 @@ class KeyRing:
         self._ended.add(public_part(lent))
 
     def records(self) -> Iterator[KeyRecord]:
-        """Return what is kept of all keys, by id."""
+        """Return what is stored of all keys, by id."""
         for name, body in self._store.items("credentials"):
             if name.startswith(_PREFIX):
                 yield _read(name, body)
 
     def revoke(self, key_id: str) -> KeyRecord:
-        """End a key, and return what was kept of it.
+        """End a key, and return what was stored of it.
 
         Raises:
             AccessError: when there is none of that id.
@@ -111,7 +111,7 @@ class KeyRing:
         return _read(key_id, body)
 
     def has_ended(self, key_id: str) -> bool:
-        """Say, without asking the store, whether a key or one it was lent for was ended here."""
+        """Return, without the store, whether a key or one it was lent for was ended here."""
         while key_id not in self._ended:
             if key_id not in self._lent:
                 return False
@@ -119,7 +119,7 @@ class KeyRing:
         return True
 
     def record(self, key_id: str) -> KeyRecord | None:
-        """Return what is kept of the key of an id; None: it has ended, or its lender's has."""
+        """Return what is stored of a key by its id; None: it has ended, or its lender's has."""
         lent = self._lent.get(key_id)
         if lent is not None:
             record, lender = lent
@@ -138,13 +138,13 @@ def whose(key: str, record: KeyRecord) -> KeyRecord | None:
 
 
 def public_part(key: str) -> str:
-    """Return what tells a key from others and is no secret; empty: it is no key."""
+    """Return the public part that identifies a key; empty: it is no key."""
     match = _KEY.fullmatch(key)
     return match[1] if match is not None else ""
 
 
 def _made(owner: str, role: Role, made_s: int) -> tuple[str, KeyRecord]:
-    """Return a new key, and what is to be kept of it."""
+    """Return a new key, and what is to be stored of it."""
     key_id, secret = secrets.token_hex(4), secrets.token_urlsafe(SECRET_BYTES)
     salt = secrets.token_bytes(hashlib.blake2b.SALT_SIZE)
     record = KeyRecord(

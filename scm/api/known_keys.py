@@ -1,6 +1,6 @@
 """Whose a key is, without keeping the event loop waiting for the store that knows.
 
-A store may be a server across the network. It is asked in threads, and what it said holds for
+A store may be a server across the network. It is queried in threads, and its answer holds for
 `FRESH_NS`: a key that another process ends is refused here so much later, one that this process
 ends at once. The red stop waits for no store: a key that was good before is good for it.
 """
@@ -23,8 +23,8 @@ class Known(NamedTuple):
     """What is known of a key.
 
     Attributes:
-        record: Whose it is; None: nobody's.
-        is_sure: Whether the store says so; else it did a while ago, and does not answer now.
+        record: Of the key; None: no such key.
+        is_sure: Whether the store confirms it; else it did earlier, and does not answer now.
     """
 
     record: KeyRecord | None
@@ -52,7 +52,7 @@ class KnownKeys:
         self._stop = _Queue(self, 1, "stop-keys")
 
     async def find(self, key: str) -> KeyRecord | None:
-        """Return whose a key is; None: nobody's.
+        """Return a key's record; None: no such key.
 
         Raises:
             StoreError: when the store does not answer.
@@ -92,7 +92,7 @@ class KnownKeys:
         return Known(self._judged(before, key), is_sure=False)
 
     def look_up(self, key_id: str) -> KeyRecord | None:
-        """Ask the store for a key by its id, and remember what it says; blocks.
+        """Query the store for a key by its id, and remember the answer; blocks.
 
         Raises:
             StoreError: when it does not answer.
@@ -118,7 +118,7 @@ class KnownKeys:
 
 
 class _Queue:
-    """Look-ups on threads of their own; who asks for a key under way shares its answer."""
+    """Look-ups on threads of their own; requests for a key under way share its answer."""
 
     def __init__(self, keys: KnownKeys, threads: int, name: str) -> None:
         self._keys = keys
@@ -127,7 +127,7 @@ class _Queue:
         self._lock = threading.Lock()
 
     async def look_up_shared(self, key_id: str) -> KeyRecord | None:
-        """Return what the store says of a key.
+        """Return the store's answer for a key.
 
         Raises:
             StoreError: when it does not answer.

@@ -1,7 +1,7 @@
 """Limits: so many requests a caller, then 429 with the seconds to wait.
 
 A caller is a key, or an address where there are no keys. Each has two buckets of tokens that refill
-steadily, one for looking and one for changing. Answers say what is left, after the IETF's draft of
+steadily, one for reading and one for changing. Answers report what is left, by the IETF's draft of
 `RateLimit` headers. Never limited: the red stop, health, streams and teleoperation.
 """
 
@@ -73,7 +73,7 @@ class Limited:
         self._changing = Buckets(changing, clock)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request pass, or ask its caller to wait."""
+        """Let a request pass, or require its caller to wait."""
         if scope["type"] != "http" or _is_free(str(scope["path"])):
             await self._app(scope, receive, send)
             return

@@ -1,4 +1,4 @@
-"""Metrics for Prometheus: how the city does, read when somebody asks, and how requests do.
+"""Metrics for Prometheus: the city's state, read on request, and the interface's requests.
 
 The names are ours: `scm_` and the unit at the end. A fault of a signal monitor stays latched until
 a person resets it, so that none is missed between two readings.
@@ -99,7 +99,7 @@ def _route_of(scope: Scope) -> str:
 
 
 class _OfCity(Collector):
-    """What the view knows, looked at when somebody asks."""
+    """The view's state, read on request."""
 
     def __init__(self, city: City, stream: Stream) -> None:
         self._city = city
@@ -107,7 +107,7 @@ class _OfCity(Collector):
         self._faults: set[tuple[str, int, str]] = set()
 
     def describe(self) -> Iterable[Metric]:
-        """Name nothing ahead: asking for it would be the same work."""
+        """List no metric in advance: it would be the same work."""
         return ()
 
     def collect(self) -> Iterator[Metric]:
@@ -122,7 +122,7 @@ class _OfCity(Collector):
             "scm_bus_callback_errors", "Arrivals that could not be read.", float(bus.rejected())
         )
         pages = float(self._stream.pages)
-        yield _gauge("scm_stream_listeners", "Pages that hear the live stream.", pages)
+        yield _gauge("scm_stream_listeners", "Pages that receive the live stream.", pages)
 
     def _of_world(self, picture: Picture) -> Iterator[Metric]:
         held = picture.snapshot
@@ -130,7 +130,7 @@ class _OfCity(Collector):
             return
         world = held.message
         age_s = seconds(self._city.now_ns() - held.arrived_ns)
-        yield _gauge("scm_snapshot_age_seconds", "How long ago the world was heard.", age_s)
+        yield _gauge("scm_snapshot_age_seconds", "Age of the world's newest message.", age_s)
         yield _gauge("scm_real_time_factor", "Simulated over elapsed.", world.real_time_factor)
         yield _counter("scm_late_ticks", "Ticks of the world that ended late.", world.late_ticks)
         stopped = picture.stop is not None and picture.stop.engaged

@@ -1,7 +1,7 @@
 """Long work: an answer at once, 202 with an operation to look at, and the work on a thread.
 
 An operation is `waiting`, `running`, then `done`, `failed` or `cancelled` for good. Work of one
-kind runs one at a time, in the order of asking.
+kind runs one at a time, in the order of requests.
 """
 
 import itertools
@@ -37,7 +37,7 @@ class Cancelled(Exception):  # noqa: N818  it is no error
 
 
 class ProgressReporter:
-    """How work tells where it is; raises `Cancelled` when it was called off."""
+    """Reports the progress of work; raises `Cancelled` when it was cancelled."""
 
     def __init__(self, operations: "Operations", name: str, cancel: threading.Event) -> None:
         self._operations = operations
@@ -51,7 +51,7 @@ class ProgressReporter:
         self._operations.change(self._name, **changes)
 
     def check(self) -> None:
-        """Raise `Cancelled` when the work was called off; tell nothing."""
+        """Raise `Cancelled` when the work was cancelled; report nothing."""
         if self.cancelled.is_set():
             raise Cancelled
 
@@ -131,7 +131,7 @@ class Operations:
         return self.find(name)
 
     def change(self, name: str, **changes: object) -> None:
-        """Change what is told of an operation; where files lie on the server is not told."""
+        """Change what is published of an operation; paths on the server are not published."""
         for text in ("doing", "error"):
             if text in changes:
                 changes[text] = without_paths(str(changes[text]))
@@ -170,7 +170,7 @@ class Operations:
             self._end(name, "failed", error=str(error))
         except Exception:
             _LOGGER.exception("operation_failed id=%s", name)
-            self._end(name, "failed", error="the server failed on this; its log says why")
+            self._end(name, "failed", error="the server failed on this; its log has the reason")
         else:
             self._end(name, "done", result=result, progress=1.0)
 
@@ -189,7 +189,7 @@ class Operations:
 def without_paths(text: str) -> str:
     """Return a text whose absolute paths are the names of their files alone, but for our addresses.
 
-    Whoever may look at a job need not know how the server's folders are called: its log says that.
+    Readers of a job need not know the names of the server's folders: its log has them.
     """
     return _PATH.sub(lambda match: match["quoted"] or match["plain"] or "a folder", text)
 

@@ -1,7 +1,7 @@
 """Pages of a long list: a cursor instead of a number, so that what is added does not move them.
 
-A page is asked for by `limit` and `cursor`; the answer names the next one in its body and, as
-RFC 8288 asks, in `Link`. A cursor is opaque to its reader: the key of the last row already told.
+A page is requested by `limit` and `cursor`; the answer names the next one in its body and, as
+RFC 8288 defines, in `Link`. A cursor is opaque to its reader: the key of the last row already sent.
 """
 
 import base64
@@ -44,7 +44,7 @@ def page_of(
 
     Args:
         rows: All of them; those up to the cursor's are skipped.
-        key: What tells a row from others and never changes; rows need not be sorted by it. Of rows
+        key: Identifies a row and never changes; rows need not be sorted by it. Of rows
             that have the same one the cursor counts which it is.
         keep: Which rows are wanted. What may cease to be true of a row belongs here: a cursor holds
             although its row is not wanted any more.
@@ -72,7 +72,7 @@ def page_of(
         last = name, alike[name]
         found.append(row)
     if wanted is not None:
-        raise _bad(cursor, "its row is gone: begin anew")
+        raise _bad(cursor, "its row is gone: begin again")
     return Page(items=tuple(found), next=None)
 
 

@@ -51,7 +51,7 @@ class SeenPose:
 
 @dataclass(frozen=True, slots=True)
 class TagSighting:
-    """A tag when a camera saw it last: in the frame exposed at `t_ns`, told at `arrived_ns`."""
+    """A tag when a camera saw it last: in the frame exposed at `t_ns`, received at `arrived_ns`."""
 
     tag: TagSeen
     t_ns: int
@@ -60,17 +60,17 @@ class TagSighting:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """The newest of everything heard, as of `now_ns`, the time of the view's last step.
+    """The newest of everything received, as of `now_ns`, the time of the view's last step.
 
     Attributes:
         spats, monitors, sites, signal_statuses: By junction.
         trips: By vehicle.
-        traffic: The observer's newest counts; `violations` the last it told, oldest first.
+        traffic: The observer's newest counts; `violations` the last it reported, oldest first.
         frames, tags: By camera, the last few, oldest first; `eye_statuses` the newest.
         tags_seen: By (camera, tag id), all of the last minute.
         poses: By (camera, vehicle).
         stations: Everybody who is there, and who was lost lately.
-        disturbances: What makes measurements void; it goes on with the city.
+        disturbances: What makes measurements void; shared with the city.
         event_seq: Number of the newest event in the log; 0: none yet.
     """
 
@@ -96,7 +96,7 @@ class Picture:
 
 
 def once_a_picture(make: Callable[[Picture], T]) -> Callable[[Picture], T]:
-    """Make what is shown of a picture once, however many ask for it before the next one."""
+    """Compute a view of a picture once, for any number of requests before the next one."""
     held: tuple[Picture, T] | None = None
 
     @wraps(make)

@@ -50,7 +50,7 @@ _CODE_OF_STATUS = {
 DISK_TROUBLE = frozenset(
     {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO}
 )
-"""What the server's disk says when nothing can be written, whoever asks."""
+"""Errors of the server's disk when nothing can be written."""
 
 _METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
 _STATUSES = (400, 401, 403, 404, 409, 412, 413, 415, 422, 428, 429, 500, 503, 504, 507)
@@ -181,12 +181,12 @@ def _allowed(request: Request) -> Iterator[str]:
 
 
 async def _on_gone(request: Request, _error: Exception) -> Response:
-    """Say of a body that broke off what metrics and audit can tell: nobody hears it, no bug."""
+    """Answer a body that broke off, for metrics and audit: no client receives it, no bug."""
     return problem(400, "invalid", "the body broke off", instance=request.url.path)
 
 
 async def _on_disk(request: Request, error: Exception) -> Response:
-    """Say what keeps a shelf from being written; any other trouble with files is a bug."""
+    """Report what keeps a folder from being written; any other file error is a bug."""
     if not isinstance(error, OSError) or error.errno not in DISK_TROUBLE:
         raise error
     detail = f"the server's disk: {error.strerror}"
@@ -198,5 +198,5 @@ async def _on_store(request: Request, error: Exception) -> Response:
 
 
 async def _on_bug(request: Request, _error: Exception) -> Response:
-    detail = "the server failed on this request; its log says why"
+    detail = "the server failed on this request; its log has the reason"
     return problem(500, "internal", detail, instance=request.url.path)

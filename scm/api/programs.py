@@ -25,11 +25,11 @@ OnLine = Callable[[str], None]
 def run_scm(
     words: Sequence[str], progress: ProgressReporter, on_line: OnLine, *, kinder: bool = True
 ) -> list[str]:
-    """Run `scm WORDS` to its end and return the last lines that it said.
+    """Run `scm WORDS` to its end and return its last lines.
 
     Args:
         words: Command and arguments.
-        progress: Of the operation; when it is cancelled, the program is asked to end.
+        progress: Of the operation; when it is cancelled, the program is requested to end.
         on_line: Receives every line, on this thread.
         kinder: Whether the city's parts go first.
 
@@ -84,7 +84,7 @@ def _follow(
 
 
 def _end(process: "subprocess.Popen[str]") -> None:
-    """Ask the program to end, and see that it does."""
+    """Request the program to end, and make sure that it does."""
     if process.poll() is None:
         process.terminate()
         try:
@@ -95,7 +95,7 @@ def _end(process: "subprocess.Popen[str]") -> None:
 
 
 def _failure(output: str) -> str:
-    """Return what a program said of its failure: from its own `scm ...:` on, or the last line."""
+    """Return a program's message of its failure: from its `scm ...:` on, or the last line."""
     lines = output.splitlines()
     begin = next((i for i, line in enumerate(lines) if line.startswith("scm ")), len(lines) - 1)
     return " ".join(lines[begin:])

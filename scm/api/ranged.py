@@ -12,7 +12,7 @@ _RANGE = re.compile(r"bytes=([0-9]{0,18})-([0-9]{0,18})")
 
 
 def send_file(request: Request, path: Path, media_type: str) -> Response:
-    """Return a file to be kept, whole or the one range that was asked for (RFC 9110, 14)."""
+    """Return a file to be cached, whole or the one requested range (RFC 9110, 14)."""
     facts = path.stat()
     size, tag = facts.st_size, f'"{facts.st_mtime_ns:x}-{facts.st_size:x}"'
     headers = {

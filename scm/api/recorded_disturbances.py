@@ -1,4 +1,4 @@
-"""What made measurements void while a run was recorded, as far as its messages tell."""
+"""What made measurements void while a run was recorded, as far as its messages show."""
 
 from scm.api.replay import read
 from scm.clock import NS_PER_S

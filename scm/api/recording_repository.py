@@ -1,7 +1,7 @@
 """The recordings of a folder: what each holds, what people wrote about it, and taking one away.
 
 A recording is `<name>.mcap`; what people call it and note stands beside it in `<name>.notes.json`.
-Indexes are kept, so that a list reads each file once, and of one that grows only what is new.
+Indexes are stored, so that a list reads each file once, and of one that grows only what is new.
 """
 
 import re
@@ -29,7 +29,7 @@ class RecordingRepository:
     """One folder of recordings; safe from any thread.
 
     Attributes:
-        editing: Held from looking at notes to changing them: of two writers the second is told.
+        editing: Held from reading notes to changing them: the second of two writers is refused.
     """
 
     def __init__(self, folder: Path | None, clock: Clock | None = None) -> None:
@@ -94,7 +94,7 @@ class RecordingRepository:
         return found
 
     def row(self, name: str) -> RecordingRow:
-        """Return what is told of one recording, also of one that cannot be read.
+        """Return the row of one recording, also of one that cannot be read.
 
         Raises:
             RefusedError: when there is none of that name.
@@ -126,7 +126,7 @@ class RecordingRepository:
         )
 
     def notes(self, name: str) -> Notes:
-        """Return what people wrote about a recording; empty where nobody did."""
+        """Return the notes about a recording; empty: none."""
         path = self.path(name)
         try:
             return msgspec.json.decode(path.with_name(name + NOTES).read_bytes(), type=Notes)
@@ -177,12 +177,12 @@ class RecordingRepository:
         return "cut off" if self._is_quiet(index.path) else "being written"
 
     def _is_quiet(self, path: Path) -> bool:
-        """Return whether nobody has written to a file for a while."""
+        """Return whether a file has not been written for a while."""
         return self._clock.now_ns() - _written_s(path) * NS_PER_S > QUIET_S * NS_PER_S
 
 
 def cars_of(index: RunIndex) -> tuple[str, ...]:
-    """Return the cars that told of themselves: n2 before n10."""
+    """Return the cars that reported themselves: n2 before n10."""
     found = {match[1] for key in index.topics.values() if (match := _CAR.fullmatch(key))}
     return tuple(sorted(found, key=natural))
 
@@ -204,7 +204,7 @@ def _trouble(state: State, index: RunIndex) -> str:
         return (
             "its writer was killed before the end"
             f"{f'; the last {lost} bytes are no whole message' if lost else ''}. What is whole is "
-            f"shown; `scm recover {index.path.name}` mends it."
+            f"shown; `scm recover {index.path.name}` repairs it."
         )
     return "" if index.chunks else "nothing was recorded yet"
 

@@ -87,7 +87,7 @@ def frames_of(index: RunIndex, from_s: float, to_s: float, hz: float) -> Frames:
 
 
 def _next_frame_s(index: RunIndex, after_ns: int) -> float | None:
-    """Return when the world next told where cars are, since the recording's begin."""
+    """Return when the world next published poses, since the recording's begin."""
     found = next(index.read(after_ns + 1, index.end_ns, SNAPSHOT), None)
     return None if found is None else round((found.t_ns - index.begin_ns) / NS_PER_S, 3)
 
@@ -177,7 +177,7 @@ class _Frames:
         )
 
     def _picture(self, one: Recorded) -> None:
-        # Rounded up: what is asked for at this time is this picture, not the one before.
+        # Rounded up: a request for this time gets this picture, not the one before.
         t_s = math.ceil((one.t_ns - self._index.begin_ns) / NS_PER_MS) / 1000
         vehicle, camera = _camera_of(one.key)
         self.pictures.append(PictureAt(t_s=t_s, vehicle=vehicle, camera=camera))
@@ -255,13 +255,13 @@ def picture_at(
 
 
 def _camera_of(key: str) -> tuple[str, str]:
-    """Return whose camera a picture's key tells, empty for an overhead one, and which."""
+    """Return vehicle and camera of a picture's key; the vehicle of an overhead one is empty."""
     *_, vehicle, camera, last = key.split("/")
     return (vehicle, last) if camera == "@camera" else ("", camera)
 
 
 def map_of(index: RunIndex) -> CityMap | None:
-    """Return the map that was driven on; None where the recording does not tell it.
+    """Return the map that was driven on; None: the recording does not contain it.
 
     Raises:
         RecordingError: when the file cannot be opened any more.
@@ -272,7 +272,7 @@ def map_of(index: RunIndex) -> CityMap | None:
 
 
 def cars_in(index: RunIndex) -> tuple[CarFacts, ...]:
-    """Return all cars of the first and the last snapshot: those that a sparse recording tells."""
+    """Return all cars of the first and the last snapshot: those of a sparse recording."""
     first = next(index.read(0, index.end_ns, SNAPSHOT), None)
     last = index.newest(index.end_ns, SNAPSHOT)
     message = [read(one, WorldSnapshot) for one in (first, last) if one is not None]
@@ -281,7 +281,7 @@ def cars_in(index: RunIndex) -> tuple[CarFacts, ...]:
 
 
 def first_frame_s(index: RunIndex) -> float:
-    """Return when the world first told where cars are; 0 where it never did."""
+    """Return when the world first published poses; 0: never."""
     first = next(index.read(0, index.end_ns, SNAPSHOT), None)
     return (first.t_ns - index.begin_ns) / NS_PER_S if first is not None else 0.0
 
@@ -318,7 +318,7 @@ def csv_of(
 
 
 def no_rows(index: RunIndex, vehicle: str, from_s: float, to_s: float | None) -> str:
-    """Say that a recording has nothing of a car, or of any, in a span, and how long it is."""
+    """Raise that a recording has nothing of a car, or of any, in a span, with its length."""
     whose = vehicle or "any car"
     span = f"from {from_s:g} s on" if to_s is None else f"from {from_s:g} s to {to_s:g} s"
     length_s = (index.end_ns - index.begin_ns) / NS_PER_S

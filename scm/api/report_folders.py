@@ -1,7 +1,7 @@
-"""Mismatch reports on their shelf: which there are, what each found, and its files.
+"""Stored mismatch reports: which there are, what each found, and its files.
 
 A report is a folder with `report.json`; of several cars it is a folder with a report for each, and
-each of those is a report of its own here, `FOLDER.CAR`. `job.json` says what it was made from.
+each of those is a report of its own here, `FOLDER.CAR`. `job.json` holds what it was made from.
 """
 
 import re
@@ -62,7 +62,7 @@ class _Drawn(msgspec.Struct):
 
 
 class ReportFolders:
-    """The shelf of reports; None: there is no such shelf, and it is empty."""
+    """The folder of reports; None: there is none, and no report."""
 
     def __init__(self, root: Path | None) -> None:
         self.root = root
@@ -96,7 +96,7 @@ class ReportFolders:
         return True
 
     def job(self, folder: Path) -> Job | None:
-        """Return what a report was made from; None: nobody said."""
+        """Return what a report was made from; None: unknown."""
         for place in (folder, folder.parent):
             try:
                 return msgspec.json.decode((place / _JOB).read_bytes(), type=Job)

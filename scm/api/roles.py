@@ -41,7 +41,7 @@ class AtLeast(SecurityBase):
     """A dependency of a route: the caller's role, from the gate, is this one or above."""
 
     model = HTTPBearer(
-        description="An API key (`scm key add`), where the city asks for one; see docs/security.md."
+        description="An API key (`scm key add`), where the city requires one; see docs/security.md."
     )
     scheme_name = SCHEME
 
@@ -49,7 +49,7 @@ class AtLeast(SecurityBase):
         self.role = role
 
     async def __call__(self, connection: HTTPConnection) -> None:
-        """Pass, or refuse; in the event loop, so that busy threads keep nobody waiting."""
+        """Pass, or refuse; in the event loop, so that busy threads delay no caller."""
         own: Role | None = connection.scope.get("scm_role")
         if own is None or ROLES.index(own) < ROLES.index(self.role):
             detail = f"your key is one of a {own}; this needs {self.role} or above"
@@ -74,5 +74,5 @@ async def _signer(connection: HTTPConnection) -> Callable[[str], str]:
 
 
 Signer = Annotated[Callable[[str], str], Depends(_signer)]
-"""Who signs a deed, by whom its body names: with keys the key's owner, whatever the body says; else
+"""Who signs a request, by its body's `by`: with keys the key's owner, whatever `by` is; else
 whom it names, or the program that calls."""

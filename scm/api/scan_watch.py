@@ -1,4 +1,4 @@
-"""LIDAR scans of the cars that somebody looks at: cars scan only while somebody hears them."""
+"""LIDAR scans of the cars that somebody watches: cars scan only while somebody subscribes."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ class ScanWatch:
         return self._newest.get(vehicle)
 
     def subscriptions(self) -> Iterator[Subscription]:
-        """Yield what has to be heard for those who watch now."""
+        """Yield the subscriptions that present viewers need."""
         return (Subscription(LidarScan, {"vehicle": vehicle}) for vehicle in self._watched)
 
 

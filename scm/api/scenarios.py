@@ -1,8 +1,8 @@
 """Fleet scenarios: Python scripts of a folder, and running one beside the live city.
 
 A script is a program with all rights of the server: who may write one may do anything there. It
-hears where the city is in `SCM_CONNECT` and by `{connect}` among its arguments, and who it is
-there in `SCM_CREDENTIALS`, which `scm.fleet.open_city` heeds. Where the web interface asks for
+gets the city's address in `SCM_CONNECT` and by `{connect}` among its arguments, and who it is
+there in `SCM_CREDENTIALS`, which `scm.fleet.open_city` reads. Where the web interface requires
 keys it is lent one while it runs, in the file that `SCM_API_KEY_FILE` names, which `scm.client`
 heeds: with it a script may do what who runs it may.
 """
@@ -51,7 +51,7 @@ class ScenarioRepository:
     """The scripts of a folder, and those that came with the program.
 
     Attributes:
-        editing: Held from looking at one to changing it: of two writers the second is told.
+        editing: Held from reading one to changing it: the second of two writers is refused.
     """
 
     def __init__(self, folder: Path | None, shipped: Path = SHIPPED) -> None:
@@ -90,7 +90,7 @@ class ScenarioRepository:
         """Keep a script.
 
         Raises:
-            RefusedError: when it is no Python, it came with the program, or nothing can be kept.
+            RefusedError: when it is no Python, it came with the program, or nothing can be stored.
         """
         self._check_own(name)
         try:
@@ -175,7 +175,7 @@ class ScenarioRuns:
         Args:
             name: Of the script.
             arguments: Of its command line.
-            owner: Who asked for it.
+            owner: Who requested it.
             key: Their API key, on behalf of which the script is lent one; empty: the city has none.
 
         Raises:
@@ -211,7 +211,7 @@ class ScenarioRuns:
 
     @contextmanager
     def _lent(self, key: str, name: str) -> Iterator[dict[str, str]]:
-        """Lend a script an API key while it runs; yield what tells it where that is."""
+        """Lend a script an API key while it runs; yield the arguments and environment for it."""
         if self._keys is None:
             yield {}
             return
@@ -246,7 +246,7 @@ class ScenarioRuns:
         except OSError as cause:
             msg = f"{path.name}: cannot be started: {cause.strerror or cause}"
             raise ScmError(msg) from cause
-        assert process.stdout is not None  # noqa: S101  it was asked for
+        assert process.stdout is not None  # noqa: S101  it was requested
         reader = threading.Thread(target=printed.read, args=(process.stdout,), daemon=True)
         reader.start()
         try:
@@ -259,7 +259,7 @@ class ScenarioRuns:
         finally:
             reader.join(GRACE_S)
         if process.returncode:
-            why = printed.last() or "it said nothing"
+            why = printed.last() or "it printed nothing"
             msg = f"{path.name} ended with exit code {process.returncode}: {why}"
             raise ScmError(msg)
         return f"/recordings/scenarios?run={printed.run}"
@@ -285,7 +285,7 @@ class _Printed:
                         self._first += 1
 
     def last(self) -> str:
-        """Return the last line that says something."""
+        """Return the last line that is not empty."""
         with self._lock:
             return next((line for line in reversed(self._lines) if line.strip()), "")[:200]
 

@@ -18,7 +18,7 @@ from scm.records.page import Page
 
 Responses = dict[int | str, dict[str, Any]]
 
-_schema = cache(msgspec.json.schema)  # shared by all routes: nobody may change it
+_schema = cache(msgspec.json.schema)  # shared by all routes: never changed
 
 _CURSOR = {
     "Link": {
@@ -28,7 +28,7 @@ _CURSOR = {
 }
 
 
-def answer(kind: Any, status: int = 200, about: str = "What was asked for.") -> Responses:
+def answer(kind: Any, status: int = 200, about: str = "What was requested.") -> Responses:
     """Describe an answer in JSON.
 
     Args:

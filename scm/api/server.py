@@ -1,4 +1,4 @@
-"""Run the web application until told to stop; the caller keeps the signals (Ctrl-C)."""
+"""Run the web application until it is stopped; the caller handles signals (Ctrl-C)."""
 
 import asyncio
 import contextlib
@@ -21,7 +21,7 @@ _POLL_S = 0.05
 LONGEST_PACKET = 4096  # bytes; a drive packet has about a hundred
 PATIENCE_S = 10.0
 MOST_CONNECTIONS = 3000
-FILES, OWN_FILES = 4096, 256  # as many as we ask for; of these the store, the bus and recordings
+FILES, OWN_FILES = 4096, 256  # as many as we request; of these the store, the bus and recordings
 BACKLOG = 128
 _numbers = itertools.count()
 
@@ -35,9 +35,9 @@ class _Server(uvicorn.Server):
 
 
 class _Impatient(H11Protocol):
-    """HTTP of uvicorn, which waits for ever for a request; and connections are not endless.
+    """HTTP of uvicorn, which waits without limit for requests; and connections are limited.
 
-    Whoever comes is let in, for it may be the red stop: where there are too many, the oldest of the
+    Every connection is accepted, it may be the city stop: of too many, the oldest of the
     address that has most of them goes.
     """
 
@@ -54,7 +54,7 @@ class _Impatient(H11Protocol):
         self._wait()
 
     def data_received(self, data: bytes) -> None:
-        """Wait on while a head comes in pieces; for each piece of a body anew."""
+        """Wait while a head comes in pieces; again for each piece of a body."""
         super().data_received(data)
         if self.conn.their_state is h11.IDLE:
             self._wait()
@@ -126,7 +126,7 @@ def serve(
         app,
         http=_Impatient,
         backlog=BACKLOG,
-        proxy_headers=bool(proxies),  # whoever else sends X-Forwarded-For may say what he likes
+        proxy_headers=bool(proxies),  # X-Forwarded-For of anybody else cannot be trusted
         forwarded_allow_ips=list(proxies),
         ws="websockets-sansio",
         ws_max_size=LONGEST_PACKET,

@@ -1,10 +1,10 @@
-"""What signals showed in the last minutes, and what became of what was told of it beforehand.
+"""What signals showed in the last minutes, and how it compares with what SPaT published.
 
 One bar is one colour of one group, from its first step to the first step of the next colour, on
-the controller's clock. While it is shown, what SPaT tells of its end is noted; when it has ended,
-it is judged once: an end before the earliest or after the latest that was told is a broken promise,
-and the likely end is compared as it was told 2, 5, 10 and 20 s before. Flash is at once and
-promises nothing: what it cuts is not judged.
+the controller's clock. While it is shown, its end according to SPaT is noted; when it has ended,
+it is judged once: an end before the earliest or after the latest published time breaks a guarantee,
+and the likely end is compared as published 2, 5, 10 and 20 s before. Flash is immediate and
+guarantees nothing: a colour that it cuts short is not judged.
 """
 
 from collections import deque
@@ -35,7 +35,7 @@ _UNPROMISED = ("flashing_red", "dark")
 
 @dataclass(frozen=True, slots=True)
 class _Judged:
-    """One colour that ended; `leads` holds error and told confidence, None: nothing was told."""
+    """One colour that ended; `leads` holds error and confidence, None: not published."""
 
     end_ns: int
     colour: str
@@ -48,7 +48,7 @@ class _Judged:
 
 @dataclass(slots=True)
 class _Shown:
-    """A colour while it is shown, and all that was told of its end."""
+    """A colour while it is shown, and all published times of its end."""
 
     colour: str
     start_ns: int
@@ -78,7 +78,7 @@ class _Shown:
         )
 
     def _error(self, end_ns: int, lead_s: int) -> tuple[float, float] | None:
-        """Return how far the likely end was off that was told some time before the end."""
+        """Return the error of the likely end that was published some time before the end."""
         at_ns = end_ns - lead_s * NS_PER_S
         forecasts = next((one for one in reversed(self.forecasts) if one[0] <= at_ns), None)
         if forecasts is None or forecasts[1] is None:
@@ -94,7 +94,7 @@ class _Group:
 
 
 class JunctionHistory:
-    """The last minutes of one junction; hears every `Spat`."""
+    """The last minutes of one junction; receives every `Spat`."""
 
     def __init__(self, junction: str) -> None:
         self._junction = junction
@@ -103,7 +103,7 @@ class JunctionHistory:
         self._t_ns: int | None = None
 
     def receive(self, spat: Spat) -> None:
-        """Note what is shown and told."""
+        """Note what is shown and published."""
         now_ns, last_ns = spat.t_ns, self._t_ns
         if last_ns is not None and now_ns < last_ns:
             self._groups.clear()  # another controller, with a clock of its own
@@ -132,7 +132,7 @@ class JunctionHistory:
         )
 
     def score(self) -> ForecastScore:
-        """Return what became of what was told."""
+        """Return how published times compare with what happened."""
         ended = [one for group in self._groups.values() for one in group.judged]
         return ForecastScore(
             junction=self._junction,
@@ -164,7 +164,7 @@ class JunctionHistory:
         shown.note(forecasts, now_ns)
 
     def _interrupt(self, last_ns: int) -> None:
-        """Nothing was heard for a while: what was shown then is not known, nor when it ended."""
+        """Nothing was received for a while: the colours then are unknown, and when they ended."""
         for group in self._groups.values():
             if group.shown is not None:
                 group.bars.append(_bar(group.shown, last_ns))
@@ -181,20 +181,20 @@ class JunctionHistory:
 
 
 class SignalHistory:
-    """All junctions, and what their monitors said."""
+    """All junctions, and the reports of their monitors."""
 
     def __init__(self) -> None:
         self._junctions: dict[str, JunctionHistory] = {}
         self._verdicts: dict[str, deque[Verdict]] = {}
 
     def receive(self, spat: Spat) -> None:
-        """Note what a junction shows and tells."""
+        """Note what a junction shows and publishes."""
         if spat.junction not in self._junctions:
             self._junctions[spat.junction] = JunctionHistory(spat.junction)
         self._junctions[spat.junction].receive(spat)
 
     def receive_monitor(self, status: MonitorStatus) -> None:
-        """Note what a monitor says, when it says something else."""
+        """Note a monitor's report when it differs from the last."""
         verdicts = self._verdicts.setdefault(status.junction, deque(maxlen=MAX_VERDICTS))
         if not verdicts or (verdicts[-1].fault, verdicts[-1].detail) != (
             status.fault,
@@ -208,11 +208,11 @@ class SignalHistory:
         return self._of(junction).history(groups)
 
     def score(self, junction: str) -> ForecastScore:
-        """Return what became of what a junction told."""
+        """Return how a junction's published times compare with what happened."""
         return self._of(junction).score()
 
     def verdicts(self, junction: str) -> tuple[Verdict, ...]:
-        """Return what a junction's monitor said, newest first."""
+        """Return the reports of a junction's monitor, newest first."""
         return tuple(reversed(self._verdicts.get(junction, ())))
 
     def _of(self, junction: str) -> JunctionHistory:

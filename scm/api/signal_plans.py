@@ -31,7 +31,7 @@ class PlanRepository:
 
     Attributes:
         folder: Where they lie; None: nothing can be saved.
-        editing: Held from looking at a plan to changing it: of two writers the second is told.
+        editing: Held from reading a plan to changing it: the second of two writers is refused.
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -72,7 +72,7 @@ class PlanRepository:
             raise PlanError("plans: this city keeps none; start `scm api` with --data FOLDER")
         names = self.names(file.junction)
         if file.plan not in names and len(names) >= MOST_PLANS:
-            raise PlanError(f"plans of {file.junction}: {len(names)}, no more are kept; delete one")
+            raise PlanError(f"plans of {file.junction}: {len(names)}, delete one first")
         path.parent.mkdir(parents=True, exist_ok=True)
         whole = path.with_suffix(".part")
         whole.write_bytes(msgspec.json.format(msgspec.json.encode(file), indent=2))
@@ -93,7 +93,7 @@ class PlanRepository:
         """Run the search in a process of its own; return the address of the proof.
 
         Raises:
-            PlanError: saying what is not as it must be.
+            PlanError: when a stage or time is not valid.
             Cancelled: when it was called off.
         """
         progress("walks through every state of kernel and plan")

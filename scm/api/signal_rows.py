@@ -1,4 +1,4 @@
-"""Junctions as they are shown: every group's colour, when it may change, and what the monitor says.
+"""Junctions as they are shown: every group's colour, when it may change, and the monitor's report.
 
 Times are seconds from now: both clocks, the controller's and ours, cancel out.
 """
@@ -39,7 +39,7 @@ def junction_rows(
 
 
 def status_rows(picture: Picture) -> tuple[StatusRow, ...]:
-    """Return what runs at every junction that was heard."""
+    """Return what runs at every junction that has reported."""
     return tuple(status_row(held.message) for held in picture.signal_statuses.values())
 
 

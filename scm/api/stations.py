@@ -1,4 +1,4 @@
-"""The table of stations: who is there, who was lost lately, and how each one says it does."""
+"""The table of stations: who is there, who was lost lately, and the status that each reports."""
 
 from collections import deque
 
@@ -38,7 +38,7 @@ class StationTable:
             self._rows[key] = msgspec.structs.replace(known, alive=False, lost_ns=now_ns)
 
     def status(self, status: PartStatus, now_ns: int) -> None:
-        """Note what a station says of itself."""
+        """Note a station's own report."""
         reports = self._status.setdefault(status.station, deque())
         if reports and (status.steps, status.dropped) < (
             reports[-1][0].steps,
@@ -50,7 +50,7 @@ class StationTable:
             reports.popleft()
 
     def forget(self, now_ns: int) -> None:
-        """Drop those lost for more than 60 s, and what was last heard from them."""
+        """Drop those lost for more than 60 s, and what was last received from them."""
         for key, row in list(self._rows.items()):
             if row.lost_ns is not None and now_ns - row.lost_ns > LOST_SHOWN_NS:
                 del self._rows[key]

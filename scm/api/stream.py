@@ -140,7 +140,7 @@ class Stream:
 
         Args:
             last_event_id: Of the last frame that the page saw; empty: none.
-            topics: Those that it hears, of `self.topics`; None: all.
+            topics: Those that it receives, of `self.topics`; None: all.
         """
         if not self._listeners:
             self._event_seq = self._city.view.picture().event_seq
@@ -165,7 +165,7 @@ class Stream:
             _LOGGER.error("stream_frame_failed frame=%d", self._frame, exc_info=failure)
 
     def _frame_of(self, changed: dict[str, msgspec.Raw], topics: frozenset[str]) -> bytes | None:
-        """Return a page's part of what changed; None: nothing, and no beat is due."""
+        """Return a page's part of what changed; None: nothing, and no `beat` is due."""
         own = {name: body for name, body in changed.items() if name in topics}
         if own:
             return self._event("delta", own, self._event_seq)
@@ -188,7 +188,7 @@ class Stream:
         return changed
 
     def _snapshot(self, listener: Listener) -> bytes:
-        """Return everything as it is; of events those that no delta told it, nor the next will."""
+        """Return everything as it is; of events those that no delta has sent or will send."""
         picture = self._city.view.picture()
         newest = self._event_seq
         after_seq = min(max(listener.sent_seq or 0, newest - EVENTS_SHOWN), newest)

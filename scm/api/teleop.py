@@ -1,8 +1,8 @@
-"""Teleoperation: one person at one car's wheel, over a WebSocket.
+"""Teleoperation: one person drives one car, over a WebSocket.
 
-    take          the lease is asked for; stolen only with a reason
+    take          the lease is requested; another owner's only with a reason
     drive         each packet goes to the car at once; without packets zeros go out every 50 ms
-    give back     or the connection ends: the lease goes back, and the car goes on with its trip
+    give back     or the connection ends: the lease is released, and the car continues its trip
 
 The car's guard stops it 300 ms after the last command, whatever becomes of this process; the
 city-wide stop holds in the guard as well, so no packet passes it.
@@ -56,13 +56,13 @@ class DriveSession:
 
     Args:
         city: Where the car is.
-        wire: Says its commands.
+        wire: Publishes its commands.
         clock: Of this process.
         socket: Accepted already.
         vehicle: The car.
-        owner: The name of the lease: of nobody else's connection.
-        is_closed: Tells when the server ends.
-        may_drive: Tells whether the person's key is still good; asked whenever the lease is kept,
+        owner: The name of the lease: unique to this connection.
+        is_closed: Returns whether the server ends.
+        may_drive: Returns whether the person's key is still valid; called whenever it is renewed,
             which it is not where that raises a StoreError.
     """
 
@@ -137,7 +137,7 @@ class DriveSession:
         return lease
 
     async def _read(self, wheel: Wheel) -> None:
-        """Hear the person, until one of the two ends it."""
+        """Receive packets until one of the two ends it."""
         try:
             while self._over is None:
                 packet = _packets.decode(await self._socket.receive_text())
@@ -216,12 +216,12 @@ class DriveSession:
         if over.code != "lost":
             status = await self._give_back(wheel, trip)
             over = Over(code=over.code, detail=f"{over.detail}; {status}".removeprefix("; "))
-        self._log_event("wheel_left", f"{self._owner} let go of {self._vehicle}: {over.detail}")
+        self._log_event("wheel_left", f"{self._owner} released {self._vehicle}: {over.detail}")
         codes = {"given_back": NORMAL, "invalid": BAD_PACKET, "lost": NOT_YOURS}
         await self._end(over, codes.get(over.code, GOING_AWAY))
 
     async def _give_back(self, wheel: Wheel, trip: Trip | None) -> str:
-        """Return the lease, send the car on where it was going, and say how that went."""
+        """Release the lease, send the car on to its destination, and report the result."""
         request = LeaseRequest(
             vehicle=self._vehicle, owner=self._owner, verb="release", epoch=wheel.epoch
         )
@@ -232,7 +232,7 @@ class DriveSession:
         return f"{self._vehicle} stands" if trip is None else await self._resume(trip)
 
     async def _resume(self, trip: Trip) -> str:
-        """Send the car on; an agent first waits to be sure that nobody drives it any more."""
+        """Send the car on; an agent first waits to be sure that it is no longer driven."""
         until_ns = self._clock.now_ns() + RESUME_NS
         request = onward(self._city.view, trip)
         while True:

@@ -1,6 +1,6 @@
-"""Topics of the live stream: what each tells, and how often it is looked at.
+"""Topics of the live stream: what each contains, and how often it is computed.
 
-A page hears those it names. One topic is one part of the city as a whole, made anew from the
+A page receives those it names. A topic is one part of the city as a whole, computed from the
 picture; it is sent when its bytes changed. A new one is a line here.
 """
 
@@ -35,11 +35,11 @@ class Topic(NamedTuple):
 
 
 class Pulse(msgspec.Struct, kw_only=True, frozen=True):
-    """How alive the world is; `t_ns` and `tick` are None until it is heard.
+    """How alive the world is; `t_ns` and `tick` are None until it has reported.
 
     Attributes:
         moving: How many of its vehicles move: after a stop, those that do not stand yet.
-        silent_signals: Junctions whose controller was heard once, and not for `LOST_S`, by name.
+        silent_signals: Junctions whose controller has reported, but not for `LOST_S`, by name.
         disturbances: What makes measurements void at this moment.
     """
 

@@ -1,8 +1,8 @@
 """W3C trace context: the id that a caller gives a piece of work, or a new one, in answer and log.
 
 A caller sends `traceparent: 00-<trace id>-<span id>-<flags>`; the trace id comes back in the header
-`Trace-Id`, in problems, and with every failed request in the server's log. What the request asks of
-the city carries it along, a wheel's requests that of its connection: whoever does it notes the id
+`Trace-Id`, in problems, and with every failed request in the server's log. Requests to the city
+carry the id along, a wheel's that of its connection: the part that serves one notes the id
 in log and audit.
 """
 
@@ -48,7 +48,7 @@ def traced(request: R) -> R:
 
 @contextmanager
 def acting(actor: str) -> Iterator[None]:
-    """Note who calls, for all that is asked of the city meanwhile."""
+    """Note the caller, for all requests to the city meanwhile."""
     token = _actor.set(actor)
     try:
         yield

@@ -42,16 +42,16 @@ _ENTRY = b"PK\x01\x02"  # begins each entry of a zip's list of contents
 
 
 def store(reports: Path, body: BinaryIO, name: str, cars: tuple[str, ...]) -> Upload:
-    """Unpack a recording below `shelf` and return what it is.
+    """Unpack a recording below a folder and return what it is.
 
     Args:
         reports: Folder of reports: uploads lie in a folder of it.
         body: The zip, wherever it was read to.
         name: What the sender calls it: the id begins with it.
-        cars: Names of the car files that it may ask for.
+        cars: Names of the car files that it may use.
 
     Raises:
-        RefusedError: when it is no such zip, too large, or asks for what lies outside.
+        RefusedError: when it is no such zip, too large, or refers to a path outside.
     """
     stem = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40] or "upload"
     upload = f"{stem}-{secrets.token_hex(4)}"
@@ -112,7 +112,7 @@ def _files_of(packed: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
 
 
 def _unpack_one(packed: zipfile.ZipFile, info: zipfile.ZipInfo, folder: Path, left: int) -> int:
-    """Write one file; return its size, as it really is and not as the zip says."""
+    """Write one file; return its size, the real one, not that of the zip's header."""
     inner = PurePosixPath(info.filename.replace("\\", "/"))
     if inner.is_absolute() or ".." in inner.parts or len(inner.parts) > 6:
         raise _refused(f"{info.filename!r}: expected a path inside the recording's folder")
@@ -145,7 +145,7 @@ def _check(folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
     """Return the cars that a recording names, once it names nothing that lies outside.
 
     Its description is read by a process of its own: whatever it makes of our reader, the server
-    goes on answering, and it gets so much time and memory and no more.
+    goes on answering, and its time and memory are limited.
     """
     description = folder / FILE_NAME
     if not description.is_file():
@@ -171,7 +171,7 @@ def _check(folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
 
 
 class _Read(msgspec.Struct, kw_only=True, frozen=True):
-    """What the process that reads a description says of it."""
+    """The result of the process that reads a description."""
 
     vehicles: tuple[str, ...] = ()
     refusal: str = ""
@@ -205,7 +205,7 @@ def _check_nesting(description: Path) -> None:
                     msg = f"{FILE_NAME}: lists within lists, more than {MOST_NESTED} deep"
                     raise RecordingError(msg)
     except yaml.YAMLError:
-        return  # its reader says what is wrong
+        return  # its reader reports what is wrong
 
 
 def _vehicles(description: Description, folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
@@ -227,7 +227,7 @@ def _vehicles(description: Description, folder: Path, cars: tuple[str, ...]) -> 
 
 
 def _forget(folder: Path) -> None:
-    """Remove the oldest uploads beyond those that are kept."""
+    """Remove the oldest uploads beyond the number stored."""
     there = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime_ns)
     for old in there[: max(0, len(there) - MAX_UPLOADS)]:
         shutil.rmtree(old, ignore_errors=True)

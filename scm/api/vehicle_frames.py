@@ -161,7 +161,7 @@ class VehicleFrames:
         self._states = _frame(STATES, head + table.tobytes() + np.array(flags, "<u4").tobytes())
 
     def _name(self, cars: Sequence[SnapshotVehicle]) -> None:
-        """Make the table of names anew if it differs from what was told."""
+        """Rebuild the table of names if it differs from the last one sent."""
         vehicles = tuple(
             NamedVehicle(
                 vehicle=car.vehicle, kind=car.kind, car=car.car, owner=car.owner, tag_id=car.tag_id
@@ -211,7 +211,7 @@ def _numbers(car: SnapshotVehicle, trip: Trip | None) -> tuple[float, ...]:
 
 
 def _trip(held: Held[Trip] | None, now_ns: int) -> Trip | None:
-    """Return a trip that is under way and was told lately."""
+    """Return a trip that is under way and was reported lately."""
     if held is None or held.age_s(now_ns) > TRIP_SHOWN_S or held.message.arrived_ns is not None:
         return None
     return held.message

@@ -1,9 +1,9 @@
-"""A car's wheel in the hands of a person far away: the rules, without socket, bus or clock.
+"""The rules of teleoperation: a remote person drives a car; without socket, bus or clock.
 
     the person holds a key, a stick or a pad     the car obeys the newest packet
-    lets go                                      zero throttle at once, steering as it was
+    releases it                                  zero throttle at once, steering as it was
     no packet for 250 ms                         zero throttle, steering held
-    no packet for 5 s                            the wheel is given back
+    no packet for 5 s                            the lease is released
 
 Whatever passes here passes the car's own guard as well, which stops it when this process dies.
 """
@@ -61,7 +61,7 @@ class Wheel:
         return "driving" if self.newest is not None and self.newest.held else "released"
 
     def is_abandoned(self, now_ns: int) -> bool:
-        """Return whether nobody has been there for so long that the car goes back."""
+        """Return whether there was silence for so long that the lease is released."""
         return now_ns - self._received_ns >= GONE_NS
 
     def command(self, now_ns: int) -> DriveCommand:

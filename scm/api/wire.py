@@ -1,4 +1,4 @@
-"""How the interface speaks on the bus: requests, commands, and questions that nobody stores."""
+"""The interface's side of the bus: requests, commands, and requests that nobody stores."""
 
 import threading
 from typing import Protocol
@@ -25,7 +25,7 @@ class Wire(Protocol):
         ...
 
     def request_once(self, request: Request, timeout_s: float) -> Message:
-        """Return the reply, or a `Refused`: asked once, under no id, so that none is stored.
+        """Return the reply, or a `Refused`; sent once, without an id, so that none is stored.
 
         Raises:
             LinkError: when the bus is closed.
@@ -44,11 +44,11 @@ class BusWire:
         self._bus.publish(message)
 
     def request(self, request: Request, timeout_s: float) -> Message:
-        """Ask until there is an answer, under an id, and the trace of what is being answered."""
+        """Send a request until there is a reply, under an id, with the trace of the call."""
         return send_request(self._bus, traced(request), timeout_s)
 
     def request_once(self, request: Request, timeout_s: float) -> Message:
-        """Ask, and wait for the reply."""
+        """Send a request, and wait for the reply."""
         replied = threading.Event()
         replies: list[Incoming] = []
 

@@ -1,6 +1,6 @@
 """A city from another program, over its web interface: `Client("http://127.0.0.1:8000")`.
 
-`connection.py` asks and tries again, `stream.py` hears what is live; `client.py`, `nouns/` and
+`connection.py` sends requests, `stream.py` receives live events; `client.py`, `nouns/` and
 `records/` are written by `python docs/make/client.py` from the interface's own description.
 """
 

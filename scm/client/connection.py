@@ -1,6 +1,6 @@
-"""Ask a city over HTTP: typed answers, problems as exceptions, and the same question again.
+"""Requests to a city over HTTP: typed answers, problems as exceptions, retries.
 
-What only looks, and changes that carry an `Idempotency-Key`, are asked again when the answer is
+Reads, and changes that carry an `Idempotency-Key`, are retried when the answer is
 lost or the server is busy: under one key an effect happens once.
 """
 
@@ -37,10 +37,10 @@ Values = Mapping[str, Any]
 
 
 class ProblemError(ScmError):
-    """The city said no.
+    """The city refused.
 
     Attributes:
-        problem: What it said: `code` is for programs, `detail` for people.
+        problem: Its reason: `code` is for programs, `detail` for people.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -53,13 +53,13 @@ class Connection:
 
     Args:
         url: Where its dashboard is: `http://127.0.0.1:8000`.
-        key: API key, where the city asks for one; empty: of the file in `SCM_API_KEY_FILE`.
+        key: API key, where the city requires one; empty: of the file in `SCM_API_KEY_FILE`.
         timeout_s: For one answer.
         transport: Another way to the server than the network, for tests.
 
     Attributes:
         etag: ETag of the last answer; empty: it had none. Give it as `if_match` with a change of
-            what that answer told.
+            what that answer stated.
     """
 
     def __init__(
@@ -105,11 +105,11 @@ class Connection:
             query: What is None is left out; likewise in `headers`.
             headers: Beside the usual ones.
             body: Sent as JSON; what is None is left to the server.
-            key: Of a change that may be asked again; empty: a new one. None: not a change, or one
+            key: Of a change that may be retried; empty: a new one. None: not a change, or one
                 that must not be.
 
         Raises:
-            ProblemError: when the city says no.
+            ProblemError: when the city refuses.
             LinkError: when there is no answer.
             MessageError: when the answer is not of that kind.
         """
@@ -126,7 +126,7 @@ class Connection:
         body: Values | None = None,
         key: str | None = None,
     ) -> None:
-        """Ask for what has no answer but that it is done; as `ask` otherwise."""
+        """Send a request whose answer has no body; otherwise as `ask`."""
         content = None if body is None else msgspec.json.encode(_given(body))
         self._send(method, path, query, headers, content, key)
 
@@ -169,10 +169,10 @@ class Connection:
             raise _no_answer(cause) from cause
 
     def events(self, path: str, *, query: Values | None = None) -> Iterator[LiveEvent]:
-        """Yield events for as long as they are asked for, through losses of the connection.
+        """Yield events until the caller stops, through losses of the connection.
 
         Raises:
-            ProblemError: when the city says no.
+            ProblemError: when the city refuses.
             LinkError: when the city cannot be reached several times in a row.
         """
         yield from events_of(lambda last_id: self._lines(path, query, last_id), self._pause)
@@ -182,7 +182,7 @@ class Connection:
         """Open a WebSocket that speaks a protocol, and close it in the end.
 
         Raises:
-            ProblemError: when the city says no.
+            ProblemError: when the city refuses.
             LinkError: when it cannot be reached.
         """
         url, own = self._http.base_url, self._http.headers
@@ -245,7 +245,7 @@ class Connection:
         return response
 
     def _again(self, once: Callable[[], httpx.Response]) -> httpx.Response:
-        """Return an answer, asking again while that may help."""
+        """Return an answer, with retries while they may help."""
         for number in range(TRIES - 1):
             try:
                 response = _reach(once)

@@ -1,7 +1,7 @@
 """Server-sent events: what is live, through losses of the connection, and as one picture.
 
-The stream tells a `snapshot` of its topics, then `delta`s with those that changed, each whole, and
-a `beat` in silence. After a loss the last id goes back to the server: no event comes twice.
+The stream sends a `snapshot` of its topics, then `delta`s with those that changed, each complete,
+and a `beat` when nothing changes. After a loss the last id is sent back: no event comes twice.
 """
 
 from collections.abc import Callable, Iterator
@@ -21,7 +21,7 @@ class LiveEvent(msgspec.Struct, kw_only=True, frozen=True):
     """One event.
 
     Attributes:
-        id: Where the stream goes on after it.
+        id: Where the stream resumes after it.
         name: `snapshot`, `delta` or `beat`.
         data: Topics by name.
     """
@@ -35,7 +35,7 @@ def events_of(connect: Callable[[str], Lines], pause: Callable[[int], bool]) -> 
     """Yield events, and connect again when they stop.
 
     Args:
-        connect: Returns the lines of a stream that goes on after an event, by its id; raises a
+        connect: Returns the lines of a stream that resumes after an event, by its id; raises a
             LinkError where it is worth trying again.
         pause: Waits before the next try, by its number; returns whether to give up.
 
@@ -62,7 +62,7 @@ def events_of(connect: Callable[[str], Lines], pause: Callable[[int], bool]) -> 
 
 
 def parse(lines: Lines) -> Iterator[LiveEvent]:
-    """Yield the events that lines tell; one that is cut off is dropped."""
+    """Yield the events in lines; one that is cut off is dropped."""
     fields: dict[str, str] = {}
     for line in lines:
         if line:
@@ -77,7 +77,7 @@ def parse(lines: Lines) -> Iterator[LiveEvent]:
 
 
 def states(events: Iterator[LiveEvent]) -> Iterator[dict[str, Any]]:
-    """Yield all topics as they are after each event; `events` of the log are those just told."""
+    """Yield all topics as they are after each event; `events` of the log are the new ones."""
     state: dict[str, Any] = {}
     for found in events:
         if found.name == "snapshot":

@@ -1,8 +1,8 @@
-"""The wheel of a car, from a program: `with city.wheel("n1") as wheel: wheel.drive(0.2, 0.0)`.
+"""Driving a car from a program: `with city.wheel("n1") as wheel: wheel.drive(0.2, 0.0)`.
 
 The program is its own dead-man: nothing is sent but by `drive`, so one that hangs, waits or dies
-tells the car nothing. The city then lets go of the throttle after 250 ms and takes the wheel back
-after 5 s; the car's own guard stops it besides.
+sends the car nothing. The city then sets zero throttle after 250 ms and releases the lease after
+5 s; the car's own guard stops it in any case.
 """
 
 import contextlib
@@ -23,7 +23,7 @@ ANSWER_S = 6.0
 
 
 class WheelError(ScmError):
-    """The car is not, or no longer, in these hands; `over` says why."""
+    """This connection does not, or no longer, drive the car; `over` has the reason."""
 
     def __init__(self, vehicle: str, over: Over) -> None:
         super().__init__(f"{vehicle}: {over.code}: {over.detail}")
@@ -45,7 +45,7 @@ def acquired(connection: Connection, vehicle: str, reason: str) -> Iterator["Whe
     Args:
         connection: To the city.
         vehicle: The car.
-        reason: With one it is taken from whoever holds it; the city's log keeps it.
+        reason: With one it is taken over from its present owner; the city logs it.
 
     Raises:
         ProblemError: when the city refuses the connection.
@@ -68,11 +68,11 @@ class Wheel:
     """One car in the hands of this program.
 
     Args:
-        socket: To the car's seat.
+        socket: Of the drive protocol.
         vehicle: The car.
 
     Attributes:
-        status: What the car was told last.
+        status: The last command in force and the car's state.
         over: How it ended; None: it has not.
     """
 
@@ -83,17 +83,17 @@ class Wheel:
         self.over: Over | None = None
 
     def acquire(self, reason: str) -> Acquired | DriveStatus:
-        """Ask for the wheel; raises as `taken`."""
+        """Acquire the car; raises as `taken`."""
         self._send({"type": "take", "reason": reason})
         return self._expect(ANSWER_S)
 
     def drive(self, throttle: float, steering: float, for_s: float = 0.0) -> DriveStatus:
-        """Drive for a beat of 50 ms, or for longer, and return what the car was told last.
+        """Drive for 50 ms, or for longer, and return the last command in force.
 
         Args:
             throttle: -1 to 1, + = forward.
             steering: -1 to 1, + = left.
-            for_s: How long; the wish is sent anew every beat.
+            for_s: How long; the command is repeated every 50 ms.
 
         Raises:
             WheelError: when the wheel is lost.
@@ -107,10 +107,10 @@ class Wheel:
                 return self.status
 
     def give_back(self) -> Over:
-        """Let go, and return what becomes of the car: it goes on with its trip, or stands.
+        """Release the car, and return what it does: it continues its trip, or stands.
 
         Raises:
-            LinkError: when the city does not say.
+            LinkError: when the city does not reply.
         """
         self._send({"type": "give_back"})
         until_s = monotonic() + ANSWER_S
@@ -127,20 +127,20 @@ class Wheel:
         self._send({"type": "drive", "seq": self._seq, "t_ms": 1e3 * now_s, **command})
 
     def _listen(self) -> None:
-        """Hear the city until the next wish is due, one word at least."""
+        """Receive from the city until the next command is due, one message at least."""
         self._expect(SILENT_S)
         while (left_s := self._next_s - monotonic()) > 0.0:
             self._receive(left_s)
 
     def _send(self, word: dict[str, object]) -> None:
-        with contextlib.suppress(ConnectionClosed):  # what it said last is heard all the same
+        with contextlib.suppress(ConnectionClosed):  # its last message is received all the same
             self._socket.send(msgspec.json.encode(word).decode())
 
     def _expect(self, timeout_s: float) -> Acquired | DriveStatus:
         """Return the next word, which has to come."""
         word = self._receive(timeout_s)
         if word is None:
-            msg = f"{self._vehicle}: the city said nothing in time; is `scm up` running?"
+            msg = f"{self._vehicle}: no reply from the city in time; is `scm up` running?"
             raise LinkError(msg)
         return word
 

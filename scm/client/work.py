@@ -12,7 +12,7 @@ LOOK_S = 0.25
 
 
 class WorkError(ScmError):
-    """It failed, or was called off; `work` tells what is known of it."""
+    """It failed, or was cancelled; `work` is its last known state."""
 
     def __init__(self, work: Operation) -> None:
         super().__init__(f"{work.kind} of {work.what}: {work.state}: {work.error}".rstrip(": "))
@@ -35,7 +35,7 @@ def finished(
 
     Raises:
         WorkError: when it fails or is called off.
-        LinkError: when it takes longer than that; it goes on.
+        LinkError: when it takes longer than that; it continues.
     """
     path, until_s = f"/api/v1/operations/{part(work.id)}", monotonic() + timeout_s
     while work.state in ("waiting", "running"):

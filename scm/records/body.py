@@ -9,7 +9,7 @@ By = Annotated[
     str,
     Meta(
         max_length=64,
-        description="who requests it, for the log; empty: whoever calls",
+        description="who requests it, for the log; empty: the caller",
         examples=["ada"],
     ),
 ]

@@ -103,5 +103,5 @@ class AcknowledgeBody(Body, kw_only=True, frozen=True):
     ]
     by: By = ""
     note: Annotated[
-        str, Meta(max_length=500, description="what there is to say", examples=["tyre put back on"])
+        str, Meta(max_length=500, description="a remark", examples=["tyre put back on"])
     ] = ""

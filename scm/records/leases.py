@@ -45,7 +45,7 @@ class AcquireBody(Body, kw_only=True, frozen=True):
         str,
         Meta(
             max_length=500,
-            description="why it is taken from whoever holds it; empty: only if it is free",
+            description="why it is taken over from its owner; empty: only if it is free",
             examples=["n1 blocks the crossing"],
         ),
     ] = ""

@@ -128,7 +128,7 @@ class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
         usable: Whether it is proven for the junction as it is now.
         stages: Its stages, in the order of the cycle.
         offset_s: When its cycle begins, after a time that is a whole number of cycles on the
-            controller's clock; null: in step with nobody.
+            controller's clock; null: not coordinated.
         saved_ns: When it was saved; 0: it was not.
         proof: What the search found of it; null: nobody searched.
     """
@@ -216,7 +216,7 @@ class PlanBody(Body, kw_only=True, frozen=True):
                 description=(
                     "when its cycle begins, after a time that is a whole number of "
                     "cycles on the controller's clock, less than the cycle; plans with "
-                    "the same cycle keep step so; null: with nobody"
+                    "the same cycle are then coordinated; null: no offset"
                 ),
                 examples=[9.6],
             ),

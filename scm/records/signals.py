@@ -257,7 +257,7 @@ class FlashBody(Attributed, kw_only=True, frozen=True):
     """Flashing red, at once."""
 
     engaged: Annotated[
-        bool, Meta(description="true: flash; false: go on, all red first", examples=[True])
+        bool, Meta(description="true: flash; false: resume, all red first", examples=[True])
     ]
     expires_s: Annotated[
         ExpiresS | None,

@@ -21,7 +21,7 @@ def _wanted(
     station: Annotated[
         str, Query(max_length=32, description="who did it", examples=["world"])
     ] = "",
-    by: Annotated[str, Query(max_length=64, description="who asked", examples=["ada"])] = "",
+    by: Annotated[str, Query(max_length=64, description="who requested it", examples=["ada"])] = "",
     kind: Annotated[
         str,
         Query(max_length=100, description="part of class or path", examples=["StopRequest"]),
@@ -40,7 +40,7 @@ def router(store: Repository) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/audit", tags=["audit"], dependencies=[ENGINEER])
 
-    @routes.get("", summary="Deeds, newest first", responses=answer_page(AuditRow))
+    @routes.get("", summary="Entries, newest first", responses=answer_page(AuditRow))
     def deeds(
         request: Request, wanted: Wanted, limit: Limit = 100, cursor: Cursor = ""
     ) -> Response:
@@ -51,7 +51,7 @@ def router(store: Repository) -> APIRouter:
 
     @routes.get(
         ".{form}",
-        summary="Deeds as a file",
+        summary="Entries as a file",
         responses=answer_file("text/csv"),
         response_class=Response,
     )

@@ -35,7 +35,7 @@ class CloseUpFrame(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         samples: As rows of `Sample`, in order of time.
         source: Where its newest pose comes from: `simulated`, `eye`, `odometry`.
-        seq: Of its newest report; a jump tells of lost ones.
+        seq: Of its newest report; a jump means lost ones.
     """
 
     vehicle: str

@@ -51,7 +51,7 @@ def _wanted(
 
 Wanted = Annotated[EventFilter, Depends(_wanted)]
 Open = Annotated[
-    bool, Query(alias="open", description="only those nobody took note of", examples=[True])
+    bool, Query(alias="open", description="only those that are not acknowledged", examples=[True])
 ]
 
 

@@ -124,7 +124,7 @@ def _add_poses(routes: APIRouter, city: City) -> None:
         for _ in range(FIRST_LOOKS):
             if rows:
                 break
-            await asyncio.sleep(LOOK_S)  # nobody asked before: they are heard from now on
+            await asyncio.sleep(LOOK_S)  # first request: they are received from now on
             rows = city.view.tracks()
         return json_response(TrackList(tracks=rows))
 

@@ -1,4 +1,4 @@
-"""Calibrating overhead cameras: pictures of a board, measuring lens and place, what is kept."""
+"""Calibrating overhead cameras: pictures of a board, lens and place, saved calibrations."""
 
 from pathlib import Path as FilePath
 from typing import Annotated, Any
@@ -179,7 +179,7 @@ def _add_measuring(routes: APIRouter, city: City, there: Any, operations: Operat
 def _add_calibrations(routes: APIRouter, there: Any) -> None:
     @routes.get(
         "/calibrations",
-        summary="All calibrations kept, newest first",
+        summary="All saved calibrations, newest first",
         responses=answer_page(CalibrationRow),
     )
     def calibrations(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
@@ -192,7 +192,7 @@ def _add_calibrations(routes: APIRouter, there: Any) -> None:
 
     @routes.put(
         "/calibrations/{name}",
-        summary="Put a calibration on the shelf, or another text in its place",
+        summary="Save a calibration, or replace its text",
         dependencies=[ENGINEER],
         responses={**answer(CalibrationFile), **answer(CalibrationFile, 201, "A new one.")},
     )
@@ -203,7 +203,7 @@ def _add_calibrations(routes: APIRouter, there: Any) -> None:
         condition: Matching,
         key: IdempotencyKey = "",
     ) -> Response:
-        del key  # the state that the writer saw is asked for
+        del key  # the state that the writer saw is required
         repository = there().repository
         with repository.editing:
             before = repository.find(name)
@@ -213,12 +213,12 @@ def _add_calibrations(routes: APIRouter, there: Any) -> None:
 
     @routes.delete(
         "/calibrations/{name}",
-        summary="Take a calibration off the shelf",
+        summary="Delete a calibration",
         dependencies=[ENGINEER],
         responses=answer(CalibrationFile),
     )
     def delete(name: CalibrationName, condition: Matching, key: IdempotencyKey = "") -> Response:
-        del key  # the state that the writer saw is asked for
+        del key  # the state that the writer saw is required
         repository = there().repository
         with repository.editing:
             found = repository.get(name)

@@ -1,4 +1,4 @@
-"""Putting a kept calibration in force while the Eye runs, and putting back what was before."""
+"""Putting a saved calibration in force while the Eye runs, and reverting to the one before."""
 
 from fastapi import APIRouter, Response
 

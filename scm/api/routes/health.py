@@ -67,9 +67,9 @@ def _parts(city: City) -> Check:
     here = {row.name for row in city.view.picture().stations if row.alive and row.role == "part"}
     missing = [name for name in city.link.parts if name not in here]
     if missing:
-        detail = f"{', '.join(missing)} not there: the terminal of `scm up` says why"
+        detail = f"{', '.join(missing)} not there: the terminal of `scm up` has the reason"
         return Check(name="parts", good=False, detail=detail)
-    detail = "all there" if city.link.parts else "nobody said which there should be"
+    detail = "all there" if city.link.parts else "it is not known which there should be"
     return Check(name="parts", good=True, detail=detail)
 
 
@@ -82,33 +82,33 @@ def _age_s(city: City) -> float | None:
 
 
 class _Disk:
-    """The room on the shelves. Anybody may ask: where they lie only the log tells, once."""
+    """Free space for the folders. No role needed, so paths are only logged, once."""
 
     def __init__(self, city: City) -> None:
         self._city = city
         self._is_good = True
 
     def check(self) -> Check:
-        """Look at the shelf with the least room."""
+        """Check the folder with the least free space."""
         free = [
             (shutil.disk_usage(folder).free, kind, folder) for kind, folder in _folders(self._city)
         ]
         if not free:
-            return Check(name="disk", good=True, detail="there are no shelves")
+            return Check(name="disk", good=True, detail="there are no folders")
         least, kind, folder = min(free, key=lambda found: found[0])
         was_good, self._is_good = self._is_good, least >= LEAST_FREE_BYTES
         if was_good and not self._is_good:
             mib = least // 2**20
             event(_log, "disk_short", level=logging.WARNING, shelf=kind, at=folder, free_mib=mib)
         detail = (
-            f"where {kind} are kept {least // 2**20} MiB are free, "
+            f"where {kind} are stored {least // 2**20} MiB are free, "
             f"expected {LEAST_FREE_BYTES // 2**20} or more"
         )
         return Check(name="disk", good=self._is_good, detail=detail)
 
 
 def _folders(city: City) -> Iterator[tuple[str, Path]]:
-    """Yield the shelves by kind, each with its folder or what that will be made in."""
+    """Yield the folders by kind, each with its path or the one it will be created in."""
     for kind in fields(city.folders):
         folder: Path | None = getattr(city.folders, kind.name)
         if folder is not None:

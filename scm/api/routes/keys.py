@@ -28,7 +28,7 @@ def router(keys: KeyRing | None) -> APIRouter:
         ],
         key: IdempotencyKey = "",
     ) -> Response:
-        del key  # kept by the server: a second end would find no such key
+        del key  # stored by the server: a second end would find no such key
         if keys is None:
             raise not_found("key", key_id)
         try:

@@ -29,7 +29,7 @@ def router(stream: Stream) -> APIRouter:
             str,
             Query(
                 max_length=200,
-                description=f"those to hear, comma between: {', '.join(stream.topics)}; none: all",
+                description=f"comma-separated: {', '.join(stream.topics)}; none: all",
                 examples=["vehicles,signals"],
             ),
         ] = "",
@@ -38,7 +38,7 @@ def router(stream: Stream) -> APIRouter:
             Header(
                 alias="Last-Event-ID",
                 max_length=64,
-                description="of the last frame seen: events go on after it",
+                description="of the last frame seen: events continue after it",
                 examples=["1f0c9a2e-120-7"],
             ),
         ] = "",

@@ -18,7 +18,7 @@ def router(metrics: Metrics) -> APIRouter:
         "/metrics",
         summary="Metrics, as Prometheus reads them",
         response_class=Response,
-        responses=answer_file("text/plain", "One line a number; `# HELP` says what it is."),
+        responses=answer_file("text/plain", "One line a number; `# HELP` describes it."),
     )
     async def all_metrics() -> Response:
         return Response(metrics.text(), headers={"Content-Type": CONTENT_TYPE_LATEST})

@@ -1,4 +1,4 @@
-"""Mismatch: searches for what the simulator left out, their reports, and drives that tell more."""
+"""Mismatch: searches for what the simulator left out, their reports, and further drives."""
 
 import csv
 from pathlib import Path as FilePath
@@ -77,7 +77,7 @@ def _add_jobs(routes: APIRouter, city: City, jobs: MismatchJobs) -> None:
         responses=answer(Operation, 202),
     )
     def search(request: Request, body: Json[JobBody], key: IdempotencyKey = "") -> Response:
-        del key  # the same wish twice is two searches of one answer: harmless
+        del key  # the same request twice is two searches with one answer: harmless
         return accepted(jobs.search(_job(jobs, body, str(request.scope.get("scm_owner", "")))))
 
 
@@ -189,7 +189,7 @@ def _add_drives(routes: APIRouter, jobs: MismatchJobs) -> None:
 
 
 def _job(jobs: MismatchJobs, body: Json[JobBody], owner: str) -> Job:
-    """Return what is asked for; what nobody says of a search again is as in the one before."""
+    """Return the request; what a repeated search leaves out is as in the one before."""
     if body.again:
         before = jobs.again(body.again)
     else:
@@ -212,7 +212,7 @@ def _folder(jobs: MismatchJobs, name: str) -> FilePath:
 
 
 def _shown(job: Job | None) -> Job | None:
-    """Return what may be told of a job: files by name, not where they lie on this machine."""
+    """Return what may be published of a job: files by name, not where they lie on this machine."""
     if job is None:
         return None
     names, answer_ = (

@@ -60,7 +60,7 @@ def router(city: City) -> APIRouter:
         limit: Annotated[int, Query(ge=0, le=1000, description="at most", examples=[20])] = 20,
         offset: Annotated[int, Query(ge=0, le=10**6, description="to skip", examples=[0])] = 0,
         count: Annotated[
-            bool, Query(description="tell how many there are in all", examples=[True])
+            bool, Query(description="return how many there are in all", examples=[True])
         ] = False,
         options: Short = "",
     ) -> Response:
@@ -121,7 +121,7 @@ def _check_heeded(request: Request) -> None:
 
 
 def _neighbours(request: Request, offset: int, limit: int, count: int) -> list[str]:
-    """Return links to the pages after and before, as NGSI-LD (6.3.10) and RFC 8288 ask."""
+    """Return links to the pages after and before, as in NGSI-LD (6.3.10) and RFC 8288."""
     there = {}
     if limit and offset + limit < count:
         there["next"] = offset + limit

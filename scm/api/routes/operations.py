@@ -1,4 +1,4 @@
-"""Operations: long work that was asked for, how far it is, and calling it off."""
+"""Operations: long work that was requested, its progress, and its cancellation."""
 
 from fastapi import APIRouter, Request, Response
 

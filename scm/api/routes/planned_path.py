@@ -29,7 +29,7 @@ def router(city: City) -> APIRouter:
 
     @routes.get(
         "/{name}/path",
-        summary="A car's way ahead, at most 12 m of it",
+        summary="A car's path ahead, at most 12 m of it",
         responses=answer(PathRow),
     )
     def path(name: Name) -> Response:

@@ -46,7 +46,7 @@ from scm.records.recordings import (
 MCAP = "application/octet-stream"
 MOST_S = 120.0
 BLOCK = 256 * 1024
-PICTURE_CACHING = "private, max-age=60"  # looped and stepped through without asking again
+PICTURE_CACHING = "private, max-age=60"  # looped and stepped through without a new request
 MOST_EXPORTS = 2  # programs at once; further ones wait for their turn
 
 Name = Annotated[
@@ -172,7 +172,7 @@ def _add_downloads(routes: APIRouter, repository: RecordingRepository) -> None:
 
 
 def _span(from_s: float, to_s: float | None) -> str:
-    """Return what a file's name says of a part: `-10-20s`; empty for the whole."""
+    """Return the part of a file's name that marks a span: `-10-20s`; empty for the whole."""
     if to_s is None:
         return f"-{from_s:g}s-end" if from_s else ""
     return f"-{from_s:g}-{to_s:g}s"
@@ -356,7 +356,7 @@ def _readable(repository: RecordingRepository, name: str) -> RunIndex:
 
 
 def _picture(name: str, index: RunIndex, camera: str, t_s: float, vehicle: str = "") -> Response:
-    """Return a picture that is in a recording, or say that it has none."""
+    """Return a picture that is in a recording, or raise that it has none."""
     found = replay.picture_at(index, camera, t_s, vehicle)
     if found is None:
         whose = f"{vehicle}'s camera" if vehicle else "camera"
@@ -389,12 +389,12 @@ async def _converted(path: FilePath, turns: asyncio.Semaphore) -> AsyncIterator[
         command = (sys.executable, "-m", "scm", "export", "foxglove", str(path))
         process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
         stand_back(process.pid)
-        assert process.stdout is not None  # noqa: S101  it was asked for
+        assert process.stdout is not None  # noqa: S101  it was requested
         try:
             while block := await process.stdout.read(BLOCK):
                 yield block
             if await process.wait():
-                msg = f"{path}: the export for Foxglove failed; the server's log says why"
+                msg = f"{path}: the export for Foxglove failed; the server's log has the reason"
                 raise RecordingError(msg)  # the answer breaks off: a cut file must not look whole
         finally:
             if process.returncode is None:

@@ -78,7 +78,7 @@ class Turns:
         self._is_sent = False
 
     def news(self) -> bytes:
-        """Return the newest turn as an event; empty: it was told."""
+        """Return the newest turn as an event; empty: it was sent."""
         row = None if self._scanner is None else _newest(self._city, self._name, self._scanner)
         if self._scanner is None and not self._is_sent:
             self._is_sent = True

@@ -1,4 +1,4 @@
-"""Scenarios: scripts that drive the fleet, kept, edited and run."""
+"""Scenarios: scripts that drive the fleet, stored, edited and run."""
 
 from typing import Annotated
 

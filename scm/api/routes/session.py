@@ -13,7 +13,7 @@ def router() -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/session", tags=["session"], dependencies=[VIEWER])
 
-    @routes.get("", summary="Who this key says you are", responses=answer(Session))
+    @routes.get("", summary="The owner and role of this key", responses=answer(Session))
     async def session(request: Request) -> Response:
         return json_response(_session(request))
 

@@ -118,7 +118,7 @@ def _add_writing(routes: APIRouter, city: City, repository: PlanRepository) -> N
         condition: Matching,
         key: IdempotencyKey = "",
     ) -> Response:
-        del key  # the state that the writer saw is asked for
+        del key  # the state that the writer saw is required
         site = site_of(city, name)
         _check_own(site, plan)
         file = _file(site, plan, body.stages)
@@ -137,7 +137,7 @@ def _add_writing(routes: APIRouter, city: City, repository: PlanRepository) -> N
     def delete(
         name: Name, plan: PlanName, condition: Matching, key: IdempotencyKey = ""
     ) -> Response:
-        del key  # the state that the writer saw is asked for
+        del key  # the state that the writer saw is required
         site = site_of(city, name)
         _check_own(site, plan)
         with repository.editing:
@@ -159,7 +159,7 @@ def _keep(
     """Save a plan with its proof, and return it.
 
     Raises:
-        RefusedError: when nobody proved it, its offset is beyond its cycle, or no more are kept.
+        RefusedError: when it is not proven, its offset is beyond its cycle, or there are too many.
     """
     proof = repository.proof_of(file.digest) or (before.proof if before is not None else None)
     if proof is None or proof.digest != file.digest:
@@ -180,7 +180,7 @@ def _check_own(site: SignalSite, plan: str) -> None:
     """Refuse to change a plan that was not saved by anybody, or a name that means something else.
 
     Raises:
-        RefusedError: saying so.
+        RefusedError: otherwise.
     """
     reserved = {"flash", *(one.plan for one in site.plans), *(one.policy for one in site.policies)}
     if plan in reserved:
@@ -192,7 +192,7 @@ def _check_offset(plan: str, offset_s: float | None, cycle_s: float) -> None:
     """Refuse an offset that is not inside the cycle.
 
     Raises:
-        RefusedError: saying so.
+        RefusedError: otherwise.
     """
     if offset_s is not None and offset_s >= cycle_s:
         detail = f"plan {plan!r}: offset_s: got {offset_s:g}, expected less than {cycle_s:g}"

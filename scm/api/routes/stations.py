@@ -25,7 +25,7 @@ def router(city: City) -> APIRouter:
 
     @routes.get(
         "/{name}/events",
-        summary="The last events that a station told, or that are about it",
+        summary="The last events that a station reported, or that are about it",
         responses=answer(StationEvents),
     )
     async def station_events(name: Name) -> Response:

@@ -1,6 +1,6 @@
-"""The red button: stop every car of the city, or let them drive again.
+"""The city stop: stop every car of the city, or let them drive again.
 
-It has threads of its own: however much others ask of the server, it never waits behind them.
+It has threads of its own: it never waits behind other requests to the server.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ THREADS = 8
 
 
 def stop_of(picture: Picture) -> CityStop:
-    """Return the stop as last told by the world; released when it never spoke of it."""
+    """Return the stop as last reported by the world; released if it never was."""
     return picture.stop or CityStop(t_ns=0, engaged=False)
 
 

@@ -98,7 +98,7 @@ class TestReady:
         self, ready, heard, full, tmp_path
     ):
         answer = ready()
-        expected = "disk: where recordings are kept 1 MiB are free, expected 200 or more"
+        expected = "disk: where recordings are stored 1 MiB are free, expected 200 or more"
         assert answer.json()["detail"] == expected
         assert str(tmp_path) not in answer.text
 

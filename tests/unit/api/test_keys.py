@@ -76,7 +76,7 @@ def test_a_lent_key_is_good_while_its_lender_s_is_and_until_it_is_taken_back(rin
     assert find(ring, again).owner == "anna: outer: inner"
     ring.revoke(key.split("_")[1])
     assert find(ring, again) is None
-    with pytest.raises(AccessError, match="later: the key of who asked for it has ended"):
+    with pytest.raises(AccessError, match="later: the key of its requester has ended"):
         ring.lend(key, "later")
 
 

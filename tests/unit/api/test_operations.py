@@ -117,7 +117,7 @@ def test_a_bug_is_logged_and_its_insides_are_not_told(work, caplog):
     with caplog.at_level(logging.ERROR):
         row = work.start("export", "a", breaks)
         finish(row)
-    assert work.find(row.id).error == "the server failed on this; its log says why"
+    assert work.find(row.id).error == "the server failed on this; its log has the reason"
     assert "ZeroDivisionError" in caplog.text
     after = work.start("export", "b", lambda _tell: "/made/2")
     finish(after)

@@ -53,7 +53,7 @@ def test_a_cursor_that_is_none_of_ours_is_refused(cursor):
 
 
 def test_a_cursor_whose_row_is_gone_says_so():
-    with pytest.raises(RefusedError, match="its row is gone: begin anew"):
+    with pytest.raises(RefusedError, match="its row is gone: begin again"):
         page_of(["a"], same, cursor=cursor_at("z"))
 
 

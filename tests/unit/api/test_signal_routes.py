@@ -141,7 +141,7 @@ def test_the_site_has_a_tag_that_spares_reading_it_again(client, heard, hear):
 
 
 def test_before_the_controller_is_heard_there_are_no_plans(client):
-    assert "was not heard yet" in refused(client("GET", f"{AT}/plans"), 503, "offline")
+    assert "has not reported yet" in refused(client("GET", f"{AT}/plans"), 503, "offline")
     refused(client("GET", "/api/v1/signals/moon/plans"), 404, "not_found")
 
 

@@ -1,7 +1,7 @@
 /** Where the dashboard stands below its host: empty, or `/city` behind a proxy that gives it that path. */
 export const BASE = document.documentElement.dataset.base ?? "";
 
-/** An address of ours as the browser has to ask for it; one that has the base already stays as it is. */
+/** An address of ours as the browser has to request it; one that has the base already is returned unchanged. */
 export function placed(address) {
   return address.startsWith("/") && !(BASE && address.startsWith(`${BASE}/`)) ? BASE + address : address;
 }

@@ -1,9 +1,9 @@
 /**
  * A car seen from above, drawn in metres with the rear axle's centre as origin, x forward, y left.
  *
- * Its kind is told by colour and by the sign on its roof: circle hosted, diamond remote, triangle real.
+ * Colour and the sign on its roof show its kind: circle hosted, diamond remote, triangle real.
  */
-/** Outlines by car file [m]: a Nigel's, until the city says otherwise. */
+/** Outlines by car file [m]: a Nigel's until the city's are read. */
 const NIGEL = { rear: -0.07, front: 0.23, half: 0.0875, wheelbase: 0.14154, track: 0.153, radius: 0.0325, middle: 0.08 };
 const outlines = new Map([["nigel", NIGEL]]);
 const SMALL_PX_PER_M = 130; // below, names are written smaller
@@ -29,7 +29,7 @@ export function footprint(car) {
   return outlines.get(car);
 }
 
-/** Ask the city what car files say; one that it does not know stays a Nigel. */
+/** Read car files from the city; an unknown one is drawn as a Nigel. */
 async function learn(car) {
   outlines.set(car, NIGEL);
   const { placed } = await import("scm/shared/base.js"); // it needs a document, and to draw needs none

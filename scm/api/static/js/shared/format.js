@@ -12,10 +12,10 @@ export function fixed(value, digits, unit = "") {
 /** Names in the order people count: n2 before n17. */
 export const byName = new Intl.Collator("en", { numeric: true }).compare;
 
-/** Events as they happened: a server that was restarted hears of what came before in any order. */
+/** Events in the order in which they happened: a restarted server receives earlier ones in any order. */
 export const newestFirst = (a, b) => b.t_ns - a.t_ns || b.seq - a.seq;
 
-/** A name as people say it: south_east is "south east". */
+/** A name in plain words: south_east is "south east". */
 export const spaced = (name) => name.replaceAll("_", " ");
 
 /** An age or a span in seconds, short. */

@@ -6,7 +6,7 @@ const LOOK_MS = 250;
 
 export const isOver = ({ state }) => OVER.includes(state);
 
-/** Look at an operation until it is over; `tell` hears each state. */
+/** Follow an operation until it is over; `onUpdate` receives each state. */
 export async function finished(operation, onUpdate = () => {}) {
   let row = operation;
   onUpdate(row);

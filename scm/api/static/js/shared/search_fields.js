@@ -1,8 +1,8 @@
-/** What a mismatch search is asked: the one form of the mismatch page and of a recording's page. */
+/** The fields of a mismatch search, shared by the mismatch page and a recording's page. */
 import { html } from "scm/shared/html.js";
 import { seconds, SpanFields, WHOLE } from "scm/shared/span_fields.js";
 
-/** Seconds that a search may take, in words; the last is what is offered first. */
+/** Seconds that a search may take, in words; the last is the default. */
 const BUDGETS = [
   [30, "half a minute"],
   [120, "two minutes"],

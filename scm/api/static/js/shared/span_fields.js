@@ -11,7 +11,7 @@ export function seconds({ start, stop }) {
 }
 
 /**
- * The browser says what is wrong with them before their form is sent.
+ * The browser reports what is wrong with them before their form is sent.
  * @param most_s length of the recording, null: not known here
  * @param player what plays it, null: nothing does
  */

@@ -2,7 +2,7 @@
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 
-/** @param yes what the button that does it says; @param act does it */
+/** @param yes the label of the confirming button; @param act what it does */
 export function Sure({ title, yes, act, onClose, children }) {
   const agree = () => {
     onClose();

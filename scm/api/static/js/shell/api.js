@@ -1,14 +1,14 @@
-/** Changes go through here: REST with an idempotency key, problems as sentences, the API key kept for the tab. */
+/** Changes go through here: REST with an idempotency key, problems as sentences, the API key stored for the tab. */
 import { signal } from "@preact/signals";
 import { placed } from "scm/shared/base.js";
 
 const KEY = "scm-api-key";
 const REFUSALS = [401, 403, 429]; // of a key; what else goes wrong is not its fault
 
-/** Resolver of the open question for an API key; null while nobody asks. */
+/** Resolver of the open request for an API key; null: none is open. */
 export const keyWanted = signal(null);
 
-/** Messages for the person at the desk: `{id, kind, text}`. */
+/** Messages for the user: `{id, kind, text}`. */
 export const notices = signal([]);
 
 let nextNotice = 1;
@@ -25,10 +25,10 @@ export function dismiss(id) {
 }
 
 /**
- * Ask the city for a change and tell the person how it went.
+ * Request a change from the city and show the user the result.
  * @param headers more of them, such as `If-Match`.
- * @param patience_ms how long to wait for the answer; none: as long as it takes.
- * @param refused what takes the sentence of a refusal instead of a notice, by the problem's code.
+ * @param timeout_ms how long to wait for the answer; none: no limit.
+ * @param refused receives the sentence of a refusal instead of a notice, by the problem's code.
  * @returns the reply, or null when it was refused.
  */
 export async function change(method, path, body, done, headers = {}, timeout_ms = null, refused = {}) {
@@ -63,14 +63,14 @@ async function send(method, path, body, own, timeout_ms) {
   throw Object.assign(new Error(sentence), { code: reply.code });
 }
 
-/** What the browser says of it is for programmers. */
+/** The browser's own message is for programmers. */
 function unreached({ name }) {
   throw new Error(name === "TimeoutError" ? "The city did not answer in time." : "The city cannot be reached.");
 }
 
 /**
- * Make sure that this page may read: ask for a key as long as the city wants one.
- * @returns whether it may; false when the person gave none, who is not asked again until something is to be done.
+ * Make sure that this page may read: request a key as long as the city requires one.
+ * @returns whether it may; false when the user gave none; the next change asks again.
  */
 export function enter() {
   entering ??= knock().finally(() => (entering = null));

@@ -1,4 +1,4 @@
-/** What the page has to say: short notices. A dialog that is open shows them, for all behind it is dim and out of reach. */
+/** Short notices of the page. An open dialog shows them, since everything behind it is out of reach. */
 import { coded } from "scm/shared/coded.js";
 import { html } from "scm/shared/html.js";
 import { dismiss, notices } from "scm/shell/api.js";

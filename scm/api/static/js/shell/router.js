@@ -4,7 +4,7 @@ import { placed, unplaced } from "scm/shared/base.js";
 
 const here = signal(unplaced(location.pathname) + location.search);
 
-/** The address that was asked for; the page at it is drawn after the bar has shown that it was heard. */
+/** The requested address; its page is drawn after the bar has shown it as current. */
 const requested = signal(here.value);
 
 /** Name of the page that the bar points to. */

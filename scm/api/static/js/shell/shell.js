@@ -19,7 +19,7 @@ const pageOf = (name) => PAGES.find((one) => one.name === name);
 /** The page of the address; undefined: there is none. */
 export const pageHere = () => pageOf(route.value.page);
 
-/** Load a page, once; one that cannot be loaded says so in its place. */
+/** Load a page, once; one that cannot be loaded shows the error in its place. */
 export async function load(page) {
   if (!page || loaded.value.has(page.name)) return;
   let found;

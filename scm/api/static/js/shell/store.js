@@ -1,8 +1,8 @@
 /**
- * The one store: what the live stream told last, and how fresh it is.
+ * The one store: the newest of the live stream, and how fresh it is.
  *
  * A page names the topics that it shows with `useTopics`; the stream carries those that anybody shows,
- * and the two of the shell. `topic(name)` is a signal of a topic's newest body, null until it was heard.
+ * and the two of the shell. `topic(name)` is a signal of a topic's newest body, null until it was received.
  */
 import { batch, computed, signal, useComputed } from "@preact/signals";
 import { useEffect } from "preact/hooks";
@@ -13,8 +13,8 @@ import { placed } from "scm/shared/base.js";
 const MAX_EVENTS = 200;
 const STALE_MS = 500;
 const LOST_MS = 2000;
-const SILENT_MS = 2500; // a server that lives says so each second
-const DEAD_MS = 5000; // a line that says nothing for so long is asked for anew
+const SILENT_MS = 2500; // a running server sends something each second
+const DEAD_MS = 5000; // a connection silent for so long is opened again
 const AGAIN_MS = 2000;
 const SHELL = ["pulse", "stop"];
 const GATHER_MS = 20; // pages come and go together: one new stream, not one each
@@ -49,7 +49,7 @@ export function topic(name) {
   return bodies.get(name);
 }
 
-/** @returns the signal of when a topic was last told, on this page's clock [ms]. */
+/** @returns the signal of when a topic was last updated, on this page's clock [ms]. */
 export function updatedAt(name) {
   topic(name);
   return bodiesAt.get(name);
@@ -71,7 +71,7 @@ const connected = signal(false);
 const receivedAt = signal(-Infinity);
 const tickAt = signal(-Infinity);
 
-/** When somebody began to look: nothing is heard while nobody does. */
+/** When somebody began to look: hidden pages receive nothing. */
 const seenAt = signal(-Infinity);
 
 /** `connecting`, `live`, `stale` (nothing new for 0.5 s) or `lost` (for 2 s). */
@@ -85,7 +85,7 @@ export const link = computed(() => {
 /** Seconds since the world last moved on. */
 export const quiet_s = computed(() => Math.max(0, (now.value - tickAt.value) / 1000));
 
-/** Whether this page hears the server, whatever the world does. */
+/** Whether this page receives from the server, whatever the world does. */
 export const isConnected = computed(() => connected.value && now.value - receivedAt.value < SILENT_MS);
 
 /** Whether what came at a time of this page's clock [ms] is old. */
@@ -94,13 +94,13 @@ export const isOld = (at) => now.value - at > STALE_MS;
 /** The same of a signal, for a component that is drawn anew when that changes. */
 export const useOld = (at) => useComputed(() => isOld(at.value)).value;
 
-/** How old what the world told last is, once that is too old to pass as news [ms]; else 0. */
+/** Age of the world's newest report once it is no longer fresh [ms]; else 0. */
 export const since_ms = computed(() => (link.value === "live" ? 0 : 1000 * quiet_s.value));
 
 /** How many components show each topic. */
 const shown = new Map();
 
-/** Hear topics for as long as the component is on the page. */
+/** Subscribe to topics while the component is on the page. */
 export function useTopics(...names) {
   useEffect(() => {
     for (const name of names) shown.set(name, (shown.get(name) ?? 0) + 1);
@@ -129,7 +129,7 @@ function wanted() {
   return [...new Set([...SHELL, ...names])].toSorted().join();
 }
 
-/** The world's clock went on: by whichever topic says so. */
+/** The world's clock advanced, according to any topic. */
 function noteTick(tick, at) {
   if (tick === null || tick === live.tick) return;
   live.tick = tick;
@@ -137,7 +137,7 @@ function noteTick(tick, at) {
 }
 
 function applyVehicles(body, at) {
-  if (body.tick === null && live.topic) return; // a server that has just begun: what was heard is the newest
+  if (body.tick === null && live.topic) return; // a server that has just started: what was received before is newer
   if (body.tick !== null && body.t_ns !== live.t_ns) {
     live.t_ns = body.t_ns;
     live.at = at;
@@ -223,7 +223,7 @@ function applySnapshot(topics) {
   wasDead = false;
 }
 
-/** When the line was asked for, or last said something. */
+/** When the connection was opened, or last delivered something. */
 let lineAt = -Infinity;
 let wasDead = false;
 
@@ -261,7 +261,7 @@ async function readCity() {
 
 let mapText = "";
 
-/** Begin: listen for ever, and read the map. */
+/** Begin: listen from now on, and read the map. */
 export async function start() {
   keepTime();
   while (!(await enter().catch(() => true))) await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));

@@ -1,6 +1,6 @@
 /**
  * What stays open to the server. A browser grants six connections to it, to all its windows together. Five of them are
- * shared out, what matters most first, so that one is left for what is asked and done; who is hidden has none.
+ * shared out, what matters most first, so that one is left for requests; who is hidden has none.
  */
 import { signal } from "@preact/signals";
 import { enter } from "scm/shell/api.js";
@@ -26,7 +26,7 @@ let all = [];
 let roomUntil = -Infinity;
 let isGone = false;
 
-/** The other windows' wishes, by the number that each drew: `{number, isFirst, ranks, at}`. */
+/** The streams that other windows request, by each window's random number: `{number, isFirst, ranks, at}`. */
 const others = new Map();
 const windows = new BroadcastChannel("scm-streams");
 const number = Math.random();
@@ -53,8 +53,8 @@ export function whileSeen(begin, rank) {
 }
 
 /**
- * Hear server-sent events while somebody looks: `heard` names them, and what takes each one's body.
- * @param onOpen is told whether the server tells it now.
+ * Subscribe to server-sent events while somebody looks: `handlers` has a function for each event's body.
+ * @param onOpen receives whether the connection is open.
  * @returns what ends it.
  */
 export function subscribe(address, handlers, rank, onOpen = () => {}) {
@@ -95,7 +95,7 @@ export function makeRoom() {
   pause(ROOM_MS);
 }
 
-/** Ask for all but the city's stream anew: a line that was dead did not say so. */
+/** Open all but the city's stream again: a dead connection reports nothing. */
 export function renew() {
   for (const { rank, look } of all) if (rank > RANKS.city) look(false);
   lookAll();
@@ -109,7 +109,7 @@ function pause(ms) {
 
 const isAway = () => isGone || document.hidden;
 
-/** Say what this window wishes for, and see what that changes here. */
+/** Announce which streams this window requests, and apply what that changes here. */
 function announce() {
   const ranks = isAway() ? [] : all.map(({ rank }) => rank);
   windows.postMessage({ number, isFirst: document.hasFocus(), ranks });

@@ -1,4 +1,4 @@
-/** Light or dark: as the system says, or as the person chose for this browser. */
+/** Light or dark: as the system is set, or as the person chose for this browser. */
 import { effect, signal } from "@preact/signals";
 
 const STORAGE_KEY = "scm-theme";

@@ -10,14 +10,14 @@ import { city, isConnected, link, pulse, quiet_s, stop } from "scm/shell/store.j
 import { isShutOut, makeRoom } from "scm/shell/streams.js";
 import { nextTheme, theme } from "scm/shell/theme.js";
 
-/** What is asked about the stop: `release`, `reason`; null: nothing. */
+/** The open dialog of the stop: `release`, `reason`; null: none. */
 const openDialog = signal(null);
 
-/** Whether a stop was asked for and nobody said that it is engaged. */
+/** Whether a stop was requested but never confirmed. */
 const unconfirmed = signal(false);
 
 const ROOM_MS = 300;
-const CONFIRM_TIMEOUT_MS = 2500; // the city asks the world for 2 s
+const CONFIRM_TIMEOUT_MS = 2500; // the city tries to reach the world for 2 s
 const PATIENCE_MS = 5000;
 
 const LINK_WORDS = { connecting: "Connecting", live: "Live", stale: "Stale", lost: "No data" };
@@ -74,7 +74,7 @@ function ThemeButton() {
   `;
 }
 
-/** One press stops, as of every emergency stop; only to let cars drive again is asked first. */
+/** One press stops, as with every emergency stop; only releasing it asks for confirmation. */
 function StopButton() {
   const engaged = stop.value.engaged;
   const press = () => (engaged ? (openDialog.value = "release") : sendStop({ engaged: true, by: "dashboard", reason: "" }));
@@ -209,7 +209,7 @@ function obeyed() {
   return moving ? `${moving} of ${vehicles} cars still move` : "all cars stand";
 }
 
-/** What it is that is not heard, or not yet. */
+/** What no longer reports, or not yet. */
 function silence() {
   if (isConnected.value) return pulse.value.t_ns === null ? "Waiting for the world" : "The world is silent";
   return isShutOut.value ? "Too many windows" : "No connection to the server";

@@ -41,7 +41,7 @@ export function NewCar({ folder, names, onWritten }) {
       <form ref=${setElement} onInput=${(event) => setForm(bodyOf(event.currentTarget))} onSubmit=${submit}>
         <p class="hint">
           Four figures make a car file; more make it surer. What you do not know is estimated from the shipped cars,
-          and the file says how sure each number is. <code>scm mismatch</code> finds the rest from a recording.
+          and the file states the uncertainty of each number. <code>scm mismatch</code> finds the rest from a recording.
         </p>
         <div class="fields">
           <label>Name <input name="car" defaultValue="my_car" pattern="[a-z][a-z0-9_\\-]{0,31}" title="small letters, digits, _ and -" required /></label>
@@ -107,7 +107,7 @@ function Made({ row }) {
   `;
 }
 
-/** What a form says, in SI units; empty fields are left out. */
+/** The values of a form, in SI units; empty fields are left out. */
 function bodyOf(form) {
   const fields = new FormData(form);
   const body = { car: fields.get("car").trim(), motor: fields.get("motor"), driven: fields.get("driven") };

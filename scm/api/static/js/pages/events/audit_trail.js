@@ -47,7 +47,7 @@ export function AuditTrail() {
       ${!list.rows.length &&
       html`<p class="empty">${list.loading ? "Reading the audit." : "Nobody changed anything that fits."}</p>`}
       ${list.more &&
-      html`<button class="more" disabled=${list.loading} onClick=${list.loadMore}>Older deeds</button>`}
+      html`<button class="more" disabled=${list.loading} onClick=${list.loadMore}>Older entries</button>`}
     </div>
   `;
 }
@@ -87,7 +87,7 @@ function inFull({ number, station, kind, request, reply, request_id }) {
   return JSON.stringify({ number, station, kind, request, reply, request_id }, null, 2);
 }
 
-/** How a deed ended, in a word or two. */
+/** How a request ended, in a word or two. */
 function outcome({ station, kind, reply }) {
   if (kind === "unreadable") return { ended: kind, bad: true };
   if (station === "api") return { ended: `${reply.status} in ${reply.ms} ms`, bad: reply.status >= 400 };

@@ -4,7 +4,7 @@ const GAP_NS = 300e9;
 
 /**
  * Group events of a kind, that is of one source, name and severity: about any car, each within five minutes of
- * the next; about no car, while the source says the same again and nothing else between. Errors stand alone.
+ * the next; about no car, while the source repeats the same text and nothing else. Errors stand alone.
  * @param events newest first
  * @returns groups newest first: `{key, newest, oldest, events, vehicles}`; vehicles newest first, each once
  */

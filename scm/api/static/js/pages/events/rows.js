@@ -8,7 +8,7 @@ const PAGE = 200;
  * Hear a list of the server, newest first.
  * @param path below /api/v1
  * @param query its filter, as an object; what is empty is left out
- * @returns `{rows, more, error, loading, loadMore, reload}`; `more` tells whether there are older ones
+ * @returns `{rows, more, error, loading, loadMore, reload}`; `more` is whether there are older ones
  */
 export function useRows(path, query) {
   const search = new URLSearchParams(Object.entries(query).filter(([, value]) => value)).toString();
@@ -40,7 +40,7 @@ export function useRows(path, query) {
   };
 }
 
-/** A value that follows another once it rests: typing asks the server once, not at each letter. */
+/** A debounced value: typing sends one request, not one for each letter. */
 export function useRested(value, rest_ms = 250) {
   const [rested, setRested] = useState(value);
   useEffect(() => {

@@ -9,8 +9,8 @@ const CLOSEST = 12;
 /**
  * Follows one camera: fetches one picture at a time, and draws it with its own tags.
  *
- * The newest is asked for, not the one that the stream named: a page that is busy, as every page is
- * when it opens, hears the name late and would show the cars where they were a second ago.
+ * The newest is requested, not the one that the stream named: a busy page, as every page is
+ * when it opens, receives the name late and would show the cars where they were a second ago.
  */
 export class EyePicture {
   #camera;
@@ -20,7 +20,7 @@ export class EyePicture {
   #known = new Map(); // whose tag it is, by id
   #named = null; // exposures in ns, as text: too long for a number
   #fetched = null;
-  #waiting = null; // a picture whose tags the stream has not told yet
+  #waiting = null; // a picture whose tags have not arrived yet
   #shown = null;
   #busy = false;
   #layers = {};
@@ -28,14 +28,14 @@ export class EyePicture {
   #zoom = 1;
   #middle = [0.5, 0.5]; // of what is shown, in parts of the picture
 
-  /** @param onDrawn is told the exposure of every picture drawn */
+  /** @param onDrawn receives the exposure of every picture drawn */
   constructor(camera, canvas, onDrawn) {
     this.#camera = camera;
     this.#canvas = canvas;
     this.#onDrawn = onDrawn;
   }
 
-  /** Take what the stream tells of the camera's newest frame. */
+  /** Apply the stream's state of the camera's newest frame. */
   update({ frame_t_ns, tags_t_ns, tags, known }) {
     if (frame_t_ns === null) return;
     this.#named = frame_t_ns;
@@ -98,7 +98,7 @@ export class EyePicture {
         if (this.#fetched === before) break; // the server has nothing newer
       }
     } catch {
-      // No picture this time; the next name that the stream tells brings the next try.
+      // No picture this time; the next name from the stream triggers the next try.
     } finally {
       this.#busy = false;
     }

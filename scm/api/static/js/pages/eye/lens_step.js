@@ -1,4 +1,4 @@
-/** Step 1: pictures of a printed board, where in the frame it was seen, and the lens they tell. */
+/** Step 1: pictures of a printed board, where in the frame it was seen, and the lens they determine. */
 import { useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
@@ -92,7 +92,7 @@ export function LensStep({ camera, saved, done, put }) {
   `;
 }
 
-/** What is asked of the server; fields hold what was typed. */
+/** The body of the request; fields hold what was typed. */
 function bodyOf({ board, columns, rows, square_mm, marker_mm, first_id, fisheye }) {
   return {
     board,

@@ -82,7 +82,7 @@ export function Picture({ camera }) {
   `;
 }
 
-/** How much older the drawn picture is than the cars on the map [s]; at least since one was heard. */
+/** How much older the drawn picture is than the cars on the map [s]; at least since one was received. */
 function behind_s(camera, drawn_t_ns) {
   const map_t_ns = live.topic?.t_ns ?? null;
   if (drawn_t_ns === null || map_t_ns === null) return camera.age_s;

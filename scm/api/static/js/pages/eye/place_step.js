@@ -42,7 +42,7 @@ export function PlaceStep({ camera, saved, lenses, done, put }) {
         <span class="facts">${seen.length ? `sees map tag ${seen.map((one) => one.tag_id).join(", ")}` : "sees no map tag"}</span>
       </div>
       <p class="note">
-        The map's own tag alone tells height and tilt poorly: lay more near the corners of the frame, measured to a
+        The map's own tag alone determines height and tilt poorly: lay more near the corners of the frame, measured to a
         millimetre, and name them here.
       </p>
       <label class="inline">Lens

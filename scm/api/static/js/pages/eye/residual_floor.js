@@ -30,7 +30,7 @@ export function ResidualFloor({ samples }) {
         ref=${canvas}
         role="img"
         data-arrows=${samples.length}
-        aria-label="Floor map with ${samples.length} residuals as arrows, ${gain} times enlarged; the table tells the same in numbers"
+        aria-label="Floor map with ${samples.length} residuals as arrows, ${gain} times enlarged; the table shows the same in numbers"
       ></canvas>
     </div>
     <p class="note">
@@ -72,7 +72,7 @@ function draw(canvas, box, samples, gain) {
 const GOOD_MM = 5;
 const FAIR_MM = 10;
 
-/** Blue, amber, red-violet: told apart by colour-blind people too, and longer anyway. */
+/** Blue, amber, red-violet: distinguishable for colour-blind people, and longer anyway. */
 function shade(mm) {
   if (mm <= GOOD_MM) return "#4aa3ff";
   return mm <= FAIR_MM ? "#ffb000" : "#ff4f9a";

@@ -1,4 +1,4 @@
-/** What the chosen car sees and means to do: its LIDAR's scans and its way ahead, heard while they are shown. */
+/** What the chosen car sees and plans: its LIDAR scans and its path, received while they are shown. */
 import { effect, signal } from "@preact/signals";
 import { selected } from "scm/shared/selection.js";
 import { subscribe, RANKS } from "scm/shell/streams.js";
@@ -14,7 +14,7 @@ export const closeUp = { scan: null, scanAt: -Infinity, path: null };
 /** The chosen car, once it is known that it has no LIDAR; else null. */
 export const blind = signal(null);
 
-/** Begin to hear what the layers ask for; returns what ends it. */
+/** Subscribe to what the visible layers need; returns the function that ends it. */
 export function subscribeCloseUp() {
   const ends = [
     effect(() => {

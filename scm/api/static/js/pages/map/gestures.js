@@ -7,7 +7,7 @@ const CLICK_PX = 5;
 const WHEEL = 0.0015;
 const LINE_PX = 16; // of a wheel that counts in lines
 
-/** Hear an element's pointers; `onClick(x, y)` is told clicks. Returns what ends it. */
+/** Listen to an element's pointers; `onClick(x, y)` receives clicks. Returns the function that ends it. */
 export function gestures(element, view, onClick) {
   const down = new Map();
   let moved = 0;

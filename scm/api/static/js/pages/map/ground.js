@@ -1,4 +1,4 @@
-/** The roads: the server's drawing, kept as a picture of what is on the screen and a rim around it. */
+/** The roads: the server's drawing, cached as a picture of what is on the screen and a margin around it. */
 import { readBox } from "scm/shared/drawing.js";
 import { placed } from "scm/shared/base.js";
 

@@ -1,4 +1,4 @@
-/** What the map shows beside roads, cars and signals; kept for this browser. */
+/** What the map shows beside roads, cars and signals; stored for this browser. */
 import { effect, signal } from "@preact/signals";
 
 const STORAGE_KEY = "scm-map-layers";

@@ -32,7 +32,7 @@ let reading = null;
 
 function groundOnce() {
   reading ??= readGround(ROADS).catch((error) => {
-    reading = null; // who comes back asks anew
+    reading = null; // coming back reads it again
     throw error;
   });
   return reading;
@@ -69,7 +69,7 @@ export function MapPanel() {
         <canvas
           ref=${canvas}
           role="img"
-          aria-label="Map of the city with its cars and signals; the tables tell the same in words"
+          aria-label="Map of the city with its cars and signals; the tables show the same in words"
         ></canvas>
       </div>
       ${view && html`<${Controls} view=${view} />`}

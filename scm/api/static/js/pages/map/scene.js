@@ -58,7 +58,7 @@ export class Scene {
       this.due = time + Math.max(FRAME_MS - 2, 1.6 * drawn.took_ms);
     };
     request = requestAnimationFrame(frame);
-    // To ask the canvas in each frame would have the whole page laid out for it.
+    // Measuring the canvas in each frame would force a layout of the whole page.
     const { canvas } = this;
     const sizes = new ResizeObserver(() => (this.size = [canvas.clientWidth, canvas.clientHeight]));
     sizes.observe(canvas);

@@ -1,9 +1,9 @@
 /** When a signal changes, in as few words as hold: a time, or two, or a forecast and how far to trust it. */
 
-const NARROW_S = 0.5; // a promise this narrow is one time: the later, so that nobody starts early
+const NARROW_S = 0.5; // a guaranteed time this narrow is one time: the later, so that nobody starts early
 
 /**
- * The time to change of a group's row, `passed_s` after it was told.
+ * The time to change of a group's row, `passed_s` after it was published.
  * @returns e.g. `4 s`, `3–9 s`, `≈6 s 80 %`; empty: nothing is known.
  */
 export function timeToChange(group, passed_s) {

@@ -22,7 +22,7 @@ export function SignalsShort() {
   `;
 }
 
-/** A junction of which nothing is told any more. */
+/** A junction that no longer reports. */
 function unknown(junction) {
   const groups = junction.groups.map(({ group }) => ({ group, colour: null, min_s: null }));
   return { ...junction, fresh: false, groups };

@@ -47,7 +47,7 @@ function sizeOf(car, px_per_m, ratio) {
   return { shape, scale, grown: shown / scale, small: length * scale < SIMPLE_PX * ratio, looks: new Map() };
 }
 
-/** Pictures of a car of this size and kind; made when first asked for. */
+/** Pictures of a car of this size and kind; made on first use. */
 function lookOf(size, kind) {
   let look = size.looks.get(kind);
   if (look) return look;

@@ -1,4 +1,4 @@
-/** The stations on the bus, behind a line that says how many: parts, vehicles and clients, and those lost. */
+/** The stations on the bus, behind a line with their numbers: parts, vehicles and clients, and those lost. */
 import { html } from "scm/shared/html.js";
 import { span } from "scm/shared/format.js";
 import { stations } from "scm/shell/store.js";

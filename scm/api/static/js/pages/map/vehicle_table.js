@@ -125,7 +125,7 @@ function Head({ column }) {
 }
 
 function Car({ vehicle, row, number }) {
-  fleetTick.value; // its properties stay the same while what `fleet` tells of it moves
+  fleetTick.value; // its properties stay the same while its state in `fleet` changes
   const isChosen = useComputed(() => selected.value === vehicle); // a choice draws two rows anew, not all
   if (row >= fleet.count) return null; // it left a moment ago
   const { kind: sort, owner } = fleet.vehicles[row];

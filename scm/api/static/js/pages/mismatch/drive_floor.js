@@ -57,7 +57,7 @@ function Laid({ way, car, cars, floor }) {
   `;
 }
 
-/** What is shown of an axis: the floor, and of what leads off it as much as tells in which direction. */
+/** What is shown of an axis: the floor, and enough of what leads off it to show the direction. */
 function shown([low, high], values) {
   const beyond = 0.3 * (high - low);
   return [

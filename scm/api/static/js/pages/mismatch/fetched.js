@@ -1,4 +1,4 @@
-/** What the server tells: read once, or again and again while somebody looks. */
+/** Data of the server: read once, or repeatedly while the page is visible. */
 import { useCallback, useEffect, useState } from "preact/hooks";
 import { placed } from "scm/shared/base.js";
 
@@ -17,7 +17,7 @@ export function useFetched(path, every_ms = 0) {
         (error) => quit.signal.aborted || setFound((before) => ({ ...before, error: error.message })),
       )
       .then(() => {
-        // After the answer: a server that takes longer than that would be asked for ever.
+        // After the answer: requests would pile up at a server that takes longer.
         if (every_ms && !quit.signal.aborted) next = setTimeout(again, every_ms);
       });
     return () => {

@@ -1,4 +1,4 @@
-/** What stays undecided, and the drive that would tell: sent to a car of the city, watched, stopped. */
+/** What remains undecided, and the drive that would decide it: sent to a car of the city, watched, stopped. */
 import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
@@ -25,7 +25,7 @@ export function Question({ question, number, report, onDriven }) {
       <p>${question.drive_this}</p>
       ${drive
         ? html`<${Drive} report=${report} drive=${drive} onDriven=${onDriven} />`
-        : html`<p class="empty">No drive on this floor would tell them apart.</p>`}
+        : html`<p class="empty">No drive on this floor would distinguish them.</p>`}
     </section>
   `;
 }

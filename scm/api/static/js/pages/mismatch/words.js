@@ -1,4 +1,4 @@
-/** Verdicts, units and numbers as the page says them. */
+/** Verdicts, units and numbers as the page writes them. */
 import { UNKNOWN } from "scm/shared/format.js";
 
 export const VERDICTS = {

@@ -1,4 +1,4 @@
-/** Begin a mismatch job: does this car drive as its file says? */
+/** Begin a mismatch job: does this car drive as its file describes? */
 import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";

@@ -7,7 +7,7 @@ const STRETCH_S = 10; // of one answer of the server
 const HZ = 10; // drawn smoothly between
 const SLOWEST_HZ = 2; // half of it is still no gap
 const MAX_STRETCHES = 40; // stretches: a few minutes either way
-const TEXT_PERIOD_MS = 100; // how often the page's words follow
+const TEXT_PERIOD_MS = 100; // how often the page's text follows
 const GAP_S = 1.5; // a silence longer than this is shown as one
 const GROWS_MS = 2000;
 const SKIP_SHOWN_S = 5; // of what is played after it
@@ -29,7 +29,7 @@ export class Player {
     /** Where it is [s], ten times a second; `t_s` is the same for every picture. */
     this.at = signal(0);
     this.t_s = 0;
-    /** Counts stretches that came: what shows a moment reads it. */
+    /** Counts stretches received, so that the page is drawn again. */
     this.came = signal(0);
     this.stretches = new Map();
     this.last_ms = null;
@@ -116,7 +116,7 @@ export class Player {
     return this.stretches.get(Math.floor(t_s / STRETCH_S));
   }
 
-  /** Ask for what is shown now and soon. */
+  /** Request what is shown now and soon. */
   fetch() {
     const first = Math.floor(this.t_s / STRETCH_S);
     const ahead = this.playing.value ? Math.ceil((this.speed.value * 4) / STRETCH_S) : 0;
@@ -140,7 +140,7 @@ export class Player {
     const length_s = this.length.value;
     try {
       const body = await this.whole(start_s, end_s);
-      // As far as was there when it was asked: the file may go on.
+      // As far as the file went at the request: it may still grow.
       Object.assign(stretch, body, { to_s: Math.min(end_s, Math.max(start_s, length_s)) });
       this.trouble.value = body.damaged.length ? `Left out here: ${body.damaged.join("; ")}` : "";
       stretch.isLoading = false;

@@ -57,7 +57,7 @@ export function Replay({ name }) {
   return html`<${Played} ...${loaded} onChanged=${() => setChanged(changed + 1)} />`;
 }
 
-/** The window's title says that it is no live city, as long as this is shown. */
+/** The window's title shows that this is not the live city. */
 function useTitle(title) {
   useEffect(() => {
     windowTitle.value = `NOT LIVE · ${title}`;
@@ -136,7 +136,7 @@ function Banner({ recording, map }) {
       <div class="about">
         <h2>${recording.title || recording.name}</h2>
         <p>${facts.join(" · ")}</p>
-        <p class="hint">The bar above tells of the city now; all below is recorded.</p>
+        <p class="hint">The bar above shows the city now; everything below is recorded.</p>
         ${recording.form-error && html`<p>${recording.form-error}</p>`}
         ${recording.notes && html`<p>“${recording.notes}”</p>`}
       </div>
@@ -229,7 +229,7 @@ function Events({ player, events, more }) {
             `,
           )}
         </ol>
-        ${!events.length && html`<p class="empty">Nothing happened that the city tells of.</p>`}
+        ${!events.length && html`<p class="empty">No event was recorded.</p>`}
       </div>
     </section>
   `;

@@ -22,7 +22,7 @@ export function ReplayMap({ player, summary, chosen, onChoose }) {
     let request = 0;
     const frame = () => {
       request = requestAnimationFrame(frame);
-      // The page may have gone, and its end not yet be told.
+      // The page may be gone before its cleanup ran.
       if (canvas.current) draw(canvas.current, box, player, summary, pick.current);
     };
     request = requestAnimationFrame(frame);
@@ -34,7 +34,7 @@ export function ReplayMap({ player, summary, chosen, onChoose }) {
       <canvas
         ref=${canvas}
         role="img"
-        aria-label="Map with the cars and signals of this moment of the recording; the table tells the same in words"
+        aria-label="Map with the cars and signals of this moment of the recording; the table shows the same in words"
         onClick=${(event) => box && onChoose(nearest(event, box, player))}
       ></canvas>
       <p class="stamp" aria-hidden="true">Not live</p>

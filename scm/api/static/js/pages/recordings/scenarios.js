@@ -1,4 +1,4 @@
-/** Scenarios: scripts that drive the fleet. Read or edit one, run it, see what it says, stop it. */
+/** Scenarios: scripts that drive the fleet. Read or edit one, run it, see its output, stop it. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
@@ -242,6 +242,6 @@ function Log({ run }) {
   return html`
     ${run.error && html`<p class="form-error">${run.error}</p>`}
     ${error && html`<p class="form-error">${error}</p>`}
-    <pre ref=${box} tabindex="0" role="log" aria-label="What ${run.what} prints">${lines.join("\n") || "It has said nothing yet."}</pre>
+    <pre ref=${box} tabindex="0" role="log" aria-label="What ${run.what} prints">${lines.join("\n") || "No output yet."}</pre>
   `;
 }

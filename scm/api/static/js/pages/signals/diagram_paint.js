@@ -3,7 +3,7 @@
  *
  * Above, a row a ring: the phases that it served one after the other, each with its green, its yellow
  * and its red clear; where all rings cross to other phases stands a barrier. Below, a row a phase. As
- * on paper, green is a full bar, yellow a hatched one and red a line: the shape says what the colour
+ * on paper, green is a full bar, yellow a hatched one and red a line: the shape shows what the colour
  * does. Right of now stands what the timetable or the policy foresees, paler.
  */
 import { LETTERS, plain } from "scm/pages/signals/words.js";
@@ -18,7 +18,7 @@ const LEAST_LETTER_PX = 13;
 
 const left = (width) => (width < 560 ? 84 : 116);
 
-/** Rings as rows, `[{name, phases}]`: the widest section says how many. */
+/** Rings as rows, `[{name, phases}]`: the widest section decides how many. */
 export function ringsOf(site) {
   const sections = site?.rings ?? [];
   const count = Math.max(0, ...sections.map((section) => section.length));
@@ -183,7 +183,7 @@ function hatch(paper, fromX, top, width, height, colour) {
   paper.restore();
 }
 
-/** One colour from `from` to `to`, in the shape that says which. */
+/** One colour from `from` to `to`, in the shape of that colour. */
 function drawBar({ paper, x, row, bar, ink, view }, colour, from, to, top, ...labels) {
   const [a, b] = [Math.max(x(from), x(view.from)), Math.min(x(to), x(view.until))];
   if (b <= a) return;
@@ -284,7 +284,7 @@ function drawPhase(sheet, group, top, { bars, times, coming, current }) {
   drawGuaranteedTime(sheet, group, top, current);
 }
 
-/** What SPaT promises of the present colour: from the earliest to the latest end, and the likely one. */
+/** Guaranteed times of the present colour: from the earliest to the latest end, and the likely one. */
 function drawGuaranteedTime({ paper, x, view, ink }, group, top, current) {
   if (group.min_s === null || current.t_ns === null) return;
   const base = current.t_ns / 1e9;

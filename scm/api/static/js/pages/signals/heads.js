@@ -1,4 +1,4 @@
-/** Each signal group now: lamp with letter and place, what is promised, what is likely, what is detected. */
+/** Each signal group now: lamp with letter and place, guaranteed times, likely end, detections. */
 import { html } from "scm/shared/html.js";
 import { city, link, now, signalsAt } from "scm/shell/store.js";
 import { status } from "scm/pages/signals/store.js";
@@ -64,7 +64,7 @@ function Head({ group, junction, detector }) {
   `;
 }
 
-/** Three lamps, one lit: colour, letter and place say the same. */
+/** Three lamps, one lit: colour, letter and place show the same. */
 function Lamp({ colour, name }) {
   const flashing = colour === "flashing_red";
   const lit = flashing ? "red" : colour;

@@ -42,7 +42,7 @@ const close = () => (open.value = null);
 
 function History() {
   return html`
-    <${Dialog} title="What the monitor said" onClose=${close}>
+    <${Dialog} title="Reports of the monitor" onClose=${close}>
       <p>
         Another process watches every colour with a card of its own. A fault makes the junction flash
         red until a person resets it; an overload of this computer ends by itself.
@@ -57,7 +57,7 @@ function History() {
             </li>
           `,
         )}
-        ${!verdicts.value.length && html`<li class="empty">It has not said anything yet.</li>`}
+        ${!verdicts.value.length && html`<li class="empty">No report yet.</li>`}
       </ul>
       <div class="actions"><button data-first onClick=${close}>Close</button></div>
     <//>

@@ -44,7 +44,7 @@ const groups = signal([]);
 const policy = signal("");
 const flashing = signal(false);
 
-/** Fill the form for a group, and let the person say why. */
+/** Fill the form for a group, and move the focus to the reason. */
 export function requestFor(what, group) {
   verb.value = what;
   groups.value = [group];

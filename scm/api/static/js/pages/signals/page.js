@@ -70,7 +70,7 @@ function modeOf({ mode, monitor }) {
   return monitor?.fault ? "until the monitor's fault is reset" : "until somebody ends it";
 }
 
-/** Which junction, what runs, and what the monitor says: the line that is read first. */
+/** Which junction, what runs, and the monitor's state: the line that is read first. */
 function Bar({ current, names }) {
   const now = status();
   const runs = !current.fresh

@@ -14,8 +14,8 @@ const MOST_STAGES = 24;
 const NAME = /^[a-z][a-z0-9_-]{0,31}$/;
 
 /**
- * The plan in the editor: `{junction, plan, about, offset_s, stages, isNew, tag, rival}`; null: it is closed.
- * It is kept while the person looks elsewhere. `rival` is the plan as somebody else saved it meanwhile.
+ * The plan in the editor: `{junction, plan, about, offset_s, stages, isNew, tag, existing}`; null: it is closed.
+ * It is retained while the user looks elsewhere. `existing` is the plan as somebody else saved it meanwhile.
  */
 export const editing = signal(null);
 

@@ -8,7 +8,7 @@ import { PlanStrip } from "scm/pages/signals/plan_strip.js";
 import { plans, read, readPlans, row, site, status } from "scm/pages/signals/store.js";
 import { plain, secs, toCome } from "scm/pages/signals/words.js";
 
-/** `{plan}` or `{policy}` that is asked about. */
+/** `{plan}` or `{policy}` that is to be confirmed. */
 const confirming = signal(null);
 const deleting = signal(null);
 

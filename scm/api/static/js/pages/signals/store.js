@@ -7,7 +7,7 @@ import { placed } from "scm/shared/base.js";
 /** The junction that is looked at, by name; null before any is known. */
 export const junction = signal(null);
 
-/** Its `SignalSite`, its plans, what SPaT told against what happened, what the monitor said. */
+/** Its `SignalSite`, its plans, what SPaT published against what happened, the monitor's reports. */
 export const site = signal(null);
 export const plans = signal([]);
 export const score = signal(null);
@@ -30,7 +30,7 @@ export const row = () => signals.value.find((one) => one.junction === junction.v
 export const status = () =>
   (topic("signal_status").value ?? []).find((one) => one.junction === junction.value) ?? null;
 
-/** The controller's clock now [s]; null: it is not heard. */
+/** The controller's clock now [s]; null: nothing received. */
 export function clockNow() {
   const current = row();
   if (!current?.fresh || current.t_ns === null) return null;
@@ -45,7 +45,7 @@ export async function read(path) {
   return { body, tag: response.headers.get("ETag") };
 }
 
-/** Look at a junction: read all that the stream does not tell. */
+/** Look at a junction: read everything that the stream does not carry. */
 export async function look(name) {
   junction.value = name;
   site.value = null;
@@ -101,7 +101,7 @@ async function readBars(name) {
     bars.junction = name;
     barsRead.value += 1;
   } catch {
-    // The stream goes on from here: the past is what is missing, and the page says how far it goes.
+    // The stream continues from here: the past is missing, and the page shows how far it goes back.
   }
 }
 
@@ -119,7 +119,7 @@ async function readScore(name) {
   }
 }
 
-/** Lengthen the bars by what the stream tells. */
+/** Extend the bars by the stream's newest state. */
 function extend(current) {
   if (!current.fresh || current.t_ns === null || bars.junction !== current.junction) return;
   const t = current.t_ns / 1e9;

@@ -1,4 +1,4 @@
-/** Colours of signals in letters, words and signs, and times as they are promised. */
+/** Colours of signals in letters, words and signs, and guaranteed times. */
 import { spaced, UNKNOWN } from "scm/shared/format.js";
 
 export const LETTERS = { red: "R", yellow: "Y", green: "G", flashing_red: "F", dark: "D" };
@@ -20,10 +20,10 @@ export const VERBS = {
   policy: "Policy",
 };
 
-/** A promise this narrow is shown as one time: the later one, so that nobody starts early. */
+/** A guaranteed time this narrow is shown as one time: the later one, so that nobody starts early. */
 const NARROW_S = 0.5;
 
-/** A promise is shown as given: as one time, as a range, or as "not before". */
+/** A guaranteed time is shown as published: as one time, as a range, or as "not before". */
 export function guaranteed({ min_s, max_s }, passed_s) {
   if (min_s === null) return UNKNOWN;
   const left = (seconds) => Math.max(0, seconds - Math.max(0, passed_s)).toFixed(1);
@@ -33,10 +33,10 @@ export function guaranteed({ min_s, max_s }, passed_s) {
   return `${whole(left(min_s))}–${whole(left(max_s))} s`;
 }
 
-/** Names of groups as people say them. */
+/** Names of groups in plain words. */
 export const plain = spaced;
 
-/** What was asked for and is not yet in force. */
+/** What was requested and is not yet in force. */
 export const toCome = (pending, mode) =>
   `${plain(pending)} begins ${mode === "flash" ? "when the flash ends" : "at the next safe moment"}`;
 

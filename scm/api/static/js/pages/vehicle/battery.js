@@ -2,7 +2,7 @@
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
 
-const LOW = 0.2; // as the city's event says
+const LOW = 0.2; // as in the city's event
 const EMPTY = 0.05;
 
 /** `none`, `unknown` (a voltage, and no charge), `good`, `low` or `empty`. */

@@ -1,4 +1,4 @@
-/** One vehicle: what it sees, what it is told and how it answers, who drives it, and a wheel to take. */
+/** One vehicle: what it sees, its commands and its response, who drives it, and teleoperation. */
 import { modeOf, stuckBy } from "scm/shared/condition.js";
 import { html } from "scm/shared/html.js";
 import { go } from "scm/shell/router.js";

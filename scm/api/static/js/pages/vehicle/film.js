@@ -9,8 +9,8 @@ const LENGTH = /^content-length: *(\d+)/im;
 const letters = new TextDecoder("latin1");
 
 /**
- * Take every picture of a film, decoded, while somebody looks; it is asked for again when it ends.
- * @param take is lent a picture for as long as it draws it.
+ * Draw every picture of a film, decoded, while the page is visible; the film is requested again when it ends.
+ * @param draw receives a picture, which is closed when it returns.
  * @returns what ends it.
  */
 export function watch(address, draw) {

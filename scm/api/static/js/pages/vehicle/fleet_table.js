@@ -50,7 +50,7 @@ export function FleetTable() {
             <tr>
               <th>Name</th><th>State</th><th>Kind</th><th class="wide">Car</th><th>Driven by</th>
               <th class="number">Speed</th><th class="wide">Trip</th><th class="number wide">Battery</th>
-              <th class="number wide" title="Score of what is doubted of its messages">Misbehaviour</th><th class="number wide" title="Age of its newest report">Link</th>
+              <th class="number wide" title="Misbehaviour score of its messages">Misbehaviour</th><th class="number wide" title="Age of its newest report">Link</th>
             </tr>
           </thead>
           <tbody>${shown.map((car) => html`<${Row} key=${car.vehicle} car=${car} />`)}</tbody>

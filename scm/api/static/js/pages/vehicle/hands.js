@@ -11,7 +11,7 @@ const PULLED = 0.2; // of a trigger
 const TRIGGERS = [6, 7];
 const TYPED_INTO = "input:not([type=range]), select, textarea, dialog *";
 
-/** Begin to feel; `wish()` tells what is wished for now, `end()` lets go for good. */
+/** Begin to read inputs; `command()` returns the present command, `end()` stops reading. */
 export function hands(onLetGo) {
   const held = new Set();
   const command = { held: false, throttle: 0, steering: 0, by: "keys" };
@@ -81,7 +81,7 @@ function byKeys(command, held, most, passed) {
   command.throttle = way ? towards(begun, way * most, RISE_PER_S * passed) : 0;
 }
 
-/** What a gamepad says whose trigger is pulled; null: none is. */
+/** The state of a gamepad whose trigger is pulled; null: none is. */
 function pull() {
   if (document.hidden || !document.hasFocus()) return null;
   for (const pad of navigator.getGamepads?.() ?? []) {

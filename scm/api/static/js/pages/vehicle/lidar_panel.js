@@ -1,4 +1,4 @@
-/** What a car's LIDAR sees, from above: the car looks up, rings every half metre. Heard while it is shown. */
+/** What a car's LIDAR sees, from above: the car looks up, rings every half metre. Received while it is shown. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";

@@ -1,11 +1,11 @@
-/** What is held against each station on the air: asked every two seconds while a page shows it. */
+/** Misbehaviour of each transmitting station: polled every two seconds while a page shows it. */
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { placed } from "scm/shared/base.js";
 
 const EVERY_MS = 2000;
 
-/** `{watched, witness, stations, reported}`; null until it was heard. */
+/** `{watched, witness, stations, reported}`; null until received. */
 export const misbehaviour = signal(null);
 
 export function useMisbehaviour() {
@@ -25,8 +25,8 @@ export function useMisbehaviour() {
 }
 
 /**
- * `{score, suspected, tagUnseen, reported}` of a car, now and ever; the score is null where it is not
- * heard. `tagUnseen`: the Eye cannot see its tag, which is no accusation.
+ * `{score, suspected, tagUnseen, reported}` of a car, now and since the start; the score is null if it is not
+ * watched. `tagUnseen`: the Eye cannot see its tag, which is no accusation.
  */
 export function misbehaviourOf(vehicle) {
   const newest = misbehaviour.value;

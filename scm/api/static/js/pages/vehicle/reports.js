@@ -1,4 +1,4 @@
-/** The last half minute of all that a car reports, in columns, and its newest scan; heard while somebody shows it. */
+/** The last half minute of all that a car reports, in columns, and its newest scan; received while a page shows it. */
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { subscribe, RANKS } from "scm/shell/streams.js";
@@ -31,7 +31,7 @@ export function reportsNow() {
   return columns;
 }
 
-/** Hear a car's reports for as long as the component is on the page. */
+/** Subscribe to a car's reports while the component is on the page. */
 export function useReports(vehicle) {
   useEffect(() => {
     columns = empty();

@@ -1,4 +1,4 @@
-/** A connection to a car's wheel: taken, driven 25 times a second, given back. */
+/** Teleoperation of a car: its lease acquired, 25 commands a second, the lease released. */
 import { signal } from "@preact/signals";
 import { isConnected } from "scm/shell/store.js";
 import { hands } from "scm/pages/vehicle/hands.js";
@@ -11,8 +11,8 @@ const REPLY_TIMEOUT_MS = 1000;
 const GONE_MS = 5000; // the city gives the car back as soon
 
 /**
- * How it stands: `state` is `free`, `asking`, `held` or `over`; `status` is the car's answer to the newest
- * packet, `round_ms` how long that took; `over` says why it ended.
+ * Its state: `state` is `free`, `requesting`, `held` or `over`; `status` is the car's answer to the newest
+ * packet, `round_ms` how long that took; `over` is why it ended.
  */
 const FREE = { state: "free", vehicle: null, owner: "", status: null, round_ms: null, over: null };
 export const wheel = signal(FREE);
@@ -24,7 +24,7 @@ const ENDS = {
   cut: "The connection was lost; the car stops by itself and goes back.",
 };
 
-/** The greatest throttle that a key asks for. */
+/** The greatest throttle that a key commands. */
 export const most = signal(0.4);
 
 /** Which keys and pads are held: `ahead left`. */
@@ -36,7 +36,7 @@ let timer = null;
 let seq = 0;
 let receivedAt = 0;
 
-/** Ask for a car; with a reason it is taken from whoever has it. */
+/** Acquire a car; with a reason it is taken over from its present owner. */
 export function acquire(vehicle, reason = "") {
   drop();
   wheel.value = { ...FREE, state: "requesting", vehicle };
@@ -86,7 +86,7 @@ function receive(word) {
   }
 }
 
-/** A dead line says nothing, not even that it is dead. */
+/** A dead connection reports nothing, so silence is measured. */
 function notice() {
   const quiet = performance.now() - receivedAt;
   const { state, status } = wheel.value;
@@ -122,7 +122,7 @@ function stopHands() {
   down.value = "";
 }
 
-/** Say what is wished for now; who lets go says so at once. */
+/** Send the present command; a release is sent at once. */
 function send() {
   if (socket?.readyState !== WebSocket.OPEN || !hand) return;
   const { held, throttle, steering } = hand.command(most.value);

@@ -1,4 +1,4 @@
-/** Take a car's wheel: keys, gamepad or pads; a dead-man in all of them; and give it back. */
+/** Drive a car: acquire its lease, drive by keys, gamepad or pads, each with a dead-man, and release it. */
 import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed, UNKNOWN } from "scm/shared/format.js";
@@ -68,7 +68,7 @@ function afterwards(car) {
   return `${car.vehicle} stands, and stands again when you give it back.`;
 }
 
-/** Who takes a car from somebody says why: it stands in the events. */
+/** Taking over a car from somebody needs a reason, which is logged as an event. */
 function Steal({ car }) {
   const [reason, setReason] = useState("");
   const submit = (event) => {
