@@ -11,7 +11,7 @@ from scm.vehicles.noise import bases_of, key_of, uniforms
 
 
 def is_lost(seed: int, vehicle: str, camera: str, number: int, drop_out: float) -> bool:
-    """Say whether a frame never comes; `drop_out` is the share of those that do not."""
+    """Return whether a frame is lost; `drop_out` is the share of those that do not."""
     if drop_out <= 0.0:
         return False
     keys = np.array([key_of(seed, vehicle, "camera", camera)], np.uint64)

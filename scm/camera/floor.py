@@ -29,7 +29,7 @@ MAX_TEXELS = 14e6
 FINEST_TEXELS_PER_M = 1000.0
 MAX_PATCHES = 8
 LEAST_UPRIGHT = 0.01
-"""Of a camera that looks straight up or down the horizon is as far away as this says."""
+"""Of a camera that looks straight up or down the horizon is at this distance."""
 ASLANT = 1.3
 """How much farther a frame's corner is than its middle in the same row, for any lens of ours."""
 BESIDE_M = 0.3
@@ -43,8 +43,8 @@ INVERSE = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
 class Floor:
     """The floor of a city in some light, ready to be seen from anywhere.
 
-    Of a large city only patches around whoever looks are painted, a fine one and a wide one; they
-    are kept for the next ones who look from there.
+    Of a large city only patches around a camera are painted, a fine one and a wide one; they
+    are cached for the next cameras there.
 
     Args:
         city_map: The city.

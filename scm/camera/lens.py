@@ -45,7 +45,7 @@ class Lens:
     """One camera's lens.
 
     Attributes:
-        optics: What the car file says.
+        optics: From the car file.
         matrix: K of the frame, (3, 3) [px].
         canvas_matrix: K of the canvas, (3, 3) [px].
         canvas_size: Its width and height [px].

@@ -40,7 +40,7 @@ Which = tuple[str, str]
 
 @dataclass
 class _Counted:
-    """What the part tells of itself."""
+    """What the part reports of itself."""
 
     frames: int = 0
     published_ns: int = 0
@@ -84,7 +84,7 @@ class CameraPart(BasePart):
         self._spent_ns = 0
 
     def attach(self, is_wanted: IsWanted) -> None:
-        """Learn whom to ask whether a picture is wanted."""
+        """Receive what reports whether a picture has subscribers."""
         self._is_wanted = is_wanted
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -137,7 +137,7 @@ class CameraPart(BasePart):
                 self._exposed_ns[which] = due_ns
                 if is_lost(self._seed, *which, number, optics.drop_out):
                     continue
-                # In the clock by which snapshots are heard: the world's may be another computer's.
+                # In the clock by which snapshots arrive: the world's may be another computer's.
                 out_ns = received_ns - (after.t_ns - due_ns) + nanoseconds(optics.latency_s)
                 for frame in self._frame(which, optics, due_ns):
                     self._under_way.put(frame, out_ns)

@@ -171,7 +171,7 @@ def _sign_face(kind: str) -> tuple[Face, ...]:
 
 
 def _round_face(kind: str) -> tuple[Face, ...]:
-    """Return a round sign: a red rim, or blue where it says which way to turn, with its arrow."""
+    """Return a round sign: a red rim, or blue if it orders a direction, with its arrow."""
     angles = np.arange(16) * math.pi / 8.0
     circle = np.column_stack((np.cos(angles), np.sin(angles)))
     if kind == SPEED_LIMIT:

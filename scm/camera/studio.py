@@ -79,7 +79,7 @@ class Studio:
             shown: What the signal heads show.
             camera: Its name, and with it its noise.
             t_ns: When it is exposed.
-            moved: Where boxes are that were pushed; the others are where the map says.
+            moved: Poses of boxes that were pushed; the others are at their place on the map.
         """
         kind = self._kind(optics)
         view = kind.lens.view(car_rotation(car), np.array([car.x_m, car.y_m, 0.0]))
@@ -158,7 +158,7 @@ def _raised(foot: Floats, height: float) -> Floats:
 
 
 class _Still(Generic[S, T]):
-    """What never moves: which of it is in sight is found at once, and only that is ever made."""
+    """What never moves: the visible part is found at once, and only that is ever built."""
 
     def __init__(self, balls: Sequence[Ball[S]], make: Callable[[S], T]) -> None:
         self._balls = balls

@@ -45,7 +45,7 @@ def _between(start: SnapshotVehicle | None, end: SnapshotVehicle, share: float) 
 def near(snapshot: WorldSnapshot, vehicle: str, reach_m: float) -> WorldSnapshot:
     """Return a snapshot with the cars around one of them, itself included.
 
-    A car whose numbers are none is left out: nobody can say where it is.
+    A car whose pose is not finite is left out.
     """
     own = next(car for car in snapshot.vehicles if car.vehicle == vehicle)
     x, y = own.x_m, own.y_m

@@ -19,9 +19,9 @@ from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 TRUTH_DEPTH = 80
-"""Snapshots kept: 4 s, longer than any camera's latency."""
+"""Snapshots stored: 4 s, longer than any camera's latency."""
 SAMPLES_NS = 300 * NS_PER_S
-"""How long samples are kept."""
+"""How long samples are stored."""
 SAMPLE_PERIOD_NS = NS_PER_S // 2
 """Between two samples of a car: its error changes over half a second or more, not each frame."""
 MAX_PAIRS = 2_000
@@ -92,7 +92,7 @@ class EyeAccuracyPart(BasePart):
             )
 
     def truth_at(self, vehicle: str, t_ns: int) -> Pose2 | None:
-        """Return the true pose of a simulated car at `t_ns`; None outside the snapshots kept."""
+        """Return the true pose of a simulated car at `t_ns`; None outside the stored snapshots."""
         before = after = None
         for snapshot in self._truth:
             if snapshot.t_ns <= t_ns:
@@ -125,7 +125,7 @@ class EyeAccuracyPart(BasePart):
         }
 
     def forget(self) -> None:
-        """Drop cars that no camera has seen for as long as samples are kept."""
+        """Drop cars that no camera has seen for as long as samples are stored."""
         oldest_ns = (self.truth_ns or 0) - SAMPLES_NS
         for pair in [p for p, samples in self._samples.items() if samples[-1].t_ns < oldest_ns]:
             del self._samples[pair]

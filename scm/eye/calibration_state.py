@@ -61,7 +61,7 @@ class CalibrationState(msgspec.Struct, kw_only=True, frozen=True):
         return camera_model(self.camera, lens_covariance)
 
     def is_alike(self, other: "CalibrationState") -> bool:
-        """Return whether lens and place are the same, whoever put them in force."""
+        """Return whether lens and place are the same, by whomever they were put in force."""
         mine = self.camera, self.lens_covariance
         return mine == (other.camera, other.lens_covariance)
 

@@ -4,9 +4,9 @@ The map's tags do not move. Any apparent change is the camera's: it moved (bumpe
 drifted (blurred tag), or its calibration is wrong (a tag of another size or elsewhere). The picture
 shows the rest: black, frozen, of the wrong size, or missing.
 
-After a bump the extrinsics are estimated from the tags, and their covariance tells how accurate
-poses are from then on: below `MAX_STD_M` the complaint is withdrawn and the new estimate reported.
-One small tag cannot separate a tilt from a shift, so with one tag the complaint stays until the
+After a bump the extrinsics are estimated from the tags, and their covariance shows how accurate
+poses are from then on: below `MAX_STD_M` the fault is withdrawn and the new estimate reported.
+One small tag cannot separate a tilt from a shift, so with one tag the fault remains until the
 camera is located again.
 """
 
@@ -30,7 +30,7 @@ RECENT_FRAMES = 8
 SHIFT_M, SHIFT_PX = 0.001, 0.15
 TURN_RAD = math.radians(0.12)
 MAX_STD_M = 0.0025
-"""Maximum standard deviation without a complaint: errors up to twice that, 5 mm."""
+"""Maximum standard deviation without a fault: errors up to twice that, 5 mm."""
 REPORTED_NS = 10 * NS_PER_S
 SIZE_TOLERANCE = 0.012
 ELSEWHERE_M, ELSEWHERE_RAD = 0.15, math.radians(10.0)
@@ -107,7 +107,7 @@ class CameraMonitor:
         return tuple(Complaint(code=code, said=complaints[code]) for code in sorted(complaints))
 
     def flags(self, now_ns: int) -> tuple[str, ...]:
-        """Return the codes of complaints that affect poses; none if the camera is good."""
+        """Return the codes of faults that affect poses; none if the camera is good."""
         codes = (one.code for one in self.complaints(now_ns))
         return tuple(code for code in codes if code not in INFO_CODES)
 
@@ -216,7 +216,7 @@ class CameraMonitor:
         self._complaints["re_anchored"] = f"{self._bump}; {corrected}"
 
     def _check_accuracy(self) -> None:
-        """Complain when poses may be less accurate than accepted, without any movement."""
+        """Report when poses may be less accurate than accepted, without any movement."""
         if self.estimator.model is not self._assessed:
             self._assessed, self._std_m = self.estimator.model, self.estimator.max_position_std_m()
         seen = self.estimator.seen_ns is not None
@@ -227,7 +227,7 @@ class CameraMonitor:
             )
 
     def misplaced(self, ours: Mapping[int, Floats]) -> dict[str, str]:
-        """Return complaints, by code, about tags of another size or place than calibrated."""
+        """Return faults, by code, of tags of another size or place than calibrated."""
         found_by_code = {}
         for tag_id, found in ours.items():
             tag = self._map_tag(tag_id)

@@ -24,13 +24,13 @@ def preview(
     names: Mapping[int, str],
     complaints: Sequence[str] = (),
 ) -> bytes:
-    """Return a frame as JPEG with its tags outlined, named, and the camera's complaints.
+    """Return a frame as JPEG with its tags outlined, named, and the camera's faults.
 
     Args:
         image: (height, width, 3) blue, green, red, or (height, width) grey; not changed.
         tags: Found in it.
         names: Of the vehicles by tag id; others are shown by their id.
-        complaints: Sentences, one a line at the picture's foot.
+        complaints: Faults as sentences, one a line at the picture's foot.
     """
     grey = image.ndim == 2
     shown: Image = np.stack((image,) * 3, axis=-1) if grey else image.copy()

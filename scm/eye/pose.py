@@ -11,8 +11,8 @@ its mirror image as in a free perspective-n-point solution.
 
 The covariance is propagated: noise of the corners, covariance of the camera's place and lens
 (shared by all cars of a frame, and by all frames), and roll and pitch of the body, which move the
-roof but cannot be observed. The misfit is the distance of the four points from the square, relative
-to corner noise. One corner that spoils an otherwise good square is left out; a remaining misfit
+roof but cannot be observed. The residual is the distance of the points from the square, relative
+to corner noise. One corner that corrupts an otherwise good square is left out; a remaining residual
 widens the covariance. Where a square of another size fits clearly better, the print has another
 size or the roof another height: centre and yaw are the same for any size, so there is a pose,
 `size_ratio` is the apparent size, and beyond `SIZE_TOLERANCE` the covariance includes half the

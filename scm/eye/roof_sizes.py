@@ -1,4 +1,4 @@
-"""Detects roof tags of another size than their car file says, and reports the size that fits.
+"""Detects roof tags of another size than in their car file, and reports the size that fits.
 
 A sheet printed with "fit to page" is 3 to 7 % off. Such a tag still gives a pose
 (`scm.eye.pose`); the sightings and the track carry the flag `roof_tag_size`, and the camera's
@@ -103,7 +103,7 @@ def _sentence(tag_id: int, roof: _Roof, camera_height_m: float) -> str:
             "file of `--tags`"
         )
     else:
-        whose, file = f"tag {tag_id} of {roof.vehicle}", f"its car file says {wants:.1f} mm"
+        whose, file = f"tag {tag_id} of {roof.vehicle}", f"its car file has {wants:.1f} mm"
         advice = f"or set ips.tag_size_m = {looks / 1e3:.4f} in the car file"
         advice = f'print it at 100 %, not "fit to page", {advice}'
     return (

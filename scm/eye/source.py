@@ -45,7 +45,7 @@ class Source(Protocol):
     """A source of frames.
 
     What cannot work at all is refused when a source is created. After the first `read` nothing is
-    raised any more: a source reports its trouble and recovers by itself.
+    raised any more: a source reports its fault and recovers by itself.
     """
 
     @property

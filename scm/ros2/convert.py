@@ -106,7 +106,7 @@ def picture(name: str, frame: CameraFrame) -> Any:
 
 
 def speed_and_angle(kind: str, message: Any, wheelbase_m: float) -> tuple[float, float]:
-    """Return speed [m/s] and road-wheel angle [rad, + = left] that a command asks for.
+    """Return speed [m/s] and road-wheel angle [rad, + = left] that a command requests.
 
     A car cannot turn on the spot: a yaw rate at standstill is ignored. NaN and infinity mean
     standstill.

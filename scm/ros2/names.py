@@ -7,7 +7,7 @@
     attachment  int64 sequence, int64 source time [ns], byte 16, 16 bytes gid; little-endian
 
 Source: ros2/rmw_zenoh, docs/design.md, liveliness_utils.cpp, attachment_helpers.cpp (Jazzy). There
-the gid is the XXH3 of the endpoint's token, here its BLAKE2: it only has to be unique, since nobody
+the gid is the XXH3 of the endpoint's token, here its BLAKE2: it only has to be unique, as nothing
 looks it up in the graph.
 """
 

@@ -136,7 +136,7 @@ class RosPart(BasePart):
         event(_log, "ros_car_not_shown", level=logging.WARNING, vehicle=vehicle, why=why)
 
     def _update_subscriptions(self) -> None:
-        """Hear what is wanted now; a list that is the same stays the same object."""
+        """Receive what is subscribed now; an equal list stays the same object."""
         moves = self._tf.is_wanted
         wanted = [
             *_ALWAYS,

@@ -71,7 +71,7 @@ class Pilot:
 
         Args:
             now_ns: Now.
-            speed_mps: Of the car, as it last told.
+            speed_mps: Of the car, as last reported.
         """
         if self._command_ns is not None and now_ns - self._command_ns >= SILENT_NS:
             self._command_ns = None
@@ -116,7 +116,7 @@ class Pilot:
         self._speed_control = _SpeedControl(self.limits)
 
     def replied(self, request: LeaseRequest, reply: Message) -> None:
-        """Hear what became of a request for the lease."""
+        """Receive the reply to a request for the lease."""
         if isinstance(reply, LeaseReply) and request.verb == "acquire":
             if reply.owner == self._owner:
                 self._epoch, self._seq = reply.epoch, 0

@@ -25,7 +25,7 @@ def with_parent(program: Sequence[str]) -> list[str]:
 
 
 class Leash(Protocol):
-    """The reading end of a pipe that nobody ever writes to."""
+    """The reading end of a pipe that is never written to."""
 
     def poll(self, timeout: float | None) -> bool:
         """Wait until there is something to read, or nothing ever more."""

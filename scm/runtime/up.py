@@ -36,7 +36,7 @@ OPTIONAL = {
     "camera": "no pictures from cars' own cameras",
     "record": "no recording: nothing to replay or to search for a mismatch",
     "observer": "no traffic counts, no delays, no list of who breaks the rules",
-    "misbehaviour": "nobody checks what cars claim on the air",
+    "misbehaviour": "cars' messages are not checked for misbehaviour",
 }
 """Parts that a city can do without, and what is missing then."""
 LOOK_EVERY_NS = 50 * NS_PER_MS
@@ -69,9 +69,9 @@ class CityOptions:
         origin: Where people find it, if a proxy calls it by another name.
         trust_proxy: Proxies whose X-Forwarded-For the server believes.
         ros2: Whether ROS 2 nodes shall see the city.
-        demand: Table of who wants to drive from where to where; None: nobody else comes.
+        demand: Table of trips; None: no further cars come.
         without: Parts to leave out, of `OPTIONAL`.
-        radio: What the air does in the place of what the map says, `key=value` each.
+        radio: Radio parameters in place of the map's, `key=value` each.
     """
 
     map_name: str
@@ -288,12 +288,12 @@ def _parts(plan: _Plan) -> list[Job]:
             last=True,
         ),
         part("traffic", "signals: safe kernel, policies, plans", *stored),
-        part("monitor", "second channel: doubts the signals, latches flash", *stored),
+        part("monitor", "second channel: checks the signals, latches flash", *stored),
         part("world", cars, "--hosted", str(plan.options.hosted), *air, *stored),
         *(eye(station, camera) for station, camera in plan.eyes.items()),
         part("camera", "cars' own cameras, rendered while somebody looks"),
         part("observer", "counts, delays, and who breaks the rules"),
-        part("misbehaviour", "doubts what cars claim on the air"),
+        part("misbehaviour", "checks cars' messages for misbehaviour"),
     ]
     if plan.options.demand is not None:
         jobs.append(demand(plan.options.demand))
@@ -350,7 +350,7 @@ def _show_next_steps(plan: _Plan, print_line: PrintLine) -> None:
             f"  {programs}/python examples/travel_times.py --live {script}      a fleet script"
         )
     else:
-        print_line(f"who is in {plan.options.fleet} may enter: --connect and --credentials say how")
+        print_line(f"members of {plan.options.fleet} may enter, with --connect and --credentials")
         print_line(
             f"  {programs}/vehicle-agent join --name NAME {at} --credentials FILE      a car of it"
         )

@@ -30,7 +30,7 @@ class CarBody:
         tag_size: Edge of its black square.
         x_span, y_span: The outline from above: rear to front, right to left.
         has_tag: Whether the car file has a section `ips`; without it the roof is bare.
-        tag_id: That this car wears, where its file says so.
+        tag_id: Of this car's tag, if its file has one.
     """
 
     tag_position: tuple[float, float, float] = (0.035125, 0.0, 0.129165)

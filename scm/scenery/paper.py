@@ -1,6 +1,6 @@
 """Pages in millimetres, written as PDF or SVG at true size: filled rectangles, lines and text.
 
-The origin is the lower left corner of the page, y up. A PDF asks the viewer not to scale it; an SVG
+The origin is the lower left corner of the page, y up. A PDF tells viewers not to scale it; an SVG
 has its size in millimetres. Both have a ruler, because printers and viewers may still scale them.
 """
 

@@ -1,7 +1,7 @@
 """The bus between processes and machines: one Zenoh client session, always closed.
 
 Rules for zenoh-python 1.10: callbacks run directly on Zenoh's threads (`indirect=False`; with the
-default, a process that dies without closing hangs for ever), they only store bytes and time, and
+default, a process that exits without closing hangs), they only store bytes and time, and
 never send a query. Publications never wait for a slow receiver. An empty result of a query is a
 failure, never an answer.
 """

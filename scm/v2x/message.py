@@ -83,7 +83,7 @@ class Refused(Message, kw_only=True, frozen=True):
     Attributes:
         code: Machine-readable: `timeout`, `not_found`, `owned`, `invalid`, `offline`.
         detail: One sentence for people: what, where, got, expected.
-        asked: If nobody answered: the request and its key on the bus, for engineers.
+        asked: Without a reply: the request and its key on the bus, for engineers.
     """
 
     KEY: ClassVar[str] = "refused"

@@ -1,4 +1,4 @@
-"""Bases of messages on the air: the world carries what a station sends to those in range."""
+"""Bases of radio messages: the world carries what a station sends to those in range."""
 
 from typing import Generic, TypeVar
 

@@ -85,10 +85,10 @@ class RetriedRequest:
         if self.tries == 1:
             return last
         detail = (
-            f"{last.detail}; asked {self.tries} times in {self._deadline_s:g} s. It may have been "
+            f"{last.detail}; tried {self.tries} times in {self._deadline_s:g} s. It may have been "
             "done all the same"
         )
-        again = f"ask again with request_id {self.request.request_id!r} to learn whether it was"
+        again = f"repeat it with request_id {self.request.request_id!r} to learn whether it was"
         return Refused(code=last.code, detail=detail, asked=f"{last.asked}; {again}".lstrip("; "))
 
 

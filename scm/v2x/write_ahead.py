@@ -210,7 +210,7 @@ class BackgroundWriter:
                         return
                 for batch in batches:
                     self._safe.put(batch)
-        except Exception as failure:  # noqa: BLE001  the edge of a thread: the part must hear of it
+        except Exception as failure:  # noqa: BLE001  the edge of a thread: the part must receive it
             self._failure = failure
 
     def _next_batches(self) -> list[Batch] | None:

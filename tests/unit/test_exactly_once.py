@@ -245,7 +245,7 @@ def test_silence_is_asked_into_again_ever_more_slowly_until_the_deadline(code):
     pauses = [seconds(b - a) for a, b in pairwise(times)]
     assert pauses[:5] == pytest.approx([0.1, 0.2, 0.4, 0.8, 1.0])
     assert times[-1] < 5 * 10**9
-    assert f"asked {len(times)} times in 5 s" in asking.reply.detail
+    assert f"tried {len(times)} times in 5 s" in asking.reply.detail
     assert "may have been done" in asking.reply.detail
     assert "'r1'" in asking.reply.asked
 

@@ -169,7 +169,7 @@ class TagFinder:
         decimate = self._settings.quad_decimate * max(1.0, round(height / DECIMATED_ROWS))
         if places and not whole:
             smallest = min(place.side for place in places)
-            # the library leaves pixels out by whole numbers, and scales back by what it was told
+            # the library leaves pixels out by whole numbers, and scales back by its argument
             decimate = max(decimate, int(min(1.5 * decimate, smallest / ENOUGH_PX)))
         self._since_whole += 1
         left, right = 0, width

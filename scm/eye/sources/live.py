@@ -1,7 +1,7 @@
 """Frames of a live camera, read in a thread of its own that stores only the newest.
 
 The thread opens the camera, reads it until it fails, and opens it again after a pause that doubles
-from 0.5 s to 5 s, until the source is closed. Any exception of a driver becomes trouble.
+from 0.5 s to 5 s, until the source is closed. Any exception of a driver becomes a fault.
 """
 
 import threading

@@ -10,7 +10,7 @@ from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 MAX_SKIPPED = 30
 HOLD_NS = NS_PER_S
-"""How long trouble with a single unusable picture is reported."""
+"""How long a single unusable picture is reported as a fault."""
 
 
 class Reel(Protocol):

@@ -10,7 +10,7 @@ from scm.geometry import Pose2
 from scm.scenery.tags import TAG_COUNT
 
 ROOF_TAG_SIZE = "roof_tag_size"
-"""Flag of a sighting whose tag has another size than its car file says, and of its track."""
+"""Flag of a sighting whose tag has another size than in its car file, and of its track."""
 FARTHEST_M = 1e4
 LARGEST_STD = 100.0
 LEAST_STD = 1e-6
@@ -80,7 +80,7 @@ class Track:
         flags: `tentative` seen fewer than three times, `unknown` an unknown tag, `duplicate` two
             places have its id, `disagree` two cameras see it slightly apart, `wrong_id` it is where
             another car is, or its tag has changed, `jumped` it was put elsewhere, `roof_tag_size`
-            its tag has another size than its car file says; and those of its cameras.
+            its tag has another size than in its car file; and those of its cameras.
         cameras: Those that saw it last, within `scm.eye.track.tracks.STALE_NS`.
     """
 

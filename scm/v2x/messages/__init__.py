@@ -1,6 +1,6 @@
-"""One message a file: `MESSAGE` is its class, named as the file; `MESSAGES` if it goes on the air.
+"""One message a file: `MESSAGE` is its class, named as the file; `MESSAGES` if it is sent by radio.
 
-A message on the air has two classes, as a station sends it and as another receives it.
+A radio message has two classes, as a station sends it and as another receives it.
 """
 
 import importlib

@@ -51,7 +51,7 @@ class CalibrationRequest(Request, kw_only=True, frozen=True):
         verb: `use` what follows; `back`: what was in force before, whatever the tags show.
         calibration: What it is called.
         place: Where the camera hangs, and the lens it was found with: the map file's block.
-        lens: Alone: in place of the lens in force. With a place: the doubt of that place's lens.
+        lens: Alone: in place of the lens in force. With a place: covariance of its lens.
         accept_unsure: Whether it is meant although its poses would be flagged `unsure`; without,
             such a calibration is refused with the code `unsure`.
     """

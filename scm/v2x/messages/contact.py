@@ -14,7 +14,7 @@ class Contact(Message, kw_only=True, frozen=True):
     Attributes:
         number: Counts the contacts reported to this car, from 1; its state names the newest
             applied.
-            0: a hosted car, whose report needs not say.
+            0: a hosted car, whose report need not state it.
         dx_m: Position correction out of the overlap, and for what it drove on before it felt the
             hit; likewise `dy_m`, `dyaw_rad`.
         against: What it touched: names of cars, or `wall`.

@@ -1,4 +1,4 @@
-"""The command of whoever holds a car's lease: throttle and steering."""
+"""The command of the lease's owner to a car: throttle and steering."""
 
 from typing import ClassVar, Literal
 

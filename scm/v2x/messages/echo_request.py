@@ -1,4 +1,4 @@
-"""Are you there, and what is your time: answered by whoever owns the car, with no effect."""
+"""Whether a car is there, and its time: answered by the car's owner, with no effect."""
 
 from typing import ClassVar
 

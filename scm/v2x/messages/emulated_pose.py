@@ -1,4 +1,4 @@
-"""Where an emulated car truly is: what an emulated camera sees, published to nobody else.
+"""The true pose of an emulated car, for an emulated camera alone.
 
 It is truth, as the world's snapshot is: never for agents, who have only what the Eye sees.
 """

@@ -13,7 +13,7 @@ class EyePictureIn(Message, kw_only=True, frozen=True):
 
     Attributes:
         t_ns: When it was exposed, on the sender's clock.
-        shares_clock: Whether that is the city's clock: the same computer, or one kept by NTP or
+        shares_clock: Whether that is the city's clock: the same computer, or one set by NTP or
             PTP. If not, the Eye takes the least delay seen as none.
     """
 

@@ -6,7 +6,7 @@ from scm.v2x.message import Message
 
 
 class EyePreview(Message, kw_only=True, frozen=True):
-    """One frame with its tags outlined and named, and the camera's complaints below.
+    """One frame with its tags outlined and named, and the camera's faults below.
 
     Made only while somebody subscribes to it by name. `EyeFrame` is the bare picture.
     """

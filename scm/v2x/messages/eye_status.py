@@ -24,7 +24,7 @@ class EyeStatus(Message, kw_only=True, frozen=True):
     """The self check of one camera.
 
     Attributes:
-        good: Nothing spoils its poses.
+        good: No fault affects its poses.
         in_force: By what it sees; None: not reported.
     """
 

@@ -11,12 +11,12 @@ class EyeTrack(Message, kw_only=True, frozen=True):
     """Pose of the rear axle's centre in the map frame and its motion, brought forward to `t_ns`.
 
     Attributes:
-        vehicle: The car; `tag-<id>` for a tag that belongs to nobody.
+        vehicle: The car; `tag-<id>` for a tag of no car.
         t_ns: The time of the estimate: when it was sent, not when a frame was exposed.
         speed_mps: Along the car, + = forward; `lateral_speed_mps`: + = to its left.
         covariance: Rows over x, y, yaw, speed, lateral speed, yaw rate, in the units of these.
         age_s: Since a camera last saw it.
-        stale: Not seen for so long that nobody should drive by it.
+        stale: Not seen for so long that it must not be used for driving.
         flags: What is wrong with it, as `scm.eye.track.sighting.Track` has them.
         cameras: Those that saw it last.
     """

@@ -10,7 +10,7 @@ class LeaseReply(Message, kw_only=True, frozen=True):
     """The lease as it stands after the request.
 
     Attributes:
-        owner: Who holds it now; `world` when nobody else does.
+        owner: Who holds it now; `world` if it is free.
         epoch: To be put into every drive command.
         ttl_ms: How long it lives without renewal.
     """

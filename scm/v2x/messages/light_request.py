@@ -1,4 +1,4 @@
-"""Switch a car's headlights and indicators: answered by whoever owns the car."""
+"""Switch a car's headlights and indicators: answered by the car's owner."""
 
 from typing import ClassVar, Literal
 
@@ -24,7 +24,7 @@ class LightReply(Message, kw_only=True, frozen=True):
 class LightRequest(Request, kw_only=True, frozen=True):
     """Set headlights, indicators or both; None leaves one as it is.
 
-    Whoever drives by `DriveCommand` sets them there: a leased car refuses this.
+    A leased car refuses this: `DriveCommand` sets them there.
     """
 
     KEY: ClassVar[str] = "v/{vehicle}/cmd/lights"

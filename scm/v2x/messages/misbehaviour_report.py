@@ -1,4 +1,4 @@
-"""A station is suspected of lying on the air: what was observed, and the messages that show it."""
+"""A station is suspected of false messages: what was observed, and the messages that show it."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -41,7 +41,7 @@ class EvidenceCam(msgspec.Struct, kw_only=True, frozen=True):
 class MisbehaviourReport(Message, kw_only=True, frozen=True):
     """After ETSI TS 103 759: who, since when, which classes of observations, and the evidence.
 
-    Told when a station becomes suspect, and every ten seconds while it stays so.
+    Published when a station becomes suspect, and every ten seconds while it remains so.
 
     Attributes:
         suspect: The station by its name on the bus.

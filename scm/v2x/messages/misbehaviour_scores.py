@@ -1,4 +1,4 @@
-"""The misbehaviour score of each station on the air."""
+"""The misbehaviour score of each transmitting station."""
 
 from typing import ClassVar
 

@@ -7,7 +7,7 @@ from scm.v2x.messages.monitor_status import MonitorStatus
 
 
 class MonitorReset(Request, kw_only=True, frozen=True):
-    """Ask the monitor of a junction to forget its fault."""
+    """Request that the monitor of a junction clears its fault."""
 
     KEY: ClassVar[str] = "tl/{junction}/mon/reset"
     REPLY: ClassVar[type[Message]] = MonitorStatus

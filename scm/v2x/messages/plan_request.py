@@ -26,12 +26,12 @@ class PlanRequest(Request, kw_only=True, frozen=True):
     """Use a plan by name, or `flash`; with who requests it and why.
 
     Attributes:
-        plan: Empty: end a flash that a person asked for; what ran, what is to come and overrides
+        plan: Empty: end a flash that a person requested; what ran, what is to come and overrides
             stay.
         stages: Of a plan that the junction does not have: it is checked, taken and run under that
             name for as long as it is wanted. Empty: one of its own.
         offset_s: Of these stages: when their cycle begins, after a time that is a whole number of
-            cycles on the controller's clock. None: it begins whenever it can, in step with nobody.
+            cycles on the controller's clock. None: it begins whenever it can, not coordinated.
     """
 
     KEY: ClassVar[str] = "tl/{junction}/req"

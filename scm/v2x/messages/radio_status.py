@@ -6,7 +6,7 @@ from scm.v2x.message import Message
 
 
 class RadioStatus(Message, kw_only=True, frozen=True):
-    """The last second on the air, to all stations but hosted cars.
+    """The last second of radio traffic, to all stations but hosted cars.
 
     Attributes:
         sent: Frames; one that two stations receive counts once here and twice in `delivered`.
@@ -15,7 +15,7 @@ class RadioStatus(Message, kw_only=True, frozen=True):
         by_chance: Lost whatever the distance.
         by_distance: Lost to fading and walls.
         by_load: Lost to collisions, or never sent because the channel is full.
-        unknown: Frames of senders whose place nobody knows.
+        unknown: Frames of senders at an unknown place.
         late: Delivered later than at once.
         late_ms: Their mean delay; 0: none was late.
         waiting: On their way now.

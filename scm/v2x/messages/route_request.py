@@ -1,4 +1,4 @@
-"""Send a car along lanes: answered by whoever drives it (the world, or its agent)."""
+"""Send a car along lanes: answered by its driver (the world, or its agent)."""
 
 from typing import ClassVar, Literal
 
@@ -25,9 +25,9 @@ class RouteRequest(Request, kw_only=True, frozen=True):
     """Drive through these lanes, from where the car is.
 
     Attributes:
-        via: Lane names to pass in this order; empty: circulate for ever.
+        via: Lane names to pass in this order; empty: circulate without end.
         laps: How often to pass `via`.
-        speed_mps: Wished speed on free road; None: the lanes' limits.
+        speed_mps: Desired speed on free road; None: the lanes' limits.
         then: What to do on arrival: `stop` there, or `circulate` so as not to block the lane.
     """
 

@@ -1,4 +1,4 @@
-"""An operator override of a junction's signals; nobody ever sets a colour."""
+"""An operator override of a junction's signals; it never sets a colour."""
 
 from typing import ClassVar, Literal
 

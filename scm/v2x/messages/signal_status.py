@@ -14,8 +14,8 @@ class SignalStatus(Message, kw_only=True, frozen=True):
         plan: Of the timetable, also while another policy runs.
         pending: Plan or policy to come at the next safe moment; empty: none.
         wishes: Overrides of people and scripts, in force.
-        detectors: Of the groups; none: nobody listens for cars now.
-        turns: Greens to come, by the timetable or as the policy foresees; none: nobody knows.
+        detectors: Of the groups; none: detectors are off.
+        turns: Greens to come, by the timetable or as the policy foresees; none: unknown.
         failure: Why a policy was given up for fixed time; empty: none was.
         stages, offset_s: Of the plan in force, where somebody made it: as it runs, whatever it was
             edited to since. No stages: it is one of the junction's own.

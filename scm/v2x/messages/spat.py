@@ -1,4 +1,4 @@
-"""Signal phase and timing of a junction, native form: colours and promised change times."""
+"""Signal phase and timing of a junction, native form: colours and guaranteed change times."""
 
 from typing import ClassVar
 

@@ -1,4 +1,4 @@
-"""The red button: stop every car of the city, or let them drive again."""
+"""Request the city stop: every car stops; or release it."""
 
 from typing import ClassVar
 

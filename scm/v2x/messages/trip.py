@@ -8,7 +8,7 @@ from scm.v2x.message import Delivery, Message
 class Trip(Message, kw_only=True, frozen=True):
     """Progress of one trip; sent twice a second, when it ends, and when somebody takes the car.
 
-    Whoever sends the car along `via`, with the same speed and the same end, has it go on with it.
+    A request along `via`, with the same speed and the same end, continues it.
 
     Attributes:
         trip_id: The id the route request gave it.
@@ -19,7 +19,7 @@ class Trip(Message, kw_only=True, frozen=True):
         waiting_for: What holds the car now: `signal`, `vehicle`, `stop`, or None.
         via: Lanes that it still has to pass, in order, the laps written out; a lane counts as
             passed at its end. Empty: it circulates.
-        speed_mps: Wished for it on free road; None: the lanes' limits.
+        speed_mps: Desired speed on free road; None: the lanes' limits.
         then: What it does on arrival, as in `RouteRequest`.
     """
 

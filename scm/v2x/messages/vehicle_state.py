@@ -23,7 +23,7 @@ class VehicleState(Message, kw_only=True, frozen=True):
         battery_charge: What is left in it, 0 to 1: a simulated car counts what it draws, a real one
             estimates it from the voltage. None: not known.
         command_age_ms: How old the newest command of its leaseholder is, since it arrived here;
-            None: nobody else drives it, or none came yet.
+            None: it is not leased, or none came yet.
         contacts: Number of the newest `Contact` that this motion includes; 0: not reported.
     """
 

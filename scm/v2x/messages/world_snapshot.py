@@ -18,11 +18,11 @@ class SnapshotVehicle(msgspec.Struct, kw_only=True, frozen=True, gc=False):
         kind: `hosted`, `remote` or `real`.
         throttle: As commanded, or as its agent reports it; None: it has not reported yet.
         owner: Who holds its lease.
-        lease_left_ms: Until that ends if it is not renewed; None: it is at home, and never ends.
+        lease_left_ms: Until that ends if it is not renewed; None: it is owned by the world.
         battery_v: Of its drive battery, under load as it is. None: not measured.
         battery_charge: What is left in it, 0 to 1; of a real car estimated. None: not known.
         command_age_ms: How old the newest command of its leaseholder is, since it reached the car;
-            None: nobody else drives it, or none came yet.
+            None: it is not leased, or none came yet.
         age_ms: How old its newest state is: 0 for hosted cars.
         alive: False from the moment its agent is known to be gone until it is taken off the map.
         stuck: It was commanded to drive for seconds and stays: what it most likely pushes against,

@@ -56,7 +56,7 @@ def test_an_entry_that_is_not_as_it_was_written_is_called_by_its_kind(app):
     words = app.state.words
     assert words.of("LeaseRequest", {"vehicle": 3}) == "LeaseRequest"
     assert words.of("Forgotten_Request", {}) == "Forgotten Request"
-    assert words.of("POST /api/v1/nothing", {}).endswith("does not have, POST /api/v1/nothing")
+    assert words.of("POST /api/v1/nothing", {}).endswith("unknown address, POST /api/v1/nothing")
 
 
 @pytest.fixture

@@ -195,8 +195,8 @@ def test_a_roof_tag_of_another_size_is_named_once_with_the_size_that_would_fit(m
     assert status.good  # the camera is
     assert [one.code for one in status.complaints] == 4 * ["roof_tag_size"]
     begins = (
-        "tag 7 of n7: its black edge looks 80.0 mm (+5.0 %), its car file says 76.2 mm: print it",
-        "tag 8 of n8: its black edge looks 71.6 mm (-6.0 %), its car file says 76.2 mm: print it",
+        "tag 7 of n7: its black edge looks 80.0 mm (+5.0 %), its car file has 76.2 mm: print it",
+        "tag 8 of n8: its black edge looks 71.6 mm (-6.0 %), its car file has 76.2 mm: print it",
         "tag 11 of no known car: its black edge looks 114.3 mm (+50.0 %), a Nigel's is 76.2 mm",
         "tag 12 of no known car: its black edge looks 80.0 mm (+5.0 %), a Nigel's is 76.2 mm",
     )
