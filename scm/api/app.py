@@ -65,7 +65,7 @@ def create_app(
     Args:
         view: What is shown; stepped by its runner on another thread.
         send: Sends a request on the bus and waits for the reply, at most so many seconds.
-        city_map: Of the city that `view` hears.
+        city_map: Of the city that `view` shows.
         keys: Who may call, and what each may do; without it only this machine may call, and may do
             everything.
         plans: Names of the signal plans each junction offers, beyond those that were seen.
@@ -155,7 +155,7 @@ def _add_layers(app: FastAPI, services: _Services, clock: WallClock, site: Site)
     app.add_middleware(Idempotent, clock=clock)
     app.add_middleware(Bounded, larger=FILES)
     app.add_middleware(Audited, store=services.store, clock=clock)
-    app.add_middleware(Limited, clock=clock)  # what is asked too often fills no log
+    app.add_middleware(Limited, clock=clock)  # frequent requests fill no log
     app.add_middleware(Dashboard, base=site.base)
     app.add_middleware(Gate, keys=services.known_keys, policy=policy, origins=site.origins)
     app.add_middleware(Measured, metrics=services.metrics, clock=clock)

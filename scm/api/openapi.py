@@ -1,8 +1,8 @@
 """The description of the interface (OpenAPI 3.1): records by name, and words on every field.
 
-Routes say what they answer by `scm.api.schemas`. Here the records move below `components`, so that
+Routes declare their answers by `scm.api.schemas`. Here the records move below `components`, so that
 each is described once and may hold others of its own kind; what `Attributes:` of a record's
-docstring says goes to its fields, before what their types say (`scm.records.fields`). Examples of
+docstring states goes to its fields, before what their types say (`scm.records.fields`). Examples of
 lists and records are put together from those of their parts.
 """
 
@@ -118,7 +118,7 @@ def described(document: Schema) -> Schema:
 
 
 def _least_role(given: list[Schema]) -> Schema:
-    """Return the highest of the roles that a noun and its route ask for: all of them have to be."""
+    """Return the highest of the roles that a noun and its route require."""
     named = {role for one in given for role in one[SCHEME]}
     return {SCHEME: [max(named, key=ROLES.index)]}
 
@@ -179,7 +179,7 @@ def _lift_words(field: Schema) -> None:
 
 
 def _describe_by_record(field: Schema, schemas: Schema) -> None:
-    """Give a field that holds records, and says nothing more, the words of these."""
+    """Give a field that holds records the description of these, if it has none of its own."""
     inner = [field, field.get("items") or {}, *field.get("anyOf", ())]
     for one in inner:
         if "$ref" in one and "description" not in field:
@@ -188,7 +188,7 @@ def _describe_by_record(field: Schema, schemas: Schema) -> None:
 
 
 def _attributes(docstring: str) -> tuple[str, dict[str, str]]:
-    """Return a record's own description, and what its docstring says of its fields."""
+    """Return a record's own description, and its docstring's descriptions of fields."""
     about, _, entries = inspect.cleandoc(docstring).partition("Attributes:\n")
     described_fields: dict[str, str] = {}
     names: list[str] = []
@@ -213,7 +213,7 @@ def _add_example(name: str, field: Schema, schemas: Schema) -> None:
 
 
 def _example(name: str, field: Schema, schemas: Schema, depth: int) -> Any:
-    """Return a value that a field may have; None: nobody knows one."""
+    """Return a value that a field may have; None: there is no example."""
     if "examples" in field:
         return field["examples"][0]
     if "$ref" in field:

@@ -30,7 +30,7 @@ class AuditRow(msgspec.Struct, kw_only=True, frozen=True):
         by: Who requested it: the owner of the API key, the program that called, the part.
         request_id: Id of the request; empty: it had none.
         trace_id: Of what led to it: the call of the web and what the city did for it have the same;
-            empty: nobody traced it.
+            empty: it was not traced.
         request, reply: The request and its reply, as the station noted them.
     """
 

@@ -107,7 +107,7 @@ class StopLine(Record, kw_only=True, frozen=True):
 
 
 class Conflict(Record, kw_only=True, frozen=True):
-    """The stretch of a lane inside a junction where nobody may stop.
+    """The stretch of a lane inside a junction where no car may stop.
 
     Attributes:
         from_m: Behind the stop line.
@@ -239,7 +239,7 @@ class Sign(Record, kw_only=True, frozen=True):
 
 
 class Wall(Record, kw_only=True, frozen=True):
-    """An obstacle along a polyline that nobody can push.
+    """An obstacle along a polyline that cannot be pushed.
 
     Attributes:
         points: Its centre line.
@@ -257,7 +257,7 @@ class Box(Record, kw_only=True, frozen=True):
     """A construction box on the floor.
 
     Attributes:
-        mass_kg: Of one that cars can push; without it nobody moves the box.
+        mass_kg: Of one that cars can push; without it the box is fixed.
         friction: Between the box and the floor.
     """
 

@@ -16,7 +16,7 @@ class Disturbance(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         kind: Of which sort it is.
         source: The junction or part that it concerns.
-        start_ns: When it began, on the clock of whoever reports it.
+        start_ns: When it began, on the reporter's clock.
         end_ns: When it was over; None: it lasts.
         text: What is wrong, as a clause: `the signals of crossing flash`.
         advice: What a person can do, in a sentence; empty: nothing.

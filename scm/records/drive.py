@@ -48,7 +48,7 @@ class Over(msgspec.Struct, kw_only=True, frozen=True, tag="over"):
 class AcquirePacket(
     msgspec.Struct, kw_only=True, frozen=True, tag="take", forbid_unknown_fields=True
 ):
-    """The first word of a person; with a `reason` the car is taken from whoever has it."""
+    """The first packet of a person; with a `reason` the car is taken over from its owner."""
 
     reason: Annotated[str, msgspec.Meta(max_length=500)] = ""
 

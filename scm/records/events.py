@@ -61,7 +61,7 @@ class EventRow(msgspec.Struct, kw_only=True, frozen=True):
         seq: Number of the event since the server started.
         id: The same for this event for ever.
         vehicle: The car it is about; null: none.
-        acknowledged_by: Who took note of it; null: nobody yet.
+        acknowledged_by: Who took note of it; null: not acknowledged.
         acknowledged_ns: When [ns since 1970]; null: not yet.
         note: A comment.
     """

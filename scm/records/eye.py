@@ -155,7 +155,7 @@ class TagRow(msgspec.Struct, kw_only=True, frozen=True):
     """One tag that a camera saw within the last minute.
 
     Attributes:
-        what: `car`; `map`: it lies on the floor, known to the map; `other`: nobody's.
+        what: `car`; `map`: it lies on the floor, known to the map; `other`: of no car.
         vehicle: The car that wears it; empty: none does.
         margin: Decision margin of the detector, higher is clearer.
         hamming: Bits of 36 that were read wrong and corrected; null: not reported.
@@ -244,7 +244,7 @@ class TrackRow(msgspec.Struct, kw_only=True, frozen=True):
         yaw_rate_radps: + = counter-clockwise.
         std_x_m, std_y_m, std_yaw_rad, std_speed_mps: Standard deviations.
         age_s: Since a camera last saw it.
-        stale: Not seen for so long that nobody should drive by it.
+        stale: Not seen for so long that it must not be used for driving.
         flags: What is wrong with it; empty: nothing.
         cameras: Those that saw it last.
     """

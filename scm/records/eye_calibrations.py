@@ -62,7 +62,7 @@ class View(msgspec.Struct, kw_only=True, frozen=True):
         name: Of its file.
         made_ns: When it came [ns since 1970].
         found: What was found in it last, as docs/dashboard/eye.md lists it; null: no board, or
-            nobody looked.
+            not searched.
     """
 
     name: Name
@@ -75,7 +75,7 @@ class Views(msgspec.Struct, kw_only=True, frozen=True):
 
     Attributes:
         views: In the order they came.
-        findings: Of all together, as docs/dashboard/eye.md lists them; null: nobody looked.
+        findings: Of all together, as docs/dashboard/eye.md lists them; null: not searched.
     """
 
     views: tuple[View, ...]

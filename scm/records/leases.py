@@ -13,7 +13,7 @@ class LeaseRow(msgspec.Struct, kw_only=True, frozen=True):
     """Who drives a car.
 
     Attributes:
-        owner: `world` or the car's own name while nobody else does.
+        owner: `world` or the car's own name if it is free.
         epoch: Grows with each change of owner; commands carry it.
         left_ms: Until it ends if it is not renewed; None: it is at home, and never ends.
     """

@@ -18,7 +18,7 @@ class StationScore(msgspec.Struct, kw_only=True, frozen=True):
         worst: The check that last gave it points; empty: none.
         suspected: Whether a report stands against it.
         tag_unseen: Whether it is a car of the city whose tag the Eye cannot see though it overlooks
-            its place: nobody confirms where it is. No accusation.
+            its place, so no position is confirmed. No accusation.
     """
 
     station: StationName

@@ -113,7 +113,7 @@ class Report(msgspec.Struct, kw_only=True, frozen=True):
         row: As in the list.
         report: The fields of `report.json`, as docs/mismatch.md lists them; None: damaged.
         drawn: What its pictures draw and the words beside them; None of an older report.
-        job: What it was made from; None: nobody noted it.
+        job: What it was made from; None: unknown.
         drives: Names of the drives it suggests.
         told: How many of them were driven and recorded since.
         files: What can be downloaded.

@@ -130,7 +130,7 @@ class PlanRow(msgspec.Struct, kw_only=True, frozen=True):
         offset_s: When its cycle begins, after a time that is a whole number of cycles on the
             controller's clock; null: not coordinated.
         saved_ns: When it was saved; 0: it was not.
-        proof: What the search found of it; null: nobody searched.
+        proof: What the search found of it; null: not searched.
     """
 
     junction: JunctionName

@@ -56,7 +56,7 @@ class SignalOverride(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SignalTurn(msgspec.Struct, kw_only=True, frozen=True):
-    """Groups that will likely be green together; `end_ns` None: nobody knows until when.
+    """Groups that will likely be green together; `end_ns` None: unknown until when.
 
     Groups of the next turn as well stay green between them.
     """
@@ -88,7 +88,7 @@ class SignalGroup(msgspec.Struct, kw_only=True, frozen=True):
         min_end_ns: The colour will not change before; never moves earlier.
         max_end_ns: It will have changed by then, never moves later; None: not known.
         next_colour: What comes then; None: not known.
-        likely_end_ns: A forecast between the two, no promise: it moves as cars come. None: nobody
+        likely_end_ns: A forecast between the two, no guarantee: it moves as cars come. None: not
             knows.
         likely_confidence: The share of such forecasts that come true within a second, 0 to 1.
     """
@@ -110,7 +110,7 @@ class GroupRow(msgspec.Struct, kw_only=True, frozen=True):
         colour: None while nothing fresh is known.
         min_s: It will not change before; None: not known.
         max_s: It will have changed by then; None: not known.
-        likely_s: It will likely change then: a forecast, no promise; None: nobody knows.
+        likely_s: It will likely change then: a forecast, no guarantee; None: unknown.
         likely_confidence: Share of such forecasts that come true within a second, 0 to 1.
         since_ns: When this colour began, on the controller's clock.
     """
@@ -167,8 +167,8 @@ class StatusRow(msgspec.Struct, kw_only=True, frozen=True):
     Attributes:
         pending: Plan or policy to come at the next safe moment; empty: none.
         wishes: Overrides in force.
-        detectors: Of its groups; none: nobody listens for cars now.
-        turns: Greens on and to come; none: nobody knows.
+        detectors: Of its groups; none: detectors are off.
+        turns: Greens on and to come; none: unknown.
         failure: Why a policy was given up for fixed time; empty: none was.
         stages, offset_s: Of the plan in force, where somebody made it: as it runs, whatever it was
             edited to since. No stages: it is one of the junction's own.

@@ -51,7 +51,7 @@ class ApproachCount(msgspec.Struct, kw_only=True, frozen=True):
         headway_s: Mean time from one car to the next [s].
         delay_s: Mean control delay: from entering the lane to leaving the junction, beyond what
             that takes at the limits.
-        level: HCM's level of service of that delay, `A` to `F`; empty: nobody passed yet.
+        level: HCM's level of service of that delay, `A` to `F`; empty: no car passed yet.
         stops: Mean number of stops of a car.
         queue: Cars that stand before the line now; `queue_m`: from the line to the tail of the
             last; `queue_most`: 95 % of the time no more.

@@ -79,7 +79,7 @@ class VehicleRow(msgspec.Struct, kw_only=True, frozen=True):
         battery_charge: What is left in it, 0 to 1: counted by a simulated car, estimated from the
             voltage by a real one; None: not known.
         command_age_ms: How old the newest command of its leaseholder is, since it reached the car,
-            the snapshot's age included; None: nobody else drives it, or none came yet.
+            the snapshot's age included; None: it is not leased, or none came yet.
         throttle: As the car reports it; None: it reports nothing.
         stuck: It was commanded to drive for seconds and stays: what it most likely pushes against,
             names of cars, `wall`, boxes; empty: nothing that is known. None: it is not stuck.

@@ -24,11 +24,11 @@ class AuditNoun(Noun):
         kind: str = "",
         text: str = "",
     ) -> Page[AuditRow]:
-        """Entries, newest first.
+        """Deeds, newest first.
 
         Args:
             station: who did it
-            by: who requested it
+            by: who asked
             kind: part of class or path
             text: to be found in it
         """
@@ -43,12 +43,12 @@ class AuditNoun(Noun):
         kind: str = "",
         text: str = "",
     ) -> bytes:
-        """Entries as a file.
+        """Deeds as a file.
 
         Args:
             form: of the file
             station: who did it
-            by: who requested it
+            by: who asked
             kind: part of class or path
             text: to be found in it
         """

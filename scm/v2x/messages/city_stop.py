@@ -1,4 +1,4 @@
-"""Whether the city-wide stop is engaged: every car obeys it, whoever drives it."""
+"""Whether the city-wide stop is engaged: every car obeys it, whatever drives it."""
 
 from typing import ClassVar
 
@@ -7,7 +7,7 @@ from scm.v2x.message import Delivery, Message
 
 
 class CityStop(Message, kw_only=True, frozen=True):
-    """State of the red button; repeated once a second while engaged.
+    """State of the city stop; repeated once a second while engaged.
 
     Attributes:
         engaged: Whether the city-wide stop is engaged: no car may drive.
