@@ -89,7 +89,7 @@ class SignalGroup(msgspec.Struct, kw_only=True, frozen=True):
         max_end_ns: It will have changed by then, never moves later; None: not known.
         next_colour: What comes then; None: not known.
         likely_end_ns: A forecast between the two, no guarantee: it moves as cars come. None: not
-            knows.
+            known.
         likely_confidence: The share of such forecasts that come true within a second, 0 to 1.
     """
 

@@ -21,7 +21,7 @@ NO_MODULES = {"scm.drive.v1"}  # a protocol of WebSockets
 NAMED = re.compile(r"`([a-z][\w./]*)`")  # a module, folder or file in a package's docstring
 COLUMN = re.compile(r"^ *([a-z]\w*/?(?:, [a-z]\w*/?)*) {2,}\S", re.MULTILINE)  # in a table of it
 NO_FILES = {"recording.yaml", "report.json", "drawn.json", "report.html", "car.toml"}
-NO_FILES |= {"value", "t", "start", "cycle"}  # arguments of sensor faults; a function of a plan
+NO_FILES |= {"value", "t", "start", "cycle", "router"}  # arguments and functions of plug-ins
 MADE = ("docs/physics/", "docs/changelog.md")  # by the code, and a history
 
 

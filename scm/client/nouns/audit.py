@@ -24,11 +24,11 @@ class AuditNoun(Noun):
         kind: str = "",
         text: str = "",
     ) -> Page[AuditRow]:
-        """Deeds, newest first.
+        """Entries, newest first.
 
         Args:
             station: who did it
-            by: who asked
+            by: who requested it
             kind: part of class or path
             text: to be found in it
         """
@@ -43,12 +43,12 @@ class AuditNoun(Noun):
         kind: str = "",
         text: str = "",
     ) -> bytes:
-        """Deeds as a file.
+        """Entries as a file.
 
         Args:
             form: of the file
             station: who did it
-            by: who asked
+            by: who requested it
             kind: part of class or path
             text: to be found in it
         """

@@ -32,7 +32,7 @@ class EventsNoun(Noun):
         """Events, newest first.
 
         Args:
-            open_: only those nobody took note of
+            open_: only those that are not acknowledged
             after: only those numbered above
             severity: one or more, comma between
             source: stations, comma between
@@ -61,7 +61,7 @@ class EventsNoun(Noun):
 
         Args:
             form: of the file
-            open_: only those nobody took note of
+            open_: only those that are not acknowledged
             severity: one or more, comma between
             source: stations, comma between
             name: names, comma between
@@ -79,8 +79,8 @@ class EventsNoun(Noun):
 
         Args:
             events: ids of the events
-            by: who requests it, for the log; empty: whoever calls
-            note: what there is to say
+            by: who requests it, for the log; empty: the caller
+            note: a remark
         """
 
     @operation("DELETE", "/api/v1/events/acknowledgements/{name}")

@@ -144,7 +144,7 @@ class EyeNoun(Noun):
 
     @operation("GET", "/api/v1/eye/calibrations")
     def calibrations(self, *, limit: int = 100, cursor: str = "") -> Page[CalibrationRow]:
-        """All calibrations kept, newest first."""
+        """All saved calibrations, newest first."""
 
     @operation("GET", "/api/v1/eye/calibrations/{name}")
     def calibration(self, name: str) -> CalibrationFile:
@@ -164,7 +164,7 @@ class EyeNoun(Noun):
         toml: str,
         idempotency_key: str = "",
     ) -> CalibrationFile:
-        """Put a calibration on the shelf, or another text in its place.
+        """Save a calibration, or replace its text.
 
         Args:
             name: a calibration's name
@@ -180,7 +180,7 @@ class EyeNoun(Noun):
         if_none_match: str | None = None,
         idempotency_key: str = "",
     ) -> CalibrationFile:
-        """Take a calibration off the shelf.
+        """Delete a calibration.
 
         Args:
             name: a calibration's name
@@ -216,7 +216,7 @@ class EyeNoun(Noun):
         """See by a calibration from the next frame on.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why
             calibration: a stored calibration
             accept_unsure: whether it is meant although the Eye would flag its poses as unsure and
@@ -230,7 +230,7 @@ class EyeNoun(Noun):
         """Put back what the camera saw by before.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why
         """
 

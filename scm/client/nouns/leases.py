@@ -35,7 +35,7 @@ class LeasesNoun(Noun):
         Args:
             program: distinguishes programs of one caller: each holds its own leases
             ttl_ms: how long it lives unless renewed [ms]
-            reason: why it is taken from whoever holds it; empty: only if it is free
+            reason: why it is taken over from its owner; empty: only if it is free
         """
 
     @operation("PUT", "/api/v1/leases/{name}")

@@ -26,7 +26,7 @@ class NgsiNoun(Noun):
         Args:
             type_: comma between: Vehicle, RoadSegment, TrafficFlowObserved; none: all
             offset: to skip
-            count: tell how many there are in all
+            count: return how many there are in all
             options: `keyValues`, `simplified`: attributes are their values
         """
 

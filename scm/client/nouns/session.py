@@ -12,7 +12,7 @@ class SessionNoun(Noun):
 
     @operation("GET", "/api/v1/session")
     def session(self) -> Session:
-        """Who this key says you are."""
+        """The owner and role of this key."""
 
     @operation("PUT", "/api/v1/session")
     def begin(self) -> Session:

@@ -52,12 +52,12 @@ class SignalsNoun(Noun):
         Args:
             plan: a plan's name
             about: what it is for
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
             stages: in the order of the cycle
             offset_s: when its cycle begins, after a time that is a whole number of cycles on the
-                controller's clock, less than the cycle; plans with the same cycle keep step so;
-                null: with nobody
+                controller's clock, less than the cycle; plans with the same cycle are then
+                coordinated; null: no offset
         """
 
     @operation("DELETE", "/api/v1/signals/{name}/plans/{plan}")
@@ -117,11 +117,11 @@ class SignalsNoun(Noun):
 
     @operation("GET", "/api/v1/signals/{name}/promises")
     def promises(self, name: str) -> ForecastScore:
-        """What SPaT told against what happened."""
+        """What SPaT published against what happened."""
 
     @operation("GET", "/api/v1/signals/{name}/wishes")
     def wishes(self, name: str, *, limit: int = 100, cursor: str = "") -> Page[SignalOverride]:
-        """Wishes in force, each with who, why and its end."""
+        """Overrides in force, each with name, reason and end."""
 
     @operation("POST", "/api/v1/signals/{name}/calls")
     def call(
@@ -137,7 +137,7 @@ class SignalsNoun(Noun):
         """Call groups: each is served once.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -157,7 +157,7 @@ class SignalsNoun(Noun):
         """Hold groups: once green, they stay green.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -177,7 +177,7 @@ class SignalsNoun(Noun):
         """Force groups off: their green ends once others are called.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -197,7 +197,7 @@ class SignalsNoun(Noun):
         """Omit groups: they are not begun.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -217,7 +217,7 @@ class SignalsNoun(Noun):
         """Pre-empt for one group: it comes next and stays.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
             groups: signal groups
             expires_s: seconds until it lapses by itself
@@ -234,10 +234,10 @@ class SignalsNoun(Noun):
         verb: Literal["", "call", "force_off", "hold", "omit", "policy", "preempt"] = "",
         idempotency_key: str = "",
     ) -> SignalReply:
-        """Take back what was asked of groups.
+        """Withdraw overrides of groups.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
             groups: overrides of any of these groups; empty: of all groups
             verb: overrides of this kind; empty: of any
@@ -250,7 +250,7 @@ class SignalsNoun(Noun):
         """Run another plan.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
             plan: a plan by name (shipped, the map's own, or saved), a policy, or `flash`
         """
@@ -269,7 +269,7 @@ class SignalsNoun(Noun):
         """Run a policy for a while.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
             policy: its name
             expires_s: seconds until it lapses by itself
@@ -286,18 +286,18 @@ class SignalsNoun(Noun):
         expires_s: float | None = None,
         idempotency_key: str = "",
     ) -> FlashReply:
-        """Flash red, or go on.
+        """Flash red, or end flashing.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
-            engaged: true: flash; false: go on, all red first
+            engaged: true: flash; false: resume, all red first
             expires_s: seconds until it ends by itself; null: not by itself
         """
 
     @operation("GET", "/api/v1/signals/{name}/monitor")
     def verdicts(self, name: str, *, limit: int = 100, cursor: str = "") -> Page[Verdict]:
-        """What the monitor said, newest first."""
+        """The monitor's reports, newest first."""
 
     @operation("POST", "/api/v1/signals/{name}/monitor/reset")
     def reset(
@@ -306,6 +306,6 @@ class SignalsNoun(Noun):
         """Clear a latched fault of the monitor.
 
         Args:
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why it is over
         """

@@ -20,4 +20,4 @@ class StationsNoun(Noun):
 
     @operation("GET", "/api/v1/stations/{name}/events")
     def station_events(self, name: str) -> StationEvents:
-        """The last events that a station told, or that are about it."""
+        """The last events that a station reported, or that are about it."""

@@ -22,6 +22,6 @@ class StopNoun(Noun):
 
         Args:
             engaged: true: stop every car
-            by: who requests it, for the log; empty: whoever calls
+            by: who requests it, for the log; empty: the caller
             reason: why, for the log
         """

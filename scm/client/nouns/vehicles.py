@@ -32,7 +32,7 @@ class VehiclesNoun(Noun):
 
     @operation("GET", "/api/v1/vehicles/{name}/path")
     def path(self, name: str) -> PathRow:
-        """A car's way ahead, at most 12 m of it."""
+        """A car's path ahead, at most 12 m of it."""
 
     @operation("GET", "/api/v1/vehicles")
     def all_vehicles(self) -> VehiclesTopic:

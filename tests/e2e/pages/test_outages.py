@@ -67,7 +67,7 @@ def test_a_fault_of_the_monitor_is_shown_kept_and_cleared_with_a_reason(visit, r
 
     with running.frozen("traffic"):
         page.wait_for_selector('.monitor[data-state="fault"]')
-        page.wait_for_selector(".runs[data-mode=unheard]")
+        page.wait_for_selector(".runs[data-mode=silent]")
         visited.until(lambda: fault() == "stale", "the fault is latched")
     wait_for(lambda: running.get("/signals/crossing")["fresh"], 90.0, "the controller is back")
     page.click(".monitor .danger")
@@ -76,7 +76,7 @@ def test_a_fault_of_the_monitor_is_shown_kept_and_cleared_with_a_reason(visit, r
     visited.until(lambda: fault() is None, "the fault is cleared")
     page.wait_for_selector(".lately >> text=it was frozen by a test")
     page.click(".monitor >> text=History")
-    page.wait_for_selector("dialog .said >> text=stale")
+    page.wait_for_selector("dialog .history >> text=stale")
     page.keyboard.press("Escape")
     page.wait_for_selector('.monitor[data-state="ok"]')
     wait_for(
