@@ -1,4 +1,4 @@
-"""The desk at which overhead cameras are calibrated: pictures of a board, and the Eye's own tools.
+"""Calibration of overhead cameras: pictures of a board, and the Eye's own tools run on them.
 
 Pictures lie in a folder for each camera. What measures a lens or a place is `scm eye calibrate` and
 `scm eye locate`, each run as a program of its own on an operation, and killed when called off.
@@ -48,7 +48,7 @@ class CalibrationJobs:
 
     Args:
         repository: Where calibrations are stored; pictures lie below it.
-        map_file: Name or path of the map, as the tools are told it.
+        map_file: Name or path of the map, as passed to the tools.
     """
 
     def __init__(self, repository: CalibrationRepository, map_file: str) -> None:
@@ -81,7 +81,7 @@ class CalibrationJobs:
         size = size_of(picture)
         there = self.views(camera)
         if len(there) >= MOST_VIEWS:
-            detail = f"pictures of {camera}: {MOST_VIEWS} are kept; delete some first"
+            detail = f"pictures of {camera}: {MOST_VIEWS} are stored; delete some first"
             raise RefusedError.of("full", detail)
         if there:
             first = size_of(there[0].read_bytes())
@@ -91,7 +91,7 @@ class CalibrationJobs:
                 raise RefusedError.of("invalid", detail)
         folder = self._views / camera
         if not folder.exists() and sum(1 for _ in self._views.glob("*")) >= MOST_CAMERAS:
-            detail = f"pictures of {MOST_CAMERAS} cameras are kept; delete those of one first"
+            detail = f"pictures of {MOST_CAMERAS} cameras are stored; delete those of one first"
             raise RefusedError.of("full", detail)
         folder.mkdir(parents=True, exist_ok=True)
         number = int(there[-1].stem) + 1 if there else 1
@@ -109,7 +109,7 @@ class CalibrationJobs:
             folder.rmdir()
 
     def findings(self, camera: str) -> dict[str, Any] | None:
-        """Return what was found in a camera's pictures last; None: nobody looked."""
+        """Return what was last found in a camera's pictures; None: nothing was searched."""
         found = read_json(self._report_path(camera))
         return found if isinstance(found, dict) else None
 
@@ -152,7 +152,7 @@ class CalibrationJobs:
         Args:
             camera: One of the map's.
             frame: A JPEG file.
-            lens: Name of a lens on the shelf; empty: the map's.
+            lens: Name of a saved lens; empty: the map's.
             tags: That lie on the floor beside the map's own.
             save_as: Name of the calibration, unless it is taken by then.
         """
@@ -208,7 +208,7 @@ def size_of(picture: bytes) -> tuple[int, int]:
 
 
 def _jpeg_size(picture: bytes) -> tuple[int, int]:
-    """Walk the segments of a JPEG file up to the one that tells its size."""
+    """Walk the segments of a JPEG file up to the one with its size."""
     at = 2
     while True:
         begin, marker, length = struct.unpack_from(">BBH", picture, at)

@@ -1,4 +1,4 @@
-"""Calibrations of overhead cameras on their shelf: a TOML file each, of a lens or of a place.
+"""Saved calibrations of overhead cameras: a TOML file each, of a lens or of a place.
 
 Both are what the Eye's own commands write: a lens for `scm eye --calibration`, a place as the
 `[[cameras]]` block of a map file. Beside each may lie the report of how it was found.
@@ -36,7 +36,7 @@ class CalibrationRepository:
 
     Attributes:
         folder: Where they lie.
-        editing: Held from looking at one to changing it: of two writers the second is told.
+        editing: Held from reading one to changing it: the second of two writers is refused.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -79,7 +79,7 @@ class CalibrationRepository:
     def holds(self, name: str) -> tuple[Camera | None, MeasuredLens | None]:
         """Return the place and the lens of a calibration, as `CalibrationRequest` wants them.
 
-        With a place goes the measured lens that it was found with, if that is on the shelf.
+        A place includes the measured lens that it was found with, if that is saved.
 
         Raises:
             RefusedError: there is none of that name.
@@ -99,15 +99,15 @@ class CalibrationRepository:
         return free
 
     def write(self, name: str, toml: str) -> CalibrationFile:
-        """Put a calibration on the shelf, or in place of the one of that name.
+        """Save a calibration, or replace the one of that name.
 
         Raises:
-            RefusedError: the text is neither a lens nor a place, or the shelf is full.
+            RefusedError: the text is neither a lens nor a place, or there are too many.
         """
         checked(toml)
         self.folder.mkdir(parents=True, exist_ok=True)
         if not self.path(name).exists() and len(self.rows()) >= MAX_CALIBRATIONS:
-            detail = f"calibrations: {MAX_CALIBRATIONS} are kept; delete some first"
+            detail = f"calibrations: {MAX_CALIBRATIONS} are stored; delete some first"
             raise RefusedError.of("full", detail)
         whole = self.path(name).with_suffix(".part")
         whole.write_text(toml, "utf-8")
@@ -115,7 +115,7 @@ class CalibrationRepository:
         return self.get(name)
 
     def delete(self, name: str) -> None:
-        """Take a calibration and its report off the shelf."""
+        """Delete a calibration and its report."""
         for path in (self.path(name), self.report_path(name)):
             path.unlink(missing_ok=True)
 

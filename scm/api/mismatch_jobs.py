@@ -1,4 +1,4 @@
-"""Mismatch searches as long work: from what, into which folder, how far; and drives that tell more.
+"""Mismatch searches as operations: source, folder, progress; and drives that decide more.
 
 Each search is `scm mismatch`, each drive `scm play`: programs of their own that can be called off.
 """
@@ -36,10 +36,10 @@ class MismatchJobs:
     """Starts searches and drives.
 
     Args:
-        city: Whose shelves are read and written.
+        city: Whose folders are read and written.
         work: What runs it.
         clock: For dates.
-        bus: Words that tell a program of ours where the bus is, and who it is there; empty: no
+        bus: Arguments that give a program the bus's address and its identity; empty: no
             bus can be reached, and nothing can be driven.
     """
 
@@ -50,7 +50,7 @@ class MismatchJobs:
             shutil.rmtree(left, ignore_errors=True)  # of a server that was killed
 
     def folder(self) -> Path:
-        """Return the shelf of reports.
+        """Return the folder of reports.
 
         Raises:
             RefusedError: when this city has none.
@@ -62,7 +62,7 @@ class MismatchJobs:
         return self._city.folders.reports
 
     def recording(self, name: str) -> Path:
-        """Return a recording of the city's shelf, by its name with or without `.mcap`.
+        """Return a recording of the city's folder, by its name with or without `.mcap`.
 
         Raises:
             RefusedError: when there is none of that name.
@@ -87,7 +87,7 @@ class MismatchJobs:
         return uploads.recording_in(folder)
 
     def again(self, report: str) -> Job:
-        """Return the job that a report was made by, with what was driven since to tell more.
+        """Return the job that a report was made by, with the drives recorded since to decide more.
 
         Of a report on one of several cars it is that car alone: only it was driven.
 
@@ -99,7 +99,7 @@ class MismatchJobs:
             raise not_found("report", report)
         job = self.reports.job(folder)
         if job is None:
-            detail = f"{report}: nobody noted what it was made from; start from the recording"
+            detail = f"{report}: its source is unknown; start from the recording"
             raise RefusedError.of("conflict", detail)
         before = (*job.recordings, *job.told)
         gone = next((path for path in map(Path, before) if not path.exists()), None)
@@ -164,7 +164,7 @@ class MismatchJobs:
         return self._work.start(DRIVE_KIND, f"{drive} of {report} by {vehicle}", work, owner=owner)
 
     def _send_on(self, trip: Trip) -> None:
-        """Send a car on where it was going; what hinders that says so on its own page."""
+        """Send a car on to its destination; a failure shows on the car's own page."""
         request = onward(self._city.view, trip)
         until_ns = self._clock.now_ns() + RESUME_NS
         while True:
@@ -217,7 +217,7 @@ def _has_no_end(run: Path) -> bool:
     try:
         return not read_index(run).whole
     except RecordingError:
-        return False  # it is no run at all: the search says so
+        return False  # it is no run at all: the search reports it
 
 
 def _words(runs: Sequence[Path], job: Job, out: Path) -> list[str]:
@@ -238,7 +238,7 @@ def _on_line(line: str, progress: ProgressReporter) -> None:
 
 
 def _placed(partial: Path, folder: Path, base: str) -> str:
-    """Give a finished report its place on the shelf; return its name, or that of its first car."""
+    """Move a finished report into its folder; return its name, or that of its first car."""
     number = 1
     while True:
         name = base if number == 1 else f"{base}-{number}"

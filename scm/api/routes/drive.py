@@ -1,6 +1,6 @@
 """Drive a car by hand: a WebSocket, the only one of the interface.
 
-The first packet takes the wheel, the others drive; see `scm.api.teleop` and docs/dashboard/vehicle.
+The first packet acquires the lease, the others drive; see `scm.api.teleop`.
 """
 
 import secrets
@@ -24,7 +24,7 @@ def router(city: City, stream: Stream, known_keys: KnownKeys | None) -> APIRoute
     @routes.websocket("/{name}/drive")
     async def drive(socket: WebSocket, name: Name) -> None:
         if city.wire is None:
-            raise RefusedError.of("offline", "this interface has no wire to say commands on")
+            raise RefusedError.of("offline", "this interface has no bus to publish commands on")
         if PROTOCOL not in socket.scope["subprotocols"]:
             detail = f"Sec-WebSocket-Protocol: expected {PROTOCOL} among those offered"
             raise RefusedError.of("invalid", detail)

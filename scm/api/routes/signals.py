@@ -1,6 +1,6 @@
 """Signals: what each junction shows, what runs, who wants what of it, and the monitor's reset.
 
-Nobody sets a colour. A wish is taken or refused in words, has who, why and an end, and the signal
+No request sets a colour. An override is accepted or refused, has a name, reason and end, and the signal
 kernel decides when it is safe.
 """
 
@@ -72,15 +72,17 @@ def junction_of(city: City, name: str) -> Junction:
 
 
 def site_of(city: City, name: str) -> SignalSite:
-    """Return what a junction told of itself.
+    """Return what a junction reported of itself.
 
     Raises:
-        RefusedError: when there is none of that name, or its controller was not heard yet.
+        RefusedError: when there is none of that name, or its controller has not reported yet.
     """
     junction_of(city, name)
     site = city.view.picture().sites.get(name)
     if site is None:
-        raise RefusedError.of("offline", f"the controller of junction {name!r} was not heard yet")
+        raise RefusedError.of(
+            "offline", f"the controller of junction {name!r} has not reported yet"
+        )
     return site
 
 
@@ -129,7 +131,7 @@ def _add_reading(routes: APIRouter, city: City) -> None:
     @routes.get(
         "/{name}/promises",
         name="promises",
-        summary="What SPaT told against what happened",
+        summary="What SPaT published against what happened",
         responses=answer(ForecastScore),
     )
     def forecasts(name: Name) -> Response:
@@ -141,7 +143,7 @@ def _add_overrides(routes: APIRouter, city: City) -> None:
     @routes.get(
         "/{name}/wishes",
         name="wishes",
-        summary="Wishes in force, each with who, why and its end",
+        summary="Overrides in force, each with name, reason and end",
         responses=answer_page(SignalOverride),
     )
     def overrides(
@@ -158,7 +160,7 @@ def _add_overrides(routes: APIRouter, city: City) -> None:
 
     @routes.post(
         "/{name}/clear",
-        summary="Take back what was asked of groups",
+        summary="Withdraw overrides of groups",
         dependencies=[OPERATOR],
         responses=answer(SignalReply),
     )
@@ -237,7 +239,7 @@ def _add_running(routes: APIRouter, city: City, repository: PlanRepository) -> N
 def _add_flash(routes: APIRouter, city: City) -> None:
     @routes.put(
         "/{name}/flash",
-        summary="Flash red, or go on",
+        summary="Flash red, or end flashing",
         dependencies=[OPERATOR],
         responses=answer(FlashReply),
     )
@@ -290,7 +292,7 @@ def _policy(
 def _add_monitor(routes: APIRouter, city: City) -> None:
     @routes.get(
         "/{name}/monitor",
-        summary="What the monitor said, newest first",
+        summary="The monitor's reports, newest first",
         responses=answer_page(Verdict),
     )
     def verdicts(request: Request, name: Name, limit: Limit = 100, cursor: Cursor = "") -> Response:
@@ -315,7 +317,7 @@ def _add_monitor(routes: APIRouter, city: City) -> None:
 
 
 def _plan_request(city: City, repository: PlanRepository, name: str, plan: str) -> PlanRequest:
-    """Return a wish for a plan, which brings its stages where somebody saved it.
+    """Return a request for a plan, with its stages if it is a saved one.
 
     Raises:
         RefusedError: when it was proven for a junction that has changed since.
