@@ -1,6 +1,6 @@
 """Signals: what each junction shows, what runs, who wants what of it, and the monitor's reset.
 
-No request sets a colour. An override is accepted or refused, has a name, reason and end, and the signal
+No request sets a colour. An override is accepted or refused, has a name, reason and end; the signal
 kernel decides when it is safe.
 """
 
@@ -80,9 +80,7 @@ def site_of(city: City, name: str) -> SignalSite:
     junction_of(city, name)
     site = city.view.picture().sites.get(name)
     if site is None:
-        raise RefusedError.of(
-            "offline", f"the controller of junction {name!r} has not reported yet"
-        )
+        raise RefusedError.of("offline", f"controller of junction {name!r}: has not reported yet")
     return site
 
 
