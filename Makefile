@@ -9,6 +9,9 @@ INSTALL = $(VENV)/bin/pip install --quiet --disable-pip-version-check --no-compi
 # Of what is installed, one module in eight is ever imported: those are compiled, once and not by each part of a city.
 COMPILE := PYTHONDONTWRITEBYTECODE= $(VENV)/bin/python -c 'import importlib, pkgutil, scm; \
 	[importlib.import_module(found.name) for found in pkgutil.walk_packages(scm.__path__, "scm.")]'
+# A first world compiles the physics and the drivers; afterwards they are in the user's cache, for every process.
+KERNELS := $(VENV)/bin/python -c 'from scm.maps.load import load_map; from scm.world.part import WorldPart; \
+	WorldPart(load_map("driving_school"), 0, ())'
 
 .PHONY: run test docs bench clean
 
@@ -34,14 +37,16 @@ $(VENV)/bin/python:
 $(RUNS): pyproject.toml | $(VENV)/bin/python
 	@echo "installing into $(VENV), 1 GB (once; half a minute to some minutes)"
 	@$(INSTALL) -e '.[formats,postgres,ros2,sumo,v2x]'
-	@echo "compiling its Python (once; up to a minute)"
+	@echo "compiling its Python and physics (once; a minute or two)"
 	@$(COMPILE)
+	@$(KERNELS)
 	@touch $@
 
 $(TESTS): pyproject.toml | $(VENV)/bin/python
 	@echo "installing into $(VENV) with the tests' tools, 2 GB (once; half a minute to some minutes)"
 	@$(INSTALL) -e '.[dev]'
 	@$(COMPILE)
+	@$(KERNELS)
 	@touch $(RUNS) $@
 
 clean:

@@ -23,6 +23,7 @@ _numba: Any = numba  # untyped
 _SOURCES: dict[Callable[..., Any], list[str]] = {}
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 _UNWRAPPED = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_COMPILED_WITH = (Path(__file__), Path(__file__).with_name("array_struct.py"))
 _UNUSED_FOR_S = 24 * 3600.0  # older compiled versions of a package are deleted after a day
 
 
@@ -120,7 +121,8 @@ def version_folder(package: Path) -> Path:
     """
     base = Path(os.environ.get("NUMBA_CACHE_DIR") or cache_folder())
     versions = base / f"{package.name}-{_digest(package.resolve())}"
-    stats = [(path.name, path.stat()) for path in sorted(package.glob("*.py"))]
+    files = [*sorted(package.glob("*.py")), *_COMPILED_WITH]
+    stats = [(path.name, path.stat()) for path in files]
     own = versions / _digest([(name, stat.st_mtime_ns, stat.st_size) for name, stat in stats])
     try:
         own.mkdir(parents=True, exist_ok=True)

@@ -349,11 +349,10 @@ class World:
             self.garage.car(name)  # read once, and not in each process
         compile_together(
             {
-                "drivers": self.drivers.warm_up_controller,
+                "drivers": self.drivers.warm_up,
                 "LIDAR": lambda: self._warm_scanner(scanner, walls),
                 **{name: partial(self._warm_car, name) for name in names},
                 "contacts": self.contacts.warm,
-                "reception": self.drivers.warm_up_rest,
             }
         )
 

@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
+import pytest
 
 from scm.vehicles import jit
+from scm.vehicles.array_struct import ArrayStruct
 from scm.vehicles.compiler.vector_code import LANES, WIDTH, fetch, put, put_lane, stage
 from scm.vehicles.jit import array_kernel, inlined, kernel_function, version_folder
 
@@ -23,10 +25,43 @@ ROWS = 3
 
 
 class Pair(NamedTuple):
-    """Two arrays, as drivers pass them."""
+    """Two arrays."""
 
     a: np.ndarray
     b: np.ndarray
+
+
+class Table(ArrayStruct):
+    """Arrays of several types and shapes, as drivers pass them."""
+
+    flags: np.ndarray
+    counts: np.ndarray
+    values: np.ndarray
+
+
+class Tables(ArrayStruct):
+    first: Table
+    second: Table
+
+
+@kernel_function
+def weighted(table, row):
+    return table.counts[row] * table.values[row, -1] if table.flags[row] else 0.0
+
+
+@array_kernel
+def add_up(tables, out):
+    for row in range(len(tables.first.counts)):
+        out[row] = weighted(tables.first, row) + weighted(tables.second, row)
+    tables.second.values[0, 0] = tables.second.values.shape[1]
+
+
+def table(rows, columns, *, flag):
+    return Table(
+        flags=np.full(rows, flag),
+        counts=np.arange(rows),
+        values=np.arange(float(rows * columns)).reshape(rows, columns),
+    )
 
 
 @kernel_function
@@ -119,6 +154,25 @@ def test_functions_of_tuples_of_arrays_are_called_from_kernels():
     out = np.zeros(2)
     fill(Pair(np.array([0.5, -4.0]), np.array([0.25, 1.0])), out)
     assert out.tolist() == [1.75, -1.125]
+
+
+def test_kernels_read_and_write_the_arrays_of_a_record_of_records():
+    tables, out = Tables(table(4, 2, flag=True), table(4, 3, flag=True)), np.zeros(4)
+    add_up(tables, out)
+    assert out.tolist() == [0.0, 3.0 + 5.0, 2 * (5.0 + 8.0), 3 * (7.0 + 11.0)]
+    assert tables.second.values[0, 0] == 3.0
+    off = Tables(tables.first, table(4, 3, flag=False))
+    add_up(off, out)
+    assert out.tolist() == [0.0, 3.0, 10.0, 21.0]
+
+
+def test_a_function_of_a_record_is_called_from_python():
+    assert weighted(table(4, 2, flag=True), 3) == 21.0
+
+
+def test_a_record_refuses_arrays_with_gaps():
+    with pytest.raises(ValueError, match="values must be C-contiguous"):
+        Table(np.ones(2, np.bool_), np.arange(2), np.zeros((3, 2)).T)
 
 
 def test_division_by_zero_gives_infinity_in_kernels_and_in_plain_calls():

@@ -20,6 +20,7 @@ STANDARD = {
     "_slots_",  # of ctypes structures
     "calm",  # the public name of a signal plan
     "Promise",  # of JavaScript
+    "strides",  # of NumPy's and numba's arrays
 }
 SECTION = re.compile(r"^( *)(Args|Attributes):\n((?:\1 +\S.*\n?)+)", re.MULTILINE)
 ENTRY = re.compile(r"^( +)(\*{0,2}\w+(?:, \*{0,2}\w+)*): ")

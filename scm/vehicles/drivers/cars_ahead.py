@@ -6,11 +6,11 @@ the swing of the own front.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from scm.arrays import Floats, Ints
+from scm.vehicles.array_struct import ArrayStruct
 from scm.vehicles.drivers.driver_state import FRONT, WIDTH
 from scm.vehicles.drivers.lane_graph import (
     COS,
@@ -51,7 +51,7 @@ REAR_AT, SPEED_OF, LENGTH_OF = range(3)
 LEFT, LOW, RIGHT, HIGH = range(4)
 
 
-class Scratch(NamedTuple):
+class Scratch(ArrayStruct):
     """Working arrays of one thread.
 
     Attributes:

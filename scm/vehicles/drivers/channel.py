@@ -12,12 +12,12 @@ Whether a frame is lost is a hash of numbers: the same in any order and on any t
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from scm.arrays import Bools, Floats
 from scm.records.city_map import RadioChannel
+from scm.vehicles.array_struct import ArrayStruct
 from scm.vehicles.jit import array_kernel, kernel_function
 
 WORDS = 4294967296.0  # number of values of a 32-bit word
@@ -29,7 +29,7 @@ HISTORY_WHEN_LOSSY, MIN_CAM_INTERVAL_MS = 16, 100.0
 IDEAL, LOSS, RANGE, FADING, EXPONENT, WALL, DELAY_NS, JITTER_NS, POOR_RECEPTION = range(9)
 
 
-class Channel(NamedTuple):
+class Channel(ArrayStruct):
     """A radio channel.
 
     Attributes:

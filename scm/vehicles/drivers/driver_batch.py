@@ -6,6 +6,7 @@ their own, are known only from their CAMs.
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
@@ -89,23 +90,15 @@ class DriverBatch:
 
     def warm_up(self) -> None:
         """Compile or load all that driving needs; call it before the first car enters."""
-        self.warm_up_controller()
-        self.warm_up_rest()
-
-    def warm_up_controller(self) -> None:
-        """Compile or load the controller, which is the larger part."""
-        self._decide(np.zeros(0, np.int64), 0, self.signals, stop=False)
-
-    def warm_up_rest(self) -> None:
-        """Compile or load reception and route setup."""
         no_cars: Ints = np.zeros(0, np.int64)
         none: Floats = np.zeros(0)
+        self._decide(no_cars, 0, self.signals, stop=False)
         self.receive_cams(no_cars, 0, none, none, none, none, none)
         if self.capacity and self.lane_graph.names:
             fill_window(self.lane_graph.arrays, self._state, 0, 0)
             self._state.lane_window[0] = -1
             kinds = np.zeros((1, col.SPEEDS + col.MAX_SPEEDS))
-            alone = col.empty_state(1)._replace(kinds=kinds, routes=np.zeros(1, np.int64))
+            alone = replace(col.empty_state(1), kinds=kinds, routes=np.zeros(1, np.int64))
             alone.lane_window[0, col.HERE] = 0
             distance_to_wall(
                 self.lane_graph.arrays, alone, self._scratch[0], np.zeros((0, 4)), 0.0, 0.0, 0.0
@@ -163,7 +156,7 @@ class DriverBatch:
         if limits not in self._kinds:
             row = col.kind_row(limits, self.lane_graph.sharpest_change(limits.wheelbase))
             kinds = np.vstack([self._state.kinds, row])
-            self._state = self._state._replace(kinds=kinds)
+            self._state = replace(self._state, kinds=kinds)
             self._kinds[limits] = len(kinds) - 1
         ints = self._state.ints[index]
         ints[col.KIND], ints[col.SEED], ints[col.LAST_NS] = self._kinds[limits], seed, col.NEVER_NS
@@ -238,7 +231,7 @@ class DriverBatch:
         """
         numbers = [self._number(name) for name in lanes]
         state, route = col.empty_state(1), np.array(numbers, np.int64)
-        state = state._replace(kinds=self._state.kinds, routes=route)
+        state = replace(state, kinds=self._state.kinds, routes=route)
         state.ints[0], state.floats[0] = self._state.ints[index], self._state.floats[index]
         ints, floats = state.ints[0], state.floats[0]
         ints[col.ROUTE], ints[col.COUNT], ints[col.INDEX] = 0, len(numbers), 0
@@ -442,4 +435,4 @@ class DriverBatch:
             routes[at : at + len(route)] = route
             ints[index, col.ROUTE] = at
             self._routes_used += len(route)
-        self._state = self._state._replace(routes=routes)
+        self._state = replace(self._state, routes=routes)

@@ -3,11 +3,10 @@
 Compiled code uses rows and columns; other code uses the properties of `DriverBatch`.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from scm.arrays import Floats, Ints
+from scm.vehicles.array_struct import ArrayStruct
 from scm.vehicles.driver import CarLimits
 
 # Of a kind of car: see `CarLimits`. SWING: time that its wheels need for the largest jump of the
@@ -48,7 +47,7 @@ WAITING_FOR = (None, "signal", "vehicle", "stop", "sign")
 FREE, SIGNAL, VEHICLE, ORDER, SIGN = range(5)
 
 
-class DriverState(NamedTuple):
+class DriverState(ArrayStruct):
     """The arrays.
 
     Attributes:

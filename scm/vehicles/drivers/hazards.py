@@ -5,7 +5,6 @@ ends. It only reduces speed: a car that stands there is seen by its own CAMs.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from scm.clock import NS_PER_S
 from scm.v2x.etsi.convert import place_of
 from scm.v2x.etsi.denm import ActionId, DenmBody
 from scm.v2x.etsi.events import DenmReceiver
+from scm.vehicles.array_struct import ArrayStruct
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived
 from scm.vehicles.jit import kernel_function
 
@@ -26,7 +26,7 @@ MAX_FRAMES = 8
 _DENM_SALT = 40_000
 
 
-class Hazards(NamedTuple):
+class Hazards(ArrayStruct):
     """The arrays: e hazards.
 
     Attributes:

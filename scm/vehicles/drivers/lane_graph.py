@@ -7,7 +7,7 @@ projections are exact and cost the same on every map.
 import math
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from scm.geometry import Pose2
 from scm.maps.polyline import advance
 from scm.maps.route import Roads
 from scm.records.city_map import Lane
+from scm.vehicles.array_struct import ArrayStruct
 from scm.vehicles.drivers.rules import RuleBook, Rules, cut_segments, lines_of
 
 # Columns of a segment: place on its lane, length, start pose, curvature (+ = left), speed limit,
@@ -26,7 +27,7 @@ GROUP, JUNCTION = range(2)
 TOLERANCE_M = 1e-6
 
 
-class LaneArrays(NamedTuple):
+class LaneArrays(ArrayStruct):
     """The arrays; rows first[i] to first[i + 1] belong to lane i.
 
     Attributes:

@@ -6,13 +6,13 @@ missing CAM does not mean a missing car.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.clock import NS_PER_S
 from scm.records.city_map import CityMap
+from scm.vehicles.array_struct import ArrayStruct
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived
 from scm.vehicles.jit import array_kernel, kernel_function
 
@@ -30,7 +30,7 @@ AT_X, AT_Y, AT_COS, AT_SIN, AT_SPEED = range(5)
 LOW_X, LOW_Y, CELLS_X, CELLS_Y, LARGEST = range(5)
 
 
-class ReceivedCams(NamedTuple):
+class ReceivedCams(ArrayStruct):
     """The arrays, by station; m stored CAMs per station.
 
     Attributes:

@@ -17,6 +17,7 @@ from scm.maps.polyline import advance, extent
 from scm.maps.route import Roads
 from scm.maps.signs import Turn, precedence_at, turn_of
 from scm.records.city_map import Conflict
+from scm.vehicles.array_struct import ArrayStruct
 
 # Kind of a line: with a signal, a stop sign, a give-way sign, or none (right before left).
 LIT, STOP_SIGN, GIVE_WAY, PLAIN = range(4)
@@ -31,7 +32,7 @@ ACROSS_RAD = math.radians(45.0)  # lines at a larger angle come from the side
 _SIGNED = {"stop": STOP_SIGN, "give_way": GIVE_WAY, None: PLAIN}
 
 
-class Rules(NamedTuple):
+class Rules(ArrayStruct):
     """The arrays: n lines in the order of `LaneArrays`, w ways over junctions, p pairs of ways.
 
     Attributes:

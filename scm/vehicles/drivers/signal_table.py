@@ -5,7 +5,6 @@ frames, and each driver uses the newest one that reached it.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from scm.records.signals import Colour
 from scm.v2x.etsi.cam_spatem import SpatemBody
 from scm.v2x.etsi.convert import REVISIONS, colours_of
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.vehicles.array_struct import ArrayStruct
 from scm.vehicles.drivers.channel import IDEAL, Channel, has_arrived, ideal
 from scm.vehicles.jit import kernel_function, plain
 
@@ -29,7 +29,7 @@ _CODES = {colour: code for code, colour in enumerate(COLOURS)}
 _SPATEM_SALT = 77  # sender ids of roadside units, apart from those of cars and hazards
 
 
-class ReceivedSignals(NamedTuple):
+class ReceivedSignals(ArrayStruct):
     """The arrays: j junctions, g signal groups over all junctions, m stored frames per junction.
 
     Attributes:
