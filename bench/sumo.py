@@ -33,7 +33,7 @@ from scm.records.city_map import CityMap
 from scm.runtime.lockstep import Lockstep
 from scm.traffic.demand.part import DemandPart, Ways
 from scm.traffic.demand.table import Flow
-from scm.traffic.signals.map_plan import OWN, adopted, map_timetable
+from scm.traffic.signals.custom_plans import OWN, adopted, map_timetable
 from scm.traffic.signals.part import TrafficPart
 from scm.traffic.signals.plan import load_timetable
 from scm.traffic.signals.program import program_of

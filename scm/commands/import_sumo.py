@@ -44,7 +44,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.maps.sumo import import_sumo
-    from scm.traffic.signals.map_plan import adopted
+    from scm.traffic.signals.custom_plans import adopted
 
     if arguments.scale is not None and not 0.0 < arguments.scale < math.inf:
         raise MapError(f"--scale: got {arguments.scale}, expected a number above 0")
@@ -86,7 +86,7 @@ def _report(
     out: Path, city: "CityMap", made: "Imported", why_not: Mapping[str, str]
 ) -> Iterator[str]:
     """Yield what became of a network, line by line."""
-    from scm.traffic.signals.map_plan import OWN
+    from scm.traffic.signals.custom_plans import OWN
 
     width, depth = (high - low for low, high in (city.floor.x_m, city.floor.y_m))
     yield f"{out}: 1:{made.scale:g} on {width:.1f} x {depth:.1f} m"

@@ -8,7 +8,7 @@
     turn on red     (`s`) is red: a car may always wait
     same greens     in phases that follow one another are one stage
 
-Whether a stage is safe is checked by `scm.traffic.signals.map_plan`, with the kernel's rules.
+Whether a stage is safe is checked by `scm.traffic.signals.custom_plans`, with the kernel's rules.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence

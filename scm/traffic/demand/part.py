@@ -1,8 +1,8 @@
-"""The demand part: cars come when a table wants them, drive where it says, and leave.
+"""The demand part: spawns cars as a table says, sends them on their way, and removes them.
 
-A car whose time has come is put onto its entry as soon as there is room; until then it waits in the
-entry's queue, is counted, and is never lost. Its way is the one of the shortest time at the lanes'
-limits. Where it ends the car is taken off the map.
+A car whose time has come enters as soon as there is room; until then it waits in the entry's queue
+and counts as queued. Its route is the quickest one at the lanes' speed limits. At its end the car
+is removed.
 """
 
 import heapq
@@ -26,15 +26,15 @@ from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
 from scm.v2x.messages.trip import Trip
 
 PERIOD_NS = 100 * NS_PER_MS
-TRY_AGAIN_NS = 500 * NS_PER_MS
-STATUS_NS = NS_PER_S
+RETRY_NS = 500 * NS_PER_MS  # of an entry without room
+STATUS_EVERY_NS = NS_PER_S
 NO_ROOM = ("occupied", "full", "timeout", "unreachable")
 NAME_IN_USE = "owned"
 
 
 @dataclass(slots=True)
 class _Departure:
-    """A car that wants to drive."""
+    """A car that is to enter."""
 
     due_ns: int
     car: str
@@ -109,7 +109,7 @@ class DemandPart(BasePart):
         for name, entry in self._entries.items():
             outbox += self._let_in(name, entry, now_ns)
         if now_ns >= self._next_status_ns:
-            self._next_status_ns = now_ns + STATUS_NS
+            self._next_status_ns = now_ns + STATUS_EVERY_NS
             outbox.append(self._current_status(now_ns))
         return outbox
 
@@ -163,16 +163,13 @@ class DemandPart(BasePart):
             self._waited_ns += now_ns - departure.due_ns
             self._under_way[departure.vehicle] = (departure, now_ns)
             trip_id = f"demand-{departure.vehicle}-{now_ns}"
-            return [
-                Call(
-                    RouteRequest(request_id=trip_id, vehicle=departure.vehicle, via=departure.route)
-                )
-            ]
+            name, via = departure.vehicle, departure.route
+            return [Call(RouteRequest(request_id=trip_id, vehicle=name, via=via))]
         code = reply.code if isinstance(reply, Refused) else ""
         if code == NAME_IN_USE:
             return []
         if code in NO_ROOM:
-            entry.next_ns = now_ns + TRY_AGAIN_NS
+            entry.next_ns = now_ns + RETRY_NS
             return []
         entry.waiting.popleft()
         self._counts["refused"] += 1
@@ -206,7 +203,7 @@ class DemandPart(BasePart):
 
 
 class Ways:
-    """From the words of a table to entries and lanes of a map."""
+    """Finds the entries and lanes of a map that a table names."""
 
     def __init__(self, city_map: CityMap) -> None:
         self._roads = Roads(city_map)

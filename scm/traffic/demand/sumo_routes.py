@@ -32,7 +32,7 @@ Element = ElementTree.Element
 
 DAY_S = 86_400.0
 HOUR_S = 3600.0
-MOST_CARS = 100_000  # of a flow; 3600 an hour are 86 400 a day
+MAX_CARS_PER_FLOW = 100_000  # of a flow; 3600 an hour are 86 400 a day
 DEFAULT_CAR = "nigel"
 DEFAULT_TYPE = "DEFAULT_VEHTYPE"
 CAR_CLASSES = ("passenger", "private", "taxi", "hov", "evehicle", "ignoring")
@@ -323,7 +323,7 @@ def _flow_times(
         got = " and ".join([*rates, *(key for key in ("end", "number") if key in own)])
         msg = f"expected one of {', '.join(RATES)}, with end or number; got {got}"
         raise DemandError(f"{where}: {msg}")
-    most = _count(own["number"], f"{where}: number") if "number" in own else MOST_CARS + 1
+    most = _count(own["number"], f"{where}: number") if "number" in own else MAX_CARS_PER_FLOW + 1
     is_open = bool(rates) and "number" in own
     begin_s, end_s = _span({**interval, **own}, is_open=is_open, where=where)
     if rates:
@@ -333,9 +333,11 @@ def _flow_times(
         times = _evenly(begin_s, (end_s - begin_s) / max(1, most), f"{where}: number")
     else:
         raise DemandError(f"{where}: expected number or one of {', '.join(RATES)}")
-    found = list(islice(takewhile(lambda at_s: at_s < end_s, times), min(most, MOST_CARS + 1)))
-    if len(found) > MOST_CARS:
-        raise DemandError(f"{where}: expected at most {MOST_CARS} cars in a flow, got more")
+    found = list(
+        islice(takewhile(lambda at_s: at_s < end_s, times), min(most, MAX_CARS_PER_FLOW + 1))
+    )
+    if len(found) > MAX_CARS_PER_FLOW:
+        raise DemandError(f"{where}: expected at most {MAX_CARS_PER_FLOW} cars in a flow, got more")
     return found
 
 

@@ -28,7 +28,7 @@ from scm.traffic.demand.sumo_routes import (
     read_routes,
 )
 
-MOST_S = 7.0 * DAY_S
+MAX_TIME_S = 7.0 * DAY_S
 COLUMNS = ("from", "to", "vehicles_per_hour", "begin", "end", "car", "seed")
 
 
@@ -152,9 +152,9 @@ def _flow(row: Mapping[str, Any], where: str) -> Flow:
 def _checked(flow: Flow, where: str) -> Flow:
     if flow.begin_s >= flow.end_s:
         raise DemandError(f"{where}: end: expected after begin = {flow.begin_s:g} s")
-    if flow.end_s > MOST_S:
+    if flow.end_s > MAX_TIME_S:
         raise DemandError(
-            f"{where}: end: expected at most {MOST_S:g} s, a week, got {flow.end_s:g}"
+            f"{where}: end: expected at most {MAX_TIME_S:g} s, a week, got {flow.end_s:g}"
         )
     if flow.per_hour > HOUR_S:
         raise DemandError(f"{where}: expected at most {HOUR_S:g} an hour, got {flow.per_hour:g}")

@@ -1,6 +1,6 @@
-"""Who lies on the air: checks on what cars claim, what they add up to, and attacks to try them on.
+"""Misbehaviour detection: checks of CAMs, their fusion into scores, and attacks to test them.
 
-`checks/` judge one claim each way and `fusion.py` remembers; `detector.py` ties them together.
+Each of `checks/` judges one claim, `fusion.py` adds them up; `detector.py` connects both.
 `attacks/` turn honest CAMs into false ones. To add a check or an attack, copy a file there.
-Nothing here knows a bus: the part is `scm/traffic/misbehaviour/part.py`.
+Only `part.py` and `attacker.py` know messages of the bus.
 """

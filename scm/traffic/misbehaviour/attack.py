@@ -1,8 +1,8 @@
-"""The contract of an attack: honest CAMs of one station go in, what it sends instead comes out.
+"""The contract of an attack: from honest CAMs of one station to those that it sends instead.
 
 Sizes are those of VeReMi NextGen, divided by the city's scale of 14 where they are lengths, speeds
-or accelerations. An attack tells of each frame whether it lies: a car that reports zero speed at a
-red light tells the truth. An attack is a pure function of what it is given and its own generator.
+or accelerations. An attack marks each frame that is false: a car that reports zero speed at a red
+light tells the truth. An attack is a pure function of its inputs and its own generator.
 """
 
 import random
@@ -17,9 +17,9 @@ from scm.traffic.misbehaviour.ground import Ground
 from scm.v2x.etsi.cam_spatem import SCALE, CamBody
 
 ATTACKS = "scm.traffic.misbehaviour.attacks"
-SLOW_MPS = 1.0 / SCALE
-STEP_M = 1.0 / SCALE
-MAX_FRAMES = 200
+MIN_LIE_MPS = 1.0 / SCALE  # a smaller error of speed misleads nobody
+NOISE_M = 1.0 / SCALE  # within it a car has not moved
+MAX_FRAMES = 200  # of other cars that an attacker remembers
 
 
 class Frame(NamedTuple):
@@ -31,7 +31,7 @@ class Frame(NamedTuple):
 
 
 class Sent(NamedTuple):
-    """A CAM that goes out instead; `lies` tells whether an observer could be misled by it."""
+    """A CAM that goes out instead; `lies`: whether an observer could be misled by it."""
 
     frame: Frame
     lies: bool
@@ -59,8 +59,8 @@ class Attack:
 
     Attributes:
         about: One line.
-        start: Returns the transformation of one attacker's frames; it may remember. A frame that it
-            returns may be due later than the one it was given.
+        start: Returns the transformation of one attacker's frames; it may have a memory. A frame
+            that it returns may be due later than its input.
     """
 
     about: str

@@ -1,10 +1,10 @@
-"""A part whose cars lie on the air: what it sends is as before, but for some stations' CAMs.
+"""A part whose cars send false CAMs; everything else that it sends is unchanged.
 
     Attacker(AgentPart("n3"), {"n3": "zero_speed"})     a station of its own, live or in lockstep
     Attacker(WorldPart(...), {"n3": "zero_speed"})      a hosted car, in lockstep
 
-Around a world, what roadside units and agents hear is changed alike; the drivers of other hosted
-cars hear the truth, for they hear it inside the world.
+Around a world, roadside units and agents receive the false CAMs; the drivers of other hosted cars
+receive the true ones, inside the world.
 """
 
 import heapq
@@ -25,12 +25,12 @@ from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 
 Cam = CamTx | CamRx
-MOST_CHECKS = 3
+MAX_CHECKS = 3
 
 
 @dataclass(slots=True)
 class _Record:
-    """What one liar has said so far, and since when it is suspected for it."""
+    """What one attacker has sent so far, and since when it is suspected."""
 
     about: str
     cams: int = 0
@@ -82,13 +82,13 @@ class Attacker:
 
     @property
     def subscriptions(self) -> Sequence[Subscription]:
-        """What the part hears, and reports on its liars where somebody is told."""
+        """Those of the part, and of reports on its attackers if lines are printed."""
         reports = (Subscription(MisbehaviourReport, {"suspect": name}) for name in self._send)
         return (*self._part.subscriptions, *reports) if self._prints else self._part.subscriptions
 
     @property
     def services(self) -> Sequence[Service]:
-        """What the part serves."""
+        """Those of the part."""
         return self._part.services
 
     def attach(self, is_wanted: IsWanted) -> None:
@@ -121,7 +121,7 @@ class Attacker:
         """Finish the part."""
         for name, record in self._records.items():
             found = "never reported" if record.since_ns is None else "reported"
-            sums = f"{record.cams} CAMs, {record.lies} of them lies, {found}"
+            sums = f"{record.cams} CAMs, {record.lies} of them false, {found}"
             self._print(f"{name} leaves: {sums if record.cams else 'it was never in the city'}")
         return self._part.finish(now_ns)
 
@@ -129,7 +129,7 @@ class Attacker:
         self._scene.received.append(Frame(cam.station, cam.t_ns, cam.body))
 
     def _lie(self, copies: list[Cam]) -> None:
-        """Replace one frame, as sent and as each receiver heard it."""
+        """Replace one frame, as sent and as each receiver got it."""
         first = copies[0]
         record = self._records[first.station]
         for sent in self._send[first.station](Frame(first.station, first.t_ns, first.body)):
@@ -138,23 +138,24 @@ class Attacker:
             record.lies += sent.lies
             if sent.lies and record.lies == 1:
                 record.first_ns = frame.t_ns
-                self._print(f"{first.station} lies from now on: {record.about}")
+                self._print(f"{first.station} sends its first false CAM: {record.about}")
             name = frame.station if self._own_names else first.station
             changed = [_as(copy, name, frame) for copy in copies]
             heapq.heappush(self._later, (frame.t_ns, next(self._count), changed))
 
     def _is_reported(self, report: MisbehaviourReport) -> None:
-        """Print each suspicion once, not at every repetition."""
+        """Print each suspicion once, not with every repeated report."""
         record = self._records[report.suspect]
         if record.since_ns == report.since_ns:
             return
         record.since_ns = report.since_ns
         after_s = seconds(report.t_ns - record.first_ns)
         checks = ", ".join(
-            f"{one.check} ({one.claims} CAMs doubted)" for one in report.observations[:MOST_CHECKS]
+            f"{one.check} ({one.claims} implausible CAMs)"
+            for one in report.observations[:MAX_CHECKS]
         )
         self._print(
-            f"{report.suspect} is reported {after_s:.1f} s after its first lie, "
+            f"{report.suspect} is reported {after_s:.1f} s after its first false CAM, "
             f"score {report.score:.1f}: {checks}"
         )
 

@@ -1,7 +1,7 @@
-"""The contract of a check: what it is given, and what it answers.
+"""The contract of a check: its inputs, and the plausibility that it returns.
 
-A check answers how plausible a claim is, 0..1, or None where it cannot tell. 1 is ordinary. Near 0
-is what an honest car would claim with that probability at most.
+A check returns how plausible a claim is, 0..1, or None where it does not apply. An honest car makes
+a claim of plausibility p with that probability at most.
 """
 
 import math
@@ -18,25 +18,22 @@ from scm.traffic.misbehaviour.limits import Limits
 from scm.v2x.messages.eye_track import EyeTrack
 
 CHECKS = "scm.traffic.misbehaviour.checks"
-LOOKED_S, TRACK_LAG_S = 0.2, 1.0
-GRACE_S = 3.0
-"""For how long a car is new that has come into the city: the Eye still looks for its tag."""
-HARD_S = 3.0
-"""For how long after it a car may still move as by hand, or as in a stop of the city."""
-CONFIRMED = 0.05
-"""From this plausibility on, the Eye speaks for a place."""
+SEEN_WITHIN_S, TRACK_LAG_S = 0.2, 1.0  # a camera's view that is fresh; how slowly a track stops
+NEWCOMER_S = 3.0  # after a car came; the Eye still searches for its tag
+HARD_DRIVING_S = 3.0  # after driving by hand or a stop of the city, hard limits still apply
+CONFIRMED = 0.05  # plausibility from which the Eye confirms a position
 Class = Literal["beacon", "static", "security", "position", "speed", "longAcc"]
 """The classes of observations of ETSI TS 103 759."""
 
 
 class Strayed:
-    """How far a station's way strays from its speeds, the last seconds counting most.
+    """How far a station's path deviates from its speeds, with exponential forgetting.
 
     Attributes:
-        last_m: Of the last claim alone, + = went farther than it said.
+        last_m: Of the last claim alone, + = went farther than claimed.
         sum_m: Of the last `WINDOW_S`, faded; `over_s` is their faded time.
-        variance_m2: Of `sum_m` for not knowing when between two claims the speed changed: anything
-            from at once to at last, a rectangle of width |v1 - v0| dt. Much where claims were lost.
+        variance_m2: Of `sum_m`, as the speed may change at any time between two claims: uniform,
+            of width |v1 - v0| dt. Large where claims were lost.
     """
 
     WINDOW_S = 5.0
@@ -46,7 +43,7 @@ class Strayed:
         self.begin()
 
     def begin(self) -> None:
-        """Forget what was."""
+        """Start anew."""
         self.last_m = self.sum_m = self.over_s = self.variance_m2 = 0.0
 
     def add(self, now: Claim, before: Claim, dt_s: float, front_share: float) -> None:
@@ -66,7 +63,7 @@ class Strayed:
 
 
 class Sender(NamedTuple):
-    """What the city itself knows of who sent a CAM, see `CamRx`; no sender can write it."""
+    """What the city knows of the sender of a CAM, see `CamRx`; no sender can write it."""
 
     car: str = ""
     by_hand: bool = False
@@ -75,7 +72,7 @@ class Sender(NamedTuple):
 
 
 class Standing(NamedTuple):
-    """What is held against a station, see `fusion`, and since when it is known [ns]."""
+    """The score of a station, see `fusion`, and since when it is known [ns]."""
 
     score: float
     since_ns: int
@@ -83,32 +80,32 @@ class Standing(NamedTuple):
 
 @dataclass(slots=True)
 class Case:
-    """One claim and all that it may be held against; one object serves all claims in turn.
+    """One claim and all that it may be compared with.
 
     Attributes:
         now: The claim to be judged.
         before: The station's claim before it; None: its first.
-        dt_s: Between these two, by what they say; 0 for the first.
-        driven_s: Of that, how long the car drove: all of it, unless its computer was too slow.
+        dt_s: Between these two, by their time stamps; 0 for the first.
+        driven_s: Of that, how long the car was moved: all of it, unless its computer was too slow.
         since_lost_s: Since time passed last without the car being moved; inf: it never did.
         gap_s: Between their arrivals.
-        kalman: The station's filter, which has taken `now`.
+        kalman: The station's filter, with `now` in it.
         neighbours: Newest claims of stations around it that are not older than a second or so.
-        strayed: The station's way beside its speeds, which has taken `now`.
+        strayed: The station's path against its speeds, with `now` in it.
         standings: By station number.
         track: The Eye's track of this very car, fresh; None: it has none.
         is_tag_unseen: Whether it is a car of the city whose tag no camera has ever seen.
-        is_new: Whether it is a car of the city that came within `GRACE_S`.
-        is_hard: Whether it is driven by hand, or the city is stopped, now or within `HARD_S`: by
-            what the city knows. `limits` are the hard ones then.
+        is_new: Whether it is a car of the city that came within `NEWCOMER_S`.
+        is_hard: Whether it is driven by hand, or the city is stopped, now or within
+            `HARD_DRIVING_S`: by what the city knows. `limits` are the hard ones then.
         unseen_s: From when a camera last saw that car to the claim, either way.
         nearest_track_m: From the claimed rear axle to any fresh track; inf: there is none near.
         eye_sees: Whether the Eye works and overlooks the place.
-        since_start_s: How long we have listened.
+        since_start_s: How long the detector has received CAMs.
         idle: Claims in a row that came fast although nothing had changed.
         is_own_number: Whether the number in the CAM is that of the station that sent it.
         touches: Whether another car, by its claim or by the Eye, is so near that they may push each
-            other; costly, so ask only in doubt.
+            other; costly, so call it only for an implausible claim.
     """
 
     now: Claim
@@ -137,11 +134,11 @@ class Case:
 
     @property
     def eye_may_deny(self) -> bool:
-        """Return whether the Eye knows better than the car; an old look may still speak for it.
+        """Whether the Eye can contradict the car; an older view can only confirm it.
 
-        The Eye carries a track on from its last look, and needs some more to see that a car stood.
+        The Eye predicts a track from its last view, and needs some more to see that a car stands.
         """
-        return self.unseen_s <= LOOKED_S and self.since_lost_s >= TRACK_LAG_S
+        return self.unseen_s <= SEEN_WITHIN_S and self.since_lost_s >= TRACK_LAG_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,10 +146,10 @@ class Check:
     """One check.
 
     Attributes:
-        judge: The answer to a case.
+        judge: Returns the plausibility of a case.
         kind: Its class of observations.
-        floor: The least it may answer, however sure: what alone shall not condemn anybody.
-        witnessed: Whether an Eye that confirms the place settles the question in the car's favour.
+        floor: The least plausibility that counts: alone it must not cause a report.
+        witnessed: Whether an Eye that confirms the position overrules it.
         name: Filled in by `load_checks`.
     """
 

@@ -1,4 +1,4 @@
-"""A CAM as a claim: where a car says it is, how it moves, and how sure it says it is."""
+"""A CAM as a claim: a car's position and motion, and their claimed standard deviations."""
 
 import math
 
@@ -14,28 +14,27 @@ from scm.v2x.etsi.convert import (
     read_cam,
 )
 
-SURELY = 1.96
-"""Deviations within which 95 % lie: what confidence means in these messages."""
-LEAST_OWN = 1e-4
+SIGMAS_95 = 1.96  # confidence fields mean 95 %
+MIN_STD = 1e-4  # metre, m/s or radian; a claimed zero must not divide
 ACCEL_UNIT_MPS2 = 0.1 / SCALE
 
 
 class Claim(msgspec.Struct, frozen=True, gc=False):
-    """What one CAM says, in metres of the table.
+    """The content of one CAM, in metres of the floor.
 
     Attributes:
         who: The station's number in the message.
         station: Who sent it, by its key on the bus.
-        receiver: Who heard it.
+        receiver: Who received it.
         sent_ns: When it left its antenna.
-        t_ns: When it says that it was true.
-        lost_ns: Of the time until then, what passed without the car being moved, see `CamRx`.
+        t_ns: The time that it claims to be of.
+        lost_ns: Time that passed without the car being moved, see `CamRx`.
         x_m, y_m: The middle of the front bumper, map frame.
-        yaw_rad, speed_mps, accel_mps2, yaw_rate_radps, length_m, width_m: None: the CAM does not
-            say, or only that it is beyond the field's range. Speed is negative in reverse.
-        is_beyond_speed: Whether it says that it is faster than the field can express.
-        accel_beyond_mps2: What it says to exceed, + = speeding up, where its acceleration is beyond
-            the field's range: +-1.14. Nigels exceed it; None: it does not say so.
+        yaw_rad, speed_mps, accel_mps2, yaw_rate_radps, length_m, width_m: None: absent, or
+            beyond the field's range. Speed is negative in reverse.
+        is_beyond_speed: Whether its speed is beyond the field's range.
+        accel_beyond_mps2: The end of the field's range, +-1.14, that its acceleration exceeds, as
+            Nigels do; None: it does not.
         own_m, own_mps, own_rad: Standard deviations of position, speed and yaw.
     """
 
@@ -62,12 +61,12 @@ class Claim(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def size(self) -> tuple[float, float]:
-        """Return length and width [m]; a Nigel's where the CAM does not tell them."""
+        """Return length and width [m]; a Nigel's where the CAM lacks them."""
         return self.length_m or ASSUMED_LENGTH_M, self.width_m or ASSUMED_WIDTH_M
 
     @property
     def accel_range(self) -> tuple[float, float] | None:
-        """Return the least and the greatest acceleration that it may mean; None: it tells none."""
+        """Return the least and the greatest possible acceleration; None: it has none."""
         if self.accel_mps2 is not None:
             return self.accel_mps2, self.accel_mps2
         beyond = self.accel_beyond_mps2
@@ -94,7 +93,7 @@ class Claim(msgspec.Struct, frozen=True, gc=False):
 def claim_of(
     station: str, receiver: str, sent_ns: int, body: CamBody, limits: Limits, lost_ns: int = 0
 ) -> Claim | None:
-    """Return what a CAM claims; None: it does not say where its car is, so it claims nothing."""
+    """Return what a CAM claims; None if it has no position."""
     reported = read_cam(body)
     if reported.place is None:
         return None
@@ -127,7 +126,7 @@ def claim_of(
 
 
 def accel_of(body: CamBody) -> tuple[float | None, float | None]:
-    """Return the acceleration that a CAM tells, and what it says to exceed; see `Claim` [m/s^2]."""
+    """Return the acceleration of a CAM, or the end of range that it exceeds; see `Claim` [m/s^2]."""
     reported = body.motion.longitudinal_acceleration
     if is_out_of_range(reported, "value"):
         return None, reported.value * ACCEL_UNIT_MPS2
@@ -137,8 +136,8 @@ def accel_of(body: CamBody) -> tuple[float | None, float | None]:
 def _deviation(
     record: msgspec.Struct, field: str, unit: float, unknown: float, most: float
 ) -> float:
-    """Return the standard deviation that a confidence field tells, never more than `most`."""
+    """Return the standard deviation of a confidence field, never more than `most`."""
     if is_out_of_range(record, field):
         return most
     reported = scaled(record, field, unit)
-    return unknown if reported is None else min(max(reported / SURELY, LEAST_OWN), most)
+    return unknown if reported is None else min(max(reported / SIGMAS_95, MIN_STD), most)

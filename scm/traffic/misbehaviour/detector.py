@@ -1,6 +1,6 @@
-"""The detector: CAMs and tracks go in, reports on stations come out.
+"""The detector: from CAMs and tracks to suspicions of stations.
 
-A CAM that several roadside units hear counts once. What comes from outside never stops it.
+A CAM that several roadside units receive counts once. No input can stop it.
 """
 
 import math
@@ -11,8 +11,8 @@ from typing import NamedTuple
 from scm.clock import NS_PER_S, nanoseconds
 from scm.traffic.misbehaviour.check import (
     CONFIRMED,
-    GRACE_S,
-    HARD_S,
+    HARD_DRIVING_S,
+    NEWCOMER_S,
     Case,
     Check,
     Sender,
@@ -20,7 +20,7 @@ from scm.traffic.misbehaviour.check import (
     load_checks,
 )
 from scm.traffic.misbehaviour.claim import Claim, claim_of
-from scm.traffic.misbehaviour.fusion import FREE, StationHistory
+from scm.traffic.misbehaviour.fusion import FREE_POINTS, StationHistory
 from scm.traffic.misbehaviour.ground import Ground
 from scm.traffic.misbehaviour.kalman import ACCEL_PSD, HARD_PSD
 from scm.traffic.misbehaviour.likely import LEAST, Box, overlap_m
@@ -29,27 +29,25 @@ from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.etsi.convert import station_id
 from scm.v2x.messages.eye_track import EyeTrack
 
-FRESH_NS = NS_PER_S // 3
-EYE_PAUSE_NS = 2 * NS_PER_S  # an Eye that was silent for longer has begun anew
-EYE_WORKS_NS = NS_PER_S // 2
-FORGET_NS = 60 * NS_PER_S
-SILENT_NS = 2 * NS_PER_S
-"""Who heard nobody for so long was away himself, and begins to listen anew."""
-NEIGHBOUR_M = 0.5
-TOUCH_M = 0.03
+MAX_TRACK_AGE_NS = NS_PER_S // 3  # of the Eye, when compared with a claim
+EYE_RESTART_NS = 2 * NS_PER_S  # without any track: the Eye has begun anew
+MAX_EYE_SILENCE_NS = NS_PER_S // 2  # after its newest track the Eye is reported as working
+MEMORY_NS = 60 * NS_PER_S  # of stations and tracks
+RESTART_SILENCE_NS = 2 * NS_PER_S  # without any CAM: reception was lost, and begins anew
+CELL_M = 0.5  # in which neighbours are searched; longer than a car
+TOUCH_M = 0.03  # between two cars that may push each other
 BAD_FLAGS = frozenset({"tentative", "duplicate", "disagree", "wrong_id", "jumped"})
-MOST_STATIONS = 10_000
-"""More station numbers than any city has: a flood of new ones must not fill the memory."""
-UNSUSPICIOUS = 10.0**-FREE
-IDLE_S, UNMOVED = 0.9, 0.5
-OLDEST_S = 60.0
-LEAST_S = 0.001
+MAX_STATIONS = 10_000  # more than any city has: a flood of new numbers must not fill the memory
+UNSUSPICIOUS = 10.0**-FREE_POINTS  # plausibility from which a finding gives no points
+MAX_IDLE_GAP_S, UNCHANGED_SHARE = 0.9, 0.5  # a fast CAM; share of a trigger that is no change
+MAX_AGE_S = 60.0  # that a track may claim
+MIN_DRIVEN_S = 0.001  # a time to divide by
 UNKNOWN = Sender()
-MOVED_M, MOVED_MPS, MOVED_RAD = 4.0 / 14.0, 0.5 / 14.0, math.radians(4.0)
+TRIGGER_M, TRIGGER_MPS, TRIGGER_RAD = 4.0 / 14.0, 0.5 / 14.0, math.radians(4.0)  # EN 302 637-2
 
 
 class CheckedClaim(NamedTuple):
-    """One claim, what each check found doubtful in it, and whether a report is due."""
+    """One claim, the suspicious findings of the checks, and whether a report is due."""
 
     claim: Claim
     history: StationHistory
@@ -63,7 +61,7 @@ class Detector:
     Attributes:
         histories: By station number.
         claims_checked: How many, so far.
-        eye_ns: When a camera last saw any car; None: no Eye was ever heard.
+        eye_ns: When a camera last saw any car; None: no track was ever received.
     """
 
     def __init__(
@@ -82,7 +80,7 @@ class Detector:
         nigel = Limits()
         self._limits_of = cache(limits_of or (lambda _car: nigel))
         chosen = load_checks() if checks is None else checks
-        # Those that a witness settles come after those by which it speaks.
+        # Those that the Eye can overrule come after those by which it confirms.
         self._checks = sorted(chosen, key=lambda check: check.witnessed)
         self._ground = ground
         self.histories: dict[int, StationHistory] = {}
@@ -104,16 +102,16 @@ class Detector:
         if not track.stale and BAD_FLAGS.isdisjoint(track.flags):
             self._seen.add(who)
         seen, before = seen_ns(track), self.eye_ns
-        if before is None or seen - before > EYE_PAUSE_NS:
+        if before is None or seen - before > EYE_RESTART_NS:
             self._eye_began_ns = seen
-        # Nobody saw anything after this was told: what came from the future is forgotten again.
+        # A track cannot be older than its last view: a time from the future is dropped again.
         self.eye_ns = seen if before is None or before > track.t_ns else max(seen, before)
 
     def receive(
         self, station: str, receiver: str, sent_ns: int, body: CamBody, lost_ns: int = 0,
         sender: Sender = UNKNOWN,
     ) -> CheckedClaim | None:  # fmt: skip
-        """Judge a CAM; None: it was heard before, through another receiver, or tells no place.
+        """Check a CAM; None: it was received before by another unit, or has no position.
 
         `lost_ns` is that of `CamRx`: time in which the car was not moved; `sender` what the city
         knows of it.
@@ -126,7 +124,7 @@ class Detector:
         claim = claim_of(station, receiver, sent_ns, body, limits, lost_ns)
         if claim is None:
             return None
-        if self._began_ns is None or sent_ns - self._received_ns > SILENT_NS:
+        if self._began_ns is None or sent_ns - self._received_ns > RESTART_SILENCE_NS:
             self._began_ns = sent_ns
         self._received_ns = sent_ns
         case = self._case(claim, history, sender, limits)
@@ -143,20 +141,20 @@ class Detector:
         return self._tracks.get(who)
 
     def forget(self, now_ns: int) -> None:
-        """Drop stations and tracks that were not heard or seen for a minute."""
+        """Drop stations and tracks that were not received for a minute."""
         for who, history in list(self.histories.items()):
             newest = history.newest
-            if newest is not None and now_ns - newest.sent_ns > FORGET_NS:
+            if newest is not None and now_ns - newest.sent_ns > MEMORY_NS:
                 self._cells.get(_cell(*newest.middle), {}).pop(who, None)
                 del self.histories[who]
                 self._standings.pop(who, None)
                 self._seen.discard(who)
-        self._tracks = {w: t for w, t in self._tracks.items() if now_ns - t.t_ns < FORGET_NS}
+        self._tracks = {w: t for w, t in self._tracks.items() if now_ns - t.t_ns < MEMORY_NS}
 
     def _history(self, who: int, station: str, sent_ns: int) -> StationHistory:
         history = self.histories.get(who)
         if history is None:
-            if len(self.histories) >= MOST_STATIONS:
+            if len(self.histories) >= MAX_STATIONS:
                 self.histories.pop(next(iter(self.histories)))
             history = self.histories[who] = StationHistory(station, sent_ns)
         return history
@@ -164,7 +162,7 @@ class Detector:
     def _number(self, name: str) -> int:
         number = self._numbers.get(name)
         if number is None:
-            if len(self._numbers) >= MOST_STATIONS:
+            if len(self._numbers) >= MAX_STATIONS:
                 self._numbers.clear()
             number = self._numbers[name] = station_id(name)
         return number
@@ -197,16 +195,16 @@ class Detector:
         history.idle = _idle(claim, before, gap_s, history.idle)
         if sender.by_hand or sender.stopped or sender.touches:
             history.hard_ns = claim.sent_ns
-        is_hard = _since_s(claim.sent_ns, history.hard_ns) <= HARD_S
+        is_hard = _since_s(claim.sent_ns, history.hard_ns) <= HARD_DRIVING_S
         limits = limits.hard if is_hard else limits
         self._filter(claim, history, before, driven_s, limits, HARD_PSD if is_hard else ACCEL_PSD)
-        if sender.touches:  # what holds or pushes it does so between two claims
+        if sender.touches:  # a push acts between two claims
             history.strayed.begin()
         track = self._fresh(claim)
         eye_sees = self._eye_sees(claim)
-        is_new = bool(sender.car) and claim.sent_ns - history.first_ns <= GRACE_S * NS_PER_S
+        is_new = bool(sender.car) and claim.sent_ns - history.first_ns <= NEWCOMER_S * NS_PER_S
         unseen = bool(sender.car) and (claim.who not in self._seen or not limits.has_tag)
-        has_looked = _since_s(claim.sent_ns, self._eye_began_ns) > GRACE_S and not is_new
+        has_looked = _since_s(claim.sent_ns, self._eye_began_ns) > NEWCOMER_S and not is_new
         history.is_tag_unseen = unseen and has_looked and (eye_sees or history.is_tag_unseen)
         neighbours = self._around(claim)
         return Case(
@@ -261,7 +259,7 @@ class Detector:
         return track if track is not None and _is_fresh(track, claim.t_ns) else None
 
     def _eye_sees(self, claim: Claim) -> bool:
-        if self.eye_ns is None or abs(claim.t_ns - self.eye_ns) > FRESH_NS:
+        if self.eye_ns is None or abs(claim.t_ns - self.eye_ns) > MAX_TRACK_AGE_NS:
             return False
         return self._ground.sees(*claim.middle)
 
@@ -271,7 +269,7 @@ class Detector:
             (
                 math.hypot(x - track.x_m, y - track.y_m)
                 for track in self._tracks.values()
-                if not track.stale and abs(claim.t_ns - track.t_ns) <= FRESH_NS
+                if not track.stale and abs(claim.t_ns - track.t_ns) <= MAX_TRACK_AGE_NS
             ),
             default=math.inf,
         )
@@ -283,7 +281,7 @@ class Detector:
         length_m, width_m = claim.size
         size = length_m + TOUCH_M, width_m + TOUCH_M
         box: Box = (*claim.middle, claim.yaw_rad, *size)
-        near_ns = 2 * FRESH_NS
+        near_ns = 2 * MAX_TRACK_AGE_NS
         claimed = (
             (*other.middle, other.yaw_rad, other.size[0] + TOUCH_M, other.size[1] + TOUCH_M)
             for other in neighbours
@@ -295,13 +293,13 @@ class Detector:
     def _seen_beside(
         self, claim: Claim, size: tuple[float, float], limits: Limits
     ) -> Iterator[Box]:
-        """Yield the outlines of all other cars that the Eye told of, as large as this one.
+        """Yield the outlines of all other tracked cars, as large as this one.
 
-        A doubtful track too: two cars that press against each other hide each other's tags.
+        Flagged tracks too: two cars that press against each other hide each other's tags.
         """
         ahead = (limits.front_share - 0.5) * claim.size[0]
         for who, track in self._tracks.items():
-            if who != claim.who and abs(claim.t_ns - track.t_ns) <= FRESH_NS:
+            if who != claim.who and abs(claim.t_ns - track.t_ns) <= MAX_TRACK_AGE_NS:
                 x = track.x_m + ahead * math.cos(track.yaw_rad)
                 y = track.y_m + ahead * math.sin(track.yaw_rad)
                 yield (x, y, track.yaw_rad, *size)
@@ -326,25 +324,25 @@ class Detector:
 
 
 def _may_wait(check: Check) -> bool:
-    """Return whether a check says nothing of a newcomer: it goes by the map or the Eye alone."""
+    """Return whether a check does not apply to a newcomer: it uses the map or the Eye alone."""
     return check.floor > LEAST and check.kind != "longAcc"
 
 
 def _cell(x: float, y: float) -> tuple[int, int]:
-    return math.floor(x / NEIGHBOUR_M), math.floor(y / NEIGHBOUR_M)
+    return math.floor(x / CELL_M), math.floor(y / CELL_M)
 
 
 def seen_ns(track: EyeTrack) -> int:
-    """Return when a camera last saw a track's car: what is told for later is only carried on."""
-    age_s = track.age_s if 0.0 <= track.age_s < OLDEST_S else OLDEST_S
+    """Return when a camera last saw a track's car; later poses are predictions."""
+    age_s = track.age_s if 0.0 <= track.age_s < MAX_AGE_S else MAX_AGE_S
     return track.t_ns - nanoseconds(age_s)
 
 
 def _driven_s(claim: Claim, before: Claim, front_share: float) -> float:
     """Return the time that a car drove between two claims, where some of it was lost [s].
 
-    How much is known from above only. So what makes the way that of the speeds counts, as far as
-    what may have been lost excuses it.
+    Of the lost time only a maximum is known, so the time in which the claimed speeds make the way
+    counts, within that maximum.
     """
     dt_s = (claim.t_ns - before.t_ns) * 1e-9
     lost_s = (claim.lost_ns - before.lost_ns) * 1e-9
@@ -353,7 +351,7 @@ def _driven_s(claim: Claim, before: Claim, front_share: float) -> float:
     v1, v0 = claim.speed_mps, before.speed_mps
     speed_mps = 0.0 if v1 is None or v0 is None else abs(v1 + v0) / 2.0
     needed_s = way_m / speed_mps if speed_mps > 0.0 else dt_s
-    return min(dt_s, max(LEAST_S, dt_s - lost_s, needed_s))
+    return min(dt_s, max(MIN_DRIVEN_S, dt_s - lost_s, needed_s))
 
 
 def _since_s(now_ns: int, then_ns: int | None) -> float:
@@ -361,19 +359,19 @@ def _since_s(now_ns: int, then_ns: int | None) -> float:
 
 
 def _is_fresh(track: EyeTrack, t_ns: int) -> bool:
-    if track.stale or abs(t_ns - track.t_ns) > FRESH_NS:
+    if track.stale or abs(t_ns - track.t_ns) > MAX_TRACK_AGE_NS:
         return False
     return not track.flags or BAD_FLAGS.isdisjoint(track.flags)
 
 
 def _idle(claim: Claim, before: Claim | None, gap_s: float, idle: int) -> int:
     """Return how many claims in a row came fast although the car had not moved."""
-    if before is None or gap_s > IDLE_S:
+    if before is None or gap_s > MAX_IDLE_GAP_S:
         return 0
-    moved = math.hypot(claim.x_m - before.x_m, claim.y_m - before.y_m) / MOVED_M
+    moved = math.hypot(claim.x_m - before.x_m, claim.y_m - before.y_m) / TRIGGER_M
     if claim.speed_mps is not None and before.speed_mps is not None:
-        moved = max(moved, abs(claim.speed_mps - before.speed_mps) / MOVED_MPS)
+        moved = max(moved, abs(claim.speed_mps - before.speed_mps) / TRIGGER_MPS)
     if claim.yaw_rad is not None and before.yaw_rad is not None:
         turned = math.remainder(claim.yaw_rad - before.yaw_rad, math.tau)
-        moved = max(moved, abs(turned) / MOVED_RAD)
-    return 0 if moved > UNMOVED else idle + 1
+        moved = max(moved, abs(turned) / TRIGGER_RAD)
+    return 0 if moved > UNCHANGED_SHARE else idle + 1

@@ -1,4 +1,4 @@
-"""A CAM with some of its numbers changed, in metres of the table."""
+"""CAMs with some values replaced, in metres of the floor."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ from scm.v2x.etsi.convert import (
 
 
 def moved(body: CamBody, x_m: float, y_m: float) -> CamBody:
-    """Return a CAM whose front bumper is told to be elsewhere."""
+    """Return a CAM with another position of the front bumper."""
     place = position_of(x_m, y_m)
     was = body.position
     place = replace(was, latitude=place.latitude, longitude=place.longitude)
@@ -29,7 +29,7 @@ def driven(
     yaw_rad: float | None = None,
     accel_mps2: float | None = None,
 ) -> CamBody:
-    """Return a CAM that tells of another motion; what is None stays."""
+    """Return a CAM with another motion; what is None stays."""
     motion = body.motion
     changes: dict[str, Any] = {}
     if speed_mps is not None:
@@ -40,14 +40,13 @@ def driven(
         changes["heading"] = replace(motion.heading, value=heading_of(yaw_rad))
     if accel_mps2 is not None:
         value = max(-ACCEL_MAX, min(ACCEL_MAX, round(accel_mps2 * SCALE * 10.0)))
-        changes["longitudinal_acceleration"] = replace(
-            motion.longitudinal_acceleration, value=value
-        )
+        was = motion.longitudinal_acceleration
+        changes["longitudinal_acceleration"] = replace(was, value=value)
     fast = HighFrequencyContainer(basic_vehicle_container_high_frequency=replace(motion, **changes))
     return replace(body, high_frequency_container=fast)
 
 
 def stamped(body: CamBody, t_ns: int, who: int | None = None) -> CamBody:
-    """Return a CAM made at another time, and by another station where `who` is its number."""
+    """Return a CAM of another time, and of another station if `who` is its number."""
     number = body.station_id if who is None else who
     return replace(body, generation_delta_time=delta_time(t_ns), station_id=number)

@@ -1,13 +1,13 @@
-"""What many plausibilities add up to: a score a station, with memory and hysteresis.
+"""Fusion of many plausibilities into one score a station, with memory and hysteresis.
 
-    points = min(MOST, -log10(least plausibility of all checks)) - FREE, at least 0
+    points = min(MAX_POINTS, -log10(least plausibility of all checks)) - FREE_POINTS, at least 0
     score <- score exp(-dt / MEMORY_S) + points
-    suspected from ON up, until it has fallen below OFF
+    suspected from SUSPECTED_FROM up, until it has fallen below CLEARED_BELOW
 
-The least counts and not the sum: checks look at the same numbers, so they are wrong together.
-FREE is what an honest car's worst check of twenty says anyway. ON takes two blatant claims, or
-many doubtful ones within the memory. Where the Eye cannot see a car's tag, nobody can speak for it:
-what checks that a witness settles find raises its score to UNSEEN_MOST and no further.
+The least counts and not the sum: checks use the same numbers, so they are wrong together.
+FREE_POINTS is what the worst of twenty checks gives an honest car. SUSPECTED_FROM takes two blatant
+claims, or many doubtful ones within the memory. Where the Eye cannot see a car's tag, it cannot
+confirm its position: checks that it could overrule raise the score to MAX_UNSEEN_SCORE at most.
 """
 
 import math
@@ -17,16 +17,16 @@ from scm.traffic.misbehaviour.check import Check, Strayed
 from scm.traffic.misbehaviour.claim import Claim
 from scm.traffic.misbehaviour.kalman import Kalman
 
-MEMORY_S = 10.0
-FREE, MOST = 0.8, 4.0
-ON, OFF = 5.0, 2.0
-UNSEEN_MOST = 3.0
-EVIDENCE = 6
-REPEAT_NS = 10_000_000_000
+MEMORY_S = 10.0  # in which a score falls to 37 %
+FREE_POINTS, MAX_POINTS = 0.8, 4.0
+SUSPECTED_FROM, CLEARED_BELOW = 5.0, 2.0
+MAX_UNSEEN_SCORE = 3.0
+MAX_EVIDENCE = 6  # claims in a report
+REPEAT_REPORT_NS = 10_000_000_000  # of a suspicion that lasts
 
 
 class Noted:
-    """How one check stands against a station since it was last in order.
+    """The findings of one check on a station since it was last clear.
 
     Attributes:
         least: The worst plausibility.
@@ -46,15 +46,15 @@ class StationHistory:
         station: Its name on the bus.
         newest: Its last claim.
         first_ns: Since when it is known.
-        late_ns: When it last told of a time in which it was not moved; None: never.
+        late_ns: When time last passed without it being moved; None: never.
         hard_ns: When it was last driven by hand, or the city stopped; None: never.
         is_tag_unseen: Whether it is a car whose tag the Eye should see and never saw.
-        idle: Its claims in a row that came fast though nothing had changed.
-        score: What is held against it.
+        idle: Its fast claims in a row without any change.
+        score: See the module.
         since_ns: Since when it is suspected; None: it is not.
         reported_ns: When that was last reported.
         is_news: Whether that report was the first of this suspicion.
-        noted: By check what led to it.
+        noted: By check, the findings that led to it.
         evidence: The last claims that gave points, each with the one before it.
     """
 
@@ -93,7 +93,7 @@ class StationHistory:
         self.reported_ns: int | None = None
         self.is_news = False
         self.noted: dict[str, Noted] = {}
-        self.evidence: deque[Claim] = deque(maxlen=EVIDENCE)
+        self.evidence: deque[Claim] = deque(maxlen=MAX_EVIDENCE)
 
     def add(self, claim: Claim, gap_s: float, findings: list[tuple[Check, float]]) -> bool:
         """Add the findings of the checks on a claim; return whether a report is due.
@@ -105,7 +105,7 @@ class StationHistory:
         """
         points = soft = 0.0
         for check, plausibility in findings:
-            found = min(MOST, -math.log10(plausibility)) - FREE
+            found = min(MAX_POINTS, -math.log10(plausibility)) - FREE_POINTS
             if found <= 0.0:
                 continue
             noted = self.noted.get(check.name)
@@ -121,7 +121,7 @@ class StationHistory:
                 points = max(points, found)
         self.score = self.score * math.exp(-max(0.0, gap_s) / MEMORY_S) + points
         if soft > points:
-            self.score = max(self.score, min(self.score + soft - points, UNSEEN_MOST))
+            self.score = max(self.score, min(self.score + soft - points, MAX_UNSEEN_SCORE))
         if points or soft:
             self._keep(claim)
         return self._judge(claim.sent_ns)
@@ -134,16 +134,16 @@ class StationHistory:
 
     def _judge(self, now_ns: int) -> bool:
         if self.since_ns is None:
-            if self.score < ON:
-                if self.score < OFF / 10.0:
+            if self.score < SUSPECTED_FROM:
+                if self.score < CLEARED_BELOW / 10.0:
                     self.noted.clear()
                 return False
             self.since_ns = now_ns
-        elif self.score < OFF:
+        elif self.score < CLEARED_BELOW:
             self.since_ns = self.reported_ns = None
             self.noted.clear()
             return False
-        if self.reported_ns is not None and now_ns - self.reported_ns < REPEAT_NS:
+        if self.reported_ns is not None and now_ns - self.reported_ns < REPEAT_REPORT_NS:
             return False
         self.is_news, self.reported_ns = self.reported_ns is None, now_ns
         return True

@@ -1,6 +1,6 @@
-"""What the map knows of places: roads and their directions, roadside units, the Eye's view.
+"""Facts of a map by position: roads and their directions, roadside units, the Eye's view.
 
-A question is answered once for each cell of 4 cm and remembered: cars come by again.
+The result for each cell of 4 cm is cached: cars come by again.
 """
 
 import math
@@ -15,13 +15,13 @@ from scm.maps.route import Roads
 from scm.records.city_map import Camera, CityMap, Point
 from scm.v2x.etsi.convert import roadside_station
 
-CELL_M = 0.04
-STEP = 4
-BUCKET_M = 0.5
-FAR_M = 1.0
-ALONGSIDE_M = 0.05
-VIEW_SHARE = 0.85
-WIDEST_RAD = math.radians(60.0)
+CELL_M = 0.04  # answers are cached for
+POINT_STEP = 4  # every fourth point of a lane: 4 cm
+BUCKET_M = 0.5  # in which points of lanes are searched
+MAX_OFF_ROAD_M = 1.0  # farther off the road makes no difference
+SAME_LANE_M = 0.05  # other lanes as near as that count too
+VIEW_SHARE = 0.85  # of a camera's picture, in which a tag is fully visible
+MAX_VIEW_RAD = math.radians(60.0)  # from a fisheye's axis
 
 Sees = Callable[[float, float], bool]
 Row = tuple[float, float, float, float]
@@ -51,7 +51,7 @@ class Ground:
         self.has_roads = bool(city_map.lanes)
         self._buckets: dict[tuple[int, int], list[Row]] = defaultdict(list)
         for lane in roads.lanes.values():
-            rows = np.column_stack([lane.points, lane.yaw])[::STEP]
+            rows = np.column_stack([lane.points, lane.yaw])[::POINT_STEP]
             for x, y, yaw in rows.tolist():
                 row = (x, y, wrap_angle(yaw), lane.width_m / 2.0)
                 self._buckets[_cell(x, y, BUCKET_M)].append(row)
@@ -63,7 +63,7 @@ class Ground:
         self.sees: Sees = sees or (lambda x, y: any(view(x, y) for view in views))
 
     def off_road_m(self, x: float, y: float) -> float:
-        """Return how far a point lies beside the nearest lane or paved area, at most `FAR_M`."""
+        """Return how far a point is off the road [m], `MAX_OFF_ROAD_M` at most."""
         return self._at(x, y)[0]
 
     def ways_at(self, x: float, y: float) -> tuple[float, ...]:
@@ -91,12 +91,12 @@ class Ground:
         for buckets in (1, 2):
             rows = self._rows(x, y, buckets)
             beside = [(math.hypot(x - row[0], y - row[1]) - row[3], row[2]) for row in rows]
-            away = min((off for off, _ in beside), default=FAR_M)
-            near = max(away, 0.0) + ALONGSIDE_M
+            away = min((off for off, _ in beside), default=MAX_OFF_ROAD_M)
+            near = max(away, 0.0) + SAME_LANE_M
             if near < buckets * BUCKET_M - self._half_m:
                 break  # all other lanes are farther
         ways = tuple(dict.fromkeys(round(yaw, 1) for off, yaw in beside if off <= near))
-        return min(FAR_M, max(0.0, away)), ways
+        return min(MAX_OFF_ROAD_M, max(0.0, away)), ways
 
     def _rows(self, x: float, y: float, buckets: int) -> list[Row]:
         """Return the points of lanes in a point's bucket and so many around it each way."""
@@ -137,7 +137,7 @@ def _view(camera: Camera) -> Sees:
 
     def reach(size_px: int, focal_px: float) -> float:
         half = size_px / 2.0 / focal_px
-        slope = math.tan(min(half, WIDEST_RAD)) if camera.lens == "fisheye" else half
+        slope = math.tan(min(half, MAX_VIEW_RAD)) if camera.lens == "fisheye" else half
         return VIEW_SHARE * camera.z_m * slope
 
     along, across = reach(camera.width_px, camera.fx_px), reach(camera.height_px, camera.fy_px)

@@ -2,24 +2,24 @@
 
     p' = p + v dt, v' = v; jerk of the driver as white noise of acceleration q [m^2/s^3]
 
-x and y share one covariance (a, b; b, c), because a claim is as unsure along x as along y.
+x and y share one covariance (a, b; b, c), because a claim has equal variance in both.
 A claim gives position and velocity (speed along yaw).
 """
 
 import math
 
-ACCEL_PSD, HARD_PSD = 0.08, 0.9
+ACCEL_PSD, HARD_PSD = 0.08, 0.9  # q of a driver, and of driving by hand [m^2/s^3]
 
 
 class Kalman:
     """One car's filter; begins at its first claim.
 
     Attributes:
-        moved_m: How far the last claim lay from the forecast.
+        moved_m: How far the last claim was from the prediction.
         moved_mps: Likewise its velocity.
-        position_std: Of that forecast and claim together, one axis [m]; `velocity_std` likewise.
-        is_warm: Whether there was a forecast.
-        has_begun: Whether it has a claim to go on from.
+        position_std: Of that prediction and claim together, one axis [m]; `velocity_std` likewise.
+        is_warm: Whether there was a prediction.
+        has_begun: Whether it has a state.
     """
 
     __slots__ = (
@@ -41,14 +41,14 @@ class Kalman:
         self.has_begun = True
 
     def stop(self) -> None:
-        """Forget the car: a claim without heading or speed leaves nothing to go on from."""
+        """Drop the state, after a claim without heading or speed."""
         self.is_warm = self.has_begun = False
 
     def update(
         self, dt: float, x: float, y: float, vx: float, vy: float, own_m: float, own_mps: float,
         psd: float = ACCEL_PSD,
     ) -> None:  # fmt: skip
-        """Forecast to a claim dt seconds on, note how far it lies off, and take it in."""
+        """Predict to a claim dt seconds later, store the innovation, and update."""
         q = psd * dt
         a = self._a + dt * (2.0 * self._b + dt * self._c) + q * dt * dt / 3.0
         b = self._b + dt * self._c + q * dt / 2.0

@@ -2,12 +2,12 @@
 
 one number   p = erfc(d / sqrt 2)    d = max(0, |r| - tolerance) / sigma
 a place      p = exp(-d^2 / 2)       the chi-squared tail of two dimensions
-two cars     p of the depth by which their outlines lie in each other
+two cars     p of the depth by which their outlines overlap
 """
 
 import math
 
-LEAST = 1e-9
+LEAST = 1e-9  # plausibility; sure enough, and its logarithm is finite
 _ROOT2 = math.sqrt(2.0)
 
 
@@ -28,7 +28,7 @@ def at_most(value: float, most: float, sigma: float) -> float:
 
 
 def of_place(away_m: float, tolerance_m: float, sigma_m: float) -> float:
-    """Return the plausibility of lying so far from where one should be, in any direction."""
+    """Return the plausibility of a distance from the expected position."""
     beyond = away_m - tolerance_m
     if beyond <= 0.0:
         return 1.0
@@ -40,7 +40,7 @@ Box = tuple[float, float, float, float, float]
 
 
 def overlap_m(one: Box, other: Box) -> float:
-    """Return how deep two rectangles lie in each other, the least way to part them; 0: apart."""
+    """Return how deep two rectangles overlap, the shortest way to separate them; 0: apart."""
     ax, ay, ayaw, alength, awidth = one
     bx, by, byaw, blength, bwidth = other
     dx, dy = bx - ax, by - ay

@@ -1,4 +1,4 @@
-"""What a car can do and how well it knows itself, in metres of the table.
+"""The limits of a car's motion and of its own measurements, in metres of the floor.
 
 Those of VeReMi NextGen hold after division by the city's scale of 14, speed by the car's own
 limit instead: acceleration 5.4 m/s^2 and deceleration 5.0 m/s^2 would be 0.39 and 0.36 m/s^2
@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-NIGEL_MPS = 0.267
-HEADING_RAD = math.radians(76.0)
-REAPPEARS_S = 4.7
+NIGEL_MPS = 0.267  # top speed
+HEADING_RAD = math.radians(76.0)  # between motion and heading
+REAPPEARS_S = 4.7  # after a longer silence a station is new
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class Limits:
         start_mps2: Gain of speed over a tenth of a second at full throttle; `stop_mps2` likewise
             of loss at none, which brakes: a driver does neither, a guard does.
         interval_s: Least time between two CAMs.
-        own_m: Standard deviation of a position whose CAM does not tell it; likewise the others.
-        most_own_m: What a CAM may claim at most: who knows himself worse is judged by this.
+        own_m: Standard deviation of a position whose CAM has none; likewise the others.
+        most_own_m: The greatest standard deviation that a CAM may claim; likewise the others.
         front_share: Of a car's length, what lies before its rear axle.
         has_tag: Whether its car file has a tag on its roof.
     """
@@ -49,13 +49,13 @@ class Limits:
 
     @cached_property
     def hard(self) -> "Limits":
-        """Return the same for who brakes with full throttle in reverse, as hands do."""
+        """The same for braking with full throttle in reverse, as drivers by hand do."""
         most = self.start_mps2 + self.stop_mps2
         return replace(self, accel_mps2=most, decel_mps2=most, start_mps2=most, stop_mps2=most)
 
 
 def limits_of(speed_mps: float, front_share: float, *, has_tag: bool) -> Limits:
-    """Return the limits of a car by its top speed: who is faster speeds up and brakes harder."""
+    """Return the limits of a car by its top speed: a faster one accelerates and brakes harder."""
     nigel = Limits()
     times = max(1.0, speed_mps / NIGEL_MPS)
     return replace(

@@ -16,7 +16,7 @@ from scm.records.traffic import EvidencePose
 from scm.runtime.part import BasePart, Subscription
 from scm.traffic.car_facts import facts_of, outline_of
 from scm.traffic.misbehaviour.check import Sender
-from scm.traffic.misbehaviour.detector import EYE_WORKS_NS, CheckedClaim, Detector
+from scm.traffic.misbehaviour.detector import MAX_EYE_SILENCE_NS, CheckedClaim, Detector
 from scm.traffic.misbehaviour.ground import Ground, Sees
 from scm.traffic.misbehaviour.limits import Limits, limits_of
 from scm.v2x.etsi.convert import roadside_station
@@ -38,13 +38,12 @@ _log = logging.getLogger(__name__)
 NAME = "misbehaviour"
 PERIOD_NS = 50 * NS_PER_MS
 CAR = "nigel"
-FASTEST_CAR_MPS = 7.0
-MAX_SCORES = 200
-"""Stations in a list of scores: those that most is held against."""
+FASTEST_CAR_MPS = 7.0  # of a car file without top speed: a 1:10 racing car's
+MAX_SCORES = 200  # stations in a list of scores, the highest first
 
 
 class MisbehaviourPart(BasePart):
-    """Judges what is said on the air of one city; see `scm.runtime.part.Part`."""
+    """Checks the CAMs of one city; see `scm.runtime.part.Part`."""
 
     role = "part"
     period_ns = PERIOD_NS
@@ -60,7 +59,7 @@ class MisbehaviourPart(BasePart):
         self._due_ns = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
-        """Judge what arrived; report at once, tell scores once a second."""
+        """Check what arrived; report at once, publish scores once a second."""
         outbox: list[Outgoing] = []
         detector = self.detector
         for item in inbox:
@@ -117,7 +116,7 @@ class MisbehaviourPart(BasePart):
             for who, history in histories[:MAX_SCORES]
         )
         eye_ns = self.detector.eye_ns
-        witness = eye_ns is not None and now_ns - eye_ns <= EYE_WORKS_NS
+        witness = eye_ns is not None and now_ns - eye_ns <= MAX_EYE_SILENCE_NS
         detail = f"{len(histories)} stations, {suspected} suspected"
         return [
             *self._report_unseen(now_ns),
@@ -126,7 +125,7 @@ class MisbehaviourPart(BasePart):
         ]
 
     def _report_unseen(self, now_ns: int) -> list[Message]:
-        """Report once for each car that the Eye cannot see its tag; that is no accusation."""
+        """Report once each car whose tag the Eye cannot see; that is no suspicion."""
         unseen = {one.station for one in self.detector.histories.values() if one.is_tag_unseen}
         news = [
             CityEvent(
@@ -146,7 +145,7 @@ class MisbehaviourPart(BasePart):
 def limits_by_car(car: str) -> Limits:
     """Return the limits of a car file by its name; of one that is not here, a Nigel's.
 
-    A file that tells no top speed is given `FASTEST_CAR_MPS`, that of a 1:10 racing car.
+    A file without a top speed gets `FASTEST_CAR_MPS`.
     """
     try:
         facts, (front_share, has_tag) = facts_of(car), outline_of(car)

@@ -1,17 +1,17 @@
-"""The signal monitor of one junction: sees what is shown, knows a card, latches the first fault.
+"""The signal monitor of one junction: checks shown colours and latches the first fault.
 
     conflict, dual, dark, card   on 2 samples, the second within 666 ms of the first: latched after
                                  0.1 s at 10 Hz; one sample alone may be a broken message
     short_green, short_yellow, short_clearance, skipped_yellow, sequence    at once
-    stale                        no new sample for more than 500 ms; the same again is none
+    stale                        no new sample for more than 500 ms; a repeated one is not new
     overload                     the same, while the monitor itself waited for a processor
     clock_jump                   time stamps that go back, or run ahead by more than 500 ms
 
-`dual` is two colours for one group, `dark` none or dark, `table` a group that is not on the card. A
-span is judged by the longest it can have been: from the sample before it began to the sample that
-ended it. So lost samples excuse, they never accuse. A fault stays until `reset`, whatever follows.
-Two end by themselves: the first silence, of a controller that was never seen; and an overload,
-after 5 s without another gap. A silence of 5 s is `stale` however busy the computer is.
+`dual` is two colours for one group, `dark` none or dark, `card` a group missing from the conflict
+table. Each duration is the longest it can have been: from the sample before it began to the sample
+that ended it, so lost samples never cause a fault. A fault stays until `reset`. Two end by
+themselves: the first silence of a controller that was never seen, and an overload after 5 s
+without another gap. A silence of 5 s is `stale` however busy the computer is.
 
 Pattern: conflict monitors of signal cabinets (NEMA TS 2), with times for this city: real ones must
 ignore 200 ms and must act at 450 ms because relays bounce; messages do not.
@@ -26,14 +26,14 @@ from scm.records.signals import Colour
 from scm.traffic.monitor.conflict_table import ConflictTable
 from scm.v2x.messages.spat import Spat
 
-STALE_NS = 500 * NS_PER_MS
-GRACE_NS = 5_000 * NS_PER_MS
-FORGET_NS = 666 * NS_PER_MS
-JUMP_NS = 500 * NS_PER_MS
-ASLEEP_NS = 300 * NS_PER_MS
-GIVE_UP_NS = 5_000 * NS_PER_MS
-REGULAR_NS = 5_000 * NS_PER_MS
-WAITED_SHARE = 0.1  # of a silence; of a computer with time to spare it is below 0.01
+MAX_SILENCE_NS = 500 * NS_PER_MS  # five samples of a controller in a row
+MAX_FIRST_SILENCE_NS = 5_000 * NS_PER_MS  # a controller that was never seen may still be starting
+CONFIRM_WITHIN_NS = 666 * NS_PER_MS  # one sample alone may be a broken message
+MAX_CLOCK_LEAD_NS = 500 * NS_PER_MS  # further ahead, the controller's clock has jumped
+MAX_TICK_GAP_NS = 300 * NS_PER_MS  # a monitor that slept for longer cannot judge silence
+MAX_OVERLOAD_SILENCE_NS = 5_000 * NS_PER_MS  # no overload excuses a longer silence
+OVERLOAD_CLEARS_NS = 5_000 * NS_PER_MS  # without a gap
+MIN_WAIT_SHARE = 0.1  # of a silence, to be an overload; an idle computer waits for less than 0.01
 OVERLOAD = "overload"
 
 _GOING = ("green", "yellow")
@@ -47,7 +47,7 @@ _MAY_FOLLOW: dict[Colour, tuple[Colour, ...]] = {
 
 @dataclass(slots=True)
 class _Group:
-    """What was seen of one group.
+    """What the monitor saw of one group.
 
     Attributes:
         seen_ns: Stamp of the last sample with this colour.
@@ -103,12 +103,12 @@ class Monitor:
 
     def tick(self, now_ns: int) -> None:
         """Check whether the controller has fallen silent."""
-        if now_ns - self._ticked_ns > ASLEEP_NS:
+        if now_ns - self._ticked_ns > MAX_TICK_GAP_NS:
             # Who slept cannot call others silent: its own link may just be coming back.
             self._received_ns = max(self._received_ns, now_ns)
         self._ticked_ns = now_ns
         silent_ns = now_ns - self._received_ns
-        if silent_ns > (GRACE_NS if self._is_new else STALE_NS):
+        if silent_ns > (MAX_FIRST_SILENCE_NS if self._is_new else MAX_SILENCE_NS):
             self._regular_ns = now_ns
             self._judge_silence(silent_ns, now_ns)
 
@@ -116,8 +116,8 @@ class Monitor:
         """Distinguish a frozen controller from an overloaded computer."""
         detail = f"no signal phase for {silent_ns // NS_PER_MS} ms"
         waited_ns = self._waited_ns() - self._waited_before_ns
-        is_busy = self.fault == OVERLOAD or waited_ns >= WAITED_SHARE * silent_ns
-        if silent_ns > GIVE_UP_NS or not is_busy:
+        is_busy = self.fault == OVERLOAD or waited_ns >= MIN_WAIT_SHARE * silent_ns
+        if silent_ns > MAX_OVERLOAD_SILENCE_NS or not is_busy:
             self._latch("stale", detail, now_ns)
         elif self.fault is None:
             why = f"the monitor itself waited {waited_ns // NS_PER_MS} ms for a processor"
@@ -129,7 +129,7 @@ class Monitor:
             return  # nothing new: an output that hangs says the same for ever
         self._received_ns = max(self._received_ns, arrived_ns)
         self._waited_before_ns = self._waited_ns()
-        is_over = self.fault == OVERLOAD and arrived_ns - self._regular_ns >= REGULAR_NS
+        is_over = self.fault == OVERLOAD and arrived_ns - self._regular_ns >= OVERLOAD_CLEARS_NS
         if is_over or (self._is_new and self.fault == "stale"):
             self.fault, self.detail, self.since_ns = None, "", arrived_ns
         self._is_new = False
@@ -147,7 +147,7 @@ class Monitor:
             back_ms = (self._stamp_ns - stamp_ns) // NS_PER_MS
             self._latch("clock_jump", f"time stamps went back by {back_ms} ms", arrived_ns)
         ahead_ns = stamp_ns - arrived_ns
-        if self._ahead_ns and ahead_ns - max(self._ahead_ns) > JUMP_NS:
+        if self._ahead_ns and ahead_ns - max(self._ahead_ns) > MAX_CLOCK_LEAD_NS:
             jump_ms = (ahead_ns - max(self._ahead_ns)) // NS_PER_MS
             self._latch("clock_jump", f"time stamps ran ahead by {jump_ms} ms", arrived_ns)
         self._ahead_ns.append(ahead_ns)
@@ -157,7 +157,7 @@ class Monitor:
         found = self._wrong_in(spat)
         for fault, detail in found.items():
             before_ns = self._suspects.get(fault)
-            if before_ns is not None and arrived_ns - before_ns <= FORGET_NS:
+            if before_ns is not None and arrived_ns - before_ns <= CONFIRM_WITHIN_NS:
                 self._latch(fault, detail, arrived_ns)
             self._suspects[fault] = arrived_ns
 

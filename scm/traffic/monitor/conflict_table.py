@@ -25,12 +25,12 @@ from scm.records.city_map import CityMap, Conflict, Group, Junction, Lane, Segme
 
 NIGEL_TOP_MPS = 0.267
 NIGEL_SLOW_MPS = 0.217
-NIGEL_BRAKES_MPS2 = 0.5
-NIGEL_STARTS_MPS2 = 0.5
+NIGEL_DECEL_MPS2 = 0.5
+NIGEL_ACCEL_MPS2 = 0.5
 NIGEL_LENGTH_M = 0.30
-REACTS_IN_S = 0.3
+REACTION_S = 0.3
 
-_STEP_M = 0.005
+_STEP_M = 0.005  # between two places of a movement, far less than a lane is wide
 
 # A movement: initial heading, the segments of its lane, and where its conflict begins and ends [m].
 _Path = tuple[float, tuple[Segment, ...], float, float]
@@ -46,7 +46,7 @@ class GroupLimits(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class ConflictTable(msgspec.Struct, kw_only=True, frozen=True):
-    """Everything the monitor of one junction knows beforehand; pairs are sorted names."""
+    """All that the monitor of one junction knows beforehand; pairs are sorted names."""
 
     junction: str
     groups: tuple[GroupLimits, ...]
@@ -81,12 +81,12 @@ def _group(group: Group, lanes: dict[str, Lane], lines: list[StopLine]) -> Group
         (_to_end_m(line, move, lanes) for line in own_lines for move in moves),
         default=max(move.to_m - move.from_m for move in moves),
     )
-    braking_s = NIGEL_TOP_MPS / NIGEL_BRAKES_MPS2
-    starting_s = slow_mps / (2.0 * NIGEL_STARTS_MPS2) + NIGEL_LENGTH_M / slow_mps
+    braking_s = NIGEL_TOP_MPS / NIGEL_DECEL_MPS2
+    starting_s = slow_mps / (2.0 * NIGEL_ACCEL_MPS2) + NIGEL_LENGTH_M / slow_mps
     return GroupLimits(
         name=group.name,
-        green_ns=int((REACTS_IN_S + starting_s) * 1e9),
-        yellow_ns=int((REACTS_IN_S + braking_s / 2.0) * 1e9),
+        green_ns=int((REACTION_S + starting_s) * 1e9),
+        yellow_ns=int((REACTION_S + braking_s / 2.0) * 1e9),
         clearance_ns=int((farthest_m + NIGEL_LENGTH_M) / slow_mps * 1e9),
     )
 

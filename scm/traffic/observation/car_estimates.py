@@ -1,11 +1,10 @@
-"""What is believed of each car: the overhead cameras' track, else what the car says of itself.
+"""The estimate of each car: the overhead cameras' track, else the car's own report.
 
-    eye    a track that is not stale; its covariance says how sure it is
-    self   the car's own report, for cars that no camera has seen for a second; taken to be good
-           to 1 cm and 2 cm/s, one standard deviation
+    eye    a track that is not stale, with its covariance
+    self   the car's own report, for cars that no camera has seen for a second, with standard
+           deviations of 1 cm and 2 cm/s
 
-World truth is never looked at. A tag that belongs to nobody is a car of its own, unless a car with
-a name is believed to be there.
+World truth is not an input. An unknown tag is a car of its own, unless a named car is there.
 """
 
 import math
@@ -15,15 +14,15 @@ from scm.clock import NS_PER_S
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.vehicle_state import VehicleState
 
-FRESH_NS = NS_PER_S
-SELF_STD_M, SELF_STD_MPS = 0.01, 0.02
-NOBODY = "tag-"
-FARTHEST_M, FASTEST_MPS, MOST_RAD = 10_000.0, 100.0, 1_000.0
-SAME_M = 0.2
+MAX_AGE_NS = NS_PER_S  # of an estimate, on our clock
+SELF_STD_M, SELF_STD_MPS = 0.01, 0.02  # assumed of a car's own report
+UNKNOWN_TAG = "tag-"  # the Eye's name of a tag that no car has
+MAX_POSITION_M, MAX_SPEED_MPS, MAX_YAW_RAD = 10_000.0, 100.0, 1_000.0  # beyond: a broken message
+SAME_CAR_M = 0.2  # less than the distance of two cars side by side
 
 
 class CarEstimate(NamedTuple):
-    """A car's rear axle, map frame; speed along the body, + = forward; doubts are 1 sigma."""
+    """A car's rear axle, map frame; speed along the body, + = forward."""
 
     vehicle: str
     t_ns: int
@@ -37,7 +36,7 @@ class CarEstimate(NamedTuple):
 
 
 class CarEstimates:
-    """The newest of every car, by who told it."""
+    """The newest estimate of every car, by source."""
 
     def __init__(self) -> None:
         self._eye: dict[str, tuple[CarEstimate, int]] = {}
@@ -55,55 +54,41 @@ class CarEstimates:
             table[message.vehicle] = (estimate, arrived_ns)
 
     def now(self, now_ns: int) -> list[CarEstimate]:
-        """Return what is believed of each car that was told of within the last second."""
+        """Return the estimate of each car that is not older than a second."""
         for table in (self._eye, self._self):
-            for name in [n for n, (_, at_ns) in table.items() if now_ns - at_ns > FRESH_NS]:
+            for name in [n for n, (_, at_ns) in table.items() if now_ns - at_ns > MAX_AGE_NS]:
                 del table[name]
         newest = {**self._self, **self._eye}
         found = [estimate for estimate, _ in newest.values()]
-        named = [estimate for estimate in found if not estimate.vehicle.startswith(NOBODY)]
+        named = [estimate for estimate in found if not estimate.vehicle.startswith(UNKNOWN_TAG)]
         return named + [
             estimate
             for estimate in found
-            if estimate.vehicle.startswith(NOBODY)
-            and all(math.dist((estimate.x, estimate.y), (one.x, one.y)) > SAME_M for one in named)
+            if estimate.vehicle.startswith(UNKNOWN_TAG)
+            and all(
+                math.dist((estimate.x, estimate.y), (one.x, one.y)) > SAME_CAR_M for one in named
+            )
         ]
 
 
 def _can_be(estimate: CarEstimate) -> bool:
     return (
-        abs(estimate.x) <= FARTHEST_M
-        and abs(estimate.y) <= FARTHEST_M
-        and estimate.std_m <= FARTHEST_M
-        and max(abs(estimate.speed), estimate.std_mps) <= FASTEST_MPS
-        and abs(estimate.yaw) <= MOST_RAD
+        abs(estimate.x) <= MAX_POSITION_M
+        and abs(estimate.y) <= MAX_POSITION_M
+        and estimate.std_m <= MAX_POSITION_M
+        and max(abs(estimate.speed), estimate.std_mps) <= MAX_SPEED_MPS
+        and abs(estimate.yaw) <= MAX_YAW_RAD
     )
 
 
 def _of_track(track: EyeTrack) -> CarEstimate:
     covariance = track.covariance
-    return CarEstimate(
-        track.vehicle,
-        track.t_ns,
-        track.x_m,
-        track.y_m,
-        track.yaw_rad,
-        track.speed_mps,
-        math.sqrt(max(0.0, covariance[0][0], covariance[1][1])),
-        math.sqrt(max(0.0, covariance[3][3])),
-        "eye",
-    )
+    std_m = math.sqrt(max(0.0, covariance[0][0], covariance[1][1]))
+    std_mps = math.sqrt(max(0.0, covariance[3][3]))
+    motion = track.x_m, track.y_m, track.yaw_rad, track.speed_mps
+    return CarEstimate(track.vehicle, track.t_ns, *motion, std_m, std_mps, "eye")
 
 
 def _of_state(state: VehicleState) -> CarEstimate:
-    return CarEstimate(
-        state.vehicle,
-        state.t_ns,
-        state.x_m,
-        state.y_m,
-        state.yaw_rad,
-        state.speed_mps,
-        SELF_STD_M,
-        SELF_STD_MPS,
-        "self",
-    )
+    motion = state.x_m, state.y_m, state.yaw_rad, state.speed_mps
+    return CarEstimate(state.vehicle, state.t_ns, *motion, SELF_STD_M, SELF_STD_MPS, "self")

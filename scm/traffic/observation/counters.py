@@ -14,7 +14,7 @@ A passage counts once: a car must have been before the place, or have come from 
 
 import itertools
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import fmean
 
@@ -23,19 +23,21 @@ from scm.maps.route import OnLane, Roads
 from scm.records.traffic import ApproachCount, LaneCount
 from scm.traffic.observation.car_estimates import CarEstimate
 from scm.traffic.observation.lane_tracking import Followed, Lines
-from scm.traffic.observation.service_level import level_of, share_below
-from scm.traffic.signals.sightings import NIGEL_FRONT_M
+from scm.traffic.signals.detectors import NIGEL_FRONT_M
 from scm.v2x.etsi.convert import ASSUMED_LENGTH_M
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.traffic_counts import TrafficCounts
 
-WINDOW_NS = 900 * NS_PER_S
-AGAIN_NS = 4 * NS_PER_S
-ARMED_M = 0.02
+WINDOW_NS = 900 * NS_PER_S  # of all counts; a quarter of an hour is usual
+MIN_PASSAGE_GAP_NS = 4 * NS_PER_S  # of one car on one lane: noise at the line is no passage
+ARMED_BEFORE_M = 0.02  # so far before the line a car must have been, beyond the noise
 STANDS_MPS, MOVES_MPS = 0.03, 0.10
-LEAVES_QUEUE_S = 8.0
-LEAST_HEADWAYS = 5
+MAX_QUEUE_HEADWAY_S = 8.0  # a car that comes later did not leave the queue with the one before
+MIN_HEADWAYS = 5  # fewer give no mean
 SAMPLE_NS = NS_PER_S
+SIGNAL_DELAY_S = (10.0, 20.0, 35.0, 55.0, 80.0)  # limits of A to E with signals, HCM
+SIGN_DELAY_S = (10.0, 15.0, 25.0, 35.0, 50.0)  # and without
+LEVELS = "ABCDEF"
 
 
 @dataclass(slots=True)
@@ -117,7 +119,7 @@ class Counters:
                     log.greens.append((now_ns, group.colour == "green"))
         for log in self._logs.values():
             log.forget(now_ns - WINDOW_NS)
-        old = now_ns - AGAIN_NS
+        old = now_ns - MIN_PASSAGE_GAP_NS
         self._last = {key: at for key, at in self._last.items() if at > old}
 
     def counts(self, now_ns: int) -> TrafficCounts:
@@ -181,12 +183,12 @@ class Counters:
         front = self._front(place)
         before_m, before_ns = visit.front_m, visit.t_ns
         visit.front_m, visit.t_ns = front, estimate.t_ns
-        if front < -ARMED_M:
+        if front < -ARMED_BEFORE_M:
             visit.armed = True
         if front < 0.0 or not visit.armed or visit.passed_ns is not None:
             return
         key = (estimate.vehicle, visit.lane)
-        if estimate.t_ns - self._last.get(key, -AGAIN_NS) < AGAIN_NS:
+        if estimate.t_ns - self._last.get(key, -MIN_PASSAGE_GAP_NS) < MIN_PASSAGE_GAP_NS:
             return
         share = -before_m / (front - before_m) if before_m < 0.0 <= front else 1.0
         visit.passed_ns = before_ns + round(share * (estimate.t_ns - before_ns))
@@ -258,6 +260,26 @@ def _saturation_headway_s(log: _Log) -> float | None:
     gaps = [
         seconds(after[0] - before[0])
         for before, after in itertools.pairwise(rows)
-        if before[2] and after[2] and seconds(after[0] - before[0]) < LEAVES_QUEUE_S
+        if before[2] and after[2] and seconds(after[0] - before[0]) < MAX_QUEUE_HEADWAY_S
     ]
-    return fmean(gaps) if len(gaps) >= LEAST_HEADWAYS else None
+    return fmean(gaps) if len(gaps) >= MIN_HEADWAYS else None
+
+
+def level_of(delay_s: float, *, signal: bool, saturation: float | None = None) -> str:
+    """Return the level of service of a mean control delay; over saturation it is `F`.
+
+    The limits are those of the Highway Capacity Manual for full-size junctions, and time is not
+    scaled: here they only compare approaches with each other.
+    """
+    if saturation is not None and saturation > 1.0:
+        return LEVELS[-1]
+    limits = SIGNAL_DELAY_S if signal else SIGN_DELAY_S
+    return LEVELS[sum(1 for limit in limits if delay_s > limit)]
+
+
+def share_below(samples: Sequence[int], share: float) -> int:
+    """Return the least value that this share of the samples does not exceed; 0 without any."""
+    if not samples:
+        return 0
+    ordered = sorted(samples)
+    return ordered[min(len(ordered) - 1, max(0, -int(-share * len(ordered) // 1) - 1))]

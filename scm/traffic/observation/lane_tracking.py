@@ -8,11 +8,11 @@ from scm.maps.route import OnLane, Roads
 from scm.maps.signs import precedence_at
 from scm.traffic.observation.car_estimates import CarEstimate
 
-SAME_WAY_RAD = math.radians(60.0)
-NEAR_M = 0.06
-STAYS_M = 0.02
-ROOM_M = 0.03
-END_M = 0.005
+MAX_HEADING_ERROR_RAD = math.radians(60.0)  # to the lane's direction
+MAX_LATERAL_M = 0.06  # beside the middle a car is plainly still on its lane
+HYSTERESIS_M = 0.02  # another lane must be nearer by this
+LANE_MARGIN_M = 0.03  # outside of a lane's edge still counts as on it
+LANE_END_M = 0.005  # from an end a projection may be the end itself
 
 
 class Lines(NamedTuple):
@@ -63,10 +63,10 @@ class Follower:
         """Return the place on the same lane if it is plainly still there."""
         lane = self._roads.lanes[known.place.lane]
         s, lateral = lane.project(estimate.x, estimate.y, known.place.s)
-        # beyond an end `project` answers the end itself, give or take the last digit
-        if not END_M < s < lane.length_m - END_M or abs(lateral) > NEAR_M:
+        # Beyond an end `project` returns the end itself, but for rounding.
+        if not LANE_END_M < s < lane.length_m - LANE_END_M or abs(lateral) > MAX_LATERAL_M:
             return None
-        if abs(wrap_angle(lane.yaw_at(s) - estimate.yaw)) > SAME_WAY_RAD:
+        if abs(wrap_angle(lane.yaw_at(s) - estimate.yaw)) > MAX_HEADING_ERROR_RAD:
             return None
         return Followed(OnLane(known.place.lane, s, lateral), known.before)
 
@@ -76,7 +76,7 @@ class Follower:
         if known is not None:
             for name in self._reached(known):
                 away, place = self._measure(name, estimate)
-                away -= STAYS_M if name == known.place.lane else 0.0
+                away -= HYSTERESIS_M if name == known.place.lane else 0.0
                 if place is not None and (best is None or away < best[0]):
                     best = away, place
         if best is None:
@@ -104,12 +104,12 @@ class Follower:
         s, lateral = lane.project(estimate.x, estimate.y)
         foot = lane.at(s)
         away = math.hypot(estimate.x - foot.x, estimate.y - foot.y)
-        same_way = abs(wrap_angle(foot.yaw - estimate.yaw)) <= SAME_WAY_RAD
+        same_way = abs(wrap_angle(foot.yaw - estimate.yaw)) <= MAX_HEADING_ERROR_RAD
         is_there = same_way and away <= self._room(name)
         return away, OnLane(name, s, lateral) if is_there else None
 
     def _room(self, lane: str) -> float:
-        return self._roads.definition(lane).width_m / 2.0 + ROOM_M
+        return self._roads.definition(lane).width_m / 2.0 + LANE_MARGIN_M
 
 
 def rules_of(roads: Roads) -> dict[str, Lines]:

@@ -1,7 +1,7 @@
-"""The observer part: counts traffic and finds violations, from what cameras, cars and signals tell.
+"""The observer part: counts traffic and finds violations, from cameras, cars' reports and signals.
 
-World truth is no input: the Eye's tracks come first, a car's own report where no camera sees it. It
-tells counts every five seconds and each violation once, also as a line of the city's event log.
+World truth is not an input: the Eye's tracks come first, a car's own report where no camera sees
+it. Counts are published every five seconds, each violation once and also as a city event.
 """
 
 from collections.abc import Sequence

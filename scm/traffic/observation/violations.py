@@ -1,15 +1,15 @@
-"""Broken rules, found in believed poses: red light, stop line, speed, wrong way, collision.
+"""Traffic violations, found in estimated poses: red light, stop line, speed, wrong way, collision.
 
     red light   the front passed the line when its group had been red for 0.3 s, and went on 0.20 m
     stop line   it passed the line at red by 0.05 m and stands there; or it passed a stop sign's
                 line and was never slower than 0.05 m/s on the last 0.30 m
     speed       a tenth and 0.02 m/s over the limit, for a second
     wrong way   0.30 m along a lane of the other direction alone, or 0.50 m backwards
-    collision   a contact that the world tells
+    collision   a contact that the world reports
 
-Each limit is passed only by three standard deviations of what is measured, and each violation is
-told once: for a line once a visit, for speed and direction until three good seconds, for a pair of
-cars until three seconds without contact. Noise around a limit says nothing.
+A limit counts as passed by three standard deviations of the estimate, so noise around it causes no
+report. Each violation is reported once: for a line once a visit, for speed and direction until it
+has been absent for three seconds, for a pair of cars until three seconds without contact.
 """
 
 import math
@@ -25,27 +25,70 @@ from scm.records.signals import SignalGroup
 from scm.records.traffic import Kind, TrackPoint
 from scm.traffic.observation.car_estimates import CarEstimate
 from scm.traffic.observation.lane_tracking import Followed, Lines
-from scm.traffic.observation.signal_history import Shown, SignalHistory
-from scm.traffic.signals.sightings import NIGEL_FRONT_M
+from scm.traffic.signals.detectors import NIGEL_FRONT_M
 from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.violation import Violation
 
-SIGMAS = 3.0
-GRACE_S = 0.3
-INTO_M, OVER_M = 0.20, 0.05
-STANDS_MPS, RESTS_MPS = 0.02, 0.05
+SIGMAS = 3.0  # by which every limit must be passed
+RED_GRACE_S = 0.3  # after a red began; a car cannot react faster
+DRIVEN_ON_M, BEYOND_LINE_M = 0.20, 0.05  # past a line: drove on, and stands beyond it
+STANDS_MPS, STOPPED_MPS = 0.02, 0.05  # stands beyond a line; has stopped at a sign
 STANDS_NS = NS_PER_S // 2
-REST_M = 0.30
-OVER_SHARE, OVER_MPS = 1.1, 0.02
-LONG_NS = NS_PER_S
-GOOD_NS = 3 * NS_PER_S
-WRONG_M, BACK_M = 0.30, 0.50
-SLOW_MPS = 0.03
-TRACK_POINTS = 50
+STOP_ZONE_M = 0.30  # before a stop sign's line, in which a car must stop
+SPEED_TOLERANCE_RATIO, SPEED_TOLERANCE_MPS = 1.1, 0.02  # above the limit
+MIN_DURATION_NS = NS_PER_S  # of speeding and of wrong way
+CLEARS_NS = 3 * NS_PER_S  # without it, before the same may be reported again
+MIN_WRONG_WAY_M, MIN_REVERSE_M = 0.30, 0.50
+MIN_MOVING_MPS = 0.03  # slower, a direction of travel is noise
+TRACK_POINTS = 50  # of a report: five seconds
+HISTORY_SAMPLES = 40  # of each group: four seconds
+MAX_SIGNAL_AGE_NS = NS_PER_S // 2  # what was shown longer ago proves nothing
+
+
+class Shown(NamedTuple):
+    """What a group showed, and since when that was red."""
+
+    junction: str
+    group: SignalGroup
+    since_ns: int
+
+
+class SignalHistory:
+    """The last seconds of every group."""
+
+    def __init__(self) -> None:
+        self._rows: dict[tuple[str, str], deque[tuple[int, SignalGroup]]] = {}
+
+    def receive(self, spat: Spat) -> None:
+        """Add what a junction shows."""
+        for group in spat.groups:
+            row = self._rows.setdefault((spat.junction, group.group), deque(maxlen=HISTORY_SAMPLES))
+            if row and spat.t_ns < row[-1][0]:
+                row.clear()  # its clock went back: what came before is another run's
+            row.append((spat.t_ns, group))
+
+    def red_at(self, junction: str, group: str, t_ns: int, grace_s: float) -> Shown | None:
+        """Return what a group showed at a time if it had been red for longer than the grace.
+
+        None also if no SPaT came within half a second before.
+        """
+        row = self._rows.get((junction, group), ())
+        shown = next(((at, what) for at, what in reversed(row) if at <= t_ns), None)
+        if shown is None or t_ns - shown[0] > MAX_SIGNAL_AGE_NS or shown[1].colour != "red":
+            return None
+        if t_ns - shown[1].since_ns < grace_s * NS_PER_S:
+            return None
+        return Shown(junction, shown[1], shown[1].since_ns)
+
+    def is_not_red(self, junction: str, group: str) -> bool:
+        """Return whether the newest sample of a group is another colour."""
+        row = self._rows.get((junction, group))
+        return bool(row) and row is not None and row[-1][1].colour != "red"
 
 
 class _Past(NamedTuple):
-    """A car has passed its line at red, and it is not yet clear what it will do."""
+    """A car that has passed its line at red and has neither driven on nor stopped yet."""
 
     t_ns: int
     shown: Shown
@@ -53,7 +96,7 @@ class _Past(NamedTuple):
 
 @dataclass(slots=True)
 class _Lasting:
-    """Something that must last before it counts, and be gone for a while before it may again."""
+    """A condition that counts once it has lasted, and again once it has been absent for a while."""
 
     since_ns: int | None = None
     way_m: float = 0.0
@@ -73,13 +116,13 @@ class _Lasting:
         self.since_ns = None
         if self.good_ns is None:
             self.good_ns = now_ns
-        if now_ns - self.good_ns >= GOOD_NS:
+        if now_ns - self.good_ns >= CLEARS_NS:
             self.reported = False
 
 
 @dataclass(slots=True)
 class _Car:
-    """What is remembered of one car."""
+    """The state of one car."""
 
     track: deque[TrackPoint] = field(default_factory=lambda: deque(maxlen=TRACK_POINTS))
     lane: str = ""
@@ -95,7 +138,7 @@ class _Car:
 
 
 class Judge:
-    """Finds violations; every one that `see` and `hit` return is to be told."""
+    """Finds violations; every one that `see` and `hit` return is to be reported."""
 
     def __init__(self, roads: Roads, lines: Mapping[str, Lines]) -> None:
         self._roads, self._lines = roads, lines
@@ -116,7 +159,7 @@ class Judge:
         return car
 
     def see(self, estimate: CarEstimate, followed: Followed | None) -> list[Violation]:
-        """Judge where a car is now."""
+        """Check where a car is now."""
         car = self._car(estimate.vehicle)
         if car.track and estimate.t_ns <= car.track[-1].t_ns:
             return []
@@ -130,13 +173,13 @@ class Judge:
         return [violation for violation in found if violation is not None]
 
     def hit(self, contact: Contact) -> list[Violation]:
-        """Judge what the world says that a car bumped into."""
+        """Check a contact that the world reports."""
         found = []
         for other in contact.against:
             pair = frozenset((contact.vehicle, other))
             last_ns = self._contacts.get(pair)
             self._contacts[pair] = contact.t_ns
-            if last_ns is None or contact.t_ns - last_ns >= GOOD_NS:
+            if last_ns is None or contact.t_ns - last_ns >= CLEARS_NS:
                 found.append(self._collision(contact, other))
         return found
 
@@ -163,7 +206,7 @@ class Judge:
     def _line(
         self, car: _Car, estimate: CarEstimate, followed: Followed | None
     ) -> Violation | None:
-        """Judge the line of the lane that it is on, or has just left over the junction."""
+        """Check the line of the lane that a car is on, or has just left over the junction."""
         if followed is None:
             car.lane, car.past = "", None
             return None
@@ -180,7 +223,7 @@ class Judge:
             car.lane, car.front_m, car.t_ns = lane, front, estimate.t_ns
             car.past, car.line_reported, car.stands_ns = None, False, None
             car.came_m, car.slowest_mps = front, math.inf
-        if front > -REST_M - NIGEL_FRONT_M:
+        if front > -STOP_ZONE_M - NIGEL_FRONT_M:
             car.slowest_mps = min(car.slowest_mps, abs(estimate.speed))
         if line.group:
             return self._at_signal(car, estimate, line, front)
@@ -200,7 +243,7 @@ class Judge:
         if before_m <= 0.0 < front:
             share = -before_m / (front - before_m)
             at_ns = before_ns + round(share * (estimate.t_ns - before_ns))
-            grace_s = GRACE_S + SIGMAS * estimate.std_m / max(abs(estimate.speed), STANDS_MPS)
+            grace_s = RED_GRACE_S + SIGMAS * estimate.std_m / max(abs(estimate.speed), STANDS_MPS)
             shown = self.signals.red_at(line.junction, line.group, at_ns, grace_s)
             car.past = None if shown is None else _Past(at_ns, shown)
         if front <= 0.0 or car.line_reported:
@@ -211,10 +254,10 @@ class Judge:
     def _past_red(
         self, car: _Car, estimate: CarEstimate, line: Lines, front: float
     ) -> Violation | None:
-        """Judge a car whose front has passed its line at red."""
-        assert car.past is not None  # noqa: S101 asked before
+        """Check a car whose front has passed its line at red."""
+        assert car.past is not None  # noqa: S101 checked by the caller
         sure = SIGMAS * estimate.std_m
-        if front >= INTO_M + sure:
+        if front >= DRIVEN_ON_M + sure:
             car.line_reported = True
             age_s = seconds(car.past.t_ns - car.past.shown.since_ns)
             text = (
@@ -232,7 +275,7 @@ class Judge:
             return None
         if car.stands_ns is None:
             car.stands_ns = estimate.t_ns
-        if front < OVER_M + sure or estimate.t_ns - car.stands_ns < STANDS_NS:
+        if front < BEYOND_LINE_M + sure or estimate.t_ns - car.stands_ns < STANDS_NS:
             return None
         car.line_reported = True
         text = (
@@ -245,11 +288,15 @@ class Judge:
         self, car: _Car, estimate: CarEstimate, line: Lines, front: float
     ) -> Violation | None:
         car.front_m, car.t_ns = front, estimate.t_ns
-        if line.sign != "stop" or car.line_reported or front < INTO_M + SIGMAS * estimate.std_m:
+        if (
+            line.sign != "stop"
+            or car.line_reported
+            or front < DRIVEN_ON_M + SIGMAS * estimate.std_m
+        ):
             return None
         car.line_reported = True
-        beyond = car.slowest_mps - RESTS_MPS
-        came_from_afar = car.came_m < -REST_M
+        beyond = car.slowest_mps - STOPPED_MPS
+        came_from_afar = car.came_m < -STOP_ZONE_M
         if not came_from_afar or beyond <= SIGMAS * estimate.std_mps:
             return None
         text = (
@@ -267,12 +314,12 @@ class Judge:
             car.speed.good(estimate.t_ns)
             return None
         limit = self._limit(followed)
-        over = abs(estimate.speed) - limit * OVER_SHARE - OVER_MPS
+        over = abs(estimate.speed) - limit * SPEED_TOLERANCE_RATIO - SPEED_TOLERANCE_MPS
         if over <= SIGMAS * estimate.std_mps:
             car.speed.good(estimate.t_ns)
             return None
         car.speed.bad(estimate.t_ns, 0.0)
-        if car.speed.reported or car.speed.lasts_ns(estimate.t_ns) < LONG_NS:
+        if car.speed.reported or car.speed.lasts_ns(estimate.t_ns) < MIN_DURATION_NS:
             return None
         car.speed.reported = True
         text = (
@@ -291,17 +338,21 @@ class Judge:
     def _direction(
         self, car: _Car, estimate: CarEstimate, followed: Followed | None, way_m: float
     ) -> Violation | None:
-        lane, needed, how = "", BACK_M, "drives backwards on"
-        if followed is not None and estimate.speed < -SLOW_MPS - SIGMAS * estimate.std_mps:
+        lane, needed, how = "", MIN_REVERSE_M, "drives backwards on"
+        if followed is not None and estimate.speed < -MIN_MOVING_MPS - SIGMAS * estimate.std_mps:
             lane = followed.place.lane
-        elif followed is None and estimate.speed > SLOW_MPS + SIGMAS * estimate.std_mps:
-            lane, needed, how = self._against(estimate), WRONG_M, "drives against the direction of"
+        elif followed is None and estimate.speed > MIN_MOVING_MPS + SIGMAS * estimate.std_mps:
+            lane, needed, how = (
+                self._against(estimate),
+                MIN_WRONG_WAY_M,
+                "drives against the direction of",
+            )
         if not lane:
             car.way.good(estimate.t_ns)
             return None
         car.way.bad(estimate.t_ns, way_m)
         is_sure = car.way.way_m - needed >= SIGMAS * estimate.std_m
-        if car.way.reported or not is_sure or car.way.lasts_ns(estimate.t_ns) < LONG_NS:
+        if car.way.reported or not is_sure or car.way.lasts_ns(estimate.t_ns) < MIN_DURATION_NS:
             return None
         car.way.reported = True
         text = f"{estimate.vehicle} {how} {lane}, for {car.way.way_m:.2f} m so far"

@@ -14,17 +14,19 @@ from scm.errors import PlanError, nearest
 from scm.records.signals import Colour, SignalGroup
 from scm.traffic.signals import kernel, operator_overrides
 from scm.traffic.signals.controller_state import (
+    COLOUR_OF,
+    NEXT_COLOUR,
     NO_OBSERVATIONS,
     Observations,
     Outlook,
     PolicyState,
     ShownColour,
+    ShownColours,
     StepTimes,
 )
 from scm.traffic.signals.forecast import Coming, forecasts, schedule, within
 from scm.traffic.signals.green_wave import Wave
 from scm.traffic.signals.guaranteed_time import (
-    SLACK_NS,
     GuaranteedTime,
     earliest_green,
     end_after,
@@ -32,7 +34,7 @@ from scm.traffic.signals.guaranteed_time import (
     requested_green,
     still_ns,
 )
-from scm.traffic.signals.kernel import Phase, Program
+from scm.traffic.signals.kernel import Program
 from scm.traffic.signals.operator_overrides import NEED_RINGS, Override
 from scm.traffic.signals.plan import FLASH, Timetable, load_timetable, plan_names
 from scm.traffic.signals.policy import (
@@ -50,36 +52,22 @@ from scm.traffic.signals.timing import NIGEL, CarFacts
 from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.spat import Spat
 
-LATE_NS = 3 * STEP_NS
-FORESEE_EVERY_NS = 5 * STEP_NS
-POLICY_FOR_OVERRIDES = "actuated"
-
-_COLOUR: dict[Phase, Colour] = {
-    Phase.RED: "red",
-    Phase.CLEARANCE: "red",
-    Phase.GREEN: "green",
-    Phase.YELLOW: "yellow",
-    Phase.FLASH: "flashing_red",
-}
-_NEXT: dict[Colour, Colour] = {
-    "red": "green",
-    "green": "yellow",
-    "yellow": "red",
-    "flashing_red": "red",
-}
+LATE_STEP_NS = 3 * STEP_NS  # a longer step puts the cycle off
+FORECAST_EVERY_NS = 5 * STEP_NS
+POLICY_FOR_OVERRIDES = "actuated"  # a timetable cannot hold or omit a group
 
 
 class Controller:
-    """The signals of one junction; step it with the time, it never asks for it.
+    """The signals of one junction; the time comes with every step.
 
     Attributes:
-        mode: `start`, `plan`, `flash`, or what a policy says: `adaptive`, `priority`, `preempt`.
+        mode: `start`, `plan`, `flash`, or the policy's: `adaptive`, `priority`, `preempt`.
         policy: In force, also while flashing.
         overrides: Of operators and scripts, in force.
-        priority: What became of each vehicle's request, by its key.
-        failure: Why a policy was given up for fixed time; empty: none was.
+        priority: The status of each vehicle's request, by its key.
+        failure: Why a policy was replaced by fixed time; empty: none was.
         changed: Whether the last step changed a colour.
-        late_steps: How often time came in too large a piece, and the cycle was put off by it.
+        late_steps: How many steps were so late that they put the cycle off.
     """
 
     def __init__(
@@ -94,17 +82,17 @@ class Controller:
         learned: Callable[[Any], Any] | None = None,
         car: CarFacts = NIGEL,
     ) -> None:
-        """Take a junction.
+        """Set up a junction.
 
         Args:
             junction: Its name.
-            program: What its kernel must keep.
+            program: Of its kernel.
             plan: Of the timetable to begin with.
             revision: Of the map.
-            policy: To run while nobody wishes another one.
+            policy: To run while nobody requests another one.
             tables: Timetables by plan, in step with the neighbours; None: all plans, alone.
             learned: For the policy `learned`.
-            car: As the worst of the fleet; policies reckon with how fast its queue leaves.
+            car: As bad as the worst of the fleet: how fast a queue leaves.
 
         Raises:
             PlanError: when there is no such plan or policy, or a plan is not safe.
@@ -126,7 +114,7 @@ class Controller:
         self.late_steps = 0
         self._flash_reasons: set[str] = set()
         self._state = kernel.start(program)
-        self._shown: dict[str, ShownColour] = {}
+        self._shown = ShownColours(program)
         self._requested: frozenset[str] = frozenset()
         self._times = StepTimes()
         self._seq = 0
@@ -140,7 +128,7 @@ class Controller:
 
     @property
     def custom_plan(self) -> tuple[Timetable, Wave | None] | None:
-        """The plan in force, where somebody made it; None: it is one of the junction's own."""
+        """The plan in force if it is a custom one; None: it is one of the junction's own."""
         return self._timetables.custom_plan
 
     @property
@@ -150,7 +138,7 @@ class Controller:
 
     @property
     def pending(self) -> str:
-        """What was asked for and is to come at the next safe moment; empty: nothing."""
+        """What was requested and comes at the next safe moment; empty: nothing."""
         target = self._target_policy()
         if target == self.policy:
             return self._timetables.pending if target == FIXED else ""
@@ -163,12 +151,12 @@ class Controller:
 
     @property
     def needs_detectors(self) -> bool:
-        """Whether cars must be listened to, for what runs or for what is to come."""
+        """Whether what runs, or what is to come, needs the cars' positions."""
         names = (self.policy, self._target_policy())
         return any(self._policies[name].needs_detectors for name in names)
 
     def request_plan(self, plan: str) -> None:
-        """Wish for a plan, and thereby for fixed time, or for a policy, until further notice.
+        """Request a plan, and with it fixed time, or a policy, until further notice.
 
         Raises:
             PlanError: when there is no such plan or policy.
@@ -182,14 +170,14 @@ class Controller:
         self.failure = self._policy_state.failed = ""
 
     def end_flash(self) -> bool:
-        """Return whether to flash was usual; a timetable is then, for flash has to end."""
+        """Make the timetable the default if flashing was; return whether it was."""
         was_default = self._policies[self._policy_state.default].is_flash
         if was_default:
             self._policy_state.default = FIXED
         return was_default
 
     def request_custom_plan(self, table: Timetable, wave: Wave | None = None) -> None:
-        """Wish for a plan that somebody made; it comes once every promise reckons with it."""
+        """Request a custom plan; it comes once every guaranteed time allows for it."""
         self._timetables.offer_custom_plan(table, wave)
         self._policy_state.default = FIXED
         self.failure = self._policy_state.failed = ""
@@ -204,7 +192,7 @@ class Controller:
         """Apply an override of an operator or a script.
 
         Raises:
-            PlanError: saying in words why it cannot be taken.
+            PlanError: saying why it is refused.
         """
         self.overrides = operator_overrides.apply(
             self.overrides, request, self._program, self._policies, now_ns
@@ -213,28 +201,30 @@ class Controller:
             self.failure = self._policy_state.failed = ""
 
     def flash(self, reason: str, *, on: bool) -> None:
-        """Give or take back a reason to flash; it ends when the last reason is gone."""
+        """Add or remove a reason to flash; flashing ends with the last reason."""
         if on:
             self._flash_reasons.add(reason)
         else:
             self._flash_reasons.discard(reason)
 
     def step(self, now_ns: int, observations: Observations = NO_OBSERVATIONS) -> None:
-        """Go on to `now_ns`."""
+        """Advance to `now_ns`."""
         dt_ns = self._elapsed_ns(now_ns)
-        self.overrides = operator_overrides.expire(self.overrides, now_ns, *self._just_changed())
+        self.overrides = operator_overrides.expire(
+            self.overrides, now_ns, *self._shown.changed_at(self._times.shown_ns)
+        )
         if self.is_flashing:
             self.mode = FLASH
             self.priority = {one.key: "rejected" for one in observations.priority}
             requested: frozenset[str] = frozenset()
         else:
             self._requested = self._next_requests(now_ns, dt_ns, observations)
-            requested = self._gate(self._requested, now_ns)
+            requested = self._shown.gate(self._requested, now_ns)
         self._state = kernel.step(
             self._program, self._state, requested, dt_ns, flash=self.mode == FLASH
         )
         self._show(now_ns)
-        if self.changed or now_ns - self._outlook.updated_ns >= FORESEE_EVERY_NS:
+        if self.changed or now_ns - self._outlook.updated_ns >= FORECAST_EVERY_NS:
             self._foresee(now_ns, observations)
 
     def spat(self, now_ns: int) -> Spat:
@@ -261,7 +251,7 @@ class Controller:
         return policy
 
     def _target_policy(self) -> str:
-        """Return the policy that should run: wished, or usual; rings, where wishes need them."""
+        """Return the policy that should run: requested, default, or one that overrides need."""
         target = next(
             (one.policy for one in self.overrides if one.verb == "policy"),
             self._policy_state.default,
@@ -276,13 +266,13 @@ class Controller:
         return POLICY_FOR_OVERRIDES if needs_override_policy else policy
 
     def _elapsed_ns(self, now_ns: int) -> int:
-        """Return the time since the last step; what is far too much of it puts the cycle off."""
+        """Return the time since the last step; a late step puts the cycle off."""
         if self._times.last_ns is None:
             self._times.last_ns = now_ns
             self._restart_cycle(now_ns)
         dt_ns = now_ns - self._times.last_ns
         self._times.last_ns = now_ns
-        self._times.is_late = dt_ns > LATE_NS
+        self._times.is_late = dt_ns > LATE_STEP_NS
         if self._times.is_late:
             self.late_steps += 1
             self._timetables.put_off(dt_ns - STEP_NS)
@@ -294,7 +284,7 @@ class Controller:
         self._timetables.clear(now_ns, now_ns + self._restart_ns)
 
     def _next_requests(self, now_ns: int, dt_ns: int, observations: Observations) -> frozenset[str]:
-        """Return what timetable or policy wishes now, after a change between them if it is time."""
+        """Return what timetable or policy requests now; change between them if it is due."""
         if self.mode == FLASH:
             self._restart_cycle(now_ns)
         target = self._target_policy()
@@ -304,7 +294,7 @@ class Controller:
             elif target != self.policy:
                 self._begin_policy(target)
         elif now_ns >= self._timetables.cycle.ends_ns:
-            if target != FIXED and not self._has_guaranteed_red_ends():
+            if target != FIXED and not self._shown.has_guaranteed_red_end():
                 self._begin_policy(target)
             else:
                 self._timetables.next_cycle()
@@ -315,13 +305,6 @@ class Controller:
             return self._timetables.requested(now_ns)
         return self._step_policy(now_ns, dt_ns, observations)
 
-    def _has_guaranteed_red_ends(self) -> bool:
-        """Return whether a red's end has been promised: only the timetable can keep that."""
-        return any(
-            shown.colour == "red" and shown.guaranteed.max_end_ns is not None
-            for shown in self._shown.values()
-        )
-
     def _begin_policy(self, name: str) -> None:
         self.policy = name
         self._policy_state.memory = self._policies[name].start(self._site)
@@ -329,7 +312,7 @@ class Controller:
     def _return_to_timetable(self, now_ns: int) -> None:
         """Clear the junction, then begin a cycle."""
         self.mode, self.policy = "start", FIXED
-        ends = self._guarantees()
+        ends = self._shown.guarantees()
         left = [
             still_ns(self._state, i, times, ends[i], now_ns)
             for i, times in enumerate(self._program.times)
@@ -343,7 +326,7 @@ class Controller:
                 self._site, self._policy_state.memory, view
             )
             self._check(answer)
-        except Exception as cause:  # noqa: BLE001 a policy is a plug-in: whatever it does, cars go on
+        except Exception as cause:  # noqa: BLE001 a policy is a plug-in: signals go on whatever it does
             self._fail(cause)
             self._return_to_timetable(now_ns)
             return frozenset()
@@ -374,24 +357,23 @@ class Controller:
                     if not shown.guaranteed.is_exact
                 }
             return
-        view, guarantees = self._view(now_ns, 0, observations), self._guarantees()
+        view, guarantees = self._view(now_ns, 0, observations), self._shown.guarantees()
         try:
             turns = self._policies[self.policy].foresee(self._site, self._policy_state.memory, view)
             self._outlook.coming = tuple(
                 schedule(self._program, self._state, guarantees, turns, now_ns)
             )
             self._outlook.ends = forecasts(self._program, self._state, self._outlook.coming)
-        except Exception as cause:  # noqa: BLE001 as above; the next step gives it up
+        except Exception as cause:  # noqa: BLE001 as above; the next step replaces it
             self._fail(cause)
 
     def _with_overrides(self, requested: frozenset[str]) -> frozenset[str]:
-        """Return a policy's wishes with those of people in them, which it may have overlooked."""
-        green = {name for name, shown in self._shown.items() if shown.colour == "green"}
+        """Return a policy's requests with the overrides, which it may have ignored, applied."""
+        green = self._shown.green()
         may_hold = self.mode != "preempt"  # pre-emption goes before a hold
-        held = (
-            operator_overrides.groups_of(self.overrides, "hold") & green if may_hold else set[str]()
-        )
-        return (requested - (operator_overrides.groups_of(self.overrides, "omit") - green)) | held
+        held = operator_overrides.groups_of(self.overrides, "hold") & green
+        omitted = operator_overrides.groups_of(self.overrides, "omit") - green
+        return requested - omitted | (held if may_hold else frozenset())
 
     def _check(self, answer: Answer) -> None:
         unknown = [group for group in answer.groups if group not in self._program.groups]
@@ -399,33 +381,12 @@ class Controller:
             msg = f"wishes {unknown}, expected groups of {list(self._program.groups)}"
             raise PlanError(msg)
 
-    def _gate(self, requested: frozenset[str], now_ns: int) -> frozenset[str]:
-        """Return the wishes as far as they keep what was promised."""
-        passed = set(requested)
-        for name, shown in self._shown.items():
-            is_green = shown.colour == "green"
-            latest_ns = shown.guaranteed.max_end_ns
-            if now_ns < shown.guaranteed.min_end_ns:
-                (passed.add if is_green else passed.discard)(name)
-            elif is_green and latest_ns is not None and now_ns >= latest_ns - SLACK_NS:
-                passed.discard(name)
-        return frozenset(passed)
-
-    def _just_changed(self) -> tuple[list[str], list[str]]:
-        """Return whose green began, and whose ended, at the last step."""
-        new = {n: s.colour for n, s in self._shown.items() if s.since_ns == self._times.shown_ns}
-        return [n for n in new if new[n] == "green"], [n for n in new if new[n] == "yellow"]
-
-    def _guarantees(self) -> list[GuaranteedTime | None]:
-        shown = [self._shown.get(name) for name in self._program.groups]
-        return [one.guaranteed if one is not None else None for one in shown]
-
     def _show(self, now_ns: int) -> None:
         self.changed = False
         self._times.shown_ns = now_ns
-        before = self._guarantees()
+        before = self._shown.guarantees()
         for index, name in enumerate(self._program.groups):
-            colour = _COLOUR[self._state[index].phase]
+            colour = COLOUR_OF[self._state[index].phase]
             shown = self._shown.get(name)
             if shown is None or shown.colour != colour:
                 self.changed = True
@@ -440,7 +401,7 @@ class Controller:
                 shown.guaranteed = self._of_green(index, shown, now_ns)
 
     def _of_green(self, index: int, shown: ShownColour, now_ns: int) -> GuaranteedTime:
-        """Return what can be promised by now of a green whose end was not known."""
+        """Return the guaranteed time of a green whose end was not known."""
         name, least_ns = self._program.groups[index], self._program.times[index].min_green
         if self.policy != FIXED or self._timetables.cycle.timetable is None:
             return requested_green(
@@ -481,7 +442,7 @@ class Controller:
             since_ns=shown.since_ns,
             min_end_ns=shown.guaranteed.min_end_ns,
             max_end_ns=shown.guaranteed.max_end_ns,
-            next_colour=_NEXT[shown.colour],
+            next_colour=NEXT_COLOUR[shown.colour],
             likely_end_ns=likely and likely.end_ns,
             likely_confidence=likely and likely.confidence,
         )

@@ -1,4 +1,4 @@
-"""What a controller knows of its steps, its policy, its colours and its forecast."""
+"""The state of a controller: its steps, its policy, its shown colours and its forecast."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,17 +7,73 @@ from typing import Any
 from scm.records.signals import Colour
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.forecast import Coming
-from scm.traffic.signals.guaranteed_time import GuaranteedTime
+from scm.traffic.signals.guaranteed_time import LATE_STEPS_NS, GuaranteedTime
+from scm.traffic.signals.kernel import Phase, Program
 from scm.traffic.signals.policy import PriorityCall
+
+COLOUR_OF: dict[Phase, Colour] = {
+    Phase.RED: "red",
+    Phase.CLEARANCE: "red",
+    Phase.GREEN: "green",
+    Phase.YELLOW: "yellow",
+    Phase.FLASH: "flashing_red",
+}
+NEXT_COLOUR: dict[Colour, Colour] = {
+    "red": "green",
+    "green": "yellow",
+    "yellow": "red",
+    "flashing_red": "red",
+}
 
 
 @dataclass(slots=True)
 class ShownColour:
-    """What one group shows, since when, and what was promised of it."""
+    """What one group shows, since when, and its guaranteed time."""
 
     colour: Colour
     since_ns: int
     guaranteed: GuaranteedTime
+
+
+class ShownColours(dict[str, ShownColour]):
+    """What each group of a junction shows, by name."""
+
+    def __init__(self, program: Program) -> None:
+        super().__init__()
+        self._program = program
+
+    def green(self) -> frozenset[str]:
+        """Return the groups that are green."""
+        return frozenset(name for name, shown in self.items() if shown.colour == "green")
+
+    def guarantees(self) -> list[GuaranteedTime | None]:
+        """Return the guaranteed times of all groups, in the program's order; None: not yet."""
+        shown = [self.get(name) for name in self._program.groups]
+        return [one.guaranteed if one is not None else None for one in shown]
+
+    def has_guaranteed_red_end(self) -> bool:
+        """Return whether the end of a red is guaranteed: only the timetable can hold to that."""
+        return any(
+            shown.colour == "red" and shown.guaranteed.max_end_ns is not None
+            for shown in self.values()
+        )
+
+    def changed_at(self, t_ns: int | None) -> tuple[list[str], list[str]]:
+        """Return the groups whose green began, and those whose green ended, at a time."""
+        new = {name: shown.colour for name, shown in self.items() if shown.since_ns == t_ns}
+        return [n for n in new if new[n] == "green"], [n for n in new if new[n] == "yellow"]
+
+    def gate(self, requested: frozenset[str], now_ns: int) -> frozenset[str]:
+        """Return requests as far as the guaranteed times allow them."""
+        passed = set(requested)
+        for name, shown in self.items():
+            is_green = shown.colour == "green"
+            latest_ns = shown.guaranteed.max_end_ns
+            if now_ns < shown.guaranteed.min_end_ns:
+                (passed.add if is_green else passed.discard)(name)
+            elif is_green and latest_ns is not None and now_ns >= latest_ns - LATE_STEPS_NS:
+                passed.discard(name)
+        return frozenset(passed)
 
 
 @dataclass(slots=True)
@@ -49,7 +105,7 @@ class Outlook:
 
 @dataclass(frozen=True, slots=True)
 class Observations:
-    """What detectors and vehicles tell a policy at one step; see `JunctionView`."""
+    """The inputs of a policy from detectors and vehicles at one step; see `JunctionView`."""
 
     detectors: Mapping[str, Detector]
     sees: bool = False

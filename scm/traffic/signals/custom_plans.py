@@ -1,14 +1,20 @@
-"""Plans that people made: their stages in words of the bus, checked, and as a timetable.
+"""Custom plans: stages of a request or of the map, checked, and as a timetable.
 
-They come with a request and stay for as long as the junction runs them or is about to. The kernel
-stays safe whatever they say; what is refused here would not do what its maker meant.
+A plan that comes with a request stays as long as the junction runs it or is about to. A map can
+give a junction stages of its own, for instance those of SUMO's network: they become the plan `own`,
+and an importer calls `adopted` first, which leaves out what the kernel's rules do not allow. The
+kernel stays safe whatever a plan requests; a refused one would not do what its maker meant.
 """
 
 import math
 import time
 from collections.abc import Collection, Sequence
 
+from msgspec.structs import replace
+
 from scm.errors import PlanError
+from scm.maps.route import Roads
+from scm.records.city_map import CityMap, Junction, PlanStage
 from scm.records.signal_plans import PlanProof, SignalPhase, SignalStage
 from scm.traffic.signals import kernel
 from scm.traffic.signals.green_wave import Wave
@@ -21,13 +27,15 @@ from scm.traffic.signals.plan import (
     least_between_ns,
     timetable,
 )
-from scm.traffic.signals.program import whole_steps_ns
-from scm.traffic.signals.proof.load_checks import check_table
+from scm.traffic.signals.program import program_of, whole_steps_ns
+from scm.traffic.signals.proof.load_checks import check_junction, check_table
 from scm.traffic.signals.proof.plan_proof import prove_plan
+from scm.traffic.signals.timing import NIGEL, CarFacts
 from scm.v2x.plan_file import PlanFile
 
-LONGEST_CYCLE_S = 300.0
-MOST_STAGES = 24
+OWN = "own"  # the plan of the stages that a map gives a junction
+MAX_CYCLE_S = 300.0  # nobody waits for longer than five minutes
+MAX_STAGES = 24  # the time of a proof grows with them
 
 
 def table_of(plan: str, stages: Sequence[SignalStage], program: Program) -> Timetable:
@@ -56,9 +64,9 @@ def limited_table(plan: str, stages: Sequence[SignalStage], program: Program) ->
         for stage in stages
     )
     table = timetable(plan, cycle, program)
-    if table.length_ns > LONGEST_CYCLE_S * 1e9:
+    if table.length_ns > MAX_CYCLE_S * 1e9:
         got_s = table.length_ns / 1e9
-        msg = f"plan {plan!r}: cycle: got {got_s:g} s, expected {LONGEST_CYCLE_S:g} s at most"
+        msg = f"plan {plan!r}: cycle: got {got_s:g} s, expected {MAX_CYCLE_S:g} s at most"
         raise PlanError(msg)
     return table
 
@@ -106,6 +114,42 @@ def stages_of(table: Timetable, program: Program) -> tuple[SignalStage, ...]:
     return tuple(made)
 
 
+def map_timetable(stages: Sequence[PlanStage], program: Program) -> Timetable:
+    """Return the timetable of a junction's own stages.
+
+    Raises:
+        PlanError: naming every problem of the stages at once.
+    """
+    made = [SignalStage(groups=stage.groups, green_s=stage.green_s) for stage in stages]
+    return limited_table(OWN, made, program)
+
+
+def adopted(city_map: CityMap, car: CarFacts = NIGEL) -> tuple[CityMap, dict[str, str]]:
+    """Return a city whose junctions run their own stages where that is safe, and why some do not.
+
+    Args:
+        city_map: Whose junctions have stages, and another plan to fall back to.
+        car: As bad as the worst of those that drive here.
+    """
+    roads = Roads(city_map)
+    junctions, why_not = [], {}
+    for junction in city_map.junctions:
+        try:
+            junctions.append(_adopted(junction, roads, car))
+        except PlanError as refusal:
+            why_not[junction.name] = str(refusal)
+            junctions.append(replace(junction, stages=()))
+    return replace(city_map, junctions=tuple(junctions)), why_not
+
+
+def _adopted(junction: Junction, roads: Roads, car: CarFacts) -> Junction:
+    if not junction.stages:
+        return junction
+    program = program_of(junction, roads, car)
+    check_junction(junction.name, program, [map_timetable(junction.stages, program)])
+    return replace(junction, plan=OWN)
+
+
 def prove_file(file: PlanFile) -> PlanProof:
     """Prove a plan for the junction that its file describes.
 
@@ -144,11 +188,11 @@ def _program(phases: Sequence[SignalPhase], conflicts: Collection[tuple[str, str
 
 def _problems(stages: Sequence[SignalStage]) -> list[str]:
     problems = []
-    if len(stages) > MOST_STAGES:
-        problems.append(f"stages: got {len(stages)}, expected {MOST_STAGES} at most")
+    if len(stages) > MAX_STAGES:
+        problems.append(f"stages: got {len(stages)}, expected {MAX_STAGES} at most")
     for number, stage in enumerate(stages, 1):
         for field, value in (("green_s", stage.green_s), ("extra_red_s", stage.extra_red_s)):
-            if not (math.isfinite(value) and 0.0 <= value <= LONGEST_CYCLE_S):
-                expected = f"expected 0 to {LONGEST_CYCLE_S:g} s"
+            if not (math.isfinite(value) and 0.0 <= value <= MAX_CYCLE_S):
+                expected = f"expected 0 to {MAX_CYCLE_S:g} s"
                 problems.append(f"stage {number}: {field}: got {value:g}, {expected}")
     return problems

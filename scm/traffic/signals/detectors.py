@@ -1,4 +1,4 @@
-"""Detectors without a cable: who stands and drives before a stop line, by where cars say they are.
+"""Virtual detectors: which cars stand and drive before a stop line, by their reported positions.
 
     call       a car within the reach of the approach, whose front is before the line
     extend     one that comes to the line within EXTEND_S, or stands close to it: keeps a green
@@ -8,11 +8,12 @@
     gap_s      since a car last kept the green
     arrivals_s when cars that drive will be at the line
 
-A car is believed to be where its last CAM, heard at the roadside, or the overhead cameras put it,
-brought forward at its speed for `FORWARD_NS` at most, and forgotten after `FORGET_NS`: a standing
-car tells itself once a second. What the world knows is never looked at.
+A car is where its last CAM received at the roadside, or the overhead cameras, put it, predicted at
+its speed for at most `MAX_PREDICTION_NS` and forgotten after `MAX_AGE_NS`. World truth is not an
+input.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -22,23 +23,32 @@ from scm.geometry import Pose2
 from scm.maps.route import Roads
 from scm.records.city_map import Group, Junction, StopLine
 from scm.traffic.signals.kernel import Program
+from scm.v2x.etsi.convert import ASSUMED_LENGTH_M, generated_ns, read_cam, station_id
+from scm.v2x.messages.cam import CamRx
+from scm.v2x.messages.eye_track import EyeTrack
 
-REACH_M = 2.4
-LATE_S = 2.5
-AHEAD_M = 0.9
-PRESENCE_M = 0.25
-EXTEND_S = 3.0
-CLOSE_M = 0.5
-STANDS_MPS = 0.04
-NEXT_IN_QUEUE_M = 0.6
-BESIDE_M = 0.2
-FORWARD_NS = 1_200_000_000
-FORGET_NS = 2_500_000_000
-BLIND_NS = 5 * NS_PER_S
+MIN_REACH_M = 2.4  # from how far before a line cars are known, at the least
+MESSAGE_AND_NOTICE_S = (
+    2.5  # a message may be a second old, the green of others is guaranteed for one
+)
+EXIT_QUEUE_M = 0.9  # behind a junction, in which standing cars count
+PRESENCE_M = 0.25  # one car's length
+EXTEND_S = 3.0  # before a line a car that comes keeps the green
+KEEP_GREEN_M = 0.5  # before a line a car keeps the green whatever its speed
+STANDS_MPS = 0.04  # at most; noise of a standing car is below it
+MAX_QUEUE_GAP_M = 0.6  # between two cars of a queue
+MAX_LATERAL_M = 0.2  # beside a lane's middle a car is on it
+MAX_PREDICTION_NS = 1_200_000_000  # a standing car sends once a second
+MAX_AGE_NS = 2_500_000_000  # of a message: two may be lost
+MAX_SILENCE_NS = 5 * NS_PER_S  # without any car the detectors may be blind
+NIGEL_FRONT_M = 0.23  # front bumper before the rear axle
+SAME_CAR_M = 0.2  # less than the distance of two cars side by side
+CAM_MEMORY_NS = 2 * NS_PER_S
+UNKNOWN_TAG = "tag-"  # the Eye's name of a tag that no car has
 
 
 class Seen(NamedTuple):
-    """A car as believed at `t_ns`: middle of its front bumper, map frame; speed + = forward."""
+    """A car at `t_ns`: middle of its front bumper, map frame; speed + = forward."""
 
     who: int
     t_ns: int
@@ -93,16 +103,15 @@ class Approach(NamedTuple):
 def reach_of(program: Program, roads: Roads) -> float:
     """Return from how far before a line cars are to be known [m].
 
-    From there a car that drives at the fastest limit comes to the line when the green of others is
-    over: its last message may be a second old, and their green is promised for a second.
+    From there a car at the fastest limit comes to the line when the green of others is over.
     """
     change_s = max(times.yellow + times.clearance for times in program.times) / NS_PER_S
     fastest_mps = max(lane.speed_limit_mps for lane in roads.city_map.lanes)
-    return max(REACH_M, fastest_mps * (change_s + LATE_S))
+    return max(MIN_REACH_M, fastest_mps * (change_s + MESSAGE_AND_NOTICE_S))
 
 
 def approaches_of(
-    junction: Junction, roads: Roads, reach_m: float = REACH_M
+    junction: Junction, roads: Roads, reach_m: float = MIN_REACH_M
 ) -> tuple[Approach, ...]:
     """Return the approaches of a junction, one for each stop line."""
     lanes = roads.city_map.lanes
@@ -136,11 +145,11 @@ def _approach(
         beyond.append(Stretch(move.lane, start_m, roads.length_of(move.lane), start_m))
         rest_m = roads.length_of(move.lane) - move.to_m
         if rest_m > 0.0:
-            ahead.append(Stretch(move.lane, move.to_m, move.to_m + min(rest_m, AHEAD_M), 0.0))
+            ahead.append(Stretch(move.lane, move.to_m, move.to_m + min(rest_m, EXIT_QUEUE_M), 0.0))
         ahead += [
-            Stretch(exit_lane, 0.0, AHEAD_M - rest_m, 0.0)
+            Stretch(exit_lane, 0.0, EXIT_QUEUE_M - rest_m, 0.0)
             for exit_lane in roads.successors(move.lane)
-            if rest_m < AHEAD_M
+            if rest_m < EXIT_QUEUE_M
         ]
     if all(stretch.lane != line.lane for stretch in beyond):
         beyond.append(Stretch(line.lane, line.at_m, roads.length_of(line.lane), line.at_m))
@@ -156,13 +165,13 @@ class _Car(NamedTuple):
 
 
 class JunctionDetectors:
-    """The detectors of one junction: show it cars, then read it.
+    """The detectors of one junction: add cars, then read them.
 
     Attributes:
         received_ns: When a car was last received or seen here; None: never.
     """
 
-    def __init__(self, junction: Junction, roads: Roads, reach_m: float = REACH_M) -> None:
+    def __init__(self, junction: Junction, roads: Roads, reach_m: float = MIN_REACH_M) -> None:
         self.approaches = approaches_of(junction, roads, reach_m)
         self.received_ns: int | None = None
         self._roads = roads
@@ -178,19 +187,19 @@ class JunctionDetectors:
         if known is not None and seen.t_ns <= known.seen.t_ns:
             return
         on = self._roads.nearest(Pose2(seen.x_m, seen.y_m, seen.yaw_rad))
-        is_on = on is not None and abs(on.lateral) <= BESIDE_M
+        is_on = on is not None and abs(on.lateral) <= MAX_LATERAL_M
         self._cars[seen.who] = (
             _Car(seen, on.lane, on.s) if on is not None and is_on else _Car(seen, None, 0.0)
         )
 
     def sees(self, now_ns: int) -> bool:
-        """Return whether anything was heard or seen lately."""
-        return self.received_ns is not None and now_ns - self.received_ns <= BLIND_NS
+        """Return whether any car was received lately."""
+        return self.received_ns is not None and now_ns - self.received_ns <= MAX_SILENCE_NS
 
     def read(self, now_ns: int) -> dict[str, Detector]:
-        """Return the detectors now, by the stop lines' names; ask once a step."""
+        """Return the detectors now, by the stop lines' names; call it once a step."""
         self._cars = {
-            who: car for who, car in self._cars.items() if now_ns - car.seen.t_ns <= FORGET_NS
+            who: car for who, car in self._cars.items() if now_ns - car.seen.t_ns <= MAX_AGE_NS
         }
         by_lane: dict[str, list[_Car]] = {}
         for car in self._cars.values():
@@ -214,7 +223,7 @@ class JunctionDetectors:
                     left_m = stretch.to_line_m - car.at_m - _driven_m(car.seen, now_ns)
                     places[car.seen.who] = (left_m, car)
         self._count(approach, places, by_lane)
-        # One that should be over the line by now may have braked: it is there until it says not.
+        # A car that should be over the line by now may have braked: it stays until it reports so.
         near = sorted((max(0.0, left), car.seen.who, car.seen) for left, car in places.values())
         queue, queue_m = _queue(near)
         extend = any(_keeps_green(left, seen) for left, _, seen in near)
@@ -242,7 +251,7 @@ class JunctionDetectors:
         places: dict[int, tuple[float, _Car]],
         by_lane: dict[str, list[_Car]],
     ) -> None:
-        """Count who was coming and is now told to be beyond the line."""
+        """Count who was coming and is now beyond the line."""
         name = approach.line.name
         beyond = {
             car.seen.who
@@ -259,19 +268,19 @@ class JunctionDetectors:
 
 
 def _driven_m(seen: Seen, now_ns: int) -> float:
-    return max(0.0, seen.speed_mps) * min(max(0, now_ns - seen.t_ns), FORWARD_NS) / NS_PER_S
+    return max(0.0, seen.speed_mps) * min(max(0, now_ns - seen.t_ns), MAX_PREDICTION_NS) / NS_PER_S
 
 
 def _keeps_green(left_m: float, seen: Seen) -> bool:
     moving = seen.speed_mps > STANDS_MPS and left_m <= seen.speed_mps * EXTEND_S
-    return moving or left_m <= CLOSE_M
+    return moving or left_m <= KEEP_GREEN_M
 
 
 def _queue(near: list[tuple[float, int, Seen]]) -> tuple[int, float]:
     """Return how many cars stand one behind the other from the line on, and how far back [m]."""
     count, tail_m = 0, 0.0
     for left_m, _, seen in near:
-        if abs(seen.speed_mps) > STANDS_MPS or left_m > tail_m + NEXT_IN_QUEUE_M:
+        if abs(seen.speed_mps) > STANDS_MPS or left_m > tail_m + MAX_QUEUE_GAP_M:
             break
         count, tail_m = count + 1, left_m + seen.length_m
     return count, tail_m
@@ -299,3 +308,48 @@ def _together(detectors: list[Detector]) -> Detector:
         gap_s=min(gaps) if gaps else None,
         arrivals_s=tuple(sorted(arrival for d in detectors for arrival in d.arrivals_s)),
     )
+
+
+class Sightings:
+    """Turns CAMs and tracks into `Seen`.
+
+    A track and the CAMs of the same car count as one car, by its name. An unknown tag is a car of
+    its own, unless a car that sent a CAM lately is there.
+    """
+
+    def __init__(self) -> None:
+        self._senders: dict[int, Seen] = {}
+
+    def of_cam(self, message: CamRx) -> Seen | None:
+        """Return the car of a CAM, or None if it lacks a position, heading or speed."""
+        cam = read_cam(message.body)
+        if cam.place is None or cam.yaw_rad is None or cam.speed_mps is None:
+            return None
+        t_ns, length_m = generated_ns(message.body, message.t_ns), cam.length_m or ASSUMED_LENGTH_M
+        seen = Seen(cam.station_id, t_ns, *cam.place, cam.yaw_rad, cam.speed_mps, length_m)
+        self._senders[seen.who] = seen
+        return seen
+
+    def of_track(self, track: EyeTrack) -> Seen | None:
+        """Return the car of a track, or None if it is stale or a sender of CAMs."""
+        if track.stale:
+            return None
+        who, yaw = station_id(track.vehicle), track.yaw_rad
+        sender = self._senders.get(who)
+        x = track.x_m + NIGEL_FRONT_M * math.cos(yaw)
+        y = track.y_m + NIGEL_FRONT_M * math.sin(yaw)
+        length_m = ASSUMED_LENGTH_M if sender is None else sender.length_m
+        seen = Seen(who, track.t_ns, x, y, yaw, track.speed_mps, length_m)
+        is_sender = track.vehicle.startswith(UNKNOWN_TAG) and self._is_sender(seen)
+        return None if is_sender else seen
+
+    def _is_sender(self, seen: Seen) -> bool:
+        """Return whether a car that sent a CAM lately is there; forget those that did not."""
+        self._senders = {
+            who: one for who, one in self._senders.items() if seen.t_ns - one.t_ns <= CAM_MEMORY_NS
+        }
+        return any(
+            math.dist((seen.x_m, seen.y_m), (one.x_m, one.y_m))
+            < SAME_CAR_M + abs(one.speed_mps) * max(0, seen.t_ns - one.t_ns) / NS_PER_S
+            for one in self._senders.values()
+        )

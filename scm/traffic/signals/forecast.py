@@ -1,13 +1,13 @@
-"""When a colour will likely end, beside the promise of when it can: a forecast, never a promise.
+"""Forecasts of when a colour will end, beside the guaranteed time; never a guarantee.
 
-A policy foresees turns: who is green, for how much longer, and who comes then, if nobody comes whom
-it does not see yet. Here the kernel's times are put between them:
+A policy foresees turns: who is green, for how much longer, and who comes then, if no further cars
+appear. Here the kernel's times are put between them:
 
-    end of a green    what is left of its turn, and the second for which it is promised then
+    end of a green    what is left of its turn, and the second for which it is guaranteed then
     end of a red      end of the turn before, its yellow and clearance, in turns that follow
 
-What is promised bounds it. How sure it is was measured: the share of forecasts like it that came
-true within a second (`docs/signals.md`). A policy that foresees nothing leaves it unknown.
+The guaranteed time bounds it. Its confidence was measured (`docs/signals.md`). A policy that
+foresees nothing leaves it unknown.
 """
 
 from collections.abc import Sequence
@@ -18,16 +18,13 @@ from scm.traffic.signals.guaranteed_time import GuaranteedTime, still_ns
 from scm.traffic.signals.kernel import Phase, Program, State
 from scm.traffic.signals.policy import Turn
 
-CERTAIN, AS_PLANNED = 1.0, 0.98
-FREED = 0.98
-SURE = ((0.05, 0.68), (0.5, 0.85), (2.0, 0.75), (16.0, 0.45))
-FAR = 0.21
-"""Shares, measured on a grid full of cars, where guessing is hardest; the lower of two policies.
-
-A timetable's next cycle is `AS_PLANNED`: somebody may yet ask for another plan. A red is `FREED`
-when nothing but the kernel's own times is left of it. Else it hangs on how many seconds a forecast
-goes beyond the promise: `SURE` up to so many, then `FAR`.
-"""
+# Shares of forecasts that came true within a second, measured on a grid full of cars, where
+# forecasting is hardest; the lower of two policies.
+EXACT_CONFIDENCE = 1.0  # the end is guaranteed
+PLANNED_CONFIDENCE = 0.98  # a timetable's next cycle: another plan may still be requested
+CLEARING_CONFIDENCE = 0.98  # of a red with nothing left but the kernel's own times
+CONFIDENCE_UP_TO_S = ((0.05, 0.68), (0.5, 0.85), (2.0, 0.75), (16.0, 0.45))  # beyond the guarantee
+BEYOND_CONFIDENCE = 0.21  # further beyond it
 
 
 class Likely(NamedTuple):
@@ -40,37 +37,39 @@ class Likely(NamedTuple):
 def within(
     guaranteed: GuaranteedTime, forecast_ns: int | None, now_ns: int, *, red: bool, planned: bool
 ) -> Likely | None:
-    """Return a forecast as far as the promise lets it be; what is promised exactly needs none.
+    """Return a forecast within the guaranteed time; an exact guarantee needs none.
 
     Args:
         guaranteed: Of the colour that is shown.
-        forecast_ns: Its likely end; None: nobody knows.
+        forecast_ns: Its likely end; None: unknown.
         now_ns: The present time.
         red: Whether it is red.
         planned: Whether a timetable says so.
     """
     latest_ns = guaranteed.max_end_ns
     if guaranteed.is_exact:
-        return Likely(guaranteed.min_end_ns, CERTAIN)
+        return Likely(guaranteed.min_end_ns, EXACT_CONFIDENCE)
     if forecast_ns is None:
         return None
     earliest_ns = max(guaranteed.min_end_ns, now_ns)
     end_ns = max(forecast_ns, earliest_ns)
     if latest_ns is not None:
         end_ns = min(end_ns, latest_ns)
-    return Likely(end_ns, AS_PLANNED if planned else _share(end_ns - earliest_ns, red=red))
+    return Likely(end_ns, PLANNED_CONFIDENCE if planned else _share(end_ns - earliest_ns, red=red))
 
 
 def _share(beyond_ns: int, *, red: bool) -> float:
-    """Return how often a forecast comes true that goes so far beyond the promise."""
+    """Return how often a forecast comes true that goes so far beyond the guarantee."""
     beyond_s = beyond_ns / NS_PER_S
-    if red and beyond_s <= SURE[0][0]:
-        return FREED
-    return next((share for most_s, share in SURE if beyond_s <= most_s), FAR)
+    if red and beyond_s <= CONFIDENCE_UP_TO_S[0][0]:
+        return CLEARING_CONFIDENCE
+    return next(
+        (share for most_s, share in CONFIDENCE_UP_TO_S if beyond_s <= most_s), BEYOND_CONFIDENCE
+    )
 
 
 class Coming(NamedTuple):
-    """A green that is on or to come [ns]; without an end: nobody knows until when."""
+    """A green that is on or to come [ns]; without an end: it is unknown."""
 
     groups: frozenset[str]
     start_ns: int
@@ -89,7 +88,7 @@ def schedule(
     Args:
         program: Of the junction.
         state: Of its kernel.
-        guarantees: What every group's colour was promised; None: not yet.
+        guarantees: The guaranteed time of every group's colour; None: not yet.
         turns: That the policy foresees, what is green now first.
         now_ns: The present time.
     """
@@ -109,7 +108,7 @@ def schedule(
 
 
 def forecasts(program: Program, state: State, coming: Sequence[Coming]) -> dict[str, int]:
-    """Return the likely ends of the present colours [ns], of the groups whose end is told.
+    """Return the likely ends of the present colours [ns], of the groups whose end is known.
 
     Args:
         program: Of the junction.

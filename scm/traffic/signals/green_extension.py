@@ -1,24 +1,25 @@
-"""Whether a green should go on for the cars that come: what waiting for them costs, and what not.
+"""Green extension: whether waiting for the cars that come costs less than ending the green.
 
     k-th of them passes in     at_k: where it drives, or k headways of a queue that sets off
     ending now costs it        max(0, red - at_k) + one start from rest
-    going on until then costs  each rival max(0, at_k + change - arrival) - max(0, change - arrival)
+    waiting for it costs       each conflicting car max(0, at_k + change - arrival)
+                               - max(0, change - arrival)
 
-`red` is the red that follows: this change, and of each rival that is called what its cars take to
-leave, no less than its least green, and its change. A green goes on as long as there is a k for
-which the first k would lose more than all rivals do. Who passes within the time for which a green
-is promised anyway needs no more of it.
+`red` is the red that follows: this change, and for each called group in conflict what its cars take
+to leave, no less than its least green, and its change. A green goes on as long as there is a k for
+which the first k cars would lose more than all others. A car that passes within the guaranteed
+green needs no more of it.
 """
 
 from collections.abc import Iterable
 
 from scm.clock import NS_PER_S
 from scm.traffic.signals.detectors import Detector
-from scm.traffic.signals.guaranteed_time import AHEAD_NS
+from scm.traffic.signals.guaranteed_time import GREEN_NOTICE_NS
 from scm.traffic.signals.policy import JunctionView, Site
 
-START_S = 1.0
-GUARANTEED_S = AHEAD_NS / NS_PER_S
+START_LOSS_S = 1.0  # what a start from rest costs a car
+GUARANTEED_S = GREEN_NOTICE_NS / NS_PER_S
 
 
 def is_worth_waiting(site: Site, number: int, view: JunctionView) -> bool:
@@ -63,7 +64,7 @@ def _is_worth(comes: list[float], red_s: float, change_s: float, waiting: list[f
     """Return whether there is a first of those who come that is worth waiting for."""
     saved = 0.0
     for at_s in comes:
-        saved += max(0.0, red_s - at_s) + START_S
+        saved += max(0.0, red_s - at_s) + START_LOSS_S
         lost = sum(
             max(0.0, at_s + change_s - there_s) - max(0.0, change_s - there_s)
             for there_s in waiting
@@ -74,14 +75,14 @@ def _is_worth(comes: list[float], red_s: float, change_s: float, waiting: list[f
 
 
 def coming(detector: Detector, headway_s: float) -> list[float]:
-    """Return when those cars will pass the line that need more green than is promised [s]."""
+    """Return when the cars that need more than the guaranteed green will pass the line [s]."""
     standing = max(0, detector.near - len(detector.arrivals_s))
     leaves = [(k + 1) * headway_s for k in range(standing)]
     return sorted(at_s for at_s in (*leaves, *detector.arrivals_s) if at_s > GUARANTEED_S)
 
 
 def conflicting_groups(site: Site, number: int, view: JunctionView) -> list[int]:
-    """Return the groups in conflict with one of which detectors tell."""
+    """Return the groups in conflict with one that have detectors."""
     names = site.program.groups
     return [
         other
@@ -102,7 +103,7 @@ def _change_s(site: Site, number: int) -> float:
 
 
 def _served_s(site: Site, number: int, view: JunctionView) -> float:
-    """Return how long a rival's turn takes; 0 while nobody calls it."""
+    """Return how long the turn of a group in conflict takes; 0 while nobody calls it."""
     detector = view.detectors[site.program.groups[number]]
     if not detector.call:
         return 0.0

@@ -18,7 +18,7 @@ from scm.traffic.signals.plan import TimedStage, Timetable
 from scm.traffic.signals.program import STEP_NS
 from scm.traffic.signals.timing import CarFacts
 
-IN_STEP_NS = 1_000_000_000
+MAX_OFFSET_ERROR_NS = 1_000_000_000  # later than that is corrected by a longer cycle
 
 
 class Wave(NamedTuple):
@@ -105,12 +105,12 @@ def dwelling(table: Timetable, dwell_ns: int) -> Timetable:
 def dwell_ns(wave: Wave | None, began_ns: int) -> int:
     """Return by how much a cycle must be longer for the next one to begin in step.
 
-    Who is late by less than `IN_STEP_NS` stays so: a whole cycle more would cost more.
+    A cycle that is late by less than `MAX_OFFSET_ERROR_NS` stays so: another cycle costs more.
     """
     if wave is None:
         return 0
     missing_ns = (wave.offset_ns - began_ns) % wave.length_ns
-    return 0 if wave.length_ns - missing_ns < IN_STEP_NS else missing_ns
+    return 0 if wave.length_ns - missing_ns < MAX_OFFSET_ERROR_NS else missing_ns
 
 
 def _longer(table: Timetable, shares: Sequence[int]) -> Timetable:

@@ -1,16 +1,15 @@
 """Guaranteed times of SPaT: when a colour will end, whatever is requested.
 
-Under a timetable a plan only ever changes at the end of a cycle. So inside a cycle every end is
-known; and of the first red end beyond it, only that some plan's cycle begins there: the earliest
-start of all plans is promised as the minimum, the latest as the maximum. When the next cycle
-begins, the promise narrows to one of them; it never widens. The maximum allows for two late steps.
-A green of the last stage may go on in the next cycle: until that is settled, when the last stage
-begins, the end of that stage is its minimum, and the latest end that any plan gives it the maximum.
+Under a timetable a plan changes only at the end of a cycle. So inside a cycle every end is
+known. The first red end beyond it lies between the earliest and the latest start of all plans; it
+narrows to one of them when the next cycle begins, and never widens. The maximum allows for two late
+steps. A green of the last stage may go on in the next cycle: until that is decided, when the last
+stage begins, its minimum is the end of that stage and its maximum the latest end of any plan.
 
-Under any other policy nobody knows how long a green will be wished for. A green that is still
-wished is promised for `AHEAD_NS` more, from step to step, so that a car which hears two SPATEM a
-second and loses one never doubts it; once it is no longer wished its end is known. A red lasts at
-least as long as the kernel must keep it; its maximum is unknown.
+Under any other policy a green has no known end. While it is requested it is guaranteed for
+`GREEN_NOTICE_NS` more at every step, so a car that receives two SPATEM a second can lose one; once
+it is no longer requested, its end is known. A red lasts at least as long as the kernel requires;
+its maximum is unknown.
 """
 
 from collections.abc import Iterable, Sequence
@@ -20,8 +19,8 @@ from scm.traffic.signals.kernel import GroupTimes, Phase, Program, State
 from scm.traffic.signals.plan import Timetable
 from scm.traffic.signals.program import STEP_NS
 
-SLACK_NS = 2 * STEP_NS
-AHEAD_NS = 10 * STEP_NS
+LATE_STEPS_NS = 2 * STEP_NS  # by which late steps may put an end off
+GREEN_NOTICE_NS = 10 * STEP_NS  # for which a requested green is guaranteed: two SPATEM
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +33,7 @@ class GuaranteedTime:
     @property
     def is_exact(self) -> bool:
         """Whether the end is known but for late steps."""
-        return self.max_end_ns is not None and self.max_end_ns - self.min_end_ns <= SLACK_NS
+        return self.max_end_ns is not None and self.max_end_ns - self.min_end_ns <= LATE_STEPS_NS
 
     def narrowed(self, by: "GuaranteedTime") -> "GuaranteedTime":
         """Return what is left when both hold."""
@@ -57,8 +56,8 @@ class Cycle:
 
 
 def end_after(end_ns: int) -> GuaranteedTime:
-    """Return the promise of an end that is due at a known time."""
-    return GuaranteedTime(end_ns, end_ns + SLACK_NS)
+    """Return the guaranteed time of an end that is due at a known time."""
+    return GuaranteedTime(end_ns, end_ns + LATE_STEPS_NS)
 
 
 def green_end(
@@ -89,7 +88,7 @@ def green_end(
         is_open |= (
             first.end_ns == table.timed_stages[-1].end_ns
         )  # perhaps beyond that cycle as well
-    latest_ns = None if is_open else max(*ends_ns, least_ns) + SLACK_NS
+    latest_ns = None if is_open else max(*ends_ns, least_ns) + LATE_STEPS_NS
     return GuaranteedTime(max(min(ends_ns), least_ns), latest_ns)
 
 
@@ -108,32 +107,32 @@ def red_end(group: str, cycle: Cycle, now_ns: int, plans: Iterable[Timetable]) -
     starts = [plan.first_start_ns(group) for plan in plans]
     if not starts:
         return GuaranteedTime(cycle.ends_ns, None)
-    return GuaranteedTime(cycle.ends_ns + min(starts), cycle.ends_ns + max(starts) + SLACK_NS)
+    return GuaranteedTime(cycle.ends_ns + min(starts), cycle.ends_ns + max(starts) + LATE_STEPS_NS)
 
 
 def requested_green(
     before: GuaranteedTime | None, now_ns: int, least_ns: int, *, requested: bool
 ) -> GuaranteedTime:
-    """Return the promise of a green whose end no timetable knows; None: it begins now."""
+    """Return the guaranteed time of a green outside of timetables; None: it begins now."""
     if before is None:
-        return GuaranteedTime(now_ns + max(least_ns, AHEAD_NS), None)
+        return GuaranteedTime(now_ns + max(least_ns, GREEN_NOTICE_NS), None)
     if before.max_end_ns is not None:
         return before
     if requested:
-        return GuaranteedTime(max(before.min_end_ns, now_ns + AHEAD_NS), None)
+        return GuaranteedTime(max(before.min_end_ns, now_ns + GREEN_NOTICE_NS), None)
     return end_after(max(before.min_end_ns, now_ns))
 
 
 def earliest_green(
     program: Program, state: State, number: int, ends: Sequence[GuaranteedTime | None], now_ns: int
 ) -> GuaranteedTime:
-    """Return the promise of a red that nothing but the kernel keeps red for certain.
+    """Return the guaranteed time of a red that only the kernel is certain to keep.
 
     Args:
         program: Of the junction.
         state: Of its kernel.
         number: Of the red group.
-        ends: What every group's colour was promised; None: not yet.
+        ends: The guaranteed time of every group's colour; None: not yet.
         now_ns: The present time.
     """
     left = [still_ns(state, number, program.times[number], ends[number], now_ns)]
@@ -146,7 +145,7 @@ def earliest_green(
 def still_ns(
     state: State, number: int, times: GroupTimes, guaranteed: GuaranteedTime | None, now_ns: int
 ) -> int:
-    """Return for how long a group still is in others' way, or in its own, at the least [ns]."""
+    """Return for how long a group blocks others, or its own next green, at the least [ns]."""
     phase, elapsed_ns = state[number]
     match phase:
         case Phase.GREEN:

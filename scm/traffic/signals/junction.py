@@ -20,8 +20,7 @@ from scm.traffic.signals.operator_overrides import NEED_RINGS, Override
 from scm.traffic.signals.plan import FLASH
 from scm.traffic.signals.policy import FIXED, policy_names
 from scm.traffic.signals.priority_requests import PriorityRequests
-from scm.traffic.signals.program import STEP_NS
-from scm.traffic.signals.status_reports import StatusReports, override_records
+from scm.traffic.signals.status_reports import StatusReports, is_due, override_records
 from scm.v2x.etsi.convert import roadside_station, spatem_of
 from scm.v2x.etsi.mapem import MapemBody
 from scm.v2x.etsi.topology import mapem_at
@@ -34,15 +33,14 @@ from scm.v2x.messages.signal_request import SignalReply, SignalRequest
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.spatem import SpatemTx
 
-MONITOR_SILENT_NS = 3_000 * NS_PER_MS
+MONITOR_SILENT_NS = 3_000 * NS_PER_MS  # six of its reports in a row
 SPATEM_EVERY_NS = 500 * NS_PER_MS
 MAPEM_EVERY_NS = 1_000 * NS_PER_MS
-EARLY_NS = STEP_NS // 2
 ENDS = {
     "monitor": "the monitor reports no fault any more",
     "silence": "the monitor is back",
 }
-"""Why a junction stops flashing, by what made it flash; a person says so."""
+"""Why a junction stops flashing, by what made it flash; a person gives their own reason."""
 
 Severity = Literal["info", "warning"]
 
@@ -57,11 +55,11 @@ class JunctionSignals:
         detectors: JunctionDetectors,
         priority_requests: PriorityRequests,
         mapem: MapemBody,
-        facts: StatusReports,
+        reports: StatusReports,
     ) -> None:
         self.junction = junction
-        self._reports = facts
-        self._names = {*(plan.plan for plan in facts.site.plans), *policy_names()}
+        self._reports = reports
+        self._names = {*(plan.plan for plan in reports.site.plans), *policy_names()}
         self._mapem = mapem
         self._mapem_ns: int | None = None
         self.record = PlanRecord(plan="")
@@ -82,11 +80,8 @@ class JunctionSignals:
     def receive_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
         """Flash while the monitor reports a fault."""
         self._monitor_ns = arrived_ns
-        self._flash(
-            "monitor",
-            f"the monitor reports {status.fault}: {status.detail}",
-            on=status.fault is not None,
-        )
+        why = f"the monitor reports {status.fault}: {status.detail}"
+        self._flash("monitor", why, on=status.fault is not None)
 
     def restore(self, record: PlanRecord) -> None:
         """Apply what was requested in an earlier run, as if it were requested now.
@@ -154,7 +149,7 @@ class JunctionSignals:
         )
 
     def step(self, now_ns: int) -> list[Outgoing]:
-        """Go on to `now_ns`; return what the city and the air are told."""
+        """Advance to `now_ns`; return what the city and the radio receive."""
         controller = self.controller
         if self._monitor_ns is not None:
             silent = now_ns - self._monitor_ns > MONITOR_SILENT_NS
@@ -178,7 +173,7 @@ class JunctionSignals:
         return Observations(self._by_group, detectors.sees(now_ns), calls)
 
     def _end_flash(self, who: str) -> PlanReply:
-        """Go on with what is wanted, which a flash has not changed."""
+        """Return to the requested plan, which a flash has not changed."""
         plan = self.controller.plan if self.controller.end_flash() else self.record.plan
         self._why_restart = who
         self._flash("person", who, on=False)
@@ -201,11 +196,11 @@ class JunctionSignals:
     def _on_air(self, spat: Spat) -> list[Outgoing]:
         station, now_ns = roadside_station(spat.junction), spat.t_ns
         sent: list[Outgoing] = []
-        if self.controller.changed or _is_due(self._sent_ns, now_ns, SPATEM_EVERY_NS):
+        if self.controller.changed or is_due(self._sent_ns, now_ns, SPATEM_EVERY_NS):
             self._sent_ns = now_ns
             body = spatem_of(spat, self.junction)
             sent.append(SpatemTx(station=station, t_ns=now_ns, body=body))
-        if _is_due(self._mapem_ns, now_ns, MAPEM_EVERY_NS):
+        if is_due(self._mapem_ns, now_ns, MAPEM_EVERY_NS):
             self._mapem_ns = now_ns
             lanes = mapem_at(self._mapem, now_ns)
             sent.append(MapemTx(station=station, t_ns=now_ns, body=lanes))
@@ -225,12 +220,8 @@ class JunctionSignals:
     def _report_changes(self, now_ns: int) -> None:
         """Report what changed since the last call."""
         controller = self.controller
-        (mode, running, failure), now = self._reported, (
-            controller.mode,
-            controller.running,
-            controller.failure,
-        )  # fmt: skip
-        self._reported = now
+        mode, running, failure = self._reported
+        now = self._reported = (controller.mode, controller.running, controller.failure)
         if self._accepted:
             self._log_event("info", "plan_taken", self._accepted, now_ns)
             self._accepted = ""
@@ -265,7 +256,7 @@ class JunctionSignals:
 
 
 def _what(override: SignalRequest | Override) -> str:
-    """Return what is wished, in the log's words."""
+    """Return what an override does, for the log."""
     if isinstance(override, SignalRequest) and override.verb == "clear":
         of = " ".join(filter(None, (override.clears, *override.groups)))
         return f"takes back {of or 'all wishes'}"
@@ -274,7 +265,3 @@ def _what(override: SignalRequest | Override) -> str:
 
 def _how_long(request: SignalRequest) -> str:
     return "" if request.verb == "clear" else f", {request.expires_s:g} s"
-
-
-def _is_due(sent_ns: int | None, now_ns: int, every_ns: int) -> bool:
-    return sent_ns is None or now_ns - sent_ns >= every_ns - EARLY_NS

@@ -2,14 +2,14 @@
 
     red -> green (at least min_green) -> yellow -> clearance (shows red) -> red
 
-A group starts only when no group in conflict with it is green, yellow or in clearance. What comes
-from outside are wishes: which groups would like to be green now. A wish that is not safe waits, a
-green that nobody wishes for any more ends. Flash is the way out of everything, at once; the way
-back leads through a clearance of all groups.
+A group starts only when no group in conflict with it is green, yellow or in clearance. Its inputs
+are requests: which groups should be green now. A request that is not safe waits; a green that is no
+longer requested ends. Flash overrides everything at once; the way back leads through a clearance of
+all groups.
 
 Every phase lasts at least one step and at least its time, however long a step is. Times are whole
 numbers of any unit (nanoseconds live, small numbers in the proof, which walks through every state
-that can be reached under every set of wishes: `tests/unit/traffic/signals/test_kernel_proof.py`).
+that can be reached under every set of requests: `tests/unit/traffic/signals/test_kernel_proof.py`).
 """
 
 from collections.abc import Collection
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 
 class Phase(Enum):
-    """Where a group stands; clearance shows red but still guards those who went last."""
+    """Where a group stands; clearance shows red but still protects those who went last."""
 
     RED = "red"
     GREEN = "green"
@@ -65,7 +65,7 @@ def start(program: Program) -> State:
 def step(
     program: Program, state: State, requested: Collection[str], dt: int, *, flash: bool = False
 ) -> State:
-    """Return the state `dt` later, with `requested` the names of groups that would like green."""
+    """Return the state `dt` later, with `requested` the names of groups that request green."""
     if flash:
         return tuple(GroupState(Phase.FLASH) for _ in program.groups)
     after = [
@@ -83,11 +83,8 @@ def _advance(group: GroupState, times: GroupTimes, *, is_requested: bool, dt: in
     elapsed = group.elapsed + dt
     match group.phase:
         case Phase.GREEN if elapsed >= times.min_green:
-            return (
-                GroupState(Phase.GREEN, times.min_green)
-                if is_requested
-                else GroupState(Phase.YELLOW)
-            )
+            stays = GroupState(Phase.GREEN, times.min_green)
+            return stays if is_requested else GroupState(Phase.YELLOW)
         case Phase.YELLOW if elapsed >= times.yellow:
             return GroupState(Phase.CLEARANCE)
         case Phase.CLEARANCE if elapsed >= times.clearance:
@@ -98,7 +95,7 @@ def _advance(group: GroupState, times: GroupTimes, *, is_requested: bool, dt: in
 
 
 def _is_free(program: Program, state: list[GroupState], name: str) -> bool:
-    """Return whether no group in conflict with this one is on its way."""
+    """Return whether no group in conflict with this one is active."""
     return not any(
         group.phase in _ACTIVE and frozenset((name, other)) in program.conflicts
         for other, group in zip(program.groups, state, strict=True)

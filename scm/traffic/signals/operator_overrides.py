@@ -35,10 +35,10 @@ def apply(
     policies: Collection[str],
     now_ns: int,
 ) -> tuple[Override, ...]:
-    """Return the wishes in force once a request is taken; a newer one replaces its like.
+    """Return the overrides in force after a request; a newer one replaces its like.
 
     Raises:
-        PlanError: saying in words why the request cannot be taken.
+        PlanError: saying why the request is refused.
     """
     _check(request, program, policies)
     if request.verb == "clear":
@@ -65,7 +65,7 @@ def apply(
 def expire(
     active: Sequence[Override], now_ns: int, began: Collection[str], ended: Collection[str]
 ) -> tuple[Override, ...]:
-    """Return the wishes that are left, given whose green began and whose ended just now."""
+    """Return the overrides that are left, given whose green began and whose ended just now."""
     left = []
     for one in active:
         done = began if one.verb == "call" else ended if one.verb == "force_off" else ()
@@ -81,7 +81,7 @@ def _is_cleared(one: Override, request: SignalRequest) -> bool:
 
 
 def groups_of(active: Sequence[Override], verb: Verb) -> frozenset[str]:
-    """Return all groups that a verb is wished for."""
+    """Return all groups that overrides of a verb name."""
     return frozenset(group for one in active if one.verb == verb for group in one.groups)
 
 

@@ -18,17 +18,16 @@ from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.store.records import PlanRecord
 from scm.traffic.signals.controller import Controller
-from scm.traffic.signals.detectors import JunctionDetectors, Seen, reach_of
+from scm.traffic.signals.custom_plans import OWN, map_timetable
+from scm.traffic.signals.detectors import JunctionDetectors, Seen, Sightings, reach_of
 from scm.traffic.signals.green_wave import links_of, waves_of
 from scm.traffic.signals.junction import JunctionSignals
 from scm.traffic.signals.kernel import Program
-from scm.traffic.signals.map_plan import OWN, map_timetable
 from scm.traffic.signals.plan import load_timetable, plan_names
 from scm.traffic.signals.policy import FIXED
 from scm.traffic.signals.priority_requests import PriorityRequests
 from scm.traffic.signals.program import STEP_NS, program_of
 from scm.traffic.signals.proof.load_checks import check_junction
-from scm.traffic.signals.sightings import Sightings
 from scm.traffic.signals.status_reports import StatusReports
 from scm.traffic.signals.timetables import Tables
 from scm.traffic.signals.timing import NIGEL, CarFacts
@@ -59,12 +58,12 @@ class TrafficPart(BasePart):
         learned: Callable[[Any], Any] | None = None,
         restored: Mapping[str, PlanRecord] | None = None,
     ) -> None:
-        """Take the map.
+        """Set up all junctions.
 
         Args:
             city_map: Whose junctions.
             plan: Replaces the plans that the map names.
-            policy: Of all junctions while nobody wishes another one.
+            policy: Of all junctions while nobody requests another one.
             car: As bad as the worst of the fleet; all least times follow from it.
             learned: For the policy `learned`.
             restored: What operators requested in an earlier run, by junction.
@@ -109,7 +108,7 @@ class TrafficPart(BasePart):
 
     @property
     def subscriptions(self) -> tuple[Subscription, ...]:
-        """The monitor and those who ask for priority; and cars, where detectors are needed."""
+        """The monitor and requests for priority; and cars, where detectors are needed."""
         listening = [
             Subscription(CamRx, {"receiver": station})
             for station, signals in self._by_station.items()
@@ -138,7 +137,7 @@ class TrafficPart(BasePart):
         return outbox
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Fall silent: cars take no green that is older than a second."""
+        """Stop publishing: cars do not use a green that is older than a second."""
         event(_log, "traffic_finished", t_ns=now_ns, junctions=len(self._junctions))
         return []
 
@@ -186,7 +185,7 @@ def timetables_of(
 ) -> dict[str, Tables]:
     """Return the timetables of all plans by junction; of several junctions they make green waves.
 
-    A junction with stages of its own has the plan `own` besides, in step with nobody.
+    A junction with stages of its own also has the plan `own`, which is not coordinated.
 
     Raises:
         PlanError: when a plan is not safe for a junction.

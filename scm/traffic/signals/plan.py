@@ -3,12 +3,12 @@
 A plan is one file of `plans/` with a constant `PLAN`. It is parametric: from a junction's program
 it makes a cycle of stages, each a set of groups that are green together, and for how long. Yellow
 and clearance between two stages are not the plan's business: the timetable adds what the kernel
-takes, and a step for each of the three changes between two greens, so that steps that come late
-never push the next stage: SPaT's promises hang on that.
+takes, and a step for each of the three changes between two greens, so that late steps never push
+the next stage: SPaT's guaranteed times rely on that.
 
-A group of two stages that follow each other stays green between them: only who leaves is waited
-for. Over a cycle's end too, where the next cycle begins with it. Which plan that will be of is not
-known to this one, so there everybody's yellow and clearance are left room for.
+A group of two stages that follow each other stays green between them, and only groups that leave
+need time. At a cycle's end too, if the next cycle begins with it; since that may be another plan's,
+there is room for the yellow and clearance of all.
 """
 
 from collections.abc import Callable, Collection
@@ -43,7 +43,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class TimedStage:
-    """A stage with its place in the cycle: green is wished from `start_ns` to `end_ns`."""
+    """A stage with its place in the cycle: green is requested from `start_ns` to `end_ns`."""
 
     groups: frozenset[str]
     start_ns: int
@@ -66,7 +66,7 @@ class Timetable:
     length_ns: int
 
     def requested(self, position_ns: int, going_on: frozenset[str] = frozenset()) -> frozenset[str]:
-        """Return the groups wished green at a position of the cycle.
+        """Return the groups requested green at a position of the cycle.
 
         Args:
             position_ns: Where.
@@ -107,7 +107,7 @@ class Timetable:
 
 
 def plan_names() -> list[str]:
-    """Return the names of all plans that can be asked for."""
+    """Return the names of all plans that can be requested."""
     return registry.names(PACKAGE)
 
 

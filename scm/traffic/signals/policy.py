@@ -1,8 +1,8 @@
-"""The contract of a policy: it sees a pure view of one junction and answers wishes.
+"""The contract of a policy: from a view of one junction to requests for green.
 
 A policy is one file of `policies/` with a constant `POLICY`. It keeps a memory that only it reads
 and that is never changed, only replaced. Whatever it answers, the kernel decides the colours and
-the controller keeps the promises already told; so a policy can be slow or stupid, never unsafe.
+the controller keeps published guarantees; so a policy can be slow or wrong, never unsafe.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 from scm import registry
 from scm.errors import PlanError
 from scm.traffic.signals.detectors import Detector
-from scm.traffic.signals.guaranteed_time import AHEAD_NS
+from scm.traffic.signals.guaranteed_time import GREEN_NOTICE_NS
 from scm.traffic.signals.kernel import GroupTimes, Program, State
 from scm.traffic.signals.operator_overrides import Override
 from scm.traffic.signals.rings import Layout, PhaseTimes, layout_of
@@ -21,22 +21,22 @@ from scm.traffic.signals.timing import NIGEL, CarFacts, headway_s
 PACKAGE = "scm.traffic.signals.policies"
 FIXED = "fixed"
 
-PASSAGE_NS = 200_000_000
-MAX1_GREENS, MAX2_GREENS = 3, 5
+PASSAGE_NS = 200_000_000  # detectors already look ahead, so the gap itself is short
+MAX1_GREENS, MAX2_GREENS = 3, 5  # least greens that make max 1 and max 2
 
 Mode = Literal["adaptive", "priority", "preempt"]
 Status = Literal["requested", "processing", "granted", "rejected"]
 
 
 class PriorityCall(NamedTuple):
-    """A vehicle asks for its green.
+    """A vehicle's request for its green.
 
     Attributes:
-        key: Who asks, and which of its requests: (station, request id).
-        group: The signal group of the way that it wants to take; empty: no such way here.
-        eta_ns: When it expects to be at the stop line; None: it does not say.
+        key: (station, request id).
+        group: The signal group of its way; empty: no such way here.
+        eta_ns: When it expects to be at the stop line; None: not given.
         role: `emergency` pre-empts, `transit` is helped; others are rejected.
-        until_ns: When the request lapses.
+        until_ns: When the request expires.
     """
 
     key: tuple[int, int]
@@ -48,7 +48,7 @@ class PriorityCall(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """What a policy knows of its junction for good.
+    """The constant facts of a policy's junction.
 
     Attributes:
         layout: Its rings and barriers.
@@ -70,10 +70,10 @@ class JunctionView:
         dt_ns: Since the last step.
         state: Of the kernel, in the order of the program's groups.
         detectors: By group.
-        sees: Whether detectors heard or saw anything lately; if not, they must not be relied on.
+        sees: Whether detectors received any car lately; if not, they are not reliable.
         overrides: Of operators and scripts, in force.
         priority: Requests of vehicles in force.
-        timetabled: What the timetable of the plan in force wishes now.
+        timetabled: What the timetable of the plan in force requests now.
     """
 
     now_ns: int
@@ -88,12 +88,12 @@ class JunctionView:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a policy wishes.
+    """What a policy requests.
 
     Attributes:
         groups: That would like green now.
         priority: What became of each vehicle's request, by its key.
-        mode: What Spat tells: `adaptive`, `priority` or `preempt`.
+        mode: As in `Spat`: `adaptive`, `priority` or `preempt`.
     """
 
     groups: frozenset[str]
@@ -106,8 +106,8 @@ class Turn(NamedTuple):
 
     Attributes:
         groups: Without conflict.
-        green_s: From now, of groups that are green; else from their begin. None: for ever, or
-            nobody knows.
+        green_s: From now, of groups that are green; else from their begin. None: unlimited, or
+            unknown.
     """
 
     groups: frozenset[str]
@@ -127,11 +127,11 @@ class Policy:
     Attributes:
         start: Makes its memory.
         step: From memory and view to the next memory and an answer.
-        foresee: From the memory after a step and its view to the turns to come, those of whoever is
-            green now first, as if nobody came whom it does not see yet. SPaT tells it as likely.
-        is_timed: It keeps to the timetable, so Spat may promise what that says.
-        is_flash: It is no policy but flashing red.
-        needs_detectors: Cars must be listened to for it.
+        foresee: From the memory after a step and its view to the turns to come, the present green
+            first, as if no further cars appeared. SPaT publishes them as likely ends.
+        is_timed: Whether it follows the timetable, so that Spat can guarantee its times.
+        is_flash: Whether it is flashing red.
+        needs_detectors: Whether it needs the cars' positions.
     """
 
     about: str
@@ -144,7 +144,7 @@ class Policy:
 
 
 def policy_names() -> list[str]:
-    """Return the names of all policies that can be asked for."""
+    """Return the names of all policies that can be requested."""
     return registry.names(PACKAGE)
 
 
@@ -172,10 +172,10 @@ def site_of(
 
 
 def _most_ns(times: GroupTimes, greens: int) -> int:
-    """Return when it is decided at the latest that a green ends: what is promised then is in it."""
-    return max(times.min_green, greens * times.min_green - AHEAD_NS)
+    """Return when the end of a green is decided at the latest, before its guaranteed notice."""
+    return max(times.min_green, greens * times.min_green - GREEN_NOTICE_NS)
 
 
 def nothing(site: Site) -> None:
-    """Make the memory of a policy that has none."""
+    """Return the memory of a policy that has none."""
     del site

@@ -1,11 +1,11 @@
 """Vehicles' requests for priority at one junction, between the air and a policy.
 
-    SREM heard at the roadside  ->  PriorityCall  ->  policy  ->  status  ->  SSEM
+    SREM received at the roadside  ->  PriorityCall  ->  policy  ->  status  ->  SSEM
 
-A request lapses when it is cancelled, `AFTER_NS` after the car should have come and gone, or, where
-it says no time, `QUIET_NS` after it was last repeated; never later than `LONGEST_NS`. A station may
-ask for itself alone: an SREM in another's name is dropped and counted. That a car may call itself
-an ambulance at all is for signatures to settle, not for signals.
+A request expires when it is cancelled, `AFTER_ARRIVAL_NS` after the car should have come and gone,
+or without a time `REPEAT_TIMEOUT_NS` after it was last repeated; never later than `MAX_REQUEST_NS`.
+A station can request for itself alone: an SREM in another's name is dropped and counted. Whether a
+car may call itself an ambulance is a matter of signatures, not of signals.
 """
 
 from collections.abc import Mapping
@@ -20,11 +20,11 @@ from scm.v2x.etsi.topology import topology_of
 from scm.v2x.messages.srem import SremRx
 from scm.v2x.messages.ssem import SsemTx
 
-AFTER_NS = 10 * NS_PER_S
-QUIET_NS = 5 * NS_PER_S
-LONGEST_NS = 120 * NS_PER_S
+AFTER_ARRIVAL_NS = 10 * NS_PER_S  # a car may be late
+REPEAT_TIMEOUT_NS = 5 * NS_PER_S  # of a request without a time of arrival
+MAX_REQUEST_NS = 120 * NS_PER_S  # whatever it claims
 SSEM_EVERY_NS = NS_PER_S
-MAX_REQUESTS = 32
+MAX_REQUESTS = 32  # more than cars fit before a junction: a flood must not fill the memory
 
 EMERGENCY = ("roadRescue", "emergency", "police", "fire", "ambulance")
 TRANSIT = ("publicTransport", "specialTransport", "transit", "tram")
@@ -33,10 +33,10 @@ Key = tuple[int, int]
 
 
 class PriorityRequests:
-    """Keeps the requests of one junction.
+    """The requests of one junction.
 
     Attributes:
-        ignored: SREMs in another's name, and requests beyond the `MAX_REQUESTS` that are kept.
+        ignored: SREMs in another's name, and requests beyond `MAX_REQUESTS`.
     """
 
     def __init__(self, junction: Junction, roads: Roads) -> None:
@@ -99,6 +99,8 @@ def _role_of(request: PriorityRequest) -> str:
 
 def _until_ns(request: PriorityRequest, now_ns: int) -> int:
     if request.arrives_ns is None:
-        return now_ns + QUIET_NS
+        return now_ns + REPEAT_TIMEOUT_NS
     lasts_ns = round((request.lasts_s or 0.0) * NS_PER_S)
-    return min(now_ns + LONGEST_NS, max(now_ns, request.arrives_ns) + lasts_ns + AFTER_NS)
+    return min(
+        now_ns + MAX_REQUEST_NS, max(now_ns, request.arrives_ns) + lasts_ns + AFTER_ARRIVAL_NS
+    )

@@ -1,9 +1,9 @@
-"""NEMA rings above the kernel: which phases would like green now. Pure, immutable, no clock.
+"""NEMA rings above the kernel: which phases request green now. Pure, immutable, no clock.
 
-A phase is a signal group, told by its place in the program. A ring is a sequence of phases that all
-conflict; rings of one section run side by side because no phase of one conflicts with any of the
-others; between two sections is a barrier that all rings cross together. `layout_of` derives all of
-it from the groups and conflicts of a junction: eight phases of a textbook crossing become two
+A phase is a signal group, given by its number in the program. A ring is a sequence of phases that
+all conflict; rings of one section run side by side because no phase of one conflicts with any of
+the others; between two sections is a barrier that all rings cross together. `layout_of` derives all
+of it from the groups and conflicts of a junction: eight phases of a textbook crossing become two
 rings and two sections, four approaches that all conflict become one ring.
 
     a green ends after min green when somebody in conflict is called, and it gaps out (no vehicle
@@ -11,8 +11,8 @@ rings and two sections, four approaches that all conflict become one ring.
     while it is held. Then comes the next called phase of the ring, or all rings cross the barrier.
     With nobody in conflict called it rests in green.
 
-What comes out is a set of phases without conflict: wishes for the kernel, which alone decides
-colours and sees to yellow and red clear. Times are whole numbers of any unit, as the kernel's.
+The output is a set of phases without conflict: requests to the kernel, which alone decides colours,
+yellow and red clear. Times are whole numbers of any unit, as the kernel's.
 """
 
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ from scm.traffic.signals.kernel import Phase, Program, State
 
 
 class Recall(Enum):
-    """A call that nobody has to place: always for a least green, for all of max, or at leisure."""
+    """A call without a vehicle: for a least green, for all of max, or when nobody else calls."""
 
     NONE = "none"
     MIN = "min"
@@ -50,7 +50,7 @@ class Layout(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the rings are told, as numbers of phases.
+    """The inputs of the rings, as numbers of phases.
 
     Attributes:
         calls: A vehicle is there: calls a red phase, extends a green one.
@@ -70,7 +70,7 @@ class Inputs(NamedTuple):
 
 
 class Ring(NamedTuple):
-    """One ring: the phase it serves or waits for, and its timers; counted no further than asked.
+    """One ring: the phase it serves or waits for, and its timers, counted no further than needed.
 
     Attributes:
         phase: None: nothing of this section was called in this ring.
@@ -125,7 +125,7 @@ def layout_of(program: Program, phases: tuple[PhaseTimes, ...]) -> Layout:
 
 
 def _components(numbers: Iterable[int], edges: dict[int, set[int]]) -> tuple[tuple[int, ...], ...]:
-    """Return what hangs together, in the order of the first of each."""
+    """Return the connected components, in the order of their first members."""
     left, found = list(numbers), []
     while left:
         reached, todo = set[int](), [left[0]]
@@ -156,7 +156,7 @@ def start(layout: Layout) -> Rings:
 
 
 def requested(state: Rings) -> frozenset[int]:
-    """Return the phases that would like green now."""
+    """Return the phases that request green now."""
     return frozenset(ring.phase for ring in state.rings if ring.phase is not None)
 
 
@@ -180,7 +180,7 @@ def step(layout: Layout, state: Rings, inputs: Inputs, green: frozenset[int], dt
 
 
 def order_of(layout: Layout, state: Rings, called: frozenset[int]) -> list[frozenset[int]]:
-    """Return which phases are wished together, one set after the other, the present one first.
+    """Return which phases request green together, one set after the other, the present one first.
 
     It is the order of `step` while these stay called, each until it has been served once.
     """
@@ -201,7 +201,7 @@ def order_of(layout: Layout, state: Rings, called: frozenset[int]) -> list[froze
 
 
 def _called(layout: Layout, state: Rings, inputs: Inputs) -> frozenset[int]:
-    """Return who is called: by vehicles, by memory, by recall; not who is left out."""
+    """Return who is called: by vehicles, by memory, by recall; not who is omitted."""
     always = {i for i, p in enumerate(layout.phases) if p.recall in (Recall.MIN, Recall.MAX)}
     called = (inputs.calls | state.calls | always) - inputs.omit
     if not called:

@@ -1,4 +1,4 @@
-"""What people are told of a junction beside its colours: what it is, what runs, who wants what."""
+"""Reports on a junction beside its colours: its program, what runs, and requests in force."""
 
 from collections.abc import Collection, Iterable, Mapping
 
@@ -10,11 +10,10 @@ from scm.errors import PlanError
 from scm.records.signal_plans import SignalPhase, SignalPlan, SignalPolicy, StageInterval
 from scm.records.signals import SignalDetector, SignalOverride, SignalTurn
 from scm.traffic.signals.controller import Controller
-from scm.traffic.signals.custom_plans import stages_of
+from scm.traffic.signals.custom_plans import OWN, stages_of
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.green_wave import Wave
 from scm.traffic.signals.kernel import Program
-from scm.traffic.signals.map_plan import OWN
 from scm.traffic.signals.operator_overrides import Override
 from scm.traffic.signals.plan import PACKAGE, Plan, Timetable
 from scm.traffic.signals.policy import load_policy, policy_names, site_of
@@ -30,7 +29,7 @@ EARLY_NS = STEP_NS // 2
 
 
 class StatusReports:
-    """Tells one junction's `SignalSite` and `SignalStatus` when they are due.
+    """Makes one junction's `SignalSite` and `SignalStatus` when they are due.
 
     Attributes:
         program: Of its kernel.
@@ -49,11 +48,11 @@ class StatusReports:
     ) -> list[Outgoing]:
         """Return what is due at a step that was just made."""
         messages: list[Outgoing] = []
-        if _is_due(self._site_ns, now_ns, SITE_EVERY_NS):
+        if is_due(self._site_ns, now_ns, SITE_EVERY_NS):
             self._site_ns = now_ns
             messages.append(replace(self.site, t_ns=now_ns))
         what = (controller.policy, controller.plan, controller.pending, controller.overrides)
-        if what != self._before or _is_due(self._status_ns, now_ns, STATUS_EVERY_NS):
+        if what != self._before or is_due(self._status_ns, now_ns, STATUS_EVERY_NS):
             self._before, self._status_ns = what, now_ns
             messages.append(self._status(controller, detectors, now_ns))
         return messages
@@ -89,7 +88,7 @@ class StatusReports:
 
 
 def override_records(overrides: Iterable[Override]) -> tuple[SignalOverride, ...]:
-    """Return wishes in force as they are told."""
+    """Return the overrides in force as they are published."""
     return tuple(
         SignalOverride(
             verb=one.verb,
@@ -103,7 +102,8 @@ def override_records(overrides: Iterable[Override]) -> tuple[SignalOverride, ...
     )
 
 
-def _is_due(sent_ns: int | None, now_ns: int, every_ns: int) -> bool:
+def is_due(sent_ns: int | None, now_ns: int, every_ns: int) -> bool:
+    """Return whether something is to be sent again, at the step nearest to its time."""
     return sent_ns is None or now_ns - sent_ns >= every_ns - EARLY_NS
 
 

@@ -13,11 +13,11 @@ Tables = Mapping[str, tuple[Timetable, Wave | None]]
 class Timetables:
     """What runs now and what may run next; it knows no clock.
 
-    A guest, a plan that somebody made, may run from the cycle after the next on: what was promised
-    before it came does not reckon with it. It leaves when it neither runs nor is wanted.
+    A custom plan may run from the cycle after the next on: times guaranteed before it came do not
+    allow for it. It leaves when it neither runs nor is pending.
 
-    When a cycle's last stage begins it is settled who stays green into the next one. If anybody
-    does, it is settled of which plan that is: another one that is asked for then comes after it.
+    When a cycle's last stage begins it is decided who stays green into the next one. If anybody
+    does, its plan is decided too: another one that is requested then comes after it.
 
     Attributes:
         plan: In force.
@@ -37,12 +37,12 @@ class Timetables:
 
     @property
     def names(self) -> list[str]:
-        """The names of all plans that may be asked for, guests included."""
+        """The names of all plans that may be requested, custom ones included."""
         return list({**self._tables, **self._entering_plans})
 
     @property
     def custom_plan(self) -> tuple[Timetable, Wave | None] | None:
-        """The plan in force, where somebody made it; None: it is one of the junction's own."""
+        """The plan in force if it is a custom one; None: it is one of the junction's own."""
         return None if self.plan in self._own_tables else self._tables[self.plan]
 
     def request(self, plan: str) -> None:
@@ -57,7 +57,7 @@ class Timetables:
         self.pending = custom_plan.plan
 
     def clear(self, now_ns: int, until_ns: int) -> None:
-        """Wish nothing until a time, then begin the first cycle."""
+        """Request nothing until a time, then begin the first cycle."""
         self._change_custom_plans()
         self._begin(Cycle(None, now_ns, until_ns))
 
@@ -67,7 +67,7 @@ class Timetables:
         self._set(Cycle(cycle.timetable, cycle.began_ns + by_ns, cycle.ends_ns + by_ns))
 
     def next_cycle(self) -> None:
-        """Begin the cycle after this one, of the plan that was asked for."""
+        """Begin the cycle after this one, of the plan that was requested."""
         self.plan = self._next_plan()
         began_ns = self.cycle.ends_ns
         table = self._beginning(self.plan, began_ns)
@@ -75,7 +75,7 @@ class Timetables:
         self._begin(Cycle(table, began_ns, began_ns + table.length_ns))
 
     def commit_next(self, now_ns: int, *, goes_on: bool) -> None:
-        """Once the last stage has begun, settle who stays green into the next cycle."""
+        """Once the last stage has begun, decide who stays green into the next cycle."""
         cycle = self.cycle
         if self._staying_green is not None or cycle.timetable is None:
             return
@@ -84,13 +84,10 @@ class Timetables:
             self._committed_plan = self._next_plan() if self._staying_green else ""
 
     def requested(self, now_ns: int) -> frozenset[str]:
-        """Return what the timetable wishes."""
+        """Return what the timetable requests."""
         table, position_ns = self.cycle.timetable, now_ns - self.cycle.began_ns
-        return (
-            table.requested(position_ns, self._staying_green or frozenset())
-            if table
-            else frozenset()
-        )
+        staying = self._staying_green or frozenset()
+        return table.requested(position_ns, staying) if table else frozenset()
 
     def green_end(self, group: str, now_ns: int, least_ns: int) -> GuaranteedTime:
         """Return when a green that is on will end, `least_ns` at the earliest."""

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 from scm.errors import PlanError
 
-OVER_LIMIT = 1.1
+SPEED_OVER_LIMIT = 1.1  # times a lane's limit a car may come whose top speed is unknown
 LANE_MPS = 0.25  # what our maps' lanes allow, for cars whose own speed is not known
 
 
@@ -58,13 +58,13 @@ def yellow_s(car: CarFacts, limit_mps: float = math.inf) -> float:
     Args:
         car: Its top speed decides where that is finite, whatever the lane allows: yellow is for
             the fastest approach that is possible.
-        limit_mps: The lane's speed limit; used, with `OVER_LIMIT`, only for a car whose top speed
+        limit_mps: The lane's speed limit; used, with `SPEED_OVER_LIMIT`, only for a car whose top speed
             is infinite, which means unknown.
 
     Raises:
         PlanError: when neither the car's top speed nor the limit is finite.
     """
-    speed_mps = car.speed_mps if math.isfinite(car.speed_mps) else OVER_LIMIT * limit_mps
+    speed_mps = car.speed_mps if math.isfinite(car.speed_mps) else SPEED_OVER_LIMIT * limit_mps
     if not math.isfinite(speed_mps):
         raise PlanError("yellow: got neither a car's top speed nor a limit, expected one of them")
     return car.reaction_s + speed_mps / (2.0 * car.decel_mps2)

@@ -22,7 +22,7 @@ from scm.maps.sumo_read import NetPhase
 from scm.maps.sumo_toml import map_toml
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
-from scm.traffic.signals.map_plan import adopted
+from scm.traffic.signals.custom_plans import adopted
 from scm.traffic.signals.part import TrafficPart
 from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.messages.route_request import RouteRequest

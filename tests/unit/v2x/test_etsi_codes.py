@@ -22,7 +22,7 @@ from scm.maps.route import Roads
 from scm.records.signals import SignalGroup
 from scm.traffic.misbehaviour.claim import claim_of
 from scm.traffic.misbehaviour.limits import Limits
-from scm.traffic.signals.sightings import Sightings
+from scm.traffic.signals.detectors import Sightings
 from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.etsi.codes import codes_in
 from scm.v2x.etsi.convert import cam_of, colours_of, place_of, read_cam, spatem_of, station_id

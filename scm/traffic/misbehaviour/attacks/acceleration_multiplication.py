@@ -1,4 +1,4 @@
-"""Acceleration multiplication: speeds up and brakes harder than it does.
+"""Acceleration multiplication: reports harder acceleration and braking than are true.
 
 a' = k a, k of 2..4        a lie where |a| > 0.5 m/s^2 of the full city
 """
@@ -6,7 +6,7 @@ a' = k a, k of 2..4        a lie where |a| > 0.5 m/s^2 of the full city
 import random
 
 from scm.traffic.misbehaviour.attack import Attack, Frame, Scene, Sent, Transform
-from scm.traffic.misbehaviour.claim import accel_of as told_of
+from scm.traffic.misbehaviour.claim import accel_of as claimed_accel
 from scm.traffic.misbehaviour.forge import driven
 from scm.v2x.etsi.cam_spatem import SCALE
 
@@ -15,8 +15,8 @@ LEAST, MOST = 2.0, 4.0
 
 
 def accel_of(frame: Frame) -> float | None:
-    """Return the acceleration that a frame tells [m/s^2]; None: none, or beyond the field."""
-    return told_of(frame.body)[0]
+    """Return the acceleration of a frame [m/s^2]; None: none, or beyond the field."""
+    return claimed_accel(frame.body)[0]
 
 
 def _start(rng: random.Random, scene: Scene) -> Transform:

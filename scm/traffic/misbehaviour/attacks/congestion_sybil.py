@@ -1,8 +1,8 @@
-"""Congestion Sybil: a jam of cars that are not there, around one that is.
+"""Congestion Sybil: a jam of false cars around a real one.
 
     4..6 ghosts at (+-5..6 m, +-2..3 m) in the car's frame, full city, speeds within 5 % of its own
 
-Each ghost keeps its place, so its claims fit each other. The car itself tells the truth.
+Each ghost keeps its place, so its claims are consistent. The car's own CAMs are true.
 """
 
 import math
@@ -19,7 +19,7 @@ NOISE_M = 2.0 / SCALE
 
 
 def ghost_name(station: str, number: int) -> str:
-    """Return the name under which a ghost of a station goes."""
+    """Return the name of a ghost of a station."""
     return f"{station}-ghost{number}"
 
 

@@ -1,4 +1,4 @@
-"""Constant position offset: somewhere else, always by the same way.
+"""Constant position offset: always the same error of position.
 
 p' = p + d, |dx| and |dy| each 20..70 m of the full city, 1.4..5 m here
 """
@@ -32,4 +32,4 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     return send
 
 
-ATTACK = Attack("a position that is off by the same way always", _start)
+ATTACK = Attack("a position with a constant error", _start)

@@ -1,4 +1,4 @@
-"""Constant speed offset: faster or slower, always by the same.
+"""Constant speed offset: always the same error of speed.
 
 v' = v + d, |d| 1..7 m/s of the full city, 0.07..0.5 m/s here; v' >= 0
 """
@@ -38,4 +38,4 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     return send
 
 
-ATTACK = Attack("a speed that is off by the same always", _start)
+ATTACK = Attack("a speed with a constant error", _start)

@@ -1,4 +1,4 @@
-"""Data replay: what another car said, as one's own.
+"""Data replay: another car's CAMs as one's own.
 
 4..8 CAMs of one victim in a row, with one's own number and the present time, then another one
 victims within 400 m of the full city, CAMs of the last 5 s
@@ -44,4 +44,4 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     return send
 
 
-ATTACK = Attack("what another car said", _start)
+ATTACK = Attack("another car's messages as its own", _start)

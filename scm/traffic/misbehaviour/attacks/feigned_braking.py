@@ -1,4 +1,4 @@
-"""Feigned braking: says it brakes hard while it speeds up.
+"""Feigned braking: reports hard braking while it speeds up.
 
 a' = -k a, k of 2..4        a lie where a > 0.25 m/s^2 of the full city
 """
@@ -27,4 +27,4 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     return send
 
 
-ATTACK = Attack("braking told while it speeds up", _start)
+ATTACK = Attack("hard braking while it speeds up", _start)

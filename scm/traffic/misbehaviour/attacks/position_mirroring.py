@@ -1,4 +1,4 @@
-"""Position mirroring: on the other side of the road.
+"""Position mirroring: a position on the other side of the road.
 
 p' = p mirrored at the left edge of the lane; heading and speed stay
 """

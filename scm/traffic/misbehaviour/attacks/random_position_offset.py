@@ -1,4 +1,4 @@
-"""Random position offset: somewhere else, by another way each time.
+"""Random position offset: another error of position in each CAM.
 
 p' = p + d, drawn anew for each CAM, sizes as in constant_position_offset
 """
@@ -24,4 +24,4 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     return send
 
 
-ATTACK = Attack("a position that is off by another way each time", _start)
+ATTACK = Attack("a position with another error each time", _start)

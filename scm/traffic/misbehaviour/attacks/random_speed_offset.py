@@ -1,4 +1,4 @@
-"""Random speed offset: faster or slower, by another amount each time.
+"""Random speed offset: another error of speed in each CAM.
 
 v' = v + d, drawn anew for each CAM, sizes as in constant_speed_offset
 """
@@ -18,4 +18,4 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     return send
 
 
-ATTACK = Attack("a speed that is off by another amount each time", _start)
+ATTACK = Attack("a speed with another error each time", _start)

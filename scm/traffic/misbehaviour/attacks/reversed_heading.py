@@ -1,4 +1,4 @@
-"""Reversed heading: says it drives the other way.
+"""Reversed heading: a heading the other way.
 
 yaw' = yaw + pi        a lie while it drives
 """

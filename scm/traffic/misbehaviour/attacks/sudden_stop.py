@@ -1,4 +1,4 @@
-"""Sudden stop: from some moment on it stands, and drives on.
+"""Sudden stop: from some moment on it reports to stand, and drives on.
 
 p' = p(t*), v' = 0, t* with 5 % for each CAM while it drives
 a lie while it drives, or once it is 20 m of the full city away
@@ -7,7 +7,7 @@ a lie while it drives, or once it is 20 m of the full city away
 import math
 import random
 
-from scm.traffic.misbehaviour.attack import SLOW_MPS, Attack, Frame, Scene, Sent, Transform
+from scm.traffic.misbehaviour.attack import MIN_LIE_MPS, Attack, Frame, Scene, Sent, Transform
 from scm.traffic.misbehaviour.forge import driven, moved
 from scm.v2x.etsi.cam_spatem import SCALE
 from scm.v2x.etsi.convert import CamView, read_cam
@@ -23,7 +23,7 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     def send(frame: Frame) -> list[Sent]:
         nonlocal stop
         reported = read_cam(frame.body)
-        is_driving = abs(reported.speed_mps or 0.0) > SLOW_MPS
+        is_driving = abs(reported.speed_mps or 0.0) > MIN_LIE_MPS
         if stop is None and is_driving and reported.place is not None and rng.random() < CHANCE:
             stop = reported
         if stop is None or stop.place is None or reported.place is None:

@@ -1,4 +1,4 @@
-"""Time delay: tells of now what was true seconds ago.
+"""Time delay: reports of seconds ago with the present time.
 
 CAM'(t) = CAM(t - d) with the time t, d of 2..4 s
 """
@@ -24,4 +24,4 @@ def _start(rng: random.Random, scene: Scene) -> Transform:
     return send
 
 
-ATTACK = Attack("old news with a new time", _start)
+ATTACK = Attack("old positions with the present time", _start)

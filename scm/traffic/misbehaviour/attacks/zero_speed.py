@@ -1,4 +1,4 @@
-"""Zero speed: says it stands, wherever it is.
+"""Zero speed: reports to stand, wherever it is.
 
 v' = 0        a lie while it drives: above 1 m/s of the full city, and moved
 """
@@ -7,8 +7,8 @@ import math
 import random
 
 from scm.traffic.misbehaviour.attack import (
-    SLOW_MPS,
-    STEP_M,
+    MIN_LIE_MPS,
+    NOISE_M,
     Attack,
     Frame,
     Scene,
@@ -22,9 +22,9 @@ from scm.v2x.etsi.convert import CamView, read_cam
 def drives(reported: CamView, before: CamView | None) -> bool:
     """Return whether a car truly moves, by its speed and its way since the CAM before."""
     was = None if before is None else before.place
-    if was is None or reported.place is None or abs(reported.speed_mps or 0.0) <= SLOW_MPS:
+    if was is None or reported.place is None or abs(reported.speed_mps or 0.0) <= MIN_LIE_MPS:
         return False
-    return math.dist(reported.place, was) > STEP_M / 5.0
+    return math.dist(reported.place, was) > NOISE_M / 5.0
 
 
 def _start(rng: random.Random, scene: Scene) -> Transform:

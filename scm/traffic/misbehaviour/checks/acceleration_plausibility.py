@@ -1,9 +1,9 @@
-"""Acceleration plausibility: no car brakes or speeds up harder than a car can.
+"""Acceleration plausibility: no car accelerates or brakes harder than it can.
 
     p = erfc((a - a_max) / sigma) for speeding up, likewise for braking
 
-Only between two claims that are both beyond it: a bump is over at once, and cars do bump. Never
-while another car touches: who is pushed knows no limit.
+Only if two claims in a row are both beyond it: a bump is over at once, and cars do bump. Never
+while another car touches: a pushed car has no limit.
 """
 
 from scm.traffic.misbehaviour.check import Case, Check

@@ -1,8 +1,8 @@
-"""Witness to the heading: the claimed heading is what the Eye measures of this car's tag.
+"""Eye heading: the claimed heading is the one that the Eye measures of this car's tag.
 
 p = erfc of |yaw - yaw_eye| beyond the tolerance, sigma of both
 
-Holds while the Eye looks, see `Case.eye_may_deny`.
+Holds while the Eye sees the tag, see `Case.eye_may_deny`.
 """
 
 import math

@@ -1,15 +1,14 @@
-"""Witness to nothing: where the Eye overlooks the floor, a car that speaks is a car that is seen.
+"""Eye missing: within the Eye's view, a car that sends CAMs has a visible tag.
 
     p = FLOOR where it sees no tag within NEAR_M of the claim
 
-A ghost is not seen. A car that is seen and does not speak is silent, which is no misbehaviour. A
-tag may be hidden for a while, so this needs several claims. A car of the city whose tag no camera
-has ever seen, or that has none, is no ghost: that the Eye cannot see its tag is said as such.
+A ghost is not seen. A tag may be hidden for a while, so this needs several claims. A car of the
+city whose tag no camera has ever seen, or that has none, is no ghost: that is an event of its own.
 """
 
 from scm.traffic.misbehaviour.check import Case, Check
 
-NEAR_M = 0.2
+NEAR_M = 0.2  # from a claim to a track
 FLOOR = 0.1
 
 

@@ -1,9 +1,9 @@
-"""Witness to the speed: the claimed speed is what the Eye measures of this car's tag.
+"""Eye speed: the claimed speed is the one that the Eye measures of this car's tag.
 
 p = erfc of |v - v_eye| beyond the tolerance, sigma of both
 
-Holds while the Eye looks, see `Case.eye_may_deny`, and not by hand or in a stop of the city: a car
-that stands within a tenth of a second is faster than the Eye's filter.
+Holds while the Eye sees the tag, see `Case.eye_may_deny`, and not by hand or in a stop of the city:
+a car that stops within a tenth of a second is faster than the Eye's filter.
 """
 
 import math

@@ -1,13 +1,13 @@
-"""Heading consistency: nobody turns on the spot.
+"""Heading consistency: no car turns on the spot.
 
-p = erfc of |yaw1 - yaw0| beyond what the tightest curve gives over the way that can be driven
+p = erfc of |yaw1 - yaw0| beyond the tightest curve over the longest possible way
 """
 
 from scm.geometry import wrap_angle
 from scm.traffic.misbehaviour.check import Case, Check
 from scm.traffic.misbehaviour.likely import of_number
 
-TIGHTEST_PER_M = 5.0
+TIGHTEST_PER_M = 5.0  # curvature: a radius of 0.2 m
 TOLERANCE_RAD = 0.15
 
 

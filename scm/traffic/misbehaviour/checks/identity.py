@@ -2,8 +2,8 @@
 
     p = 1 if it is, else the least
 
-The city's router lets a station write under its own name alone, so the name can be trusted. What
-a certificate would say on a real road is said here by the key.
+The city's router lets a station write under its own name alone, so the key replaces the certificate
+of a real road.
 """
 
 from scm.traffic.misbehaviour.check import Case, Check

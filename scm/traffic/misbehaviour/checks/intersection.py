@@ -1,8 +1,8 @@
-"""Intersection: two cars do not stand in each other.
+"""Intersection: two cars do not overlap.
 
-    p = erfc of the depth of their outlines in each other, beyond TOLERANCE_M
+    p = erfc of the overlap of their outlines, beyond TOLERANCE_M
 
-Both say so, one lies: the one that more is held against, else the one that spoke for less time.
+One of the two claims is false: that of the higher score, else that of the more recent station.
 """
 
 from scm.clock import NS_PER_S
@@ -11,8 +11,8 @@ from scm.traffic.misbehaviour.claim import Claim
 from scm.traffic.misbehaviour.likely import Box, at_most, overlap_m
 
 TOLERANCE_M = 0.03
-DRIVEN_S = 1.3
-LONGER_NS = NS_PER_S
+MAX_AGE_S = 1.3  # of the other claim: a standing car sends once a second
+CLEARLY_LONGER_NS = NS_PER_S
 
 
 def _judge(case: Case) -> float | None:
@@ -23,7 +23,7 @@ def _judge(case: Case) -> float | None:
     least = 1.0
     for other in case.neighbours:
         age_s = (now.t_ns - other.t_ns) * 1e-9
-        if other.yaw_rad is None or abs(age_s) > DRIVEN_S:
+        if other.yaw_rad is None or abs(age_s) > MAX_AGE_S:
             continue
         if _is_other(case, other):
             continue
@@ -36,13 +36,13 @@ def _judge(case: Case) -> float | None:
 
 
 def _is_other(case: Case, other: Claim) -> bool:
-    """Return whether the other one is rather to blame."""
+    """Return whether the other claim is more likely false."""
     one, two = case.standings.get(case.now.who), case.standings.get(other.who)
     if two is None:
         return False
     score = 0.0 if one is None else one.score
     known_ns = case.now.sent_ns if one is None else one.since_ns
-    return two.score > score or two.since_ns > known_ns + LONGER_NS
+    return two.score > score or two.since_ns > known_ns + CLEARLY_LONGER_NS
 
 
 CHECK = Check(_judge, "position", floor=1e-2, witnessed=True)

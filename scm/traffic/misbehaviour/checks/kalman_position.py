@@ -1,6 +1,6 @@
-"""Kalman position (F2MD's PSCP): the claim lies where the filter forecasts it.
+"""Kalman position (F2MD's PSCP): the claim is where the filter predicts it.
 
-p = place(innovation, sigma of forecast and claim)
+p = place(innovation, sigma of prediction and claim)
 """
 
 from scm.traffic.misbehaviour.check import Case, Check

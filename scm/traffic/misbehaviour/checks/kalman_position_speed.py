@@ -1,4 +1,4 @@
-"""Kalman position and speed together (F2MD's PSCSP, PSCSS): neither may stray far, nor both.
+"""Kalman position and speed together (F2MD's PSCSP, PSCSS), near their prediction.
 
 d^2 = (position innovation / sigma)^2 + (velocity innovation / sigma)^2
 p = (1 + d^2/2) exp(-d^2 / 2)        the chi-squared tail of four dimensions

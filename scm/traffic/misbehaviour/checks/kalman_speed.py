@@ -1,6 +1,6 @@
-"""Kalman speed (F2MD's PSCS): the claimed velocity is the forecast one.
+"""Kalman speed (F2MD's PSCS): the claimed velocity is the predicted one.
 
-p = place(innovation of velocity, sigma of forecast and claim)
+p = place(innovation of velocity, sigma of prediction and claim)
 """
 
 from scm.traffic.misbehaviour.check import Case, Check

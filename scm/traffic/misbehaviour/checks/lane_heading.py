@@ -1,10 +1,9 @@
-"""Lane heading: who is on a lane drives its way.
+"""Lane heading: a car on a lane drives in its direction.
 
     p = erfc of the least angle to a lane there, beyond 76 degrees
 
-A mirrored position lies on the other side of the road and heads against it. So does a real
-wrong-way driver, who tells the truth: an Eye that confirms the place settles it, and without an
-Eye this weighs little.
+A mirrored position is on the other side of the road and heads against it. So does a real wrong-way
+driver: an Eye that confirms the position overrules this, and without an Eye it weighs little.
 """
 
 from scm.geometry import wrap_angle

@@ -1,4 +1,4 @@
-"""Position consistency: from claim to claim nobody gets farther than his car can drive.
+"""Position consistency: between two claims no car gets farther than it can drive.
 
 p = place(|p1 - p0|, v_max dt)
 """
@@ -9,7 +9,7 @@ from scm.traffic.misbehaviour.check import Case, Check
 from scm.traffic.misbehaviour.likely import of_place
 
 TOLERANCE_M = 0.03
-TOO_FAST = 1.2
+SPEED_MARGIN = 1.2  # times the top speed
 
 
 def _judge(case: Case) -> float | None:
@@ -17,7 +17,7 @@ def _judge(case: Case) -> float | None:
     if before is None:
         return None
     away = math.hypot(now.x_m - before.x_m, now.y_m - before.y_m)
-    reach = TOO_FAST * case.limits.speed_mps * max(case.dt_s, 0.0) + TOLERANCE_M
+    reach = SPEED_MARGIN * case.limits.speed_mps * max(case.dt_s, 0.0) + TOLERANCE_M
     return of_place(away, reach, now.own_m + before.own_m)
 
 

@@ -1,9 +1,9 @@
-"""Position plausibility: cars are on roads, not beside them and not in walls.
+"""Position plausibility: cars are on roads.
 
-    p = erfc of what lies beyond TOLERANCE_M beside the nearest lane or paved area
+    p = erfc of the distance beyond TOLERANCE_M to the nearest lane or paved area
 
-Holds where the map has lanes. A car that drives over the kerb is not lying: an Eye that sees it
-there settles it.
+Holds where the map has lanes. A car may drive over the kerb: an Eye that sees it there overrules
+this.
 """
 
 from scm.traffic.misbehaviour.check import Case, Check

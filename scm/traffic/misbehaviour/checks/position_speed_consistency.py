@@ -1,15 +1,14 @@
-"""Position-speed consistency: the way from claim to claim is the mean of the speeds times the time.
+"""Position-speed consistency: the way between two claims is the mean speed times the time.
 
     r = (rear1 - rear0) . (cos yaw, sin yaw) - (v0 + v1) / 2 dt        yaw: the mean of both
     p = erfc of |r| beyond the tolerance, for one claim; and of the mean of r over the last seconds
 
-Along the heading, because a length would grow with noise; over seconds, because the noise of places
-cancels there and a small constant lie remains.
+Along the heading, because a length would grow with noise; over seconds, because there the noise of
+positions cancels and a small constant error remains.
 
-Between two CAMs the speed strays from both by DRIFT_MPS: beyond it another CAM would have been due
-(EN 302 637-2, 6.1.3), and lost ones make the tolerance grow with the square of the time, and the
-mean as unsure as it is when the speed changed. Who drives faster than a Nigel can slips more: all
-tolerances of a speed grow in that ratio.
+Between two CAMs the speed may differ from both by DRIFT_MPS: beyond it another CAM would have been
+due (EN 302 637-2, 6.1.3). Lost CAMs make the tolerance grow with the square of the time. A car
+faster than a Nigel slips more: all tolerances of a speed grow in that ratio.
 """
 
 import math
@@ -20,8 +19,8 @@ from scm.traffic.misbehaviour.limits import NIGEL_MPS
 
 DRIFT_MPS = 0.03
 TOLERANCE_M = 0.006
-LEAST_S = 2.0
-MEAN_MPS, SIGMA_MPS = 0.02, 0.006
+MIN_MEAN_S = 2.0  # of claims, before their mean counts
+MEAN_MPS, SIGMA_MPS = 0.02, 0.006  # tolerance and standard deviation of the mean
 
 
 def _judge(case: Case) -> float | None:
@@ -34,7 +33,7 @@ def _judge(case: Case) -> float | None:
     sigma = math.hypot(now.own_m + before.own_m, now.own_mps * dt)
     strayed = case.strayed
     p = of_number(strayed.last_m, tolerance, sigma)
-    if strayed.over_s < LEAST_S:
+    if strayed.over_s < MIN_MEAN_S:
         return p
     mean = strayed.sum_m / strayed.over_s
     unsure_m = math.hypot(2.0 * now.own_m, math.sqrt(strayed.variance_m2))

@@ -1,4 +1,4 @@
-"""Position-speed consistency, extremes: the way lies between what braking and racing would give.
+"""Position-speed consistency, extremes: the way is between full braking and full throttle.
 
 least = the way at full braking from v0, most = at full acceleration to v_max
 p = erfc of what lies outside of [least, most]

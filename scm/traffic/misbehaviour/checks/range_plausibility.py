@@ -1,4 +1,4 @@
-"""Range plausibility: nobody is heard from farther away than the radio reaches.
+"""Range plausibility: no car is received from beyond the radio's range.
 
 p = place(|claimed - receiver|, range)        range of the map, 20 m; VeReMi's 418 m is 30 m
 """
@@ -15,7 +15,7 @@ def _judge(case: Case) -> float | None:
     if receiver is None:
         return None
     away = math.hypot(now.x_m - receiver[0], now.y_m - receiver[1])
-    # The antenna may sit a car's length behind the bumper that is told.
+    # The antenna may be a car's length behind the claimed bumper.
     return at_most(away, case.ground.range_m + now.size[0], now.own_m)
 
 

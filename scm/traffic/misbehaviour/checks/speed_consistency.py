@@ -1,10 +1,10 @@
-"""Speed consistency: speed changes no faster than a car can brake or speed up.
+"""Speed consistency: speed changes no faster than a car can brake or accelerate.
 
-p = erfc of what v1 - v0 lies beyond [-most(decel, stop), most(accel, start)]
+p = erfc of v1 - v0 beyond [-most(decel, stop), most(accel, start)]
 most(a, b) = max(a dt, min(b dt, v_max))
 
-A driver uses a, for any time. b is of full throttle at rest, and of no throttle at all, as a guard
-stops a car whose commands come late: it ends at the car's top speed, or at rest.
+a is a driver's, for any time. b is that of full throttle at rest, or of a guard that stops a car
+whose commands are late: it ends at the car's top speed, or at rest.
 """
 
 import math

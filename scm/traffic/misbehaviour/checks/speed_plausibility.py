@@ -1,4 +1,4 @@
-"""Speed plausibility: nobody is faster than his car.
+"""Speed plausibility: no claim is faster than the car's top speed.
 
 p = erfc((|v| - v_max) / sigma)        v_max of the car itself, not VeReMi's 62 m/s
 """

@@ -1,4 +1,4 @@
-"""Static fields: a car keeps its length and width, where it tells them.
+"""Static fields: a car's length and width do not change.
 
 p = 1 within one step of the field, else the least
 """
@@ -6,8 +6,7 @@ p = 1 within one step of the field, else the least
 from scm.traffic.misbehaviour.check import Case, Check
 from scm.traffic.misbehaviour.likely import LEAST
 
-STEP_M = 0.0145
-"""Two steps of 0.1 m of the enlarged city: one to either side."""
+STEP_M = 0.0145  # two steps of 0.1 m of the full-size city, one to either side
 
 
 def _judge(case: Case) -> float | None:

@@ -1,9 +1,9 @@
 """Actuated: rings and barriers, green as long as vehicles come, none where nobody is.
 
 A phase is called by a vehicle before its stop line or by an operator; one that has been red for
-`UNSEEN_NS` is called anyway, for whoever the detectors do not see. Max 2 is in force where a queue
-is longer than max 1 can clear. When detectors see nothing at all, every phase has max recall: then
-it runs like fixed time.
+`UNSEEN_NS` is called anyway, for cars that the detectors do not see. Max 2 is in force where a
+queue is longer than max 1 can clear. When detectors receive nothing at all, every phase has max
+recall: then it runs like fixed time.
 
 Vocabulary and rules: NEMA TS 2 and NTCIP 1202, as far as `scm.traffic.signals.rings` says.
 """
@@ -19,14 +19,14 @@ from scm.traffic.signals.green_extension import (
     is_worth_waiting,
     worth_until_s,
 )
-from scm.traffic.signals.guaranteed_time import AHEAD_NS
+from scm.traffic.signals.guaranteed_time import GREEN_NOTICE_NS
 from scm.traffic.signals.kernel import Phase
 from scm.traffic.signals.operator_overrides import NEED_RINGS, groups_of
 from scm.traffic.signals.policy import Answer, JunctionView, Mode, Policy, Site, Turn
 from scm.traffic.signals.rings import Inputs, Recall, Ring, Rings
 
-UNSEEN_NS = 120 * NS_PER_S
-LONG_QUEUE = 4
+UNSEEN_NS = 120 * NS_PER_S  # red for so long is a call: a car may be invisible to detectors
+LONG_QUEUE = 4  # cars; max 1 lets no more of them go
 
 
 class Memory(NamedTuple):
@@ -38,7 +38,7 @@ class Memory(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RingInputs:
-    """What the rings are to be told, and whether the detectors can be relied on."""
+    """The inputs of the rings, and whether the detectors are reliable."""
 
     inputs: Inputs
     sees: bool
@@ -71,7 +71,7 @@ def ride(site: Site, memory: Memory, view: JunctionView, ring_inputs: RingInputs
 
 
 def inputs_of(site: Site, memory: Memory, view: JunctionView) -> RingInputs:
-    """Return what detectors and operators tell the rings."""
+    """Return the inputs of the rings from detectors and operators."""
     groups = site.program.groups
     calls = {i for i, wait in enumerate(memory.not_green_ns) if wait >= UNSEEN_NS}
     long = set()
@@ -102,7 +102,7 @@ def numbers(site: Site, groups: frozenset[str]) -> frozenset[int]:
 
 
 def foresee(site: Site, memory: Memory, view: JunctionView) -> tuple[Turn, ...]:
-    """Return the turns of the rings as they are called now; wishes of people end it."""
+    """Return the turns of the rings as they are called now; none under overrides."""
     if any(one.verb in NEED_RINGS for one in view.overrides):
         return ()
     inputs = inputs_of(site, memory, view).inputs
@@ -148,7 +148,7 @@ def _green_s(site: Site, phase: int, view: JunctionView) -> float:
     times = site.layout.phases[phase]
     detector = view.detectors.get(site.program.groups[phase])
     if not view.sees or detector is None:
-        return (times.max1 + AHEAD_NS) / NS_PER_S
+        return (times.max1 + GREEN_NOTICE_NS) / NS_PER_S
     needed_s = min(green_s(site, phase, detector), times.max1 / NS_PER_S)
     return max(needed_s, times.min_green / NS_PER_S + GUARANTEED_S)
 

@@ -8,7 +8,7 @@ from scm.traffic.signals.policy import Answer, JunctionView, Policy, Site, nothi
 
 
 def step(site: Site, memory: None, view: JunctionView) -> tuple[None, Answer]:
-    """Wish what the timetable says."""
+    """Request what the timetable says."""
     del site
     return memory, Answer(view.timetabled)
 

@@ -4,7 +4,7 @@ from scm.traffic.signals.policy import Answer, JunctionView, Policy, Site, nothi
 
 
 def step(site: Site, memory: None, view: JunctionView) -> tuple[None, Answer]:
-    """Wish nothing."""
+    """Request nothing."""
     del site, view
     return memory, Answer(frozenset())
 

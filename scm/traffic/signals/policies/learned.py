@@ -1,4 +1,4 @@
-"""Learned: a callable of your own that sees what every policy sees and answers the wished groups.
+"""Learned: a callable of your own that gets what every policy gets and returns groups to be green.
 
     scm traffic MAP --learned my_module:decide
 
@@ -19,7 +19,7 @@ from scm.errors import PlanError
 from scm.traffic.signals.kernel import Phase
 from scm.traffic.signals.policy import Answer, JunctionView, Policy, Site
 
-STARVED_NS = 180 * NS_PER_S
+STARVED_NS = 180 * NS_PER_S  # longest wait of a called group
 
 Memory = tuple[int, ...]
 

@@ -29,10 +29,9 @@ from scm.traffic.signals.operator_overrides import NEED_RINGS, groups_of
 from scm.traffic.signals.plan import stages, times_of
 from scm.traffic.signals.policy import Answer, JunctionView, Mode, Policy, Site, Turn
 
-STARVED_NS = 60 * NS_PER_S
-UNSEEN_NS = 120 * NS_PER_S
-SWITCH_AT = 1.0
-MANY_GROUPS = 10
+STARVED_NS = 60 * NS_PER_S  # a called group that has waited for longer is next
+SWITCH_AT = 1.0  # car: by how much another stage's pressure must be higher
+MANY_GROUPS = 10  # more have too many sets without conflict to compare all
 
 
 class Memory(NamedTuple):

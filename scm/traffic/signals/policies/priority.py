@@ -32,9 +32,9 @@ from scm.traffic.signals.policy import (
     Turn,
 )
 
-LEAD_NS = 20 * NS_PER_S
-LATE_NS = 10 * NS_PER_S
-EXTEND_NS = 8 * NS_PER_S
+LEAD_NS = 20 * NS_PER_S  # before an arrival help begins
+LATE_NS = 10 * NS_PER_S  # after an estimated arrival it ends: a vehicle may be late
+EXTEND_NS = 8 * NS_PER_S  # of green beyond max, for one vehicle
 
 
 class Memory(NamedTuple):
@@ -90,7 +90,7 @@ def _helped(
     ring_inputs: RingInputs,
     transit: list[PriorityCall],
 ) -> RingInputs:
-    """Return what the rings are told with green extensions and early greens in it."""
+    """Return the inputs of the rings with green extensions and early greens."""
     wanted = numbers(site, frozenset(one.group for one in transit))
     green = rings.green_in(view.state)
     extended = {i for i in wanted & green if memory.helped_ns[i] < EXTEND_NS}

@@ -1,10 +1,10 @@
-"""Proof by exhaustion that a kernel is safe for a program: every reachable state, every wish.
+"""Proof by exhaustion that a kernel is safe for a program: every reachable state, every request.
 
 An observer sees what people see, colours and time, and keeps a small memory of its own. The search
 walks the product of kernel and observer until it finds nothing new. Unsafe is: a green, yellow or
 all-red shorter than its least time, a colour that may not follow the last one, a start against a
-group in conflict that still goes or clears, or a green that nobody wished for. At last, from every
-state, a group that alone is wished for must get its green.
+group in conflict that still goes or clears, or a green that was not requested. At last, from every
+state, a group that alone is requested must get its green.
 """
 
 import math
@@ -146,7 +146,7 @@ def _look(before: _Seen, colour: str, dt: int) -> _Seen:
 
 @cache
 def _forget(seen: _Seen, times: GroupTimes) -> _Seen:
-    """Count no further than anybody asks: that keeps the search finite."""
+    """Count no further than any rule needs: that keeps the search finite."""
     if seen.colour in _GOING:
         return _Seen(seen.colour, min(seen.age, max(times.min_green, times.yellow)), 0)
     return _Seen(seen.colour, 0, min(seen.quiet, times.clearance))
@@ -186,7 +186,7 @@ def _wrong_start(program: Program, name: str, after: Sequence[_Seen]) -> str:
 
 
 def _must_serve(kernel: Kernel, program: Program, states: Collection[State], index: int) -> None:
-    """Go on from each state under one wish until its green, or where that is known to come."""
+    """Go on from each state under one request until its green, or where that is known to come."""
     requested = {program.groups[index]}
     longest = 2 * sum(map(sum, program.times)) + 10
     served = {state for state in states if _of(state[index]) == "green"}

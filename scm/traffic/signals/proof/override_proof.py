@@ -42,10 +42,10 @@ def prove_overrides(
         logic: The rings.
         program: Of the junction, its times in steps.
         phases: How each is run, in steps; without recall or locking.
-        most: Groups that one wish names at most, and that call at a time, but for all at once.
+        most: Groups that one override names at most, and that call at a time, but for all at once.
 
     Raises:
-        PlanError: saying which wish lost its meaning, or who waits for ever.
+        PlanError: saying which override has no effect, or who waits for ever.
     """
     layout = logic.layout_of(program, phases)
     letters = _letters(program, most)
@@ -67,12 +67,12 @@ def prove_overrides(
 
 @cache
 def check_ring_shape(groups: int, conflicts: frozenset[tuple[int, int]]) -> Served | None:
-    """Prove the rings of a junction, told by its conflicts alone, with short times.
+    """Prove the rings of a junction, given by its conflicts alone, with short times.
 
-    Each wish names one group, and nobody, one, or all call. None: so many groups take too long.
+    Each override names one group, and nobody, one, or all call. None: so many groups take too long.
 
     Raises:
-        PlanError: saying which wish lost its meaning, or who waits for ever.
+        PlanError: saying which override has no effect, or who waits for ever.
     """
     if groups > MANY_GROUPS:
         return None
@@ -102,7 +102,7 @@ def _sets(everyone: Iterable[int], least: int, most: int) -> list[Numbers]:
 
 
 def _letters(program: Program, most: int) -> list[Inputs]:
-    """Return all that the rings may be told at one step; nobody holds two that conflict."""
+    """Return all inputs that the rings may get at one step; nobody holds two that conflict."""
     everyone = range(len(program.groups))
     some = _sets(everyone, 1, most)
     holds = [held for held in some if not any(_clash(program, i, j) for i in held for j in held)]
@@ -124,7 +124,7 @@ def _clash(program: Program, one: int, other: int) -> bool:
 
 
 def _check_meaning(program: Program, before: Node, inputs: Inputs, requested: Numbers) -> None:
-    """Refuse wishes that lost their meaning.
+    """Refuse overrides without effect.
 
     Raises:
         PlanError: saying which.
@@ -169,7 +169,7 @@ def _all_served(
 
 
 def _in_the_way(program: Program, layout: Layout, phase: int) -> Numbers:
-    """Return the phases that keep this one waiting while held: rivals, and other sections'."""
+    """Return the phases that keep this one waiting while held."""
     here = next(s for s in layout.sections if any(phase in sequence for sequence in s))
     beside = {i for sequence in here for i in sequence if not _clash(program, i, phase)}
     return frozenset(range(len(program.groups))) - beside - {phase}

@@ -31,17 +31,16 @@ from scm.traffic.signals.proof.kernel_proof import (
     watch,
 )
 
-LATEST = 2
-"""Tenths of a second that a step may take: what a timetable leaves room for at each change."""
+MAX_STEP_TENTHS = 2  # what a timetable leaves room for at each change
 
-MOST_NODES = 3_000_000
+MAX_NODES = 3_000_000  # more would take too long and too much memory
 
 
 class Proven(NamedTuple):
     """What was walked through without finding fault.
 
     Attributes:
-        states, transitions: Of the kernel, under any wishes.
+        states, transitions: Of the kernel, under any requests.
         plan_states, plan_transitions: Of the kernel under this plan.
     """
 
@@ -79,16 +78,16 @@ def prove_plan(kernel: Kernel, program: Program, table: Timetable) -> Proven:
     walked = prove(kernel, small)
     cleared = _all_come_to_rest(kernel, small, walked.states)
     for stage in table.timed_stages:
-        if stage.end_ns - stage.start_ns < LATEST * STEP_NS:
+        if stage.end_ns - stage.start_ns < MAX_STEP_TENTHS * STEP_NS:
             where = f"plan {table.plan!r}: stage {sorted(stage.groups)}"
-            least_s = LATEST * STEP_NS / 1e9
+            least_s = MAX_STEP_TENTHS * STEP_NS / 1e9
             raise PlanError(f"{where}: too short for late steps, expected {least_s:g} s at least")
     nodes, transitions = _walk(kernel, small, table, cleared)
     return Proven(len(walked.states), walked.transitions, nodes, transitions)
 
 
 def _all_come_to_rest(kernel: Kernel, program: Program, states: frozenset[State]) -> State:
-    """Return the state that all others end in when nobody wishes anything."""
+    """Return the state that all others end in without requests."""
     longest = max(sum(times) for times in program.times) + 2
     passed, ends = set[State](), set[State]()
     for begun in states:
@@ -110,7 +109,7 @@ def _walk(kernel: Kernel, program: Program, table: Timetable, cleared: State) ->
         green: _resting(kernel, program, cleared, green)
         for green in {*_some_of(first), *_some_of(last)}
     }
-    begin = table.length_ns // STEP_NS - LATEST
+    begin = table.length_ns // STEP_NS - MAX_STEP_TENTHS
     todo = [_Node(begin, *rests[green], green) for green in _some_of(first)]
     seen, transitions = set(todo), 0
     while todo:
@@ -128,8 +127,8 @@ def _walk(kernel: Kernel, program: Program, table: Timetable, cleared: State) ->
             if after not in seen:
                 seen.add(after)
                 todo.append(after)
-        if len(seen) > MOST_NODES:
-            msg = f"plan {table.plan!r}: more than {MOST_NODES} states: too many to prove"
+        if len(seen) > MAX_NODES:
+            msg = f"plan {table.plan!r}: more than {MAX_NODES} states: too many to prove"
             raise PlanError(f"{msg}; expected fewer stages or a shorter cycle")
     return len(seen), transitions
 
@@ -157,7 +156,7 @@ def _resting(
 def _onward(table: Timetable, node: _Node) -> Iterator[tuple[int, int, frozenset[str]]]:
     """Yield each next step: how long it takes, where it leads to, and who goes on from there."""
     length, last = table.length_ns // STEP_NS, table.timed_stages[-1]
-    for dt in range(1, LATEST + 1):
+    for dt in range(1, MAX_STEP_TENTHS + 1):
         at = node.at + dt
         if at >= length:
             yield dt, at - length, frozenset()
@@ -186,7 +185,7 @@ def _check_end(
 def _check_green(
     program: Program, table: Timetable, node: _Node, requested: frozenset[str]
 ) -> None:
-    """Refuse a wished group that is not green."""
+    """Refuse a requested group that is not green."""
     for name, group in zip(program.groups, node.state, strict=True):
         if name in requested and group.phase is not Phase.GREEN:
             at_s = node.at * STEP_NS / 1e9

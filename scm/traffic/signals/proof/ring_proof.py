@@ -3,8 +3,8 @@
 The search walks through every state that rings and kernel can reach together under every set of
 calls. Then, for each phase: a call for it stays, all others come and go as unkindly as they can.
 Among the states in which it still waits there must be no way round in a circle; the longest way
-through them is the worst wait, and it is told. That every green is safe is the kernel's own proof,
-which holds for any wishes; here it is only checked that the rings' wishes do not conflict.
+through them is the worst wait. That every green is safe is the kernel's own proof, which holds for
+any requests; here it is only checked that the rings' requests do not conflict.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from scm.traffic.signals import kernel
 from scm.traffic.signals.kernel import GroupTimes, Phase, Program, State
 from scm.traffic.signals.rings import Inputs, Layout, PhaseTimes, Rings, green_in
 
-MOST_STATES = 20_000
+MAX_STATES = 20_000  # more would take too long where a junction is loaded
 
 
 class RingLogic(Protocol):
@@ -127,7 +127,7 @@ def explore(
     """Return what follows each state that can be reached, for each of the inputs.
 
     Raises:
-        PlanError: when there are more than `MOST_STATES`.
+        PlanError: when there are more than `MAX_STATES`.
     """
     logic, program, layout = of
     nodes = [(kernel.start(program), logic.start(layout))]
@@ -142,8 +142,8 @@ def explore(
                 nodes.append(then)
             following.append(number[then])
         ways.append(tuple(following))
-        if len(nodes) > MOST_STATES:
-            raise PlanError(f"unsafe: more than {MOST_STATES} states, so nothing is proven")
+        if len(nodes) > MAX_STATES:
+            raise PlanError(f"unsafe: more than {MAX_STATES} states, so nothing is proven")
     return Explored(nodes, ways)
 
 

@@ -70,10 +70,10 @@ def test_suspicion_comes_at_one_score_and_goes_at_a_lower_one():
     blatant, gap_s = [(CHECK, 1e-9)], 1.0
     told = [history.add(claim_at(judge, next(times)), gap_s, blatant) for _ in range(2)]
     assert told == [False, True]
-    while history.score >= fusion.ON:
+    while history.score >= fusion.SUSPECTED_FROM:
         history.add(claim_at(judge, next(times)), gap_s, [])
     assert history.since_ns is not None
-    while history.score >= fusion.OFF:
+    while history.score >= fusion.CLEARED_BELOW:
         history.add(claim_at(judge, next(times)), gap_s, [])
     assert history.since_ns is None
     assert history.noted == {}

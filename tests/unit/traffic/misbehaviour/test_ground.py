@@ -7,7 +7,14 @@ from numpy.testing import assert_allclose
 
 from scm.geometry import wrap_angle
 from scm.maps.route import Roads
-from scm.traffic.misbehaviour.ground import ALONGSIDE_M, CELL_M, FAR_M, STEP, Ground, inside
+from scm.traffic.misbehaviour.ground import (
+    CELL_M,
+    MAX_OFF_ROAD_M,
+    POINT_STEP,
+    SAME_LANE_M,
+    Ground,
+    inside,
+)
 from tests.unit.traffic.misbehaviour.claims import LANE, MAP, ground
 
 
@@ -49,7 +56,7 @@ def test_what_is_near_is_found_as_if_all_lanes_were_looked_at():
     rows = [
         (x, y, wrap_angle(yaw), lane.width_m / 2.0)
         for lane in roads.lanes.values()
-        for x, y, yaw in np.column_stack([lane.points, lane.yaw])[::STEP].tolist()
+        for x, y, yaw in np.column_stack([lane.points, lane.yaw])[::POINT_STEP].tolist()
     ]
     paved = 0
     for i in range(-30, 120, 3):
@@ -62,8 +69,8 @@ def test_what_is_near_is_found_as_if_all_lanes_were_looked_at():
                 continue
             beside = [(math.hypot(x - row[0], y - row[1]) - row[3], row[2]) for row in rows]
             away = min(beside)[0]
-            near = max(away, 0.0) + ALONGSIDE_M
-            assert off == min(FAR_M, max(0.0, away))
-            if away < FAR_M - 0.25:  # farther off not all lanes are asked
+            near = max(away, 0.0) + SAME_LANE_M
+            assert off == min(MAX_OFF_ROAD_M, max(0.0, away))
+            if away < MAX_OFF_ROAD_M - 0.25:  # farther off not all lanes are asked
                 assert set(ways) == {round(yaw, 1) for beyond, yaw in beside if beyond <= near}
     assert paved > 10

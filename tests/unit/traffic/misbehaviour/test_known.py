@@ -5,9 +5,9 @@ import math
 import pytest
 
 from scm.clock import NS_PER_S
-from scm.traffic.misbehaviour.check import GRACE_S, HARD_S, Sender, load_checks
+from scm.traffic.misbehaviour.check import HARD_DRIVING_S, NEWCOMER_S, Sender, load_checks
 from scm.traffic.misbehaviour.detector import Detector
-from scm.traffic.misbehaviour.fusion import UNSEEN_MOST
+from scm.traffic.misbehaviour.fusion import MAX_UNSEEN_SCORE
 from scm.traffic.misbehaviour.limits import Limits, limits_of
 from tests.unit.traffic.misbehaviour.claims import RSU, body, ground, state, track
 
@@ -83,7 +83,7 @@ def test_a_newcomer_beside_the_road_has_seconds_of_grace_and_no_more():
         return None
 
     assert until_s(Sender()) < 0.5
-    assert GRACE_S < until_s(NIGEL) < GRACE_S + 1.0
+    assert NEWCOMER_S < until_s(NIGEL) < NEWCOMER_S + 1.0
 
 
 def against_its_lane(judge, sender, jumps=False):
@@ -102,7 +102,7 @@ def test_who_cannot_be_seen_is_not_suspected_for_driving_badly_alone():
     assert against_its_lane(detector(), Sender()).since_ns is not None
     history = against_its_lane(detector(), NIGEL)
     assert (history.since_ns, history.is_tag_unseen) == (None, True)
-    assert 2.0 < history.score <= UNSEEN_MOST
+    assert 2.0 < history.score <= MAX_UNSEEN_SCORE
     assert against_its_lane(detector(), NIGEL, jumps=True).since_ns is not None
 
 
@@ -124,8 +124,10 @@ def test_hands_and_stops_move_a_car_as_no_driver_does():
 
 def test_leniency_ends_soon_after_hands_let_go():
     """It goes by what the world writes into each CAM: a car that says so itself gains nothing."""
-    late = harder(detector(), HAND, hard_until_s=1.0, from_s=1.0 + HARD_S + 0.5)
-    assert late == pytest.approx(harder(detector(), NIGEL, from_s=1.0 + HARD_S + 0.5), rel=0.1)
+    late = harder(detector(), HAND, hard_until_s=1.0, from_s=1.0 + HARD_DRIVING_S + 0.5)
+    assert late == pytest.approx(
+        harder(detector(), NIGEL, from_s=1.0 + HARD_DRIVING_S + 0.5), rel=0.1
+    )
 
 
 @pytest.mark.parametrize("sender", [HAND, STOPPED])

@@ -146,12 +146,12 @@ def test_people_are_told_once_though_reports_go_on(lying):
 def test_whoever_watches_an_attack_is_told_of_the_first_lie_the_report_and_the_end(lying):
     first, found, last = lying.lines
     report = lying.reports[0]
-    assert first == "n2 lies from now on: a speed of zero while driving"
+    assert first == "n2 sends its first false CAM: a speed of zero while driving"
     assert f"score {report.score:.1f}: {report.observations[0].check}" in found
     assert 0.0 < float(found.split(" s after")[0].rpartition(" ")[2]) < 20.0
     count = sum(cam.station == "n2" for cam in lying.cams)
     assert last.startswith(f"n2 leaves: {count} CAMs, ")
-    assert last.endswith("of them lies, reported")
+    assert last.endswith("of them false, reported")
 
 
 def test_the_log_names_a_suspect_once(lying):

@@ -6,9 +6,8 @@ from scm.maps.grid_city import grid_city
 from scm.maps.route import Roads
 from scm.records.signals import SignalGroup
 from scm.traffic.observation.car_estimates import CarEstimate, CarEstimates
-from scm.traffic.observation.counters import Counters
+from scm.traffic.observation.counters import Counters, level_of, share_below
 from scm.traffic.observation.lane_tracking import Follower, rules_of
-from scm.traffic.observation.service_level import level_of, share_below
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_state import VehicleState

@@ -7,7 +7,7 @@ import pytest
 from scm.clock import NS_PER_S
 from scm.maps.load import load_map
 from scm.maps.route import Roads
-from scm.traffic.signals.detectors import BLIND_NS, FORGET_NS, JunctionDetectors, Seen
+from scm.traffic.signals.detectors import MAX_AGE_NS, MAX_SILENCE_NS, JunctionDetectors, Seen
 
 MAP = load_map("driving_school")
 ROADS = Roads(MAP)
@@ -108,13 +108,13 @@ def test_a_car_that_falls_silent_is_forgotten_and_old_news_is_ignored(watcher):
     show(watcher, at(0.05, t_s=1.0))
     show(watcher, at(-0.5, t_s=0.5))
     assert read(watcher, 1.0).call
-    assert not read(watcher, 1.1 + FORGET_NS / NS_PER_S).call
+    assert not read(watcher, 1.1 + MAX_AGE_NS / NS_PER_S).call
 
 
 def test_it_is_blind_when_nothing_was_heard_for_long(watcher):
     show(watcher, at(0.05))
-    assert watcher.sees(BLIND_NS)
-    assert not watcher.sees(BLIND_NS + 1)
+    assert watcher.sees(MAX_SILENCE_NS)
+    assert not watcher.sees(MAX_SILENCE_NS + 1)
 
 
 def test_a_car_that_stands_behind_the_junction_is_ahead(watcher):

@@ -10,7 +10,7 @@ from scm.traffic.signals import rings
 from scm.traffic.signals.controller import Controller
 from scm.traffic.signals.controller_state import Observations
 from scm.traffic.signals.detectors import Detector
-from scm.traffic.signals.forecast import FREED, forecasts, schedule, within
+from scm.traffic.signals.forecast import CLEARING_CONFIDENCE, forecasts, schedule, within
 from scm.traffic.signals.guaranteed_time import GuaranteedTime
 from scm.traffic.signals.kernel import GroupTimes, Program
 from scm.traffic.signals.plan import plan_names
@@ -224,8 +224,8 @@ def test_a_forecast_is_bounded_by_the_promise_and_surer_the_nearer_it_is():
     def told(at, **more):
         return within(promise, at * S, 10 * S, **({"red": True, "planned": False} | more))
 
-    assert told(20) == (50 * S, FREED)
-    assert told(20, red=False).confidence < FREED
+    assert told(20) == (50 * S, CLEARING_CONFIDENCE)
+    assert told(20, red=False).confidence < CLEARING_CONFIDENCE
     assert told(300).end_ns == 200 * S
     assert told(60).confidence > told(100).confidence
     assert within(promise, None, 0, red=True, planned=False) is None

@@ -6,7 +6,7 @@ from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.traffic.signals.detectors import Detector, JunctionDetectors, reach_of
 from scm.traffic.signals.green_extension import is_worth_waiting
-from scm.traffic.signals.guaranteed_time import AHEAD_NS
+from scm.traffic.signals.guaranteed_time import GREEN_NOTICE_NS
 from scm.traffic.signals.kernel import GroupState, GroupTimes, Phase, Program
 from scm.traffic.signals.policies import max_pressure
 from scm.traffic.signals.policy import JunctionView, site_of
@@ -44,7 +44,7 @@ def test_a_far_car_is_waited_for_while_the_others_are_still_on_their_way():
 
 
 def test_nobody_is_waited_for_who_passes_within_what_is_promised():
-    promised_s = AHEAD_NS / S
+    promised_s = GREEN_NOTICE_NS / S
     assert not goes_on(cars(promised_s - 0.2), cars(standing=1))
     assert goes_on(cars(promised_s + 0.2), cars(standing=1))
     assert not goes_on(cars(), cars(standing=1))
@@ -68,7 +68,7 @@ def test_the_headway_is_what_one_more_car_of_a_queue_takes():
 
 
 def test_max_one_counts_what_is_promised_when_a_green_is_ended():
-    assert SITE.layout.phases[0].max1 + AHEAD_NS == 3 * TIMES.min_green
+    assert SITE.layout.phases[0].max1 + GREEN_NOTICE_NS == 3 * TIMES.min_green
 
 
 @pytest.mark.parametrize(("green_s", "stays"), [(5, True), (7, True), (8, False)])
