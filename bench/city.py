@@ -123,7 +123,7 @@ def run(city_map: CityMap, cars: int, stages: Stages, *, lidar: bool = False) ->
         "kib_a_car": held_kib,
         "junctions": len(city_map.junctions),
         "scans": len(scans.drain()) / SPAN_S if scans is not None else 0.0,
-        "speed": float(part.world.vehicles.speed[part.world.vehicles.hosted].mean()),
+        "speed": float(part.world.cars.arrays.speed[part.world.cars.arrays.hosted].mean()),
     }
 
 

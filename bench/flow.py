@@ -62,7 +62,7 @@ class Cameras(BasePart):
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Tell a track of every hosted car."""
         del inbox
-        vehicles = self._world.vehicles
+        vehicles = self._world.cars.arrays
         of = np.flatnonzero(vehicles.hosted)
         noise = self._dice.normal(size=(4, len(of)))
         rows = zip(
@@ -79,7 +79,7 @@ class Cameras(BasePart):
         self, now_ns: int, vehicle: int, x: float, y: float, yaw: float, speed: float
     ) -> EyeTrack:
         return EyeTrack(
-            vehicle=self._world.vehicles.names[vehicle], tag_id=1, t_ns=now_ns, x_m=x, y_m=y,
+            vehicle=self._world.cars.arrays.names[vehicle], tag_id=1, t_ns=now_ns, x_m=x, y_m=y,
             yaw_rad=yaw, speed_mps=speed, lateral_speed_mps=0.0, yaw_rate_radps=0.0, age_s=0.0,
             stale=False, covariance=self._covariance,  # type: ignore[arg-type]
         )  # fmt: skip
@@ -183,7 +183,7 @@ class Count:
 
     def look(self, at_s: float, *, prints_progress: bool) -> None:
         """Take note of an instant; `at_s` after the count began."""
-        self.standing.look(self._world.drivers, self._world.vehicles.speed, LOOK_S)
+        self.standing.look(self._world.drivers, self._world.cars.arrays.speed, LOOK_S)
         self.took_s = time.perf_counter() - self._began
         while at_s >= len(self._passed) * self._span_s / 4.0 and len(self._passed) <= 4:
             self._passed.append(self._world.drivers.passed.copy())
@@ -198,7 +198,7 @@ class Count:
 
     def row(self, span_s: float) -> dict[str, float]:
         """Return what there is to tell of a run that lasted so long."""
-        drivers, hosted = self._world.drivers, self._world.vehicles.hosted
+        drivers, hosted = self._world.drivers, self._world.cars.arrays.hosted
         passed = drivers.passed - self._passed[0]
         marks = [float(mark.sum()) / 2.0 for mark in self._passed]
         share = 4.0 * 3600.0 / self._span_s

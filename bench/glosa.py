@@ -88,12 +88,12 @@ def drive(city_map: CityMap, cars: int, span_s: float, policy: str, seed: int) -
     with Lockstep([part, TrafficPart(city_map, policy=policy), MonitorPart(city_map)]) as city:
         city.run_for(WARM_UP_S)
         watch, passed = (
-            Watch(world.vehicles.hosted.copy(), world.vehicles.speed),
+            Watch(world.cars.arrays.hosted.copy(), world.cars.arrays.speed),
             drivers.passed.sum(),
         )
         for _ in range(round(span_s / LOOK_S)):
             city.run_for(LOOK_S)
-            watch.look(world.vehicles.speed)
+            watch.look(world.cars.arrays.speed)
     watch.tally.contacts = len(touched.began)
     watch.tally.lines = float(drivers.passed.sum() - passed) / 2.0 / span_s
     return watch.tally

@@ -55,8 +55,8 @@ def driven(name: str, cars: int, policy: str, span_s: float) -> Row:
         stood_s, longest_s = np.zeros(cars), 0.0
         for _ in range(round(span_s / LOOK_S)):
             city.run_for(LOOK_S)
-            way_m += LOOK_S * float(np.abs(world.vehicles.speed[:cars]).sum())
-            stands = np.abs(world.vehicles.speed[:cars]) < 0.01
+            way_m += LOOK_S * float(np.abs(world.cars.arrays.speed[:cars]).sum())
+            stands = np.abs(world.cars.arrays.speed[:cars]) < 0.01
             stood_s = np.where(stands, stood_s + LOOK_S, 0.0)
             longest_s = max(longest_s, float(stood_s.max()))
     passed = float((world.drivers.passed - before)[:cars].sum()) / 2.0

@@ -175,7 +175,7 @@ def drive(city_map: CityMap, flows: Sequence[Flow], span_s: float) -> Outcome:
     world.attach(lambda _kind, _where: False)
     touched = counted(world.world)
     demand = DemandPart(city_map, flows)
-    vehicles, stands, longest = world.world.vehicles, np.zeros(MOST_CARS), (0.0, "")
+    vehicles, stands, longest = world.world.cars.arrays, np.zeros(MOST_CARS), (0.0, "")
     parts = [world, TrafficPart(city_map), demand] if city_map.junctions else [world, demand]
     with Lockstep(parts) as city:
         for _ in range(round(span_s)):

@@ -106,7 +106,7 @@ class Stages:
 
 def by_attribute(world: World) -> Callable[[], object]:
     """Return the peer's contact step: the same bodies, moved and read one attribute at a time."""
-    _, motion = everybody(world, 0)
+    _, motion = everybody(world.cars, 0)
     space = pymunk.Space()
     bodies = []
     for _ in motion:
@@ -143,7 +143,7 @@ def row_of(cars: int, stages: Stages) -> str:
     spent = {name.strip("_"): ms / ticks for name, ms in stages.spent_ms.items()}
     messages = [out for out in world.outbox if isinstance(out, Message)]
     json_ms = timed(lambda: [encode(one) for one in messages], 5)
-    vehicles, motion = everybody(world, 0)
+    vehicles, motion = everybody(world.cars, 0)
     ours_us = timed(lambda: world.contacts.step(vehicles, motion), 30) * 1e3
     peer_us = timed(by_attribute(world), 30) * 1e3
     parts = " ".join(f"{name} {ms:.2f}" for name, ms in spent.items())

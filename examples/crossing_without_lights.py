@@ -68,7 +68,7 @@ def run(
 ) -> tuple[list[float], float]:
     """Return when each car was over the junction [s], and the least distance between two [m]."""
     part = crossing(radio, seed)
-    vehicles = part.world.vehicles
+    vehicles = part.world.cars.arrays
     through, least = [math.inf] * 4, math.inf
     with Lockstep([part]) as city:
         for step in range(round(longest_s / 0.1)):

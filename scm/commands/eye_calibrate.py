@@ -115,7 +115,7 @@ def _measure(
     print(report(solution, assessment))
     if assessment.refused:
         reasons = "".join(f"\n  {one}" for one in assessment.refused)
-        raise EyeError(f"refused, nothing written: these views do not tell the lens{reasons}")
+        raise EyeError(f"refused, nothing written: these views do not determine the lens{reasons}")
     calibration = solution.calibration()
     if owner is not None:
         calibrated(owner, calibration)

@@ -61,7 +61,7 @@ def _run(arguments: argparse.Namespace) -> int:
     if form not in {".pdf", ".svg"}:
         raise EyeError(f"--out: expected a name that ends in .pdf or .svg, got {arguments.out}")
     if arguments.board and (arguments.vehicles or arguments.tags or arguments.map_tag):
-        raise EyeError("--board: expected it alone: tags are another file")
+        raise EyeError("--board: expected without tags: they go into another file")
     if arguments.board:
         pages = [_board(arguments)]
     else:

@@ -19,9 +19,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     from scm.v2x.rights import ROLES
 
     parser.description = (
-        f"{COMMAND.help} The first one makes the fleet file, and says how its stations prove who "
-        "they are. A station that is in it already gets new credentials; its old ones end when the "
-        "router is started again."
+        f"{COMMAND.help} The first one creates the fleet file and chooses how its stations "
+        "authenticate. A station that is already in it gets new credentials; its old ones end when "
+        "the router restarts."
     )
     parser.add_argument("name", metavar="NAME", help="of the station: a-z 0-9 _ -")
     parser.add_argument("--role", required=True, choices=ROLES, help="what it may do")
@@ -60,7 +60,7 @@ def _run(arguments: argparse.Namespace) -> int:
     name_hosts(fleet, arguments.host, now)
     file = fleet.credentials(made.station)
     print(f"{made.station}: {made.role}; credentials in {file}: copy it to where it runs, mode 600")
-    print("A router that runs already learns of it at its next start.")
+    print("A running router admits it after its next start.")
     return 0
 
 

@@ -1,4 +1,4 @@
-"""`scm fleet remove`: let a station into the city no more."""
+"""`scm fleet remove`: remove a station from the city's fleet."""
 
 import argparse
 
@@ -15,7 +15,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.v2x.fleet_file import load_fleet, remove
 
     remove(load_fleet(arguments.fleet), arguments.name)
-    print(f"{arguments.name} is removed. A router that runs lets it in until its next start.")
+    print(f"{arguments.name} is removed. A running router admits it until its next start.")
     return 0
 
 

@@ -59,7 +59,7 @@ def _run(arguments: argparse.Namespace) -> int:
             if len(made.left_out) > MAX_PRINTED_LINES
             else ""
         )
-        print(f"{len(made.left_out)} lines are left out{shown}: kept in {arguments.out / LEFT_OUT}")
+        print(f"{len(made.left_out)} lines are left out{shown}: see {arguments.out / LEFT_OUT}")
     print(f"scm replay {arguments.out}")
     return 0
 

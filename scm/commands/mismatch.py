@@ -51,7 +51,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--budget-s",
         type=float,
         default=DEFAULT_S,
-        help="time for each car; the report says what was not answered then [s] (%(default)g)",
+        help="time for each car; the report lists the questions left open then [s] (%(default)g)",
     )
     parser.add_argument(
         "--strict",
@@ -175,7 +175,7 @@ def _check(arguments: argparse.Namespace, out: Path, vehicle: str = "") -> str:
 
 def _with_account(found: "Result", text: str, check: str) -> str:
     """Return the summary between the lines on which rows were read and how to check it."""
-    again = (f"  the figures again: {check}",) if check and found.diagnosis.fit else ()
+    again = (f"  recomputed figures: {check}",) if check and found.diagnosis.fit else ()
     return "\n".join((*found.account, text, *again))
 
 

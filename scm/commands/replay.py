@@ -1,4 +1,4 @@
-"""`scm replay`: a recording driven again by the simulator, and how far it strays."""
+"""`scm replay`: simulate a recorded drive from its commands, and print the errors."""
 
 import argparse
 import csv
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from scm.vehicles.car import Car
 
 HORIZONS_S = (0.5, 1.0, 3.0)
-DOUBTFUL = ("other_car", "without_effect", "unrelated", "standing")  # is driven again nevertheless
+DOUBTFUL = ("other_car", "without_effect", "unrelated", "standing")  # is simulated nevertheless
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -129,7 +129,7 @@ def _replayed(
     print("free run from the measured state, median and 90th percentile of the error")
     corrected = [f.kind.name for f in car.faults if any(map(f.function_for, POSES))]
     if corrected:
-        print(f"measured poses with {', '.join(corrected)} of the car file taken out")
+        print(f"measured poses are corrected for {', '.join(corrected)} of the car file")
     print(_table(run, arguments.horizon_s) + "\n")
     return run
 
@@ -155,7 +155,7 @@ def _runs(
         except RecordingError as error:
             failures.append(error)
     if not stretches:
-        msg = f"{path}: poses and commands are nowhere together for long enough to be driven again"
+        msg = f"{path}: poses and commands never overlap for long enough to be simulated"
         raise RecordingError(msg)
     if not runs and len(stretches) > 1:
         longest_s = max(float(np.ptp(stretch.channel("pose.x").t)) for stretch in stretches)

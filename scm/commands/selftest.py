@@ -1,4 +1,4 @@
-"""`scm selftest`: hurt a city in every way there is, and measure how it takes it."""
+"""`scm selftest`: inject faults into a city, and measure its reaction."""
 
 import argparse
 import signal
@@ -38,8 +38,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--city", default="city", help="its name (%(default)s)")
     credentials_argument(parser)
-    parser.add_argument("--yes", action="store_true", help="disturb it without asking first")
-    parser.add_argument("--list", action="store_true", help="tell the faults, and end")
+    parser.add_argument("--yes", action="store_true", help="start without confirmation")
+    parser.add_argument("--list", action="store_true", help="list the faults, and exit")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the table as Markdown")
 
 
@@ -54,7 +54,7 @@ def _run(arguments: argparse.Namespace) -> int:
         return inject_city_faults(arguments.map, arguments.fault, print, arguments.out)
     faults_of(arguments.fault)
     if arguments.connect and not (arguments.yes or _agreed(arguments.connect)):
-        print("nothing was disturbed")
+        print("no fault was injected")
         return 0
     return _test_signals(arguments)
 
@@ -75,7 +75,7 @@ def _known() -> Iterator[str]:
 
 def _agreed(endpoint: str) -> bool:
     print(f"The signals of the city at {endpoint} will fail one way after the other, and flash.")
-    print("Go on? [y/N] ", end="", flush=True)
+    print("Continue? [y/N] ", end="", flush=True)
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 

@@ -1,4 +1,4 @@
-"""`scm trial`: effects concealed in a reality of its own, diagnosed blind, then labels opened."""
+"""`scm trial`: effects concealed in an independent simulation, diagnosed blind, then scored."""
 
 import argparse
 import sys
@@ -55,7 +55,7 @@ def _run(arguments: argparse.Namespace) -> int:
     with closing(Progress(sys.stderr, WallClock())) as progress:
         lines = _table(arguments, out, progress)
     print("\n".join(lines))
-    print(f"\nkept in {out}: recordings, labels and their seals, each diagnosis, this table")
+    print(f"\nwritten to {out}: recordings, labels and their seals, each diagnosis, this table")
     return 0
 
 

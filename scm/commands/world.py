@@ -42,7 +42,7 @@ def _run(arguments: argparse.Namespace) -> int:
         )
         # Loaded when its first car comes, a kernel would stop the city for a moment.
         for car in car_names():
-            part.world.garage.prepare(car)
+            part.world.cars.garage.prepare(car)
         return run_part(part, arguments, state)
 
 

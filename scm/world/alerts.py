@@ -1,27 +1,41 @@
-"""Conditions that are reported once: warnings on the air, low batteries, lanes too narrow."""
+"""Events of the world, and conditions that are reported once: warnings, batteries, lanes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from scm.v2x.etsi.events import CarWarnings, DenmReceiver
+from scm.v2x.messages.city_event import CityEvent
 from scm.world.stuck import Stuck
 
+NAME = "world"
 LOW_CHARGE = 0.2  # a battery below this is reported
 RECHARGED = 0.3  # above this it may be reported again
 
 
+def city_event(
+    severity: Literal["info", "warning", "error"],
+    name: str,
+    text: str,
+    now_ns: int,
+    vehicle: str | None = None,
+) -> CityEvent:
+    """Return an event of the world."""
+    return CityEvent(
+        severity=severity, source=NAME, t_ns=now_ns, name=name, text=text, vehicle=vehicle
+    )
+
+
 @dataclass(slots=True)
 class WarningState:
-    """Who warns of what.
+    """Warnings by radio.
 
     Attributes:
-        hits: What cars have hit since their last warning of it could be sent, by name.
         braked: Indices of hosted cars that have braked hard since the last check.
         warners: What hosted cars warn of, by name.
         denms: What all stations warn of.
     """
 
-    hits: dict[str, tuple[str, ...]] = field(default_factory=dict)
     braked: set[int] = field(default_factory=set)
     warners: dict[str, CarWarnings] = field(default_factory=dict)
     denms: DenmReceiver = field(default_factory=DenmReceiver)
@@ -48,7 +62,7 @@ class LowBatteries:
 
 @dataclass(slots=True)
 class Alerts:
-    """What is wrong with cars and was reported.
+    """Problems of cars that were reported.
 
     Attributes:
         stuck: Which cars push in vain.

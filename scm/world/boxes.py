@@ -17,8 +17,8 @@ from scm.arrays import Bools, Floats
 from scm.records.boxes import SnapshotBox
 from scm.records.city_map import Box
 
-GRAVITY = 9.80665
-STILL_MPS, STILL_RADPS = 1e-6, 1e-5
+GRAVITY = 9.80665  # m/s^2
+STILL_MPS, STILL_RADPS = 1e-6, 1e-5  # less is rounding of the solver
 
 
 class Boxes:
@@ -61,7 +61,7 @@ class Boxes:
     def push(self, dv: Floats, shift: Floats) -> None:
         """Change velocities (k, 3) and places (k, 2) or poses (k, 3).
 
-        What is next to no velocity becomes none.
+        Velocities within the solver's rounding become zero.
         """
         self.motion[:, 3:] += dv
         self.motion[:, : shift.shape[1]] += shift
@@ -86,7 +86,7 @@ class Boxes:
 
 
 def is_still(velocity: Floats) -> Bools:
-    """Return which velocities (k, 3) x, y, yaw rate are no more than dust of the solver."""
+    """Return which velocities (k, 3) x, y, yaw rate are no more than rounding of the solver."""
     slow = np.hypot(velocity[:, 0], velocity[:, 1]) < STILL_MPS
     return np.asarray(slow & (np.abs(velocity[:, 2]) < STILL_RADPS))
 

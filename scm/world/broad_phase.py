@@ -14,12 +14,12 @@ from scm.arrays import Bools, Floats, Ints
 from scm.vehicles.jit import array_kernel, kernel_function
 from scm.world.sweep import is_any_fast, share_moves
 
-LEEWAY_M = 0.025
-LOOK_AHEAD_S = 0.1
-TOUCH_M = 1e-4
+LEEWAY_M = 0.025  # a body may move before its pairs are listed anew
+LOOK_AHEAD_S = 0.1  # added to the leeway, times its speed
+TOUCH_M = 1e-4  # gap at which boxes count as overlapping; the solver decides
 CELL_M = 0.5
-PIECE_M = 2.0
-MOST_CELLS = 4_000_000
+PIECE_M = 2.0  # a longer wall is sorted into cells in pieces of this
+MAX_CELLS = 4_000_000  # of the grid; larger cells on a larger map
 
 
 class Obstacles(NamedTuple):
@@ -43,13 +43,8 @@ class Obstacles(NamedTuple):
 def obstacles_of(boxes: Floats) -> Obstacles:
     """Sort boxes (m, 6) into cells; a long one goes only into those along its way."""
     if not len(boxes):
-        return Obstacles(
-            boxes,
-            np.array([0.0, 0.0, CELL_M]),
-            np.zeros(2, int),
-            np.zeros(1, int),
-            np.zeros(0, int),
-        )
+        frame, none = np.array([0.0, 0.0, CELL_M]), np.zeros(0, int)
+        return Obstacles(boxes, frame, np.zeros(2, int), np.zeros(1, int), none)
     pieces = np.maximum(1, np.ceil(2.0 * boxes[:, 4] / PIECE_M)).astype(int)
     owner = np.repeat(np.arange(len(boxes)), pieces)
     within = np.arange(len(owner)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
@@ -61,7 +56,7 @@ def obstacles_of(boxes: Floats) -> Obstacles:
     x, y = x + along * c, y + along * s
     low = np.array([(x - reach_x).min(), (y - reach_y).min()])
     high = np.array([(x + reach_x).max(), (y + reach_y).max()])
-    edge = max(CELL_M, math.sqrt(float(np.prod(high - low)) / MOST_CELLS))
+    edge = max(CELL_M, math.sqrt(float(np.prod(high - low)) / MAX_CELLS))
     columns, rows = (int(v) + 1 for v in (high - low) / edge)
     held: list[list[int]] = [[] for _ in range(columns * rows)]
     low_cells = ((np.column_stack((x - reach_x, y - reach_y)) - low) / edge).astype(int)
@@ -79,7 +74,7 @@ def obstacles_of(boxes: Floats) -> Obstacles:
 
 
 class BroadPhase:
-    """Keeps the lists of a set of bodies that comes in the same order at most steps."""
+    """Lists of pairs of a set of bodies that come in the same order at most steps."""
 
     def __init__(self, obstacles: Obstacles) -> None:
         self._obstacles = obstacles

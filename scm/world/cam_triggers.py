@@ -7,15 +7,15 @@ from scm.v2x.cam_trigger import HEADING_RAD, N_GEN_CAM, POSITION_M, SPEED_MPS, T
 from scm.v2x.congestion import ReactiveControl
 from scm.world.vehicle_arrays import VehicleArrays
 
-FEW, TICKS_BETWEEN = 100, 5
+FEW, TICKS_BETWEEN = 100, 5  # CAMs that one tick always allows; ticks in 100 ms
 _NEVER_NS = -(2**62)
 
 
 class CamTriggers:
-    """The rule's memory by slot; ask it every tick.
+    """The rule's state by vehicle index; call `due` every tick.
 
-    When many owe one at once, those wait for the next ticks who spoke last: a fifth of the cars in
-    a tick is what 100 ms between two CAMs of a car allow in the long run.
+    If many are due at once, those that sent last wait for the next ticks: a fifth of the cars a
+    tick is what 100 ms between two CAMs of a car allow in the long run.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -31,7 +31,7 @@ class CamTriggers:
     def due(
         self, vehicles: VehicleArrays, now_ns: int, control: ReactiveControl | None = None
     ) -> Ints:
-        """Return the slots, ascending, whose CAM must go now; they count as sent.
+        """Return the indices, ascending, whose CAM is due now; they count as sent.
 
         `control` may allow each car less than a CAM every 100 ms.
         """

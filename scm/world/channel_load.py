@@ -16,9 +16,9 @@ class ChannelLoad:
     """The load of the one channel; on an endless one nothing is measured.
 
     Attributes:
-        ratio: (capacity,) by slot, of the last two windows; 0: unheard of.
-        lost: (capacity,) what share of frames the load costs each, by slot.
-        control: Who may speak how often; None: everybody as the rule for CAMs says.
+        ratio: (capacity,) by vehicle index, of the last two windows; 0: unknown.
+        lost: (capacity,) share of frames that each loses to the load.
+        control: How often each may send; None: as the rule for CAMs allows.
     """
 
     def __init__(self, radio: RadioChannel, range_m: float, lost: Floats) -> None:
@@ -50,9 +50,9 @@ class ChannelLoad:
 
         Args:
             now_ns: The present time [ns].
-            x: Of every slot [m]; likewise `y`.
+            x: By vehicle index [m]; likewise `y`.
             y: See `x`.
-            hosted: Which slots hold hosted cars.
+            hosted: Which indices are hosted cars.
             others: Where the antennas of all other stations are.
         """
         span_s = 1e-9 * (now_ns - self._window_ns)
@@ -72,7 +72,7 @@ class ChannelLoad:
             self.control.update(self.ratio, now_ns)
 
     def loss_of(self, names: Sequence[str]) -> Floats:
-        """Return what share of frames the load costs stations that are not hosted (n,)."""
+        """Return the share of frames that stations that are not hosted lose to the load (n,)."""
         offered = np.array([self._others.get(name, (0.0, 0.0)) for name in names])
         return load_loss(offered.reshape(-1, 2).mean(axis=1), self._radio.hidden_share)
 

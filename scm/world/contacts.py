@@ -27,14 +27,14 @@ from scm.world.boxes import Boxes, is_still
 from scm.world.broad_phase import BroadPhase, obstacles_of
 from scm.world.solids import Hull, box_body, car_body, obstacle_boxes, outline_of, solids
 
-INSTANT = 1e-9
+INSTANT = 1e-9  # duration of a solver step [s]: it moves nobody
 STEP_S = 0.005
-ALLOWED_OVERLAP_M = 2e-4
-SHARE_CORRECTED = 0.2
+ALLOWED_OVERLAP_M = 2e-4  # stays, so that a contact does not flicker
+SHARE_CORRECTED = 0.2  # of a deeper overlap, in one step
 ITERATIONS = 30
 MAX_ITERATIONS = 300  # where bodies were stopped: a light one between heavy ones takes many
 MAX_SPEED_GAIN = 2.0  # one hit gives a free box at most 1 + restitution of the car's speed
-STEPS_IN_SPACE = 40
+STEPS_IN_SPACE = 40  # a body stays after its last contact: entering costs ten microseconds
 WALL, FIRST_BOX = -1, -2
 
 _MOTION = (
@@ -199,7 +199,7 @@ def _nothing(n: int) -> Touches:
 class _Ring:
     """The pymunk space: everything that stays, and whoever touched something a moment ago.
 
-    Coming in costs a body ten microseconds, so it stays for `STEPS_IN_SPACE` steps that solve.
+    A body stays for `STEPS_IN_SPACE` steps that solve.
 
     Attributes:
         known: Cars that may come in, by key; boxes have the first keys.

@@ -11,28 +11,30 @@ from scm.v2x.exchange import Outgoing, PersistedState
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.vehicles.guard import Guard
 from scm.world import lease as rules
+from scm.world.alerts import city_event
+from scm.world.cars import lease_record
 from scm.world.hosted import HostedCar
-from scm.world.vehicle_arrays import CODES, DRIVE, IDLE, STOP
-from scm.world.world import World, city_event, lease_record
+from scm.world.vehicle_arrays import CODES, DRIVE, IDLE, STOP, VehicleArrays
+from scm.world.world import World
 
 
 def steer(world: World, now_ns: int) -> list[Outgoing]:
     """Set the commands of all hosted cars for the time after `now_ns`; return lost leases."""
     out: list[Outgoing] = []
     stop = world.stop.engaged
-    _stand(world, stop=stop)
-    for car in list(world.leased.values()):
+    _stand(world.cars.arrays, stop=stop)
+    for car in list(world.cars.leased.values()):
         lost = _loss(car, now_ns)
         if lost is not None:
             out.append(hand_over(world, car, rules.sent_home(car.lease), now_ns))
-            world.vehicles.hazard[car.index] = True
-            world.vehicles.mode[car.index] = STOP
+            world.cars.arrays.hazard[car.index] = True
+            world.cars.arrays.mode[car.index] = STOP
             text = f"{car.name} stands: {lost}"
             out.append(city_event("warning", "lease_lost", text, now_ns, car.name))
         else:
-            _obey(world, car, now_ns, stop=stop)
+            _obey(world.cars.arrays, car, now_ns, stop=stop)
     _drive(world, now_ns, stop=stop)
-    world.garage.command(world.vehicles)
+    world.cars.garage.command(world.cars.arrays)
     return out
 
 
@@ -42,18 +44,18 @@ def hand_over(world: World, car: HostedCar, lease: rules.Lease, now_ns: int) -> 
     Its trip is over, and older commands are refused.
     """
     if lease.is_at_home:
-        world.leased.pop(car.name, None)
+        world.cars.leased.pop(car.name, None)
         car.guard = None
-        world.vehicles.throttle[car.index] = 0.0
+        world.cars.arrays.throttle[car.index] = 0.0
     else:
-        world.leased[car.name] = car
+        world.cars.leased[car.name] = car
         car.guard = car.guard or Guard(car.lease.epoch)
         car.guard.set_epoch(lease.epoch, now_ns)
     car.lease = lease
     record = lease_record(car)
     world.trips.end(car.index, now_ns)
-    world.vehicles.driven[car.index] = False
-    world.vehicles.hazard[car.index] = False
+    world.cars.arrays.driven[car.index] = False
+    world.cars.arrays.hazard[car.index] = False
     return record
 
 
@@ -64,15 +66,14 @@ def send(world: World, car: HostedCar, request: RouteRequest, now_ns: int) -> Ro
         ScmError: when the lanes do not allow the route, or the car stands on none.
     """
     reply = world.trips.begin(car.index, car.name, request, car.pose, now_ns)
-    vehicles = world.vehicles
+    vehicles = world.cars.arrays
     vehicles.driven[car.index] = not car.has_diverged
     vehicles.hazard[car.index] = vehicles.arrived[car.index] = False
     return reply
 
 
-def _stand(world: World, *, stop: bool) -> None:
+def _stand(vehicles: VehicleArrays, *, stop: bool) -> None:
     """Set zero throttle for cars that nobody drives; their steering stays as it is."""
-    vehicles = world.vehicles
     standing = vehicles.hosted & ~vehicles.driven
     vehicles.throttle[standing] = 0.0
     vehicles.mode[standing] = STOP if stop else IDLE
@@ -87,12 +88,12 @@ def _loss(car: HostedCar, now_ns: int) -> str | None:
     return None
 
 
-def _obey(world: World, car: HostedCar, now_ns: int, *, stop: bool) -> None:
+def _obey(vehicles: VehicleArrays, car: HostedCar, now_ns: int, *, stop: bool) -> None:
     if car.guard is None:
         return
     car.guard.stop(stop)
     allowed = car.guard.output(now_ns)
-    vehicles, index = world.vehicles, car.index
+    index = car.index
     vehicles.throttle[index], vehicles.steering[index] = allowed.throttle, allowed.steering
     vehicles.mode[index] = STOP if allowed.mode == "lost" else CODES[allowed.mode]
     vehicles.hazard[index] = allowed.hazard
@@ -100,7 +101,7 @@ def _obey(world: World, car: HostedCar, now_ns: int, *, stop: bool) -> None:
 
 def _drive(world: World, now_ns: int, *, stop: bool) -> None:
     """Apply the drivers' decisions, and note which cars have arrived."""
-    vehicles, drivers = world.vehicles, world.drivers
+    vehicles, drivers = world.cars.arrays, world.drivers
     driven = vehicles.driven
     if not driven.any():
         return

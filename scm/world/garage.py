@@ -29,7 +29,7 @@ class Garage:
         fit: What a car file's car is here; the floor may give it more effects.
 
     Attributes:
-        fleets: Those in use; a row's slot is the number its car has in the whole world.
+        fleets: Those in use; a row's index is its car's vehicle index.
     """
 
     def __init__(self, capacity: int, fit: Callable[[Car], Car]) -> None:
@@ -159,7 +159,7 @@ class Garage:
         return values
 
     def batteries(self) -> tuple[Floats, Floats]:
-        """Return voltage under load [V] and charge left by slot; NaN: there is no battery."""
+        """Return voltage under load [V] and charge left by vehicle index; NaN: no battery."""
         volts, charge = np.full((2, self._capacity), np.nan)
         for name, rows in self._rows.items():
             own, packs = self._indices[name], self._packs[name]
@@ -167,7 +167,7 @@ class Garage:
         return volts, charge
 
     def frozen(self) -> Ints:
-        """Return the slots of cars whose numbers left every physical range."""
+        """Return the indices of cars whose dynamics diverged."""
         return np.concatenate(
             [
                 self._indices[name][self.fleets[name].status[rows] != VehicleStatus.OK]

@@ -1,4 +1,4 @@
-"""A car that the world simulates, for requests; no stage of a tick walks over these.
+"""A car that the world simulates, for requests; no stage of a tick loops over these.
 
 Its dynamics live in the `Garage`, its present state in the `VehicleArrays`, its driver in the
 `DriverBatch`.

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from scm.clock import NS_PER_MS
 from scm.errors import LeaseError
 
-SHORTEST_TTL_MS = 100
-LONGEST_TTL_MS = 60_000
+MIN_TTL_MS = 100  # a shorter one would expire between two renewals
+MAX_TTL_MS = 60_000  # a lost owner must not hold a car for longer
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,14 +39,14 @@ class Lease:
 
 
 def grant(home: str, epoch: int = 1) -> Lease:
-    """Return the lease of a car that nobody but its home owner has asked for."""
+    """Return the lease of a car that its home owner holds."""
     return Lease(home, home, epoch)
 
 
 def acquire(lease: Lease, owner: str, ttl_ms: int, now_ns: int) -> Lease:
     """Lease a car that is at home; requesting one's own lease again only renews it.
 
-    The home owner that asks gets a newer epoch: what it commanded before is void.
+    A home owner that acquires it gets a newer epoch: its older commands are void.
 
     Raises:
         LeaseError: when somebody else holds it.
@@ -63,7 +63,7 @@ def renew(lease: Lease, owner: str, epoch: int, ttl_ms: int, now_ns: int) -> Lea
     """Extend one's own lease.
 
     Raises:
-        LeaseError: when the asker does not hold it under this epoch.
+        LeaseError: when `owner` does not hold it under this epoch.
     """
     _check_holder(lease, owner, epoch)
     return _extended(lease, ttl_ms, now_ns)
@@ -73,7 +73,7 @@ def release(lease: Lease, owner: str, epoch: int) -> Lease:
     """Give one's lease back: the car goes home under a new epoch.
 
     Raises:
-        LeaseError: when the asker does not hold it under this epoch.
+        LeaseError: when `owner` does not hold it under this epoch.
     """
     _check_holder(lease, owner, epoch)
     return sent_home(lease)
@@ -97,7 +97,7 @@ def is_expired(lease: Lease, now_ns: int) -> bool:
 
 
 def left_ms(lease: Lease, now_ns: int) -> float | None:
-    """Return how long it lives on unless it is renewed; None: for ever, it is at home."""
+    """Return how long it lives on unless it is renewed; None: it is at home."""
     return None if lease.expires_ns is None else max(0.0, (lease.expires_ns - now_ns) / NS_PER_MS)
 
 
@@ -129,4 +129,4 @@ def _handed_over(lease: Lease, owner: str, ttl_ms: int, now_ns: int) -> Lease:
 
 
 def _bounded(ttl_ms: int) -> int:
-    return max(SHORTEST_TTL_MS, min(ttl_ms, LONGEST_TTL_MS))
+    return max(MIN_TTL_MS, min(ttl_ms, MAX_TTL_MS))

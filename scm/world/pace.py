@@ -1,4 +1,4 @@
-"""The pace of simulated time: it follows the clock, and what it cannot follow is counted.
+"""The pace of simulated time: it follows the clock, and what it cannot follow is counted as lost.
 
 A tick covers the time since the last one, at most `LONGEST_TICK_NS`; the rest is lost and shows in
 `real_time_factor`. The dynamics move in whole contact steps; what is left over waits for the next.
@@ -9,9 +9,9 @@ from collections import deque
 from scm.clock import NS_PER_S
 
 CONTACT_STEP_NS = 5_000_000
-LONGEST_TICK_NS = 100_000_000
-WINDOW_NS = NS_PER_S
-LATE = 1.5
+LONGEST_TICK_NS = 100_000_000  # more at once would be too coarse for guards and drivers
+WINDOW_NS = NS_PER_S  # of the real-time factor
+LATE_PERIODS = 1.5  # a tick after a longer gap is late
 
 
 class Pace:
@@ -40,7 +40,7 @@ class Pace:
             return 0
         elapsed_ns = max(0, now_ns - self._last_ns)
         self._last_ns = max(now_ns, self._last_ns)
-        self.late_ticks += elapsed_ns > LATE * self._period_ns
+        self.late_ticks += elapsed_ns > LATE_PERIODS * self._period_ns
         covered_ns = min(elapsed_ns, LONGEST_TICK_NS)
         self.lost_ns += elapsed_ns - covered_ns
         whole, self._owed_ns = divmod(self._owed_ns + covered_ns, CONTACT_STEP_NS)
@@ -63,7 +63,7 @@ class Pace:
 
 
 class Every:
-    """Tells when something at a fixed rate is due; never twice for one moment.
+    """Something due at a fixed rate; never twice for one moment.
 
     Attributes:
         period_ns: Between two due moments.

@@ -12,15 +12,16 @@ from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.world_definition import WorldDefinition
+from scm.world.alerts import NAME, city_event
 from scm.world.driving import send
 from scm.world.hosted import HostedCar
 from scm.world.reception import subscriptions_of
 from scm.world.requests import SERVICES, reply_to
 from scm.world.restore import RestoredState, restore
 from scm.world.step import tick
-from scm.world.world import DEFAULT_CAR, NAME, PERIOD_NS, World, city_event
+from scm.world.world import DEFAULT_CAR, PERIOD_NS, World
 
-ROOM = 256
+ROOM = 256  # cars that may come later
 DEFINITION_EVERY_NS = 10 * NS_PER_S
 """Interval at which the definition of the city is published again: the bus stores it for late
 joiners, but on rare occasions one of them gets no reply."""
@@ -73,10 +74,10 @@ class WorldPart(BasePart):
         elif now_ns >= self._definition_due_ns:
             first = [self._definition]
             self._definition_due_ns = now_ns + DEFINITION_EVERY_NS
-        joined = set(self.world.remote)
+        joined = set(self.world.cars.remote)
         sent = tick(self.world, now_ns, inbox)
-        if joined != set(self.world.remote):
-            self.subscriptions = subscriptions_of(self.world.remote)
+        if joined != set(self.world.cars.remote):
+            self.subscriptions = subscriptions_of(self.world.cars.remote)
         return [*first, *sent]
 
     def attach(self, is_wanted: IsWanted) -> None:
@@ -94,7 +95,7 @@ class WorldPart(BasePart):
         if self._restored.is_first:
             self._spawn_all(now_ns, out)
         for name, _ in self._to_spawn:
-            car = world.hosted.get(name)
+            car = world.cars.hosted.get(name)
             if car is not None and car.lease.is_at_home:
                 out += self._circulate(car, now_ns)
         return out

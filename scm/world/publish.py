@@ -19,19 +19,20 @@ from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 from scm.vehicles.lights import Indicators, lamps
 from scm.world import lease as rules
+from scm.world.alerts import NAME
 from scm.world.hosted import HostedCar
 from scm.world.remote import RemoteCar
 from scm.world.vehicle_arrays import MODES
-from scm.world.world import NAME, World
+from scm.world.world import World
 
-STATES_A_TICK = 400
+STATES_A_TICK = 400  # of hosted cars: more would delay the tick
 TRIPS_A_SECOND = 200
-TRIP_NS = NS_PER_S // 2
+TRIP_NS = NS_PER_S // 2  # between two reports of a trip, at the least
 TURNS: dict[int, Indicators] = {1: "left", -1: "right", 0: "off"}
 
 
 class LampState(TypedDict):
-    """What its driver or guard switches on a car's lamps."""
+    """The lamps that a car's driver or guard switches."""
 
     hazard: bool
     turn: Indicators
@@ -49,16 +50,16 @@ def publish(world: World, now_ns: int) -> list[Outgoing]:
     out: list[Outgoing] = []
     if world.subscribers.any(VehicleState):
         turn = _whose_turn(world)
-        world.vehicles.seq[turn] += 1
+        world.cars.arrays.seq[turn] += 1
         out += states_of(world, turn, now_ns)
     out += world.impulses.reports.pop(now_ns)
-    for remote in world.remote.values():
+    for remote in world.cars.remote.values():
         contact = remote.contact(now_ns)
         if contact is not None:
             out.append(contact)
     if world.every["snapshot"].is_due(now_ns) and world.subscribers.any(WorldSnapshot):
         out.append(snapshot(world, now_ns))
-    world.trips.every_ns = max(TRIP_NS, len(world.hosted) * NS_PER_S // TRIPS_A_SECOND)
+    world.trips.every_ns = max(TRIP_NS, len(world.cars.hosted) * NS_PER_S // TRIPS_A_SECOND)
     out += world.trips.reports(now_ns)
     if world.every["second"].is_due(now_ns):
         out += _each_second(world, now_ns)
@@ -66,12 +67,12 @@ def publish(world: World, now_ns: int) -> list[Outgoing]:
 
 
 def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
-    """Yield the reports of the hosted cars in some slots."""
-    vehicles, signal = world.vehicles, world.garage.signal
+    """Yield the reports of the hosted cars with some indices."""
+    vehicles, signal = world.cars.arrays, world.cars.garage.signal
     columns = (
         vehicles.seq, vehicles.x, vehicles.y, vehicles.yaw, vehicles.speed, signal("lateral_speed"),
         vehicles.yaw_rate, signal("accel_x") + signal("contact_accel_x"), signal("steer_angle"),
-        vehicles.throttle, vehicles.steering, vehicles.mode, *world.garage.batteries(),
+        vehicles.throttle, vehicles.steering, vehicles.mode, *world.cars.garage.batteries(),
     )  # fmt: skip
     rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
     for (
@@ -104,8 +105,8 @@ def states_of(world: World, of: Ints, now_ns: int) -> Iterator[VehicleState]:
 
 
 def _cars(world: World, of: Ints) -> list[tuple[HostedCar, LampState]]:
-    """Return the cars of some slots, and what their lamps are told by driver and guard."""
-    vehicles, hosted, names = world.vehicles, world.hosted, world.vehicles.names
+    """Return the cars of some indices, and the lamps that driver and guard switch."""
+    vehicles, hosted, names = world.cars.arrays, world.cars.hosted, world.cars.arrays.names
     hazards = vehicles.hazard[of].tolist()
     turns = (world.drivers.turn * vehicles.driven)[of].tolist()
     states = zip(of.tolist(), hazards, turns, strict=True)
@@ -119,7 +120,7 @@ def snapshot(world: World, now_ns: int) -> WorldSnapshot:
         tick=world.tick,
         vehicles=(
             *_hosted_in_snapshot(world, now_ns),
-            *(_remote_in_snapshot(world, car, now_ns) for car in world.remote.values()),
+            *(_remote_in_snapshot(world, car, now_ns) for car in world.cars.remote.values()),
         ),
         boxes=world.contacts.boxes.in_snapshot(),
         real_time_factor=world.pace.real_time_factor,
@@ -128,12 +129,12 @@ def snapshot(world: World, now_ns: int) -> WorldSnapshot:
 
 
 def _hosted_in_snapshot(world: World, now_ns: int) -> Iterator[SnapshotVehicle]:
-    vehicles, signal = world.vehicles, world.garage.signal
+    vehicles, signal = world.cars.arrays, world.cars.garage.signal
     of = np.flatnonzero(vehicles.hosted)
     columns = (
         vehicles.x, vehicles.y, vehicles.yaw, vehicles.speed, vehicles.throttle,
         signal("steer_angle"), signal("roll"), signal("pitch"), vehicles.mode,
-        *world.garage.batteries(),
+        *world.cars.garage.batteries(),
     )  # fmt: skip
     rows = zip(_cars(world, of), *(column[of].tolist() for column in columns), strict=True)
     for (
@@ -199,8 +200,8 @@ def _command_age_ms(state: VehicleState | None, age_ms: float) -> float | None:
 
 
 def _whose_turn(world: World) -> Ints:
-    """Return the slots of the hosted cars that report in this tick."""
-    hosted = np.flatnonzero(world.vehicles.hosted)
+    """Return the indices of the hosted cars that report in this tick."""
+    hosted = np.flatnonzero(world.cars.arrays.hosted)
     if len(hosted) <= STATES_A_TICK:
         return hosted
     first = world.tick * STATES_A_TICK % len(hosted)
@@ -208,7 +209,7 @@ def _whose_turn(world: World) -> Ints:
 
 
 def _each_second(world: World, now_ns: int) -> list[Message]:
-    count = len(world.hosted) + len(world.remote)
+    count = len(world.cars.hosted) + len(world.cars.remote)
     lost = world.pace.lost_ns // NS_PER_MS
     detail = f"{count} car{'s' * (count != 1)}" + (f", {lost} ms of time lost" if lost else "")
     lost_s = seconds(world.pace.lost_ns)

@@ -1,13 +1,13 @@
 """The radio: which stations receive a frame, by distance and chance.
 
-A frame sent by one station reaches other stations as `vehicles/drivers/channel.py` says. Stations
-are cars, and the roadside units at their junctions. What hosted cars hear their drivers keep, all
-for themselves (`vehicles/drivers/driver_batch.py`); here are all other receivers.
+A frame reaches other stations as `vehicles/drivers/channel.py` says. Stations are cars, and the
+roadside units at their junctions. The drivers of hosted cars receive theirs in
+`vehicles/drivers/driver_batch.py`; here are all other receivers.
 """
 
 import heapq
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,18 +25,21 @@ from scm.vehicles.drivers.channel import (
     Channel,
     link_losses,
 )
+from scm.world.alerts import WarningState
+from scm.world.cam_triggers import CamTriggers
+from scm.world.channel_load import ChannelLoad
 
 
 @dataclass(slots=True)
 class RadioCounts:
-    """What became of frames: one frame to three stations counts three times but for `sent`.
+    """Counts of frames: one frame to three stations counts three times, except in `sent`.
 
     Attributes:
         out_of_range: Beyond a sharp edge.
         lost: All that got lost within it: `by_chance`, `by_distance` (fading and walls) and
             `by_load` (collisions, and what a full channel never sends).
         late: How many of the delivered came later than at once; `late_ns` all they were late.
-        unknown: Frames of senders whose place nobody knows.
+        unknown: Frames of senders whose position is unknown.
     """
 
     sent: int = 0
@@ -87,9 +90,10 @@ class Radio:
         receivers: Receivers,
         load: Floats | None = None,
     ) -> Bools:
-        """Return who hears the frames of senders at x (k,), y (k,): (k, number of receivers).
+        """Return who receives the frames of senders at x (k,), y (k,): (k, number of receivers).
 
-        Nobody hears itself. `load` (n,) is what share of frames a full channel costs each.
+        Nobody receives its own. `load` (n,) is the share of frames that each loses to a full
+        channel.
         """
         numbers = self._channel.numbers
         sharp = numbers[FADING] <= 0.0
@@ -111,7 +115,7 @@ class Radio:
         return received
 
     def delays(self, count: int) -> Ints:
-        """Return how late frames that are heard arrive [ns], (count,)."""
+        """Return the delays of received frames [ns], (count,)."""
         numbers = self._channel.numbers
         late = np.full(count, numbers[DELAY_NS])
         if numbers[JITTER_NS]:
@@ -124,7 +128,7 @@ class Radio:
     def _lost(
         self, near: Bools, x: Floats, y: Floats, receivers: Receivers, load: Floats | None
     ) -> Bools:
-        """Return what gets lost of the frames to who is near, and count why."""
+        """Return which frames to near receivers get lost, and count why."""
         numbers, walls = self._channel.numbers, self._channel.walls
         link = np.zeros(near.shape)
         if numbers[FADING] or len(walls):
@@ -177,3 +181,28 @@ class DelayQueue:
         while self._waiting and self._waiting[0][0] <= now_ns:
             frames.append(heapq.heappop(self._waiting)[2])
         return frames
+
+
+@dataclass(slots=True)
+class RadioState:
+    """The radio of the city.
+
+    Attributes:
+        link: Decides which frames reach everybody except the drivers of hosted cars.
+        load: How busy the channel is.
+        cams: When hosted cars must send a CAM.
+        roadside: Where the roadside units stand, by station.
+        units: These as receivers.
+        in_flight: Frames that arrive later.
+        published: The counts at the last `RadioStatus`.
+        warnings: Warnings on the air.
+    """
+
+    link: Radio
+    load: ChannelLoad
+    cams: CamTriggers
+    roadside: dict[str, Point]
+    units: Receivers
+    in_flight: DelayQueue = field(default_factory=DelayQueue)
+    published: RadioCounts = field(default_factory=RadioCounts)
+    warnings: WarningState = field(default_factory=WarningState)

@@ -14,11 +14,12 @@ from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.vehicle_state import VehicleState
+from scm.world.alerts import city_event
 from scm.world.remote import is_plausible
 from scm.world.requests import reply_to
 from scm.world.transmission import RECEIVED, Frame, transmit
 from scm.world.watch import lose
-from scm.world.world import World, city_event
+from scm.world.world import World
 
 VEHICLE_ROLE = "v"
 
@@ -37,9 +38,9 @@ def receive(world: World, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoi
 
 
 def _state(world: World, state: VehicleState, now_ns: int) -> Sequence[Outgoing]:
-    car = world.remote.get(state.vehicle)
+    car = world.cars.remote.get(state.vehicle)
     if car is None or not is_plausible(state):
-        world.ignored += state.vehicle not in world.hosted
+        world.ignored += state.vehicle not in world.cars.hosted
         return ()
     was_alive = car.alive
     if car.follow(state, now_ns) and not was_alive:
@@ -49,7 +50,7 @@ def _state(world: World, state: VehicleState, now_ns: int) -> Sequence[Outgoing]
 
 
 def _command(world: World, command: DriveCommand, now_ns: int) -> Sequence[Outgoing]:
-    car = world.hosted.get(command.vehicle)
+    car = world.cars.hosted.get(command.vehicle)
     if car is None:
         return ()  # for an agent
     if car.lease.is_at_home or command.epoch != car.lease.epoch:
@@ -61,7 +62,7 @@ def _command(world: World, command: DriveCommand, now_ns: int) -> Sequence[Outgo
 
 
 def _frame(world: World, frame: Frame, now_ns: int) -> Sequence[Outgoing]:
-    if frame.station in world.hosted:  # the bus brings our own cars' frames back
+    if frame.station in world.cars.hosted:  # the bus brings our own cars' frames back
         return ()
     return transmit(world, frame, now_ns)
 
@@ -77,7 +78,7 @@ def _presence(world: World, presence: Presence, now_ns: int) -> Sequence[Outgoin
         world.sessions[presence.session] = presence.station
     else:
         world.sessions.pop(presence.session, None)
-    car = world.remote.get(presence.station)
+    car = world.cars.remote.get(presence.station)
     if car is None or presence.session != car.session:
         return ()
     if not presence.alive:

@@ -23,20 +23,20 @@ from scm.world.lease import Lease
 from scm.world.pace import LONGEST_TICK_NS
 from scm.world.solids import cog_motion
 
-FARTHEST_M = 10_000.0
-FASTEST = 100.0
-STALE_NS = NS_PER_S
-ECHO_NS = 60 * NS_PER_MS
-ANSWER_NS = 300 * NS_PER_MS
-REPORT_NS = 20 * NS_PER_MS
-GONE_NS = 3 * NS_PER_S
+MAX_POSITION_M = 10_000.0  # beyond: a broken report
+MAX_SPEED = 100.0  # m/s, rad/s and rad alike
+STALE_NS = NS_PER_S  # without a report an agent is lost, and its car no longer extrapolated
+ECHO_NS = 60 * NS_PER_MS  # of reports, in which an agent that confirms nothing applies a hit
+ANSWER_NS = 300 * NS_PER_MS  # in which an agent confirms a hit, else it never will
+REPORT_NS = 20 * NS_PER_MS  # between two reports of an agent
+GONE_NS = 3 * NS_PER_S  # after which a lost car leaves the map
 
 
 def is_plausible(state: VehicleState) -> bool:
     """Return whether a report can be of a car: one absurd number would blind the contact solver."""
     where = (state.x_m, state.y_m)
     speeds = (state.yaw_rad, state.speed_mps, state.lateral_speed_mps, state.yaw_rate_radps)
-    return all(abs(v) <= FARTHEST_M for v in where) and all(abs(v) <= FASTEST for v in speeds)
+    return all(abs(v) <= MAX_POSITION_M for v in where) and all(abs(v) <= MAX_SPEED for v in speeds)
 
 
 def missed_between(before: VehicleState, now: VehicleState) -> int:
@@ -56,7 +56,7 @@ class Echo:
     """A push that the agent's reports do not show yet.
 
     Attributes:
-        number: Of the contact that tells of it.
+        number: Of the contact that reports it.
         dv: (3,) change of velocity x, y and yaw rate.
         shift: (3,) change of x, y and yaw.
     """
@@ -118,7 +118,7 @@ class RemoteCar:
 
     @property
     def battery_charge(self) -> float | None:
-        """What is left in its battery, 0 to 1, as reported; None: not known, or no such share."""
+        """What is left in its battery, 0 to 1, as reported; None: unknown, or no such share."""
         charge = None if self.state is None else self.state.battery_charge
         return charge if charge is not None and 0.0 <= charge <= 1.0 else None
 
@@ -179,7 +179,7 @@ class RemoteCar:
         self._against |= against
 
     def contact(self, now_ns: int) -> Contact | None:
-        """Return what is to be told to its agent since the last time, if anything."""
+        """Return the contact to be sent to its agent since the last time, if any."""
         if not (self._dv.any() or self._shift.any()):
             return None
         (dvx, dvy, rate), (dx, dy, turn) = self._dv.tolist(), self._shift.tolist()

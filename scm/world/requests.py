@@ -30,10 +30,12 @@ from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.car import car_names
 from scm.vehicles.drivers.limits import limits_of, turning_radius_m
 from scm.world import lease as rules
+from scm.world.alerts import NAME, city_event
+from scm.world.cars import AnyCar, lease_record
 from scm.world.driving import hand_over, send
 from scm.world.hosted import HostedCar
 from scm.world.remote import RemoteCar
-from scm.world.world import NAME, AnyCar, World, city_event, lease_record
+from scm.world.world import World
 
 KINDS = ("remote", "real")
 
@@ -70,7 +72,7 @@ def reply_to(
 
 
 def _spawn(world: World, request: SpawnRequest, now_ns: int, out: list[Outgoing]) -> SpawnReply:
-    name = request.vehicle or world.free_name()
+    name = request.vehicle or world.cars.free_name()
     _check_new(world, name, request.car)
     car = world.host(name, request.car, _place(world, request.spawn, request.car), now_ns)
     out += world.arrival(car, now_ns)
@@ -82,7 +84,7 @@ def _spawn(world: World, request: SpawnRequest, now_ns: int, out: list[Outgoing]
 
 
 def _join(world: World, request: JoinRequest, now_ns: int, out: list[Outgoing]) -> JoinReply:
-    name, before = request.vehicle, world.remote.get(request.vehicle)
+    name, before = request.vehicle, world.cars.remote.get(request.vehicle)
     if request.kind not in KINDS:
         raise _RefusedError("invalid", f"kind: got {request.kind!r}, expected remote or real")
     owner = world.sessions.get(request.session, name)
@@ -111,7 +113,7 @@ def _lane_misfits(world: World, name: str, car_file: str, now_ns: int) -> list[O
     if car_file in world.alerts.checked_files:
         return []
     world.alerts.checked_files.add(car_file)
-    car = world.garage.car(car_file)
+    car = world.cars.garage.car(car_file)
     problem = misfit(world.city_map, turning_radius_m(car), limits_of(car).width)
     text = f"{name}, a {car_file}: {problem}"
     return [city_event("warning", "lanes_misfit", text, now_ns, name)] if problem else []
@@ -205,9 +207,9 @@ def _stop(world: World, request: StopRequest, now_ns: int, out: list[Outgoing]) 
 
 
 def _known(world: World, name: str) -> AnyCar:
-    car = world.car(name)
+    car = world.cars.get(name)
     if car is None:
-        names = [car.name for car in world.cars()]
+        names = [car.name for car in world.cars.all()]
         raise _RefusedError("not_found", f"no car named {name!r}{nearest(name, names)}")
     return car
 
@@ -225,7 +227,7 @@ def _at_home(world: World, name: str) -> HostedCar:
 
 def _check_new(world: World, name: str, car_file: str) -> None:
     check_name(name, "vehicle")
-    if world.car(name) is not None or name in (NAME, *world.radio.roadside):
+    if world.cars.get(name) is not None or name in (NAME, *world.radio.roadside):
         raise _RefusedError("owned", f"vehicle: there is already one named {name!r}")
     if car_file not in car_names():  # no paths: whoever asks may be far away
         known = ", ".join(car_names())
@@ -243,7 +245,7 @@ def _check_tag(world: World, tag_id: int | None) -> None:
         raise _RefusedError("invalid", detail)
     if tag_id == world.city_map.tag.tag_id:
         raise _RefusedError("invalid", f"tag_id: {tag_id} is the map's own, on the floor")
-    wearer = next((car.name for car in world.cars() if car.tag_id == tag_id), None)
+    wearer = next((car.name for car in world.cars.all() if car.tag_id == tag_id), None)
     if wearer is not None:
         detail = f"tag_id: {wearer} has tag {tag_id}: take it off the map first, or raise the "
         raise _RefusedError("owned", detail + "map's first_vehicle_tag_id")
@@ -269,7 +271,7 @@ def _place(world: World, spawn: str, car_file: str) -> Pose2:
 
 def is_free(world: World, pose: Pose2) -> bool:
     """Return whether a car can be put there."""
-    return world.vehicles.nearest_m(pose, ahead_s=AHEAD_S) >= CLEARANCE_M
+    return world.cars.arrays.nearest_m(pose, ahead_s=AHEAD_S) >= CLEARANCE_M
 
 
 def _boxes(world: World, request: BoxesRequest, now_ns: int, out: list[Outgoing]) -> BoxesReply:

@@ -13,12 +13,14 @@ from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.store.records import CarRecord, EpochRecord, StopRecord, record, records
 from scm.store.repository import Repository
-from scm.v2x.exchange import Outgoing, PersistedState
+from scm.v2x.exchange import PersistedState, Outgoing
+from scm.world.alerts import NAME, city_event
+from scm.world.cars import lease_record
 from scm.world.driving import hand_over
 from scm.world.hosted import HostedCar
 from scm.world.lease import Lease
 from scm.world.requests import is_free
-from scm.world.world import NAME, World, city_event, lease_record
+from scm.world.world import World
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +31,7 @@ class RestoredState:
         is_first: Whether there was none.
         cars: By name.
         highest_epoch: No new lease may have one as low as this.
-        stop: The red button; None: it was never touched.
+        stop: The city stop; None: it was never used.
     """
 
     is_first: bool = True
@@ -61,8 +63,7 @@ def restore(world: World, restored: RestoredState, now_ns: int) -> list[Outgoing
             out += _restore_car(world, name, car, now_ns)
         else:
             out.append(PersistedState("leases", name, None))
-    epochs = EpochRecord(highest=world.identities.highest_epoch)
-    return [*out, PersistedState("latches", "epochs", epochs)]
+    return [*out, world.identities.epoch_record()]
 
 
 def _restore_car(world: World, name: str, record: CarRecord, now_ns: int) -> list[Outgoing]:

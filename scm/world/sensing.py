@@ -1,6 +1,7 @@
-"""The sensor stage: all devices that are due and wanted read; their readings become messages."""
+"""The sensor stage: read all devices that are due and subscribed to, and make messages."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,39 +10,72 @@ from scm.clock import NS_PER_S
 from scm.v2x.message import Message
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
-from scm.vehicles.bank import Readings
+from scm.vehicles.bank import Bank, Readings
+from scm.vehicles.external_vehicles import ExternalVehicles
+from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import ENCODERS, sensor_messages
 from scm.vehicles.sensors import lidar
+from scm.world.boxes import Boxes
+from scm.world.cars import Cars
 from scm.world.solids import outline
-from scm.world.world import SCANNER, World
+from scm.world.subscribers import Subscribers
+from scm.world.vehicle_arrays import VehicleArrays
+
+SCANNER = "lidar"
 
 
-def sense(world: World, now_ns: int) -> list[Message]:
+@dataclass(slots=True)
+class SensorState:
+    """The sensors of all cars.
+
+    Attributes:
+        banks: The devices of all cars, by kind of sensor.
+        readings: By kind and vehicle index the newest reading, NaN before the first; no LIDARs.
+        external: Where the remote cars are, for their LIDARs: only the world can see for them.
+        walls: What LIDARs see of the map.
+    """
+
+    banks: dict[str, Bank]
+    readings: dict[str, Floats]
+    external: ExternalVehicles
+    walls: WallGrid
+
+    def remove(self, index: int) -> None:
+        """Remove the devices of a car."""
+        for bank in self.banks.values():
+            bank.unfit(index)
+        for values in self.readings.values():
+            values[index] = float("nan")
+
+
+def sense(
+    cars: Cars, sensors: SensorState, boxes: Boxes, subscribers: Subscribers, now_ns: int
+) -> list[Message]:
     """Read all devices that are due; return what came out of them by now."""
-    scans, sensors = _wanted(world, LidarScan), _wanted(world, VehicleSensors)
+    scans = _wanted(cars.arrays, subscribers, LidarScan)
+    others = _wanted(cars.arrays, subscribers, VehicleSensors)
     out: list[Message] = []
     fresh: list[Readings] = []
-    for kind, bank in world.sensors.banks.items():
-        bank.wanted[:] = scans if kind == SCANNER else sensors
+    for kind, bank in sensors.banks.items():
+        bank.wanted[:] = scans if kind == SCANNER else others
         if kind == SCANNER:
-            for readings in bank.step(now_ns, lambda: _scene(world)):
-                out += _scans(world, readings)
+            for readings in bank.step(now_ns, lambda: _scene(cars, boxes, sensors.walls)):
+                out += _scans(cars.arrays.names, readings)
             continue
         for readings in bank.step(now_ns):
-            world.sensors.readings[kind][readings.indices] = readings.values
+            sensors.readings[kind][readings.indices] = readings.values
             if kind == ENCODERS:
                 fresh.append(readings)
     for readings in fresh:
-        newest = {kind: values[readings.indices] for kind, values in world.sensors.readings.items()}
-        names = [world.vehicles.names[index] for index in readings.indices.tolist()]
+        newest = {kind: values[readings.indices] for kind, values in sensors.readings.items()}
+        names = [cars.arrays.names[index] for index in readings.indices.tolist()]
         out += sensor_messages(names, readings.t_ns, newest)
     return out
 
 
-def _wanted(world: World, kind: type[Message]) -> Bools:
-    """Return by slot whether anybody wants such messages of its car."""
-    vehicles, subscribers = world.vehicles, world.subscribers
+def _wanted(vehicles: VehicleArrays, subscribers: Subscribers, kind: type[Message]) -> Bools:
+    """Return by vehicle index whether anybody subscribes to such messages of its car."""
     if subscribers.all(kind, "vehicle"):
         return vehicles.used
     wanted = np.zeros(vehicles.capacity, np.bool_)
@@ -53,22 +87,21 @@ def _wanted(world: World, kind: type[Message]) -> Bools:
     return wanted
 
 
-def _scene(world: World) -> Scene:
+def _scene(cars: Cars, boxes: Boxes, walls: WallGrid) -> Scene:
     """Return all that LIDARs can see now: walls, boxes, cars."""
-    boxes = world.contacts.boxes
     outlines: list[Floats] = [boxes.outline()]
     owners: list[Ints] = [np.full(len(boxes), -1)]
-    for name in world.garage.fleets:
-        if len(own := world.garage.indices(name)):
-            outlines.append(outline(world.garage.car(name), world.garage.poses(name)))
+    for name in cars.garage.fleets:
+        if len(own := cars.garage.indices(name)):
+            outlines.append(outline(cars.garage.car(name), cars.garage.poses(name)))
             owners.append(own)
-    for car in world.remote.values():
+    for car in cars.remote.values():
         outlines.append(outline(car.car, np.array([car.pose])))
         owners.append(np.array([car.index]))
-    return Scene(world.sensors.walls, np.concatenate(outlines), np.concatenate(owners))
+    return Scene(walls, np.concatenate(outlines), np.concatenate(owners))
 
 
-def _scans(world: World, scans: Readings) -> Iterator[LidarScan]:
+def _scans(names: Sequence[str], scans: Readings) -> Iterator[LidarScan]:
     nearest, farthest = scans.car.vector("lidar.range_m")
     first, step, _ = lidar.bearings_of(scans.car)
     sweep_ns = round(lidar.sweep_s(scans.car) * NS_PER_S)
@@ -76,7 +109,7 @@ def _scans(world: World, scans: Readings) -> Iterator[LidarScan]:
     ranges = scans.values.astype("<f4")
     for row, index in enumerate(scans.indices.tolist()):
         yield LidarScan(
-            vehicle=world.vehicles.names[index],
+            vehicle=names[index],
             t_ns=scans.t_ns,
             beams=ranges.shape[1],
             range_min_m=nearest,

@@ -2,14 +2,16 @@
 
     receive -> drivers, guards -> [ dynamics, contacts ] x 4 -> watch -> sensors -> publish -> radio
 
-Each stage is one file beside this one and returns the messages to send. All of them work on the
-arrays of `vehicle_arrays.py`; none walks over all cars in Python.
+Each stage is one file beside this one and returns the messages to send. Stages work on the arrays
+of `vehicle_arrays.py`; none loops over all cars in Python. Sensing and contacts get what they need;
+the others answer requests, remove cars or report on everything, so they get the world.
 """
 
 from collections.abc import Sequence
 
 from scm.clock import seconds
 from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.messages.contact import Contact
 from scm.world.collide import collide
 from scm.world.driving import steer
 from scm.world.pace import CONTACT_STEP_NS
@@ -30,7 +32,7 @@ def tick(world: World, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]
         *steer(world, now_ns),  # leaseholders through their guards, drivers all in one call
         *move(world, now_ns),
         *watch(world, now_ns),
-        *sense(world, now_ns),
+        *sense(world.cars, world.sensors, world.contacts.boxes, world.subscribers, now_ns),
         *publish(world, now_ns),
         *send_radio(world, now_ns),
     ]
@@ -41,11 +43,16 @@ def move(world: World, now_ns: int) -> list[Outgoing]:
     steps = world.pace.steps(now_ns)
     step_s = seconds(CONTACT_STEP_NS)
     world.impulses.accelerations.begin(steps * step_s)
+    is_subscribed = world.subscribers.any(Contact)
     out: list[Outgoing] = []
     for left in range(steps, 0, -1):
         t_ns = now_ns - left * CONTACT_STEP_NS
-        world.garage.advance(world.ground, t_ns, step_s)
-        out += collide(world, t_ns + CONTACT_STEP_NS)
-    world.garage.drain(steps * step_s)
-    world.locate()
+        world.cars.garage.advance(world.ground, t_ns, step_s)
+        end_ns = t_ns + CONTACT_STEP_NS
+        out += collide(
+            world.cars, world.contacts, world.impulses, world.alerts.stuck, end_ns,
+            is_subscribed=is_subscribed,
+        )  # fmt: skip
+    world.cars.garage.drain(steps * step_s)
+    world.cars.locate(world.sensors.external)
     return out

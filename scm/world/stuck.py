@@ -1,12 +1,12 @@
 """Detect stuck cars: commanded to drive for seconds, while the rear axle stays where it is.
 
-    throttle of LEAST_THROTTLE or more, either way, for PATIENCE_NS
-    and the rear axle within NEAR_M of where that began             stuck
+    throttle of MIN_THROTTLE or more, either way, for STUCK_AFTER_NS
+    and the rear axle within MOVED_M of where that began             stuck
     the rear axle farther than that, whoever moved it              free again
 
-A car that waits in a queue or at a line has no throttle and is never stuck. At the least throttle
-a Nigel drives twice as far as NEAR_M in that time. It most likely pushes against what it touched
-last. A hosted driver releases the throttle of a stuck car, and tries again from time to time.
+A car that waits in a queue or at a line has no throttle and is never stuck. It most likely pushes
+against what it touched last. A hosted driver releases the throttle of a stuck car, and tries again
+from time to time.
 """
 
 from collections import deque
@@ -16,12 +16,12 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_MS, NS_PER_S
 
-LEAST_THROTTLE = 0.05
-PATIENCE_NS = 4 * NS_PER_S
-NEAR_M = 0.03
-PAUSE_NS = 6 * NS_PER_S
+MIN_THROTTLE = 0.05  # a Nigel with this drives twice as far as MOVED_M in STUCK_AFTER_NS
+STUCK_AFTER_NS = 4 * NS_PER_S
+MOVED_M = 0.03
+REST_NS = 6 * NS_PER_S  # a stuck driver's throttle is released for this, then tried for TRY_NS
 TRY_NS = 2 * NS_PER_S
-TOUCH_NS = 500 * NS_PER_MS
+TOUCH_MEMORY_NS = 500 * NS_PER_MS  # in which a touched thing is what it pushes against
 
 
 class Stuck:
@@ -39,32 +39,32 @@ class Stuck:
         self._touches: deque[tuple[int, Ints, Ints]] = deque()
 
     def feel(self, t_ns: int, indices: Ints, pairs: Ints) -> None:
-        """Remember for a moment who touched whom, as `Touches` tells it: rows of `vehicles`."""
+        """Remember for a moment who touched whom, as in `Touches`: rows of `indices`."""
         self._touches.append((t_ns, indices, pairs))
-        while self._touches[0][0] < t_ns - TOUCH_NS:
+        while self._touches[0][0] < t_ns - TOUCH_MEMORY_NS:
             self._touches.popleft()
 
     def touches(self, now_ns: int) -> list[tuple[Ints, Ints]]:
         """Return the slots and pairs of the contact steps of the last moment."""
-        return [(s, pairs) for t_ns, s, pairs in self._touches if t_ns >= now_ns - TOUCH_NS]
+        return [(s, pairs) for t_ns, s, pairs in self._touches if t_ns >= now_ns - TOUCH_MEMORY_NS]
 
     def look(self, throttle: Floats, x: Floats, y: Floats, t_ns: int) -> tuple[Ints, Ints]:
         """Return the slots that are stuck, and those that are free again, since the last time.
 
         Args:
-            throttle: (capacity,) what each car is told, -1 to 1; 0 where there is none.
+            throttle: (capacity,) each car's command, -1 to 1; 0 where there is none.
             x: (capacity,) of the rear axles [m]; likewise `y`.
             y: See `x`.
             t_ns: The present time without what was lost: nobody moved then [ns].
         """
-        moved = np.hypot(x - self._x, y - self._y) > NEAR_M
-        idle = ~self._stuck & (np.abs(throttle) < LEAST_THROTTLE)
+        moved = np.hypot(x - self._x, y - self._y) > MOVED_M
+        idle = ~self._stuck & (np.abs(throttle) < MIN_THROTTLE)
         free = np.flatnonzero(self._stuck & moved)
         begin = moved | idle
         self._x[begin], self._y[begin], self._since_ns[begin] = x[begin], y[begin], t_ns
         self._stuck[free] = False
         pushes = ~begin & ~self._stuck
-        new = np.flatnonzero(pushes & (t_ns - self._since_ns >= PATIENCE_NS))
+        new = np.flatnonzero(pushes & (t_ns - self._since_ns >= STUCK_AFTER_NS))
         self._stuck[new] = True
         self._since_ns[new] = t_ns
         for index in free.tolist():
@@ -74,8 +74,8 @@ class Stuck:
 
     def rests(self, t_ns: int) -> Bools:
         """Return by slot which stuck cars their drivers do not try to free now; time as above."""
-        at_ns = (t_ns - self._since_ns) % (PAUSE_NS + TRY_NS)
-        rests: Bools = self._stuck & (at_ns < PAUSE_NS)
+        at_ns = (t_ns - self._since_ns) % (REST_NS + TRY_NS)
+        rests: Bools = self._stuck & (at_ns < REST_NS)
         return rests
 
     def forget(self, index: int) -> None:

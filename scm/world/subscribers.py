@@ -5,16 +5,13 @@ from collections.abc import Sequence
 from scm.runtime.part import IsWanted
 from scm.v2x.message import Message
 
-REFRESH_EVERY_TICKS = 50
-REFRESH_CLASSES_EVERY_TICKS = 5
-NOBODY = "_"
+REFRESH_EVERY_TICKS = 50  # once a second, for single stations: many
+REFRESH_CLASSES_EVERY_TICKS = 5  # ten times a second, for whole classes: few
+NOBODY = "_"  # a name that no car has: only a wildcard matches it
 
 
 class Subscribers:
-    """Asks the bus, ten times a second for whole classes and once for single stations.
-
-    Without a bus everything is wanted.
-    """
+    """Caches which messages have subscribers on the bus; without a bus all have."""
 
     def __init__(self) -> None:
         self._is_wanted: IsWanted | None = None
@@ -36,18 +33,18 @@ class Subscribers:
             self._known.clear()
 
     def any(self, kind: type[Message]) -> bool:
-        """Return whether anybody hears any message of a class."""
+        """Return whether anybody subscribes to any message of a class."""
         known = self._any.get(kind)
         if known is None:
             known = self._any[kind] = self._is_wanted is None or self._is_wanted(kind, {})
         return known
 
     def all(self, kind: type[Message], key: str) -> bool:
-        """Return whether somebody hears a class whatever the key part: even that of nobody."""
+        """Return whether somebody subscribes to a class whatever the key part."""
         return self._is_wanted is None or self._one(kind, key, NOBODY)
 
     def of(self, kind: type[Message], key: str, names: Sequence[str]) -> list[bool]:
-        """Return for each name whether messages of a class with this key part are heard."""
+        """Return for each name whether messages of a class with this key part have subscribers."""
         if self.all(kind, key):
             return [True] * len(names)
         if not self.any(kind):

@@ -1,7 +1,7 @@
 """Radio transmission: each sent frame is delivered to the stations that receive it.
 
-Drivers of hosted cars get it directly, everybody else who subscribes gets it on the bus. Bodies are
-not read here, except the CAMs, SPATEMs and DENMs that drivers use.
+Drivers of hosted cars get it directly, all other subscribers on the bus. Bodies are not read here,
+except the CAMs, SPATEMs and DENMs that drivers use.
 """
 
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.records.city_map import Point
 from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.etsi.convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, cam_of, read_cam
 from scm.v2x.exchange import Outgoing
@@ -41,10 +42,9 @@ RECEIVED: dict[type[Frame], type[ReceivedFrame]] = {
     SsemTx: SsemRx,
 }
 """All frame types: as sent, and as received."""
-TOUCHES_NS = NS_PER_S // 2
-"""For how long a car that was pushed counts as touching: some CAMs long."""
-OF_ROADSIDE = (MapemTx, SpatemTx, SsemTx)
-"""What nobody else may send."""
+TOUCHES_NS = NS_PER_S // 2  # for which a pushed car counts as touching: some CAMs long
+OF_ROADSIDE = (MapemTx, SpatemTx, SsemTx)  # nobody else may send these
+EYE = "eye"
 
 
 def send_radio(world: World, now_ns: int) -> list[Outgoing]:
@@ -54,7 +54,7 @@ def send_radio(world: World, now_ns: int) -> list[Outgoing]:
         _measure(world, now_ns)
     if world.every["radio"].is_due(now_ns):
         out.append(status(world, now_ns))
-    due = world.radio.cams.due(world.vehicles, now_ns, world.radio.load.control)
+    due = world.radio.cams.due(world.cars.arrays, now_ns, world.radio.load.control)
     if len(due):
         out += _send_cams(world, due, now_ns)
     note_hard_braking(world)
@@ -69,8 +69,8 @@ def transmit(world: World, frame: Frame, now_ns: int) -> list[Outgoing]:
     if isinstance(frame, OF_ROADSIDE) and frame.station not in world.radio.roadside:
         world.ignored += 1
         return []
-    receivers = world.receivers()
-    place = world.antenna(frame.station)
+    receivers = receivers_of(world)
+    place = antenna_of(world, frame.station)
     if place is None:
         world.radio.link.counts.sent += 1
         world.radio.link.counts.unknown += 1
@@ -79,10 +79,26 @@ def transmit(world: World, frame: Frame, now_ns: int) -> list[Outgoing]:
     world.radio.load.note(kind_of(frame), x, y)
     out = _deliver_to_drivers(world, frame, now_ns)
     received = world.radio.link.reach([frame.station], x, y, receivers, _load(world, receivers))
-    listen = np.array(
-        world.subscribers.of(RECEIVED[type(frame)], "receiver", receivers.names), np.bool_
-    )
+    listen = _listens(world, RECEIVED[type(frame)], receivers)
     return out + _deliver(world, [frame], received & listen, receivers, now_ns)
+
+
+def receivers_of(world: World) -> Receivers:
+    """Return all stations that frames are brought to, except the hosted cars."""
+    if not world.cars.remote:
+        return world.radio.units
+    cars = {car.name: (car.pose.x, car.pose.y) for car in world.cars.remote.values()}
+    return Receivers({**world.radio.roadside, **cars})
+
+
+def antenna_of(world: World, station: str) -> Point | None:
+    """Return where a station that is no hosted car sends from; None: unknown."""
+    if (car := world.cars.remote.get(station)) is not None:
+        return car.pose.x, car.pose.y
+    if station == EYE or station.startswith(f"{EYE}-"):
+        (left, right), (low, high) = world.city_map.floor.x_m, world.city_map.floor.y_m
+        return 0.5 * (left + right), 0.5 * (low + high)
+    return world.radio.roadside.get(station)
 
 
 def kind_of(frame: Frame) -> str:
@@ -91,15 +107,15 @@ def kind_of(frame: Frame) -> str:
 
 
 def status(world: World, now_ns: int) -> RadioStatus:
-    """Return what became of the frames since the last time, and how busy the channel is."""
+    """Return the counts of frames since the last time, and how busy the channel is."""
     counts, before = world.radio.link.counts, world.radio.published
     new = {f.name: getattr(counts, f.name) - getattr(before, f.name) for f in fields(counts)}
     for name, value in new.items():
         setattr(before, name, getattr(before, name) + value)
     late_ns, _ = new.pop("late_ns"), new.pop("lost")
     busy = world.radio.load
-    others = {name: busy.ratio_of(name) for name in world.receivers().names}
-    all_of_them = np.array([*busy.ratio[world.vehicles.hosted], *others.values(), 0.0])
+    others = {name: busy.ratio_of(name) for name in receivers_of(world).names}
+    all_of_them = np.array([*busy.ratio[world.cars.arrays.hosted], *others.values(), 0.0])
     stations = max(1, len(all_of_them) - 1)
     return RadioStatus(
         t_ns=now_ns,
@@ -113,10 +129,15 @@ def status(world: World, now_ns: int) -> RadioStatus:
     )
 
 
+def _listens(world: World, kind: type[ReceivedFrame], receivers: Receivers) -> Bools:
+    """Return for each receiver whether anybody subscribes to its frames of a kind."""
+    return np.array(world.subscribers.of(kind, "receiver", receivers.names), np.bool_)
+
+
 def _measure(world: World, now_ns: int) -> None:
-    vehicles = world.vehicles
+    vehicles = world.cars.arrays
     world.radio.load.measure(
-        now_ns, vehicles.x, vehicles.y, vehicles.hosted, world.receivers().places
+        now_ns, vehicles.x, vehicles.y, vehicles.hosted, receivers_of(world).places
     )
 
 
@@ -125,8 +146,8 @@ def _load(world: World, receivers: Receivers) -> Floats | None:
 
 
 def _send_cams(world: World, due: Ints, now_ns: int) -> list[Outgoing]:
-    vehicles = world.vehicles
-    front = world.vehicles.front[due]
+    vehicles = world.cars.arrays
+    front = world.cars.arrays.front[due]
     x, y, yaw = vehicles.x[due], vehicles.y[due], vehicles.yaw[due]
     bumper_x, bumper_y = x + front * np.cos(yaw), y + front * np.sin(yaw)
     world.radio.load.note("cam", x, y)
@@ -138,13 +159,16 @@ def _send_cams(world: World, due: Ints, now_ns: int) -> list[Outgoing]:
 
 def _send_denm(world: World, frame: DenmTx, now_ns: int) -> list[Outgoing]:
     """Send a hosted car's warning."""
-    index = world.hosted[frame.station].index
-    x, y = world.vehicles.x[index : index + 1].copy(), world.vehicles.y[index : index + 1].copy()
+    index = world.cars.hosted[frame.station].index
+    x, y = (
+        world.cars.arrays.x[index : index + 1].copy(),
+        world.cars.arrays.y[index : index + 1].copy(),
+    )
     world.radio.load.note("denm", x, y)
     out = _deliver_to_drivers(world, frame, now_ns)
-    receivers = world.receivers()
+    receivers = receivers_of(world)
     reached = world.radio.link.reach([frame.station], x, y, receivers, _load(world, receivers))
-    listen = np.array(world.subscribers.of(DenmRx, "receiver", receivers.names), np.bool_)
+    listen = _listens(world, DenmRx, receivers)
     return out + _deliver(world, [frame], reached & listen, receivers, now_ns, also_sent=True)
 
 
@@ -155,7 +179,7 @@ def _deliver_to_drivers(world: World, frame: Frame, now_ns: int) -> list[Outgoin
     elif isinstance(frame, DenmTx):
         world.drivers.receive_denm(frame.body, now_ns)
         return log_warning(world, frame, now_ns)
-    elif isinstance(frame, CamTx) and (car := world.remote.get(frame.station)) is not None:
+    elif isinstance(frame, CamTx) and (car := world.cars.remote.get(frame.station)) is not None:
         _deliver_cam(world, car.index, frame.body, now_ns)
     return []
 
@@ -177,12 +201,12 @@ def _deliver_cam(world: World, index: int, body: CamBody, now_ns: int) -> None:
 
 def _deliver_cams(world: World, due: Ints, x: Floats, y: Floats, now_ns: int) -> list[Outgoing]:
     """Return hosted cars' CAMs for all other receivers and the bus, if anybody subscribes."""
-    receivers, on_bus = world.receivers(), world.subscribers.any(CamTx)
-    listen = np.array(world.subscribers.of(CamRx, "receiver", receivers.names), np.bool_)
+    receivers, on_bus = receivers_of(world), world.subscribers.any(CamTx)
+    listen = _listens(world, CamRx, receivers)
     if not (on_bus or listen.any()):
         world.radio.link.counts.sent += len(due)
         return []
-    names = [world.vehicles.names[index] for index in due.tolist()]
+    names = [world.cars.arrays.names[index] for index in due.tolist()]
     reached = world.radio.link.reach(names, x, y, receivers, _load(world, receivers)) & listen
     is_received = reached.any(axis=1) | on_bus
     frames: list[Frame] = [
@@ -217,7 +241,7 @@ def _deliver(
 
 
 def _cam(world: World, state: VehicleState, now_ns: int) -> CamTx:
-    hosted = world.hosted[state.vehicle]
+    hosted = world.cars.hosted[state.vehicle]
     rear, front = hosted.car.vector("body.footprint_x_m")
     right, left = hosted.car.vector("body.footprint_y_m")
     body = cam_of(
@@ -230,12 +254,18 @@ def _cam(world: World, state: VehicleState, now_ns: int) -> CamTx:
     return CamTx(station=state.vehicle, t_ns=now_ns, body=body)
 
 
+def _lost_ns(world: World, station: str) -> int:
+    """Return the time that passed without a station's car being moved, since it came [ns]."""
+    car = world.cars.remote.get(station)
+    return world.pace.lost_ns if car is None else car.missed_ns
+
+
 def _received(world: World, receiver: str, frame: Frame, now_ns: int) -> ReceivedFrame:
     if isinstance(frame, CamTx):
-        car = world.car(frame.station)
+        car = world.cars.get(frame.station)
         return CamRx(
             receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body,
-            signed=frame.signed, lost_ns=world.lost_ns(frame.station),
+            signed=frame.signed, lost_ns=_lost_ns(world, frame.station),
             car="" if car is None else car.car_file,
             by_hand=car is not None and not car.lease.is_at_home, stopped=world.stop.engaged,
             touches=now_ns - world.impulses.touched_ns.get(frame.station, -TOUCHES_NS) < TOUCHES_NS,

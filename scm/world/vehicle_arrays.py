@@ -1,7 +1,7 @@
 """The state of all cars as arrays by vehicle index; stages of a tick work on these, not on cars.
 
-A slot is a car's number in the whole world, hosted or remote, the lowest free one first. Motion is
-read from the fleets once a tick; what only a person asks for is read from them on demand.
+A vehicle index is a car's number in the whole world, hosted or remote, the lowest free one first.
+Motion is read from the fleets once a tick; all else is read from them on demand.
 """
 
 from collections.abc import Collection
@@ -18,7 +18,7 @@ CODES = {mode: code for code, mode in enumerate(MODES)}
 
 
 class Numbers:
-    """Gives out whole numbers from `first` on, the lowest free one first; none of `never`."""
+    """Assigns whole numbers from `first` on, the lowest free one first; none of `never`."""
 
     def __init__(self, first: int = 0, never: Collection[int] = ()) -> None:
         self._first = self._lowest = first
@@ -51,8 +51,8 @@ class VehicleArrays:
     """Arrays of shape (capacity,).
 
     Attributes:
-        names: Of the car in each slot; empty where there is none.
-        used: Whether a car has the slot; `hosted`: and the world simulates it.
+        names: Of the car with each index; empty where there is none.
+        used: Whether a car has the index; `hosted`: and the world simulates it.
         x, y, yaw: Pose of the rear axle, map frame, at the end of the last tick.
         front: From the rear axle to the front bumper [m].
         speed, yaw_rate: Along the body, about the vertical; 0 for remote cars.
@@ -61,7 +61,7 @@ class VehicleArrays:
         mode: Number in `MODES` of what `VehicleState` calls so.
         arrived: Whether it stands at the end of its trip.
         hazard: Whether the hazard lights must flash: its commander was lost.
-        diverged: Whether its numbers left every physical range, and that was told.
+        diverged: Whether its numbers left every physical range, and that was reported.
         seq: Reports sent.
     """
 
@@ -80,7 +80,7 @@ class VehicleArrays:
         self._numbers = Numbers()
 
     def add(self, name: str, pose: Pose2, *, hosted: bool) -> int:
-        """Give a car a slot.
+        """Give a car an index.
 
         Raises:
             RunError: when all are in use.

@@ -1,4 +1,4 @@
-"""Watch all cars: lost agents, expired leases, low batteries, stuck and frozen cars."""
+"""Monitor all cars: lost agents, expired leases, low batteries, stuck and diverged cars."""
 
 import math
 
@@ -9,25 +9,27 @@ from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.city_event import CityEvent
 from scm.vehicles.fleet import VehicleStatus
 from scm.world import lease as rules
+from scm.world.alerts import city_event
+from scm.world.cars import lease_record
 from scm.world.collide import WALL, touched_lately
 from scm.world.remote import GONE_NS, STALE_NS, RemoteCar
-from scm.world.world import World, city_event, lease_record
+from scm.world.world import World
 
-FIRST_REPORT_NS = 10 * NS_PER_S
+FIRST_REPORT_NS = 10 * NS_PER_S  # an agent may compile its car before its first report
 
 
 def watch(world: World, now_ns: int) -> list[Outgoing]:
     """Mark lost cars, remove those lost for long, and report frozen, stuck and low cars."""
     out: list[Outgoing] = []
-    for car in list(world.remote.values()):
+    for car in list(world.cars.remote.values()):
         out += _watch_agent(world, car, now_ns)
         out += _watch_lease(car, now_ns)
-    vehicles = world.vehicles
-    for index in world.garage.frozen().tolist():
+    vehicles = world.cars.arrays
+    for index in world.cars.garage.frozen().tolist():
         if not vehicles.diverged[index]:
             vehicles.diverged[index] = True
             vehicles.driven[index] = False
-            hosted = world.hosted[vehicles.names[index]]
+            hosted = world.cars.hosted[vehicles.names[index]]
             status = VehicleStatus(int(hosted.fleet.status[hosted.row]))
             name = f"vehicle_{status.name.lower()}"
             out.append(city_event("error", name, status.sentence, now_ns, hosted.name))
@@ -39,9 +41,9 @@ def watch(world: World, now_ns: int) -> list[Outgoing]:
 
 
 def _watch_batteries(world: World, now_ns: int) -> list[CityEvent]:
-    _, left = world.garage.batteries()
-    hosted = {name: float(left[car.index]) for name, car in world.hosted.items()}
-    remote = {name: car.battery_charge for name, car in world.remote.items()}
+    _, left = world.cars.garage.batteries()
+    hosted = {name: float(left[car.index]) for name, car in world.cars.hosted.items()}
+    remote = {name: car.battery_charge for name, car in world.cars.remote.items()}
     charges = {name: None if math.isnan(c) else c for name, c in hosted.items()} | remote
     texts = {
         name: f"the battery of {name} is low: {100.0 * (charges[name] or 0.0):.0f} % left"
@@ -52,17 +54,20 @@ def _watch_batteries(world: World, now_ns: int) -> list[CityEvent]:
 
 def _watch_stuck(world: World, now_ns: int) -> list[CityEvent]:
     out: list[CityEvent] = []
-    vehicles, stuck = world.vehicles, world.alerts.stuck
+    vehicles, stuck = world.cars.arrays, world.alerts.stuck
     throttle = np.where(vehicles.hosted & ~vehicles.diverged, vehicles.throttle, 0.0)
-    for car in world.remote.values():
+    for car in world.cars.remote.values():
         if car.alive and car.state is not None:
             throttle[car.index] = car.state.throttle
     new, free = stuck.look(throttle, vehicles.x, vehicles.y, now_ns - world.pace.lost_ns)
     for index in new.tolist():
-        name, against = vehicles.names[index], touched_lately(world, index, now_ns)
+        name, against = (
+            vehicles.names[index],
+            touched_lately(world.cars, world.contacts, stuck, index, now_ns),
+        )
         stuck.against[index] = against
         others = ", ".join("a wall" if other == WALL else other for other in against)
-        pushes = f"pushes against {others}" if against else "is told to drive, touches nothing"
+        pushes = f"pushes against {others}" if against else "is commanded to drive, touches nothing"
         text = f"{name} is stuck: it {pushes} and stays"
         out.append(city_event("warning", "stuck", text, now_ns, name))
     for index in free.tolist():
@@ -88,7 +93,7 @@ def _watch_agent(world: World, car: RemoteCar, now_ns: int) -> list[Outgoing]:
         out += lose(car, why, now_ns, dead=False)
     if car.lost_ns is not None and now_ns - car.lost_ns >= GONE_NS:
         out += world.remove(car.name)
-        text = f"{car.name} was taken off the map: nobody drives it any more"
+        text = f"{car.name} was removed from the map: nobody drives it any more"
         out.append(city_event("info", "vehicle_removed", text, now_ns, car.name))
     return out
 

@@ -24,7 +24,7 @@ def test_a_fault_of_the_output_and_a_frozen_controller_are_found_in_time(tmp_pat
 def test_a_running_city_is_left_alone_without_a_yes():
     done = selftest("--connect", "tcp/127.0.0.1:1", input="\n")
     assert done.returncode == 0
-    assert "nothing was disturbed" in done.stdout
+    assert "no fault was injected" in done.stdout
 
 
 def test_a_fault_that_does_not_exist_is_bad_input():

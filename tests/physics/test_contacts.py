@@ -53,7 +53,7 @@ def run(world, seconds):
     start = world.tick
     for i in range(round(seconds / TICK_S) + 1):
         tick(world, (start + i) * PERIOD_NS, [])
-        cars = world.hosted.values()
+        cars = world.cars.hosted.values()
         history.append([car.fleet.planar_cog(car.row) for car in cars])
     return np.array(history)
 

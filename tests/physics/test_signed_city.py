@@ -37,7 +37,7 @@ def city_after_two_minutes():
     with Lockstep([part]) as city:
         for _ in range(round(SPAN_S / 0.5)):
             city.run_for(0.5)
-            stood = np.where(np.abs(world.vehicles.speed[:CARS]) < 0.01, stood + 0.5, 0.0)
+            stood = np.where(np.abs(world.cars.arrays.speed[:CARS]) < 0.01, stood + 0.5, 0.0)
             longest = np.maximum(longest, stood)
     return world, touched, longest
 

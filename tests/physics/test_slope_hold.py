@@ -37,9 +37,9 @@ def parked(slope, cars):
     places = []
     for i in range(MINUTE_TICKS + 1):
         if i in {0, MINUTE_TICKS // 2, MINUTE_TICKS}:
-            world.locate()
-            of = [world.car(f"c{k}").index for k in range(len(cars))]
-            places.append(np.column_stack((world.vehicles.x[of], world.vehicles.y[of])))
+            world.cars.locate(world.sensors.external)
+            of = [world.cars.get(f"c{k}").index for k in range(len(cars))]
+            places.append(np.column_stack((world.cars.arrays.x[of], world.cars.arrays.y[of])))
         move(world, i * PERIOD_NS)
     start, half, end = places
     return np.hypot(*(end - start).T), np.hypot(*(end - half).T)

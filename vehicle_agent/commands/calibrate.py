@@ -19,7 +19,7 @@ TAG = "tag-"
 ADVICE = {
     "pose": "the Eye reports no pose of that name; a car that has not joined is called tag-ID",
     "doubt": "the Eye sees it but its pose is uncertain: is the tag flat, intact and lit?",
-    "stop": "the red button is pressed",
+    "stop": "the city is stopped",
     "outside the floor": "put it inside the rectangle of --floor, bumpers and all",
 }
 REPEAT_DRIVE = "drive again"
@@ -30,7 +30,7 @@ MIN_LONG_SIDE, MIN_SHORT_SIDE = 4.0, 3.3
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--name", required=True,
-        help="of the vehicle, as the Eye calls it: tag-ID where it has not joined the city",
+        help="of the vehicle in the Eye: tag-ID if it has not joined the city",
     )  # fmt: skip
     parser.add_argument("--connect", required=True, metavar="ENDPOINT", help="the city's router")
     credentials_argument(parser)
@@ -52,15 +52,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="drive 20 legs of 1 s instead of 40 of 1.8 s: half a minute, wider intervals",
     )  # fmt: skip
     parser.add_argument(
-        "--speed-limit", type=float, default=1.0, metavar="THROTTLE", help="most throttle, 0 to 1"
+        "--speed-limit", type=float, default=1.0, metavar="THROTTLE", help="maximum throttle"
     )
     parser.add_argument(
         "--top-speed", type=float, default=0.3, metavar="MPS",
-        help="of this car at full throttle, at most [m/s] (%(default)g)",
+        help="maximum speed of this car at full throttle [m/s] (%(default)g)",
     )  # fmt: skip
     parser.add_argument(
         "--eye-delay-ms", type=float, default=0.0, metavar="MS",
-        help="so much of the delays found is the Eye's [ms] (%(default)g)",
+        help="the Eye's part of the delays found [ms] (%(default)g)",
     )  # fmt: skip
     parser.add_argument(
         "--out",
@@ -200,7 +200,7 @@ def _fit(arguments: argparse.Namespace, part: "CalibrationPart", out: Path) -> i
     for line in unsure(found):
         print(f"{REPEAT_DRIVE}: {line}")
     print(f"{path}: for `vehicle-agent join --calibration`; {out / 'fit.svg'} shows the fit")
-    print(f"`scm replay {out / 'drive'} --car {path}` shows how well it drives again")
+    print(f"`scm replay {out / 'drive'} --car {path}` shows how well it reproduces the drive")
     return 0
 
 

@@ -28,9 +28,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="a car of the city to drive; the first is the script's V1, the next V2",
     )  # fmt: skip
     parser.add_argument(
-        "--script-port", type=_port, default=DEFAULT_PORT, help="where it serves (%(default)s)"
+        "--script-port", type=_port, default=DEFAULT_PORT, help="port to serve (%(default)s)"
     )
-    parser.add_argument("--script-host", default="127.0.0.1", help="on which host (%(default)s)")
+    parser.add_argument("--script-host", default="127.0.0.1", help="address to bind (%(default)s)")
     parser.add_argument(
         "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT",
         help="the city's router (%(default)s)",
@@ -55,23 +55,23 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--cameras", nargs="*", choices=("front", "rear"), default=["front", "rear"],
-        help="which cameras are pictured; the others stay black (both)",
+        help="cameras to render; the others stay black (both)",
     )  # fmt: skip
     parser.add_argument(
         "--max-hz", type=float, default=FASTEST_HZ,
-        help="most packets a second; 0: as fast as the script answers (%(default)s)",
+        help="maximum packets per second; 0: as fast as the script answers (%(default)s)",
     )  # fmt: skip
     brought = parser.add_mutually_exclusive_group()
     brought.add_argument(
         "--spawn", nargs="*", action="extend", type=place, metavar="PLACE",
-        help="bring the cars, to these places of the map, to X,Y,DEG (--spawn=-1,0,90 where X is "
-        "below 0), or to free places, and take them away after",
+        help="spawn the cars, at these places of the map, at X,Y,DEG (--spawn=-1,0,90 if X is "
+        "below 0), or at free places, and remove them at the end",
     )  # fmt: skip
     brought.add_argument(
         "--cosim", action="store_true", help="the script places the cars itself, by PosX ... RotW"
     )
     parser.add_argument(
-        "--car-file", default="nigel", help="of the cars that are brought or placed (%(default)s)"
+        "--car-file", default="nigel", help="of the cars that are spawned or placed (%(default)s)"
     )
 
 

@@ -123,7 +123,7 @@ def _join(
 
 
 COMMAND = Command(
-    help="be a Nigel's Arduino on a pseudo-terminal, and the car that it moves",
+    help="emulate a Nigel's Arduino on a pseudo-terminal, and the car that it drives",
     example="vehicle-agent emulate --link /tmp/nigel --connect tcp/127.0.0.1:7447 --name n7",
     arguments=_arguments,
     run=_run,

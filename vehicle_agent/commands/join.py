@@ -45,7 +45,7 @@ def _real_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=1.0,
         metavar="SHARE",
-        help="most throttle beyond the dead-band, 0 to 1 (%(default)s)",
+        help="maximum throttle beyond the dead-band, 0 to 1 (%(default)s)",
     )
     real.add_argument(
         "--fence",
@@ -111,7 +111,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    help="join a city with a car of one's own dynamics, and drive until Ctrl-C",
+    help="join a city as a car with its own dynamics, and drive until Ctrl-C",
     example="vehicle-agent join --name n7 --connect tcp/127.0.0.1:7447",
     arguments=_arguments,
     run=_run,

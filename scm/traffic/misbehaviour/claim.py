@@ -126,7 +126,7 @@ def claim_of(
 
 
 def accel_of(body: CamBody) -> tuple[float | None, float | None]:
-    """Return the acceleration of a CAM, or the end of range that it exceeds; see `Claim` [m/s^2]."""
+    """Return the acceleration of a CAM, or the range end that it exceeds; see `Claim` [m/s^2]."""
     reported = body.motion.longitudinal_acceleration
     if is_out_of_range(reported, "value"):
         return None, reported.value * ACCEL_UNIT_MPS2

@@ -125,7 +125,7 @@ def test_each_reason_to_wait_is_said_once_and_with_advice(capsys):
         "0 % driven",
         "10 % driven",
         "waits (the Arduino starts)",
-        "waits (slew, stop): the red button is pressed",
+        "waits (slew, stop): the city is stopped",
         "waits (outside the floor): put it inside the rectangle of --floor, bumpers and all",
     ]
 

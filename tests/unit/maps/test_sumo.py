@@ -105,7 +105,7 @@ def test_cars_go_round_in_their_lanes(imported):
         for _ in range(round(SPAN_S / 0.2)):
             city.run_for(0.2)
             worst = np.maximum(worst, np.abs(world.drivers.cross_track[:count]))
-            way += 0.2 * np.abs(world.vehicles.speed[:count])
+            way += 0.2 * np.abs(world.cars.arrays.speed[:count])
     assert worst.max() < BESIDE_CAR_M
     assert way.min() > 0.3
     assert way.max() > 6.0

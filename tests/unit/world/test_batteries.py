@@ -63,8 +63,8 @@ def test_a_charge_that_is_no_share_is_not_believed_and_its_car_still_is(city, ab
 
 def test_a_hosted_car_tells_its_battery_and_a_nearly_empty_one_is_low(city):
     city.ask(SpawnRequest(vehicle="n1"))
-    car = city.world.hosted["n1"]
-    city.world.garage.drain(0.9 * 3600.0 * 5.2 / 0.8)
+    car = city.world.cars.hosted["n1"]
+    city.world.cars.garage.drain(0.9 * 3600.0 * 5.2 / 0.8)
     city.run_for(1.1)
     assert city.shown("n1").battery_charge == pytest.approx(0.1, abs=1e-3)
     assert low(city) == ["the battery of n1 is low: 10 % left"]

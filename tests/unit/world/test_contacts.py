@@ -122,7 +122,7 @@ def test_a_car_that_presses_against_a_wall_does_not_say_that_it_speeds_up(make_c
     for seq in range(1, 120):
         news = (city.command(lease, seq, 1.0), *((renewal,) if seq % 20 == 0 else ()))
         city.run(1, *news)
-    slot = city.world.hosted["n1"].index
-    assert abs(city.world.vehicles.speed[slot]) < 0.01
-    assert city.world.garage.signal("accel_x")[slot] > 1.0, "what its wheels alone would do"
+    slot = city.world.cars.hosted["n1"].index
+    assert abs(city.world.cars.arrays.speed[slot]) < 0.01
+    assert city.world.cars.garage.signal("accel_x")[slot] > 1.0, "what its wheels alone would do"
     assert abs(city.heard(VehicleState)[-1].accel_mps2) < 0.3

@@ -65,7 +65,7 @@ def test_stealing_with_a_reason_changes_owner_and_epoch():
 
 def test_a_lease_asked_for_no_time_lives_the_shortest_allowed():
     held = rules.acquire(rules.grant("world"), "ann", 0, 0)
-    assert held.ttl_ms == rules.SHORTEST_TTL_MS
+    assert held.ttl_ms == rules.MIN_TTL_MS
 
 
 @given(st.lists(st.tuples(st.sampled_from("arsh"), st.sampled_from(["ann", "bob", "world"]))))

@@ -145,7 +145,7 @@ class Leases(RuleBasedStateMachine):
     def epochs_only_grow_and_each_has_one_owner(self):
         if not hasattr(self, "part"):
             return
-        epoch = self.part.world.hosted[CAR].lease.epoch
+        epoch = self.part.world.cars.hosted[CAR].lease.epoch
         assert epoch >= self.highest
         self.highest = epoch
         owners = {}

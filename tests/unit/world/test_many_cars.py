@@ -48,8 +48,8 @@ def test_a_city_runs_the_same_again_on_any_number_of_threads(threads, monkeypatc
     first, _ = run(100, cars(40))
     again, _ = run(100, cars(40), threads)
     for name in ("x", "y", "yaw", "speed", "throttle", "steering"):
-        assert (getattr(first.vehicles, name) == getattr(again.vehicles, name)).all()
-    assert (first.vehicles.speed[first.vehicles.hosted] > 0.05).any()
+        assert (getattr(first.cars.arrays, name) == getattr(again.cars.arrays, name)).all()
+    assert (first.cars.arrays.speed[first.cars.arrays.hosted] > 0.05).any()
 
 
 def test_another_car_far_away_changes_nobodys_noise():

@@ -11,11 +11,11 @@ from scm.geometry import Pose2
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.join_request import JoinRequest
 from scm.v2x.messages.route_request import RouteRequest
-from scm.world.stuck import LEAST_THROTTLE, NEAR_M, PATIENCE_NS, PAUSE_NS, TRY_NS, Stuck
+from scm.world.stuck import MIN_THROTTLE, MOVED_M, REST_NS, STUCK_AFTER_NS, TRY_NS, Stuck
 
 EAST_WALL_M = 2.884  # its inner face
 FRONT_M, REAR_M = 0.23, 0.07  # a Nigel's, from its rear axle
-PATIENCE_S, PAUSE_S, TRY_S = PATIENCE_NS / NS_PER_S, PAUSE_NS / NS_PER_S, TRY_NS / NS_PER_S
+PATIENCE_S, PAUSE_S, TRY_S = STUCK_AFTER_NS / NS_PER_S, REST_NS / NS_PER_S, TRY_NS / NS_PER_S
 AT_WALL = Pose2(EAST_WALL_M - FRONT_M - 0.005, 0.6, 0.0)
 
 
@@ -53,9 +53,9 @@ def test_a_car_that_pushes_against_a_wall_is_stuck_once_until_it_moves(city):
 def test_time_that_a_slow_computer_lost_makes_nobody_stuck(make_city):
     city = make_city(hosted=(("n1", "nigel"),))
     city.run_for(1.0)
-    city.now += 3 * PATIENCE_NS
+    city.now += 3 * STUCK_AFTER_NS
     city.run_for(0.5)
-    assert city.world.vehicles.throttle[0] > LEAST_THROTTLE, "it drives"
+    assert city.world.cars.arrays.throttle[0] > MIN_THROTTLE, "it drives"
     assert told(city) == []
 
 
@@ -71,7 +71,7 @@ def test_two_cars_nose_to_nose_name_each_other(city):
     ]
 
 
-@pytest.mark.parametrize("throttle", [0.0, 0.9 * LEAST_THROTTLE])
+@pytest.mark.parametrize("throttle", [0.0, 0.9 * MIN_THROTTLE])
 def test_a_car_that_is_hardly_told_to_drive_is_not_stuck(city, throttle):
     put(city, "n1", AT_WALL)
     push(city, city.lease(ttl_ms=60_000), 1.5 * PATIENCE_S, throttle, 1)
@@ -80,7 +80,7 @@ def test_a_car_that_is_hardly_told_to_drive_is_not_stuck(city, throttle):
 
 def test_the_least_throttle_moves_a_free_car_far_enough(city):
     put(city, "n1", Pose2(1.0, 0.6, 0.0))
-    push(city, city.lease(ttl_ms=60_000), 2 * PATIENCE_S, LEAST_THROTTLE, 1)
+    push(city, city.lease(ttl_ms=60_000), 2 * PATIENCE_S, MIN_THROTTLE, 1)
     assert told(city) == []
 
 
@@ -91,10 +91,10 @@ def test_a_car_of_an_agent_is_judged_by_its_own_throttle_and_place(city):
         return msgspec.structs.replace(city.report(seq=seq, x=x), throttle=0.4)
 
     for seq in range(1, 60):
-        city.run(5, report(seq, 1.0 + 0.2 * NEAR_M * (seq % 2)))
+        city.run(5, report(seq, 1.0 + 0.2 * MOVED_M * (seq % 2)))
     assert told(city) == ["n7 is stuck: it is told to drive, touches nothing and stays"]
     assert city.shown("n7").stuck == ()
-    city.run(15, report(60, 1.0 + 2 * NEAR_M))
+    city.run(15, report(60, 1.0 + 2 * MOVED_M))
     assert told(city)[1:] == ["n7 is free again"]
 
 
@@ -124,7 +124,7 @@ def test_a_driver_lets_go_of_a_stuck_car_and_tries_again_once_in_a_while(city, b
     throttles = []
     for seq in range(2, round(50 * (0.5 + PATIENCE_S + PAUSE_S + TRY_S + 0.5 * PAUSE_S) / 5)):
         city.run(5, stand(seq))
-        throttles.append(city.world.vehicles.throttle[car.index] > 0.0)
+        throttles.append(city.world.cars.arrays.throttle[car.index] > 0.0)
     assert told(city)[:1] == ["n1 is stuck: it pushes against n7 and stays"]
     changes = np.flatnonzero(np.diff(throttles)) + 1
     spans_s = np.diff(changes) * 0.1
@@ -138,7 +138,7 @@ def test_a_driver_lets_go_of_a_stuck_car_and_tries_again_once_in_a_while(city, b
 def test_a_queue_before_a_red_light_is_not_stuck(make_city):
     city = make_city(hosted=tuple((f"n{i}", "nigel") for i in range(1, 7)))
     city.run_for(8.0 + 1.5 * PATIENCE_S)
-    assert city.world.vehicles.speed.max() < 0.02, "all wait at the dark light by now"
+    assert city.world.cars.arrays.speed.max() < 0.02, "all wait at the dark light by now"
     assert told(city) == []
 
 
@@ -160,15 +160,15 @@ def test_patience_begins_anew_whenever_a_car_is_let_go_of():
         assert not len(new)
 
 
-@pytest.mark.parametrize("throttle", [LEAST_THROTTLE, -LEAST_THROTTLE])
+@pytest.mark.parametrize("throttle", [MIN_THROTTLE, -MIN_THROTTLE])
 def test_whoever_stays_for_that_long_is_stuck_either_way(throttle):
     stuck, none, told = Stuck(2), np.zeros(2), np.array([throttle, 0.0])
     stuck.look(np.zeros(2), none, none, 0)
-    assert [one.tolist() for one in stuck.look(told, none, none, PATIENCE_NS - 1)] == [[], []]
-    near = np.array([0.9 * NEAR_M, 0.0])
-    assert [one.tolist() for one in stuck.look(told, near, none, PATIENCE_NS)] == [[0], []]
-    assert stuck.rests(PATIENCE_NS).tolist() == [True, False]
-    assert stuck.rests(PATIENCE_NS + PAUSE_NS).tolist() == [False, False]
-    far = np.array([1.1 * NEAR_M, 0.0])
-    assert [one.tolist() for one in stuck.look(told, far, none, PATIENCE_NS + 1)] == [[], [0]]
+    assert [one.tolist() for one in stuck.look(told, none, none, STUCK_AFTER_NS - 1)] == [[], []]
+    near = np.array([0.9 * MOVED_M, 0.0])
+    assert [one.tolist() for one in stuck.look(told, near, none, STUCK_AFTER_NS)] == [[0], []]
+    assert stuck.rests(STUCK_AFTER_NS).tolist() == [True, False]
+    assert stuck.rests(STUCK_AFTER_NS + REST_NS).tolist() == [False, False]
+    far = np.array([1.1 * MOVED_M, 0.0])
+    assert [one.tolist() for one in stuck.look(told, far, none, STUCK_AFTER_NS + 1)] == [[], [0]]
     assert stuck.against == {}

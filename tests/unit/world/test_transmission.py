@@ -45,7 +45,7 @@ class Air:
 
     def remote(self, name, x, y):
         pose = SimpleNamespace(x=x, y=y)
-        self.world.remote[name] = SimpleNamespace(name=name, pose=pose, index=0, missed_ns=0)
+        self.world.cars.remote[name] = SimpleNamespace(name=name, pose=pose, index=0, missed_ns=0)
 
     def send(self, kind, station, now_ns=0):
         body = warning(station, now_ns) if kind is DenmTx else None

@@ -26,7 +26,7 @@ def causes(city):
 def test_cars_that_drive_brake_and_wait_at_a_dark_light_warn_of_nothing(make_city):
     city = make_city(hosted=CARS)
     city.run_for(20.0)
-    assert city.world.vehicles.speed.max() < 0.02, "all wait by now"
+    assert city.world.cars.arrays.speed.max() < 0.02, "all wait by now"
     assert causes(city) == []
 
 
@@ -74,7 +74,7 @@ def test_a_stop_of_the_whole_city_is_no_event_of_a_car(make_city):
 
 def test_two_cars_that_meet_both_warn_of_an_accident(make_city):
     city = make_city(hosted=CARS[:1])
-    pose = city.world.hosted["n1"].pose
+    pose = city.world.cars.hosted["n1"].pose
     there = city.world.host("n2", "nigel", pose @ Pose2(0.34, 0.0, 0.0), city.now)
     assert there.name == "n2"
     lease = city.lease()

@@ -27,7 +27,7 @@ MAP = load_map("driving_school")
 
 def test_commands_for_a_car_that_nobody_leased_are_counted_as_ignored(city):
     city.ask(SpawnRequest(vehicle="n1"))
-    epoch = city.world.hosted["n1"].lease.epoch
+    epoch = city.world.cars.hosted["n1"].lease.epoch
     city.run(1, DriveCommand(vehicle="n1", t_ns=0, epoch=epoch, seq=1, throttle=1.0, steering=0.0))
     assert city.world.ignored == 1
 
@@ -134,14 +134,14 @@ def test_a_remote_car_gets_scans_of_walls_and_cars_but_not_of_itself(make_city):
 def test_a_real_car_is_not_pushed_but_pushes(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
     city.ask(JoinRequest(vehicle="r1", session="s", kind="real"))
-    start = city.world.hosted["n1"].pose
+    start = city.world.cars.hosted["n1"].pose
     behind = start @ Pose2(-0.295, 0.0, 0.0)
     report = city.report("r1", x=behind.x, y=behind.y, yaw_rad=behind.yaw, speed_mps=0.2)
     city.run(10, report)
     of_real = [contact for contact in city.heard(Contact) if contact.vehicle == "r1"]
     assert of_real
     assert all(abs(c.dvx_mps) + abs(c.dvy_mps) < 1e-5 for c in of_real)
-    pose = city.world.hosted["n1"].pose
+    pose = city.world.cars.hosted["n1"].pose
     assert np.hypot(pose.x - start.x, pose.y - start.y) > 0.001
 
 

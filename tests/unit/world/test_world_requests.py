@@ -87,7 +87,7 @@ def test_a_car_keeps_the_tag_that_is_glued_onto_its_roof(city):
     joined = city.ask(JoinRequest(vehicle="r1", session="s", kind="real", tag_id=2))
     others = [city.ask(SpawnRequest()).tag_id for _ in range(2)]
     assert (joined.tag_id, others) == (2, [1, 3])
-    assert city.world.remote["r1"].tag_id == 2
+    assert city.world.cars.remote["r1"].tag_id == 2
     city.ask(RemoveRequest(vehicle="r1"))
     assert city.ask(JoinRequest(vehicle="r2", session="s", tag_id=2)).tag_id == 2
 
@@ -138,7 +138,7 @@ def test_a_car_of_ones_own_folder_comes_by_its_name(make_city, monkeypatch):
     city = make_city()
     joined = city.ask(JoinRequest(vehicle="b1", session="s", kind="real", car="buggy"))
     assert joined.vehicle == "b1"
-    assert city.world.remote["b1"].car.value("body.mass_kg") == load_car("buggy").value(
+    assert city.world.cars.remote["b1"].car.value("body.mass_kg") == load_car("buggy").value(
         "body.mass_kg"
     )
     assert car_body("buggy") != car_body("nigel")
@@ -426,7 +426,7 @@ def test_a_session_takes_its_own_car_off_and_no_other_of_that_name(city):
 def test_a_remote_car_that_drives_into_a_standing_one_is_told_of_the_contact(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
     city.join()
-    behind = city.world.hosted["n1"].pose @ Pose2(-0.295, 0.0, 0.0)
+    behind = city.world.cars.hosted["n1"].pose @ Pose2(-0.295, 0.0, 0.0)
     ahead = city.report(x=behind.x, y=behind.y, yaw_rad=behind.yaw, speed_mps=0.2)
     city.run(2, ahead)
     told = next(contact for contact in city.heard(Contact) if contact.vehicle == "n7")
@@ -439,7 +439,7 @@ def test_a_remote_car_that_says_nothing_is_not_pushed_faster_than_who_pushes_it(
     city = make_city(hosted=(("n1", "nigel"),))
     city.run_for(2.0)  # n1 drives
     city.join()
-    ahead = city.world.hosted["n1"].pose @ Pose2(0.32, 0.0, 0.0)
+    ahead = city.world.cars.hosted["n1"].pose @ Pose2(0.32, 0.0, 0.0)
     city.run(2, city.report(x=ahead.x, y=ahead.y, yaw_rad=ahead.yaw))
     city.run_for(0.9)
     told = [contact for contact in city.heard(Contact) if "n1" in contact.against]
@@ -450,7 +450,7 @@ def test_a_remote_car_that_says_nothing_is_not_pushed_faster_than_who_pushes_it(
 def test_nobody_is_put_before_a_car_that_comes(make_city):
     city = make_city(hosted=(("n1", "nigel"),))
     city.run_for(1.5)
-    car = city.world.hosted["n1"]
+    car = city.world.cars.hosted["n1"]
     x, y, yaw = car.pose
     near = Pose2(x + 0.6 * math.cos(yaw), y + 0.6 * math.sin(yaw), yaw)
     assert car.speed > 0.2
@@ -518,7 +518,7 @@ def test_a_trip_taken_away_is_told_a_last_time_with_what_is_left_of_it(city):
 @pytest.mark.parametrize(("x_m", "y_m", "yaw_rad"), [(0.328, 1.134, 1.152), (2.568, 0.539, 0.562)])
 def test_a_car_given_back_before_a_wall_stands_and_says_why(city, x_m, y_m, yaw_rad):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
-    lease, car = city.lease(), city.world.hosted["n1"]
+    lease, car = city.lease(), city.world.cars.hosted["n1"]
     car.fleet.place(car.row, Pose2(x_m, y_m, yaw_rad), 0.0)
     city.ask(LeaseRequest(vehicle="n1", owner="ann", verb="release", epoch=lease.epoch))
     reply = city.ask(RouteRequest(vehicle="n1"))
@@ -534,10 +534,10 @@ def test_a_car_given_back_before_a_wall_stands_and_says_why(city, x_m, y_m, yaw_
 
 def test_a_car_given_back_beside_its_lane_drives_there_where_no_wall_is(city):
     city.ask(SpawnRequest(vehicle="n1", spawn="a"))
-    car, start = city.world.hosted["n1"], city.world.roads.spawn_pose("a")
+    car, start = city.world.cars.hosted["n1"], city.world.roads.spawn_pose("a")
     beside = Pose2(*start.apply(0.0, 0.1), start.yaw + 0.5)
     car.fleet.place(car.row, beside, 0.0)
-    city.world.locate()
+    city.world.cars.locate(city.world.sensors.external)
     city.ask(RouteRequest(vehicle="n1"))
     city.run_for(8.0)
     assert "contact" not in city.events()

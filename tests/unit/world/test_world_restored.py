@@ -58,31 +58,31 @@ def test_cars_that_came_and_went_by_request_are_there_and_gone_after_a_kill(rebo
     reborn.city.call(SpawnRequest(vehicle="van"))
     reborn.city.call(RemoveRequest(vehicle="n2"))
     reborn.kill()
-    assert sorted(reborn.world.hosted) == ["n1", "van"]
-    assert reborn.world.hosted["n1"].is_sent
-    assert not reborn.world.hosted["van"].is_sent
+    assert sorted(reborn.world.cars.hosted) == ["n1", "van"]
+    assert reborn.world.cars.hosted["n1"].is_sent
+    assert not reborn.world.cars.hosted["van"].is_sent
 
 
 def test_a_lease_is_its_holders_after_a_kill_and_its_commands_are_obeyed(reborn):
     held = reborn.lease("acquire", ttl_ms=5000)
     reborn.kill()
-    lease = reborn.world.hosted["n1"].lease
+    lease = reborn.world.cars.hosted["n1"].lease
     assert (lease.owner, lease.epoch, lease.ttl_ms) == ("ann", held.epoch, 5000)
     command = DriveCommand(
         vehicle="n1", t_ns=0, epoch=held.epoch, seq=1, throttle=0.5, steering=0.0
     )
     reborn.city.publish(command)
     reborn.city.run_for(0.06)
-    assert reborn.world.hosted["n1"].mode == "drive"
+    assert reborn.world.cars.hosted["n1"].mode == "drive"
     assert reborn.lease("renew", epoch=held.epoch).epoch == held.epoch
 
 
 def test_until_its_holder_speaks_a_leased_car_stands_after_a_kill_and_then_it_is_lost(reborn):
     held = reborn.lease("acquire", ttl_ms=5000)
     reborn.kill()
-    assert reborn.world.hosted["n1"].mode == "hold"
+    assert reborn.world.cars.hosted["n1"].mode == "hold"
     reborn.city.run_for(1.0)
-    lease = reborn.world.hosted["n1"].lease
+    lease = reborn.world.cars.hosted["n1"].lease
     assert (lease.owner, lease.epoch) == ("world", held.epoch + 1)
 
 
@@ -90,7 +90,7 @@ def test_a_lease_that_was_lost_is_not_taken_up_again(reborn):
     held = reborn.lease("acquire", ttl_ms=100)
     reborn.city.run_for(0.3)
     reborn.kill()
-    lease = reborn.world.hosted["n1"].lease
+    lease = reborn.world.cars.hosted["n1"].lease
     assert lease.owner == "world"
     assert lease.epoch > held.epoch
 
@@ -101,13 +101,13 @@ def test_a_name_that_is_used_again_has_a_higher_epoch_than_ever_before(reborn):
         for n in range(40)
     ]
     assert stolen == sorted(set(stolen))
-    car = reborn.world.hosted["n1"]
+    car = reborn.world.cars.hosted["n1"]
     far = stolen[-1] + 10**9  # more changes than milliseconds pass
     car.lease = replace(car.lease, epoch=far)
     reborn.city.call(RemoveRequest(vehicle="n1"))
     reborn.kill()
     reborn.city.call(SpawnRequest(vehicle="n1"))
-    assert reborn.world.hosted["n1"].lease.epoch > far
+    assert reborn.world.cars.hosted["n1"].lease.epoch > far
 
 
 def test_the_epoch_grows_across_a_kill_though_the_clock_was_set_back():
@@ -126,13 +126,13 @@ def test_the_epoch_grows_across_a_kill_though_the_clock_was_set_back():
 
 
 def test_a_car_that_comes_back_has_its_tag_so_that_a_real_one_keeps_its_own(reborn):
-    before = reborn.world.hosted["n1"].tag_id
+    before = reborn.world.cars.hosted["n1"].tag_id
     reborn.city.call(RemoveRequest(vehicle="n1"))
     reborn.city.call(JoinRequest(vehicle="r1", session="s1", tag_id=before))
     reborn.city.call(SpawnRequest(vehicle="n2"))
-    worn = reborn.world.hosted["n2"].tag_id
+    worn = reborn.world.cars.hosted["n2"].tag_id
     reborn.kill()
-    assert reborn.world.hosted["n2"].tag_id == worn != before
+    assert reborn.world.cars.hosted["n2"].tag_id == worn != before
     assert reborn.city.call(JoinRequest(vehicle="r1", session="s2", tag_id=before)).tag_id == before
 
 
@@ -141,7 +141,7 @@ def test_the_red_button_stays_pressed_over_a_kill_and_released_once_released(reb
     reborn.kill()
     assert (reborn.world.stop.engaged, reborn.world.stop.by) == (True, "ann")
     reborn.city.run_for(1.0)
-    assert max(abs(car.speed) for car in reborn.world.hosted.values()) < 1e-3
+    assert max(abs(car.speed) for car in reborn.world.cars.hosted.values()) < 1e-3
     reborn.city.call(StopRequest(engaged=False, by="bob"))
     reborn.kill()
     assert not reborn.world.stop.engaged
@@ -152,19 +152,19 @@ def test_a_retry_after_a_kill_gets_the_answer_and_no_second_car(reborn):
     first = reborn.city.call(request)
     reborn.kill()
     assert reborn.city.call(request) == first
-    assert sorted(reborn.world.hosted) == ["n1", "n2", first.vehicle]
+    assert sorted(reborn.world.cars.hosted) == ["n1", "n2", first.vehicle]
 
 
 def test_a_car_for_which_no_place_is_left_is_told_of_and_forgotten():
     reborn = Reborn(hosted=())
     for _ in MAP.spawns:
         reborn.city.call(SpawnRequest())
-    car = next(iter(reborn.world.hosted.values()))
+    car = next(iter(reborn.world.cars.hosted.values()))
     record = read_restored(reborn.store).cars[car.name]
     reborn.store.put("leases", "world/zz", msgspec.json.encode(record))
     reborn.kill()
-    assert "zz" not in reborn.world.hosted
-    assert len(reborn.world.hosted) == len(MAP.spawns)
+    assert "zz" not in reborn.world.cars.hosted
+    assert len(reborn.world.cars.hosted) == len(MAP.spawns)
     assert "zz" not in read_restored(reborn.store).cars
     reborn.city.close()
 
@@ -175,7 +175,7 @@ def test_without_a_store_the_world_is_the_same_to_the_bit():
         part = WorldPart(MAP, hosted=(("n1", "nigel"), ("n2", "nigel")))
         city.add(part, state)
         city.run_for(2.0)
-        poses = [tuple(car.pose) for car in part.world.hosted.values()]
+        poses = [tuple(car.pose) for car in part.world.cars.hosted.values()]
         city.close()
         return poses
 

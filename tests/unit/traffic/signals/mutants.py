@@ -58,7 +58,7 @@ KERNEL = {
         "else GroupState(group.phase, elapsed)",
         "else GroupState(group.phase, group.elapsed)",
     ),
-    "a green never ends": ("if is_requested\n", "if True\n"),
+    "a green never ends": ("if is_requested else", "if True else"),
     "all-red one step short": ("elapsed >= times.clearance", "elapsed + 1 >= times.clearance"),
     "yellow one step short": ("elapsed >= times.yellow", "elapsed + 1 >= times.yellow"),
     "min green one step short": ("elapsed >= times.min_green:", "elapsed + 1 >= times.min_green:"),
