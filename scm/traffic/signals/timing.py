@@ -58,8 +58,8 @@ def yellow_s(car: CarFacts, limit_mps: float = math.inf) -> float:
     Args:
         car: Its top speed decides where that is finite, whatever the lane allows: yellow is for
             the fastest approach that is possible.
-        limit_mps: The lane's speed limit; used, with `SPEED_OVER_LIMIT`, only for a car whose top speed
-            is infinite, which means unknown.
+        limit_mps: The lane's speed limit; used, with `SPEED_OVER_LIMIT`, only for a car whose top
+            speed is infinite, which means unknown.
 
     Raises:
         PlanError: when neither the car's top speed nor the limit is finite.
