@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from vehicle_agent.session import CitySession
 
 BODIES = "vehicle_agent.bodies"
-MAX_CONTACT_CHANGE = 100.0
+MAX_CONTACT_CHANGE = 100.0  # m/s, rad/s, m and rad alike; beyond: a broken message
 SUBSCRIBER_CHECK_NS = 100 * NS_PER_MS
 
 _log = logging.getLogger(__name__)

@@ -6,7 +6,7 @@ from scm.command import Command
 from scm.commands.cut import span_arguments
 from scm.commands.export_foxglove import export_arguments, write_blocks
 
-LONGEST_S = 1e7  # four months
+MAX_SPAN_S = 1e7  # four months
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,8 +27,8 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.recorder.run_index import read_index
 
     from_s, to_s = arguments.from_s, arguments.to_s
-    end_s = LONGEST_S if to_s is None else to_s
-    if not 0.0 <= from_s <= end_s <= LONGEST_S:
+    end_s = MAX_SPAN_S if to_s is None else to_s
+    if not 0.0 <= from_s <= end_s <= MAX_SPAN_S:
         got = f"{from_s:g} to {end_s:g} s"
         msg = f"span: got {got}, expected 0 or more, and the end behind the begin"
         raise RecordingError(msg)

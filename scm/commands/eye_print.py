@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # the command line starts without what draws tags
     from scm.scenery.paper import Page
     from scm.scenery.prints import TagPrint
 
-LARGEST_RANGE = 200
+MAX_RANGE = 200  # of names such as n1..n8
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -113,7 +113,7 @@ def _names(text: str) -> list[str]:
     if found is None:
         return [text]
     first, last = int(found[2]), int(found[4])
-    is_range = found[3] in {"", found[1]} and first <= last < first + LARGEST_RANGE
+    is_range = found[3] in {"", found[1]} and first <= last < first + MAX_RANGE
     return [f"{found[1]}{number}" for number in range(first, last + 1)] if is_range else [text]
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from scm.maps.sumo import Imported
     from scm.records.city_map import CityMap
 
-MOST_NAMES = 4
+MAX_NAMES = 4  # in a printed line
 NEXT_STEP = (
     "  a program is kept where ways that cross are green one after the other, and all ways of a "
     "lane together: netconvert -s NET --tls.rebuild --tls.layout incoming -o NEW writes such ones"
@@ -136,8 +136,8 @@ def _kind(why: str) -> frozenset[str]:
 
 def _some(names: Sequence[str]) -> str:
     """Return the first few of many names."""
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
+    more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+    return ", ".join(names[:MAX_NAMES]) + more
 
 
 COMMAND = Command(

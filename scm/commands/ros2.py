@@ -5,12 +5,12 @@ import argparse
 from scm.command import Command, part_arguments, run_part
 from scm.ros2.wire import DEFAULT_LISTEN
 
-MOST_DOMAIN = 232  # what leaves DDS a port: ROS 2 knows no more
+MAX_DOMAIN = 232  # what leaves DDS a port: ROS 2 knows no more
 
 
 def _domain(text: str) -> int:
-    if not text.isdecimal() or int(text) > MOST_DOMAIN:
-        msg = f"got {text!r}, expected 0 to {MOST_DOMAIN}"
+    if not text.isdecimal() or int(text) > MAX_DOMAIN:
+        msg = f"got {text!r}, expected 0 to {MAX_DOMAIN}"
         raise argparse.ArgumentTypeError(msg)
     return int(text)
 

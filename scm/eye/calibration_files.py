@@ -33,7 +33,7 @@ LOGGER = logging.getLogger(__name__)
 ASSUMED_RAY_SHARE = 5e-4
 """Assumed ray standard deviation over the frame's width, of a lens whose file has no covariance: as
 much as `scm eye calibrate` accepts at the board's points."""
-MAX_SKEW_SHARE = 1e-4
+MAX_SKEW_SHARE = 1e-4  # of the width: a lens with skew has no place in our model
 GRID = 24
 """Grid points along each side of the frame at which two lenses are compared."""
 EXPECTED = (

@@ -25,7 +25,7 @@ from scm.records.city_map import Camera, MapTag
 from scm.records.eye import Calibrated, InForce
 from scm.v2x.messages.calibration_request import CalibrationRequest, MeasuredLens
 
-MAX_STATES = 10
+MAX_STATES = 10  # the first and the newest
 _OF_THE_SENSOR = ("name", "rate_hz", "noise_sigma", "rolling_s")
 
 

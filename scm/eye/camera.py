@@ -22,13 +22,13 @@ from scm.errors import EyeError, MessageError, nearest
 from scm.records.city_map import Camera, CityMap
 from scm.v2x.key import check_name
 
-LARGEST_TILT_RAD = math.radians(45.0)
+MAX_TILT_RAD = math.radians(45.0)
 LENS_PARAMETERS = 9
 """Number of lens parameters: fx, fy, cx, cy and five of the distortion."""
 WIDEST_RAD = math.radians(89.9)
 """Rays further off a fisheye's axis cannot be represented by a pinhole."""
 _UNDISTORT_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 400, 1e-12)
-_NEWTON_STEPS = 4
+_NEWTON_STEPS = 4  # converges to rounding for lenses up to WIDEST_RAD
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -245,7 +245,7 @@ def _faults(camera: Camera, lens_covariance: Floats | None) -> list[str]:
     }
     for name in ("tilt_x_rad", "tilt_y_rad"):
         tilt = getattr(camera, name)
-        checks[name] = (tilt, abs(tilt) < LARGEST_TILT_RAD, "a camera that looks down (below 0.78)")
+        checks[name] = (tilt, abs(tilt) < MAX_TILT_RAD, "a camera that looks down (below 0.78)")
     return [
         f"{k}: expected {want}, got {got}" for k, (got, good, want) in checks.items() if not good
     ]

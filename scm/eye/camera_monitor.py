@@ -25,27 +25,27 @@ from scm.eye.sharpness import EdgeWidth, edge_width
 from scm.records.city_map import MapTag
 from scm.v2x.messages.eye_status import Complaint
 
-REFERENCE_FRAMES = 10
-RECENT_FRAMES = 8
+REFERENCE_FRAMES = 10  # averaged for the place of a tag
+RECENT_FRAMES = 8  # averaged for its place now
 SHIFT_M, SHIFT_PX = 0.001, 0.15
 TURN_RAD = math.radians(0.12)
 MAX_STD_M = 0.0025
 """Maximum standard deviation without a fault: errors up to twice that, 5 mm."""
-REPORTED_NS = 10 * NS_PER_S
+REPORT_AGAIN_NS = 10 * NS_PER_S
 SIZE_TOLERANCE = 0.012
 ELSEWHERE_M, ELSEWHERE_RAD = 0.15, math.radians(10.0)
-BLURRED = 1.5
-BLURRED_PX = 0.5
+BLUR_RATIO = 1.5  # edge width over the reference that counts as blurred
+MIN_BLUR_PX = 0.5  # and by how much it must be wider
 BLURRED_CELL = 0.9
 """An edge wider than this part of a tag's cell is out of focus in any case."""
-MIN_CONTRAST = 25.0
-CELLS = 8
-UNSEEN_NS = 1_500 * NS_PER_MS
+MIN_CONTRAST = 25.0  # grey levels; less and edges are not measured
+TAG_CELLS = 8  # across a tag36h11 inside its border
+MAX_UNSEEN_NS = 1_500 * NS_PER_MS  # without any tag the camera is reported
 FROZEN_NS = NS_PER_S
-STALLED_NS = NS_PER_S // 2
-STALLED_PERIODS = 5
+MAX_FRAME_GAP_NS = NS_PER_S // 2  # without a frame the camera is reported
+MAX_GAP_PERIODS = 5  # or so many of its periods, if longer
 BLACK, BLANK_STD = 12.0, 2.5
-SAMPLE_STEP = 8
+SAMPLE_STEP_PX = 8  # every eighth pixel is enough for brightness
 INFO_CODES = ("re_anchored",)
 """Codes that do not affect poses."""
 
@@ -113,7 +113,7 @@ class CameraMonitor:
 
     def tags_seen(self, now_ns: int) -> dict[int, Floats]:
         """Return the recent corners of the map's tags, (4, 2) [px] by id; none if unseen."""
-        late = self.estimator.age_ms(now_ns) * NS_PER_MS > UNSEEN_NS
+        late = self.estimator.age_ms(now_ns) * NS_PER_MS > MAX_UNSEEN_NS
         return {} if late or self.estimator.seen_ns is None else self.estimator.averaged()
 
     def _look(self, t_ns: int, grey: Image) -> None:
@@ -124,7 +124,7 @@ class CameraMonitor:
                 f"frames are {got[0]} x {got[1]} px, the calibration is for "
                 f"{wanted[0]} x {wanted[1]} px"
             )
-        sample = grey[::SAMPLE_STEP, ::SAMPLE_STEP]
+        sample = grey[::SAMPLE_STEP_PX, ::SAMPLE_STEP_PX]
         same = sample.tobytes()
         if same != self._sample or camera.noise_sigma == 0.0:
             self._sample, self._changed_ns = same, t_ns
@@ -147,12 +147,12 @@ class CameraMonitor:
         period_ns = NS_PER_S / self.estimator.model.camera.rate_hz
         if self._frame_ns is not None:
             late_ns = now_ns - self._frame_ns
-            if late_ns > max(STALLED_NS, STALLED_PERIODS * period_ns):
+            if late_ns > max(MAX_FRAME_GAP_NS, MAX_GAP_PERIODS * period_ns):
                 complaints["stalled"] = (
                     f"no frame for {late_ns / NS_PER_S:.1f} s: the camera stalls"
                 )
             unseen_ms = self.estimator.age_ms(now_ns)
-            if unseen_ms * NS_PER_MS > UNSEEN_NS:
+            if unseen_ms * NS_PER_MS > MAX_UNSEEN_NS:
                 names = ", ".join(str(tag_id) for tag_id in sorted(self._tags))
                 complaints["map_tag_unseen"] = (
                     f"no map tag ({names}) seen for {unseen_ms / 1000.0:.1f} s: "
@@ -210,7 +210,7 @@ class CameraMonitor:
             return
         if self._corrected_ns is None:
             self._corrected_ns = t_ns
-        if t_ns - self._corrected_ns > REPORTED_NS:
+        if t_ns - self._corrected_ns > REPORT_AGAIN_NS:
             self._bump, self._corrected_ns = None, None
             return
         self._complaints["re_anchored"] = f"{self._bump}; {corrected}"
@@ -262,8 +262,8 @@ class CameraMonitor:
         if tag_state.sharp_px is None and len(tag_state.widths) == RECENT_FRAMES:
             tag_state.sharp_px = width
         then = tag_state.sharp_px if tag_state.sharp_px is not None else width
-        never = width > BLURRED_CELL * _side(found) / CELLS
-        if never or width > max(BLURRED * then, then + BLURRED_PX):
+        never = width > BLURRED_CELL * _side(found) / TAG_CELLS
+        if never or width > max(BLUR_RATIO * then, then + MIN_BLUR_PX):
             self._complaints["focus"] = (
                 f"focus drifted: edges of map tag {tag_id} are {width:.1f} px wide, "
                 f"{then:.1f} px at the start"

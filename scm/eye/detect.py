@@ -18,7 +18,7 @@ import numpy as np
 import pupil_apriltags
 
 from scm.arrays import Floats, Image
-from scm.eye.picture import LEAST_PX
+from scm.eye.picture import MIN_SIDE_PX
 from scm.records.eye import TagSeen
 
 PIXEL_ORIGIN_PX = 0.5
@@ -83,7 +83,7 @@ def in_order(tags: Iterable[TagSeen]) -> tuple[TagSeen, ...]:
 
 def look(grey: Image, settings: Settings, decimate: float, sigma: float) -> list[TagSeen]:
     """Return what the library finds in a grey picture, clearest first, duplicates included."""
-    if min(grey.shape) < LEAST_PX:
+    if min(grey.shape) < MIN_SIDE_PX:
         return []
     with _lock:
         detector = _detector()

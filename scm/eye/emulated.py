@@ -13,7 +13,7 @@ from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 GONE_NS = NS_PER_S
 """A car without a report for this long was removed."""
-FAR_M = 1000.0
+MAX_POSITION_M = 1000.0  # beyond: a broken report
 
 
 class EmulatedCars:
@@ -24,7 +24,7 @@ class EmulatedCars:
 
     def update(self, report: EmulatedPose) -> None:
         """Store a car's pose; poses beyond all maps are ignored."""
-        if max(abs(report.x_m), abs(report.y_m)) < FAR_M:
+        if max(abs(report.x_m), abs(report.y_m)) < MAX_POSITION_M:
             self._newest[report.vehicle] = report
 
     def seen(self, light: WorldSnapshot) -> WorldSnapshot:

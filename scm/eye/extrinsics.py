@@ -31,12 +31,12 @@ from scm.records.city_map import MapTag
 from scm.scenery.tags import floor_corners
 
 LOGGER = logging.getLogger(__name__)
-AVERAGED_FRAMES = 20
-MOVED_PX = 1.0
+AVERAGED_FRAMES = 20  # of a tag at rest
+MOVED_PX = 1.0  # a tag that moved by more is measured anew
 STILL_PX = 0.006
 """Smaller changes of the averages do not trigger another solution."""
-KNOCKED_SIGMAS = 5.0
-KNOCKED_TOLERANCE = 30.0
+KNOCKED_SIGMAS = 5.0  # by which the camera was moved, against its stated place
+KNOCKED_TOLERANCE = 30.0  # times the prior std of a camera that was moved
 ITERATIONS = 4
 EXTRINSICS_COUNT = 6
 STEPS = np.array(
@@ -47,7 +47,7 @@ SURVEY_STD_M = 0.001
 """Standard deviation of every tag's place but the first, which defines the map [m]."""
 BUMP_STD = np.array([0.05, 0.05, 0.02, 0.05, 0.02, 0.02])
 """Standard deviation of a bump that leaves the camera on its mount, [m] and [rad]."""
-ROOF_M = 0.13
+ROOF_M = 0.13  # height of a roof tag
 GRID = np.linspace(0.1, 0.9, 4)
 
 

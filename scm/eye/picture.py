@@ -8,7 +8,7 @@ import numpy as np
 from scm.arrays import Image
 from scm.errors import EyeError
 
-LEAST_PX = 16
+MIN_SIDE_PX = 16  # of a picture
 _JPEG, _SCAN, _END = b"\xff\xd8", b"\xff\xda", b"\xff\xd9"
 
 
@@ -44,8 +44,8 @@ def decode_picture(data: bytes, name: str) -> Image:
     if image is None:
         raise EyeError(f"{name}: expected a picture that OpenCV reads, got {len(data)} bytes")
     height, width = image.shape[:2]
-    if min(height, width) < LEAST_PX:
-        least = f"{LEAST_PX} x {LEAST_PX}"
+    if min(height, width) < MIN_SIDE_PX:
+        least = f"{MIN_SIDE_PX} x {MIN_SIDE_PX}"
         raise EyeError(f"{name}: expected at least {least} px, got {width} x {height}")
     return image
 

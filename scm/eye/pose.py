@@ -16,7 +16,7 @@ to corner noise. One corner that corrupts an otherwise good square is left out; 
 widens the covariance. Where a square of another size fits clearly better, the print has another
 size or the roof another height: centre and yaw are the same for any size, so there is a pose,
 `size_ratio` is the apparent size, and beyond `SIZE_TOLERANCE` the covariance includes half the
-shift that another height would cause. Corners that fit no square of any size (`REFUSED`) are no
+shift that another height would cause. Corners that fit no square of any size (`MAX_MISFIT`) are no
 tag.
 """
 
@@ -36,7 +36,7 @@ ROLL_PITCH_STD_RAD = 0.003
 """Standard deviation of roll and of pitch of a scaled car."""
 MISFIT = 2.0
 """RMS deviation that corner noise exceeds for one in 1000 squares."""
-REFUSED = 20.0
+MAX_MISFIT = 20.0  # of corners that can be a square
 SIZE_TOLERANCE = 0.025
 """Larger size errors are reported; printers are accurate to 1 %, "fit to page" is not: A4 on Letter
 paper loses 3 to 7 %."""
@@ -66,7 +66,7 @@ class PoseEstimate:
     @property
     def is_refused(self) -> bool:
         """Whether these corners are no square."""
-        return not self.misfit < REFUSED
+        return not self.misfit < MAX_MISFIT
 
     @property
     def is_other_size(self) -> bool:
@@ -93,7 +93,7 @@ def car_poses(
     by_pixel = np.linalg.inv(by_metre)
     on = _Square(points[..., :2], by_metre, square, offsets[:, :2], std)
     fit = _patched(on)
-    widened = std * np.maximum(1.0, np.minimum(fit.misfit, REFUSED) / MISFIT)
+    widened = std * np.maximum(1.0, np.minimum(fit.misfit, MAX_MISFIT) / MISFIT)
     ratios = _resized(on, fit)
     by_corner = np.einsum("nkij,nijp->nkip", fit.slopes, by_pixel).reshape(-1, 3, 8)
     by_corner *= widened[:, None, None]

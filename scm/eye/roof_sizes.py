@@ -18,7 +18,7 @@ from scm.v2x.messages.eye_status import Complaint
 
 FRAMES = 5
 """Number of agreeing sightings before a report: one frame may be blurred or half covered."""
-REMEMBERED_NS = 10 * NS_PER_S
+MEMORY_NS = 10 * NS_PER_S  # of a tag of another size
 MAX_RATIO_ERROR = 0.15
 """Larger size error above which an unknown tag gives no pose: it may lie on the floor, or belong to
 another kind of car. Printing errors are smaller."""
@@ -61,9 +61,7 @@ class RoofSizes:
     def complaints(self, t_ns: int, camera_height_m: float) -> tuple[Complaint, ...]:
         """Return a sentence for each recently seen tag of wrong size, by tag id."""
         self._roofs = {
-            tag_id: one
-            for tag_id, one in self._roofs.items()
-            if t_ns - one.seen_ns <= REMEMBERED_NS
+            tag_id: one for tag_id, one in self._roofs.items() if t_ns - one.seen_ns <= MEMORY_NS
         }
         return tuple(
             Complaint(code=ROOF_TAG_SIZE, said=_sentence(tag_id, one, camera_height_m))
@@ -75,7 +73,7 @@ class RoofSizes:
         """Return a sentence for each tag of wrong size that was not returned here before."""
         news = []
         for tag_id, one in sorted(self._roofs.items()):
-            is_off = abs(one.ratio - 1.0) > SIZE_TOLERANCE and t_ns - one.seen_ns <= REMEMBERED_NS
+            is_off = abs(one.ratio - 1.0) > SIZE_TOLERANCE and t_ns - one.seen_ns <= MEMORY_NS
             if is_off and not one.reported:
                 news.append(_sentence(tag_id, one, camera_height_m))
             one.reported = is_off

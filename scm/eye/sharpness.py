@@ -10,7 +10,7 @@ from scm.arrays import Floats, Image
 ALONG = np.linspace(0.2, 0.8, 12)
 REACH = 0.11
 """Range to either side of an edge, in sides of the tag: slightly less than one of its cells."""
-SAMPLES = 41
+SAMPLES = 41  # across an edge
 
 
 class EdgeWidth(NamedTuple):

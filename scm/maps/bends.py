@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from scm.maps.polyline import extent
 from scm.records.city_map import CityMap, Lane
 
-WIDEST_CUT_RAD = math.radians(170.0)
+MAX_CUT_RAD = math.radians(170.0)  # beyond, a cut corner has no finite length
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ def _worst(lane: Lane, radius_m: float, width_m: float) -> TightBend | None:
     room = max(0.0, 0.5 * (lane.width_m - width_m))
     bends = []
     for radius, angle in _runs(lane):
-        cut = 1.0 / math.cos(0.5 * min(angle, WIDEST_CUT_RAD)) - 1.0
+        cut = 1.0 / math.cos(0.5 * min(angle, MAX_CUT_RAD)) - 1.0
         outside = (radius_m - radius) * cut - room
         if outside > 0.0:
             bends.append(TightBend(lane.name, radius, outside))

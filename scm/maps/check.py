@@ -15,8 +15,8 @@ from scm.maps.rules_check import rule_problems
 from scm.maps.vehicle_tags import LAST_TAG_ID
 from scm.records.city_map import CityMap, Conflict, Group, Junction, Segment
 
-JOIN_M = 0.001
-JOIN_RAD = math.radians(0.1)
+MAX_GAP_M = 0.001  # between two lanes that follow one another
+MAX_KINK_RAD = math.radians(0.1)  # between their directions
 
 _POSITIVE = {
     "width_m", "length_m", "radius_m", "height_m", "size_m", "speed_limit_mps", "radio_range_m",
@@ -226,13 +226,13 @@ def _connections(city_map: CityMap, paths: dict[str, LanePath]) -> Iterator[str]
             start = paths[name].at(0.0)
             gap = math.hypot(start.x - end.x, start.y - end.y)
             kink = abs(wrap_angle(start.yaw - end.yaw))
-            if gap > JOIN_M or kink > JOIN_RAD:
+            if gap > MAX_GAP_M or kink > MAX_KINK_RAD:
                 yield (
                     f"lanes[{index}] ({lane.name}).next: {name!r} does not connect: the end is at "
                     f"({end.x:.4f}, {end.y:.4f}, {math.degrees(end.yaw):.2f} deg), the start of "
                     f"{name!r} at ({start.x:.4f}, {start.y:.4f}, {math.degrees(start.yaw):.2f} "
-                    f"deg); expected at most {JOIN_M * 1e3:.0f} mm and "
-                    f"{math.degrees(JOIN_RAD):.1f} deg between them"
+                    f"deg); expected at most {MAX_GAP_M * 1e3:.0f} mm and "
+                    f"{math.degrees(MAX_KINK_RAD):.1f} deg between them"
                 )
 
 

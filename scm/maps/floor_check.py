@@ -10,11 +10,11 @@ from scm.records.city_map import CityMap
 from scm.records.floor import Floor, FrictionMap, HeightMap, Patch, Plate, Samples
 
 MOST_GRIP, MOST_ROLLING = 2.0, 0.5
-STEEPEST = 0.35
-STEEPEST_PIXELS = 1.0
-HIGHEST_M = 2.0
-RIM_M = 0.001
-STRONGEST_MPS = 50.0
+MAX_SLOPE = 0.35  # of a ramp; no car climbs more
+MAX_PIXEL_SLOPE = 1.0  # of a height picture, at a single edge
+MAX_HEIGHT_M = 2.0
+MAX_RIM_HEIGHT_M = 0.001  # so that the floor has no step around a picture
+MAX_WIND_MPS = 50.0
 
 
 def floor_problems(city_map: CityMap) -> Iterator[str]:
@@ -28,7 +28,7 @@ def floor_problems(city_map: CityMap) -> Iterator[str]:
     for index, plate in enumerate(floor.plates):
         where = f"floor.plates[{index}] ({plate.name})"
         yield from _one_shape(where, plate)
-        yield from _within(f"{where}.height_m", plate.height_m, 0.0, HIGHEST_M)
+        yield from _within(f"{where}.height_m", plate.height_m, 0.0, MAX_HEIGHT_M)
         if len(plate.points) > 2 and not is_convex(plate.points):
             yield f"{where}.points: expected a convex outline, got a corner that points inwards"
     yield from _ramps(floor)
@@ -38,8 +38,8 @@ def floor_problems(city_map: CityMap) -> Iterator[str]:
         yield from _height_map(floor.height_map, floor)
     for key in ("x_mps", "y_mps"):
         speed = getattr(city_map.wind, key)
-        yield from _within(f"wind.{key}", speed, -STRONGEST_MPS, STRONGEST_MPS)
-    yield from _within("wind.gust_mps", city_map.wind.gust_mps, 0.0, STRONGEST_MPS)
+        yield from _within(f"wind.{key}", speed, -MAX_WIND_MPS, MAX_WIND_MPS)
+    yield from _within("wind.gust_mps", city_map.wind.gust_mps, 0.0, MAX_WIND_MPS)
 
 
 def _within(where: str, value: float, low: float, high: float) -> Iterator[str]:
@@ -80,10 +80,10 @@ def _ramps(floor: Floor) -> Iterator[str]:
     for index, ramp in enumerate(floor.ramps):
         where = f"floor.ramps[{index}] ({ramp.name})"
         for key in ("from_m", "to_m"):
-            yield from _within(f"{where}.{key}", getattr(ramp, key), -HIGHEST_M, HIGHEST_M)
-        if ramp.length_m > 0.0 and abs(slope_of(ramp)) > STEEPEST:
+            yield from _within(f"{where}.{key}", getattr(ramp, key), -MAX_HEIGHT_M, MAX_HEIGHT_M)
+        if ramp.length_m > 0.0 and abs(slope_of(ramp)) > MAX_SLOPE:
             yield (
-                f"{where}: expected a slope of at most {STEEPEST:g}, got {slope_of(ramp):.3g} "
+                f"{where}: expected a slope of at most {MAX_SLOPE:g}, got {slope_of(ramp):.3g} "
                 "(to_m - from_m over length_m): make it longer, or a step with a plate"
             )
 
@@ -119,9 +119,10 @@ def _rim(where: str, picture: HeightMap, samples: Samples, floor: Floor) -> Iter
     heights = (unpack(samples) - picture.zero_grey) * picture.m_per_grey
     rim = (heights[0], heights[-1], heights[:, 0], heights[:, -1])
     highest = max(float(np.abs(edge).max()) for edge in rim)
-    if highest > RIM_M:
+    if highest > MAX_RIM_HEIGHT_M:
         yield (
-            f"{where}.zero_grey: expected the picture's rim at height 0 within {RIM_M:g} m, for "
+            f"{where}.zero_grey: expected the picture's rim at height 0 "
+            f"within {MAX_RIM_HEIGHT_M:g} m, for "
             f"the floor around it is level; got up to {highest:.3g} m"
         )
 
@@ -130,9 +131,9 @@ def _heights(where: str, picture: HeightMap, samples: Samples) -> Iterator[str]:
     """Doubt the heights that the picture gives."""
     heights = (unpack(samples) - picture.zero_grey) * picture.m_per_grey
     low, high = float(heights.min()), float(heights.max())
-    if max(-low, high) > HIGHEST_M:
+    if max(-low, high) > MAX_HEIGHT_M:
         yield (
-            f"{where}.m_per_grey: expected heights within {HIGHEST_M:g} m, "
+            f"{where}.m_per_grey: expected heights within {MAX_HEIGHT_M:g} m, "
             f"got {low:.3g} to {high:.3g} m"
         )
     rows, columns = heights.shape
@@ -142,8 +143,8 @@ def _heights(where: str, picture: HeightMap, samples: Samples) -> Iterator[str]:
         float(np.abs(np.diff(heights, axis=1)).max()) / across,
         float(np.abs(np.diff(heights, axis=0)).max()) / along,
     )
-    if steepest > STEEPEST_PIXELS:
+    if steepest > MAX_PIXEL_SLOPE:
         yield (
-            f"{where}.m_per_grey: expected slopes of at most {STEEPEST_PIXELS:g} between pixels, "
+            f"{where}.m_per_grey: expected slopes of at most {MAX_PIXEL_SLOPE:g} between pixels, "
             f"got {steepest:.3g}: for a step, use a plate"
         )

@@ -17,9 +17,9 @@ from scm.records.city_map import CityMap
 from scm.records.floor import Floor, FrictionMap, HeightMap, Patch, Plate, Ramp
 
 ICE, SAND, LIGHT, DARK, INK = "#8fd3ff", "#e0a35a", "#ffffff", "#000000", "#23272e"
-MOST_CELLS = 72
+MAX_CELLS = 72  # a side of a drawn picture
 SHADES = 8
-STRONGEST = 0.55
+MAX_OPACITY = 0.55  # of a surface over the lanes
 FULL_ROLLING = 0.1
 CHEVRON_M = 0.05
 
@@ -71,7 +71,7 @@ def _patch(patch: Patch) -> str:
 def _tint(grip: float, rolling: float) -> tuple[str, float]:
     """Return colour and opacity of a floor that holds and rolls like this."""
     slippery, soft = min(abs(1.0 - grip), 1.0), min(rolling / FULL_ROLLING, 1.0)
-    return (ICE if slippery >= soft else SAND), STRONGEST * max(slippery, soft, 0.2)
+    return (ICE if slippery >= soft else SAND), MAX_OPACITY * max(slippery, soft, 0.2)
 
 
 def _plate(plate: Plate) -> str:
@@ -130,10 +130,10 @@ def _hills(picture: HeightMap) -> list[str]:
 
 
 def _coarse(picture: Floats) -> Floats:
-    """Return a picture of at most `MOST_CELLS` a side, each the mean of what it covers."""
+    """Return a picture of at most `MAX_CELLS` a side, each the mean of what it covers."""
     for axis in (0, 1):
         size = picture.shape[axis]
-        edges = np.linspace(0, size, min(size, MOST_CELLS) + 1).astype(int)
+        edges = np.linspace(0, size, min(size, MAX_CELLS) + 1).astype(int)
         widths = np.diff(edges).reshape((-1, 1) if axis == 0 else (1, -1))
         picture = np.add.reduceat(picture, edges[:-1], axis=axis) / widths
     return picture
@@ -155,7 +155,11 @@ def _shaded(strength: Floats, picture: FrictionMap | HeightMap, fill: str, name:
             at += length
     return [
         element(
-            "path", d="".join(data), fill=fill, fill_opacity=STRONGEST * shade / SHADES, class_=name
+            "path",
+            d="".join(data),
+            fill=fill,
+            fill_opacity=MAX_OPACITY * shade / SHADES,
+            class_=name,
         )
         for shade, data in sorted(shades.items())
     ]

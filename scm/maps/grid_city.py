@@ -1,9 +1,9 @@
 """A city made to measure: straight two-way streets in a grid, signals or signs at each junction.
 
     north                       Heading k of 4: east, north, west, south. One keeps to the right.
-      |v|^|                     Lane middles lie OFFSET beside the street's middle. A junction is
-    --+ + +--  HALF from its    a square of half edge HALF; a right turn has radius HALF - OFFSET,
-    <- - - -   middle to its    a left turn HALF + OFFSET.
+      |v|^|                     Lane middles lie `offset` beside the street's middle. A junction is
+    --+ + +--  half from its    a square of half edge `half`; a right turn has radius half - offset,
+    <- - - -   middle to its    a left turn half + offset.
     -> - - ->  edge
     --+ + +--                   Each approach has one signal group for all its ways: straight on,
       |v|^|                     left, right. Corners of the city are bends without signals.
@@ -43,19 +43,19 @@ from scm.records.city_map import (
 )
 from scm.records.floor import Floor
 
-WIDTH = 0.257
-OFFSET = 0.14
-HALF = 0.54
-EDGE = OFFSET + WIDTH / 2.0
-LINE_BEFORE = 0.14
+LANE_WIDTH_M = 0.257
+LANE_OFFSET_M = 0.14
+HALF_JUNCTION_M = 0.54
+STREET_EDGE_M = LANE_OFFSET_M + LANE_WIDTH_M / 2.0  # from the middle of a street
+LINE_BEFORE_M = 0.14  # a junction
 SPEED_MPS = 0.25
-TAG_TO_CORNER = 0.6
-FLOOR_BEYOND = 0.45
-PAVEMENT = 0.17
+TAG_TO_CORNER_M = 0.6
+FLOOR_BEYOND_M = 0.45  # the last street
+PAVEMENT_M = 0.17
 BLOCK_M = 4.0
-LEAST_BLOCK_M = 2.2
-MOST_JUNCTIONS = 2500
-SPAWN_EVERY = 0.7
+MIN_BLOCK_M = 2.2  # junctions would overlap
+MAX_JUNCTIONS = 2500  # a city of 50 x 50
+SPAWN_EVERY_M = 0.7
 PLAN = "calm"
 STOP, GIVE_WAY = "stop", "give_way"
 
@@ -98,11 +98,11 @@ def grid_city(columns: int, rows: int, *, block_m: float = BLOCK_M, signs: bool 
     Raises:
         MapError: when there can be no city of this size.
     """
-    if min(columns, rows) < 2 or columns * rows > MOST_JUNCTIONS:
-        msg = f"grid city: expected at least 2 x 2 and at most {MOST_JUNCTIONS} junctions"
+    if min(columns, rows) < 2 or columns * rows > MAX_JUNCTIONS:
+        msg = f"grid city: expected at least 2 x 2 and at most {MAX_JUNCTIONS} junctions"
         raise MapError(f"{msg}, got {columns} x {rows}")
-    if not LEAST_BLOCK_M <= block_m <= 1000.0:
-        raise MapError(f"grid city: block_m: expected {LEAST_BLOCK_M} to 1000, got {block_m}")
+    if not MIN_BLOCK_M <= block_m <= 1000.0:
+        raise MapError(f"grid city: block_m: expected {MIN_BLOCK_M} to 1000, got {block_m}")
     city = _Grid(columns, rows, block_m)
     return city.signed() if signs else city.city()
 
@@ -113,13 +113,15 @@ class _Grid:
     def __init__(self, columns: int, rows: int, block_m: float) -> None:
         self.columns, self.rows, self.block_m = columns, rows, block_m
         self.places = [(i, j) for j in range(rows) for i in range(columns)]
-        self.street_m = block_m - 2.0 * HALF
+        self.street_m = block_m - 2.0 * HALF_JUNCTION_M
 
     def city(self) -> CityMap:
         size = f"{self.columns} x {self.rows}"
-        high_x = TAG_TO_CORNER + (self.columns - 1) * self.block_m + EDGE + FLOOR_BEYOND
-        high_y = TAG_TO_CORNER + (self.rows - 1) * self.block_m + EDGE + FLOOR_BEYOND
-        low = TAG_TO_CORNER - EDGE - FLOOR_BEYOND
+        high_x = (
+            TAG_TO_CORNER_M + (self.columns - 1) * self.block_m + STREET_EDGE_M + FLOOR_BEYOND_M
+        )
+        high_y = TAG_TO_CORNER_M + (self.rows - 1) * self.block_m + STREET_EDGE_M + FLOOR_BEYOND_M
+        low = TAG_TO_CORNER_M - STREET_EDGE_M - FLOOR_BEYOND_M
         crossings = [place for place in self.places if len(self.arms(place)) > 2]
         return CityMap(
             map=1,
@@ -165,7 +167,7 @@ class _Grid:
 
     def at(self, place: Place, heading: int, ahead: float, right: float) -> Point:
         """Return a point ahead and to the right of a junction's middle, as a heading sees it."""
-        x, y = (TAG_TO_CORNER + k * self.block_m for k in place)
+        x, y = (TAG_TO_CORNER_M + k * self.block_m for k in place)
         ux, uy = _STEPS[heading]
         return _mm(x + ahead * ux + right * uy), _mm(y + ahead * uy - right * ux)
 
@@ -186,8 +188,8 @@ class _Grid:
                 assert there is not None  # noqa: S101 an arm has a street
                 yield Lane(
                     name=_street(place, heading),
-                    width_m=WIDTH,
-                    start=(*self.at(place, heading, HALF, OFFSET), _yaw(heading)),
+                    width_m=LANE_WIDTH_M,
+                    start=(*self.at(place, heading, HALF_JUNCTION_M, LANE_OFFSET_M), _yaw(heading)),
                     segments=(Segment(length_m=self.street_m),),
                     next=tuple(_way(there, heading, to) for to in self.exits(there, heading)),
                     speed_limit_mps=SPEED_MPS,
@@ -196,8 +198,11 @@ class _Grid:
                 for to in self.exits(place, heading):
                     yield Lane(
                         name=_way(place, heading, to),
-                        width_m=WIDTH,
-                        start=(*self.at(place, heading, -HALF, OFFSET), _yaw(heading)),
+                        width_m=LANE_WIDTH_M,
+                        start=(
+                            *self.at(place, heading, -HALF_JUNCTION_M, LANE_OFFSET_M),
+                            _yaw(heading),
+                        ),
                         segments=(_bend(heading, to),),
                         next=(_street(place, to),),
                         speed_limit_mps=SPEED_MPS,
@@ -227,7 +232,7 @@ class _Grid:
             Approach(
                 name=f"{_name(place)}_{_HEADINGS[heading]}",
                 lane=self.street_to(place, heading),
-                at_m=_mm(self.street_m - LINE_BEFORE),
+                at_m=_mm(self.street_m - LINE_BEFORE_M),
                 ways=self.movements(place, heading),
             )
             for heading in self.approaches(place)
@@ -242,7 +247,7 @@ class _Grid:
                 if kind is None or (kind == GIVE_WAY and heading % 2 == 0):
                     continue
                 number += 1
-                x, y = self.at(place, heading, -HALF - 0.05, EDGE + 0.07)
+                x, y = self.at(place, heading, -HALF_JUNCTION_M - 0.05, STREET_EDGE_M + 0.07)
                 yield Sign(
                     sign_id=number,
                     kind=kind,
@@ -250,7 +255,7 @@ class _Grid:
                     y_m=y,
                     yaw_rad=_yaw((heading + 2) % 4),
                     lane=self.street_to(place, heading),
-                    at_m=_mm(self.street_m - LINE_BEFORE),
+                    at_m=_mm(self.street_m - LINE_BEFORE_M),
                 )
 
     def street_to(self, place: Place, heading: int) -> str:
@@ -264,7 +269,7 @@ class _Grid:
             yield StopLine(
                 name=f"{_name(place)}_{_HEADINGS[heading]}",
                 lane=self.street_to(place, heading),
-                at_m=_mm(self.street_m - LINE_BEFORE),
+                at_m=_mm(self.street_m - LINE_BEFORE_M),
                 junction=_name(place),
                 group=_HEADINGS[heading],
             )
@@ -274,7 +279,7 @@ class _Grid:
         for place in crossings:
             for heading in self.approaches(place):
                 number += 1
-                x, y = self.at(place, heading, -HALF - 0.05, EDGE + 0.07)
+                x, y = self.at(place, heading, -HALF_JUNCTION_M - 0.05, STREET_EDGE_M + 0.07)
                 yield Light(
                     light_id=number,
                     x_m=x,
@@ -286,9 +291,9 @@ class _Grid:
 
     def crosswalks(self, place: Place) -> Iterator[Crosswalk]:
         for arm in self.arms(place):
-            x, y = self.at(place, arm, HALF + LINE_BEFORE / 2.0, 0.0)
+            x, y = self.at(place, arm, HALF_JUNCTION_M + LINE_BEFORE_M / 2.0, 0.0)
             name = f"{_name(place)}_{_HEADINGS[arm]}"
-            width = 2.0 * EDGE - 0.02
+            width = 2.0 * STREET_EDGE_M - 0.02
             yield Crosswalk(
                 name=name, x_m=x, y_m=y, yaw_rad=_yaw(arm), length_m=0.09, width_m=width
             )
@@ -299,32 +304,37 @@ class _Grid:
         for heading in range(4):
             left = (heading + 1) % 4
             if heading in arms:
-                points += [self.at(place, heading, HALF, side) for side in (EDGE, -EDGE)]
+                points += [
+                    self.at(place, heading, HALF_JUNCTION_M, side)
+                    for side in (STREET_EDGE_M, -STREET_EDGE_M)
+                ]
             if heading in arms and left in arms:
                 for k in range(1, 6):
-                    turn, radius = math.radians(15.0 * k), HALF - EDGE
-                    ahead = HALF - radius * math.sin(turn)
-                    points.append(self.at(place, heading, ahead, -HALF + radius * math.cos(turn)))
+                    turn, radius = math.radians(15.0 * k), HALF_JUNCTION_M - STREET_EDGE_M
+                    ahead = HALF_JUNCTION_M - radius * math.sin(turn)
+                    points.append(
+                        self.at(place, heading, ahead, -HALF_JUNCTION_M + radius * math.cos(turn))
+                    )
             elif heading not in arms and left not in arms:
-                points.append(self.at(place, heading, EDGE, -EDGE))
+                points.append(self.at(place, heading, STREET_EDGE_M, -STREET_EDGE_M))
         return Area(name=_name(place), points=tuple(points))
 
     def buildings(self) -> Iterator[Wall]:
-        inset = EDGE + PAVEMENT
+        inset = STREET_EDGE_M + PAVEMENT_M
         for i in range(self.columns - 1):
             for j in range(self.rows - 1):
-                x, y = TAG_TO_CORNER + i * self.block_m, TAG_TO_CORNER + j * self.block_m
+                x, y = TAG_TO_CORNER_M + i * self.block_m, TAG_TO_CORNER_M + j * self.block_m
                 far = self.block_m - inset
                 yield _ring(x + inset, x + far, y + inset, y + far, 0.02, 0.3 + 0.1 * ((i + j) % 3))
 
     def spawns(self) -> Iterator[Spawn]:
         """Yield places along the streets: first one on each of them, then a second one, ..."""
-        last = self.street_m - LINE_BEFORE - 0.4
+        last = self.street_m - LINE_BEFORE_M - 0.4
         streets = [(place, heading) for place in self.places for heading in self.arms(place)]
-        for k in range(int((last - 0.2) / SPAWN_EVERY) + 1):
+        for k in range(int((last - 0.2) / SPAWN_EVERY_M) + 1):
             for place, heading in streets:
                 lane = _street(place, heading)
-                yield Spawn(name=f"{lane}_{k}", lane=lane, at_m=_mm(0.2 + k * SPAWN_EVERY))
+                yield Spawn(name=f"{lane}_{k}", lane=lane, at_m=_mm(0.2 + k * SPAWN_EVERY_M))
 
 
 def _name(place: Place) -> str:
@@ -345,12 +355,12 @@ def _yaw(heading: int) -> float:
 
 def _bend(heading: int, to: int) -> Segment:
     if to == heading:
-        return Segment(length_m=2.0 * HALF)
+        return Segment(length_m=2.0 * HALF_JUNCTION_M)
     left = to == (heading + 1) % 4
     quarter = math.pi / 2.0
     if left:
-        return Segment(radius_m=HALF + OFFSET, angle_rad=quarter)
-    return Segment(radius_m=HALF - OFFSET, angle_rad=-quarter)
+        return Segment(radius_m=HALF_JUNCTION_M + LANE_OFFSET_M, angle_rad=quarter)
+    return Segment(radius_m=HALF_JUNCTION_M - LANE_OFFSET_M, angle_rad=-quarter)
 
 
 def _bend_length(heading: int, to: int) -> float:

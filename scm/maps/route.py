@@ -15,9 +15,9 @@ from scm.maps.polyline import Polyline, advance, extent, join, sample
 from scm.maps.signs import SPEED_LIMIT, Held, allowed_next, is_obeyed, looks_along
 from scm.records.city_map import Approach, CityMap, Conflict, Lane, Spawn, StopLine
 
-SAME_WAY_RAD = math.radians(60.0)
-MOST_PASSES = 400
-NEAR_M = 0.5
+MAX_HEADING_ERROR_RAD = math.radians(60.0)  # between a car and its lane
+MAX_PASSES = 400  # lanes of one route: its path takes 0.1 ms a lane while the city waits
+MAX_LANE_DISTANCE_M = 0.5
 
 
 class LanePath(Polyline):
@@ -145,10 +145,10 @@ class Roads:
         for lane in self._lanes_near(pose.x, pose.y):
             s, lateral = lane.project(pose.x, pose.y)
             foot = lane.at(s)
-            if abs(wrap_angle(foot.yaw - pose.yaw)) > SAME_WAY_RAD:
+            if abs(wrap_angle(foot.yaw - pose.yaw)) > MAX_HEADING_ERROR_RAD:
                 continue
             away = math.hypot(pose.x - foot.x, pose.y - foot.y)
-            if away <= NEAR_M and (best is None or away < best[0] - 1e-9):
+            if away <= MAX_LANE_DISTANCE_M and (best is None or away < best[0] - 1e-9):
                 best = away, OnLane(lane.name, s, lateral)
         return best[1] if best else None
 
@@ -218,8 +218,8 @@ class Roads:
         if laps < 1:
             raise MapError(f"laps: expected at least 1, got {laps}")
         passes = laps * max(1, len(via))
-        if passes > MOST_PASSES:  # its path takes 0.1 ms a lane to lay, while the car's city waits
-            msg = f"laps x via: expected at most {MOST_PASSES} lanes to pass, got {passes}"
+        if passes > MAX_PASSES:  # its path takes 0.1 ms a lane to lay, while the car's city waits
+            msg = f"laps x via: expected at most {MAX_PASSES} lanes to pass, got {passes}"
             raise MapError(msg)
         if not via:
             return self.loop(start_lane) * laps
@@ -430,5 +430,5 @@ def _box_of(lane: Lane) -> tuple[float, float, float, float]:
         ys.append(pose.y)
         if curvature:
             bulge = max(bulge, min(0.5 * length, 2.0 / abs(curvature)))
-    out = bulge + NEAR_M
+    out = bulge + MAX_LANE_DISTANCE_M
     return min(xs) - out, min(ys) - out, max(xs) + out, max(ys) + out

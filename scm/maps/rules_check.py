@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from scm.errors import nearest
 from scm.maps.polyline import extent
 from scm.maps.signs import (
-    BEFORE_LINE_M,
+    LINE_DISTANCE_M,
     PRECEDENCE,
     SIGN_KINDS,
     SPEED_LIMIT,
@@ -15,7 +15,7 @@ from scm.maps.signs import (
 )
 from scm.records.city_map import Approach, CityMap, Conflict, Lane, Sign
 
-DEEPEST = 3
+MAX_DEPTH = 3  # of yielding chains that are followed
 
 
 def rule_problems(city_map: CityMap) -> Iterator[str]:
@@ -57,10 +57,10 @@ def _sign(
         return
     yield from _place(f"{where}.at_m", sign.at_m, lanes[sign.lane])
     if sign.kind in PRECEDENCE and not any(
-        lane == sign.lane and abs(at - sign.at_m) <= BEFORE_LINE_M for lane, at in lines
+        lane == sign.lane and abs(at - sign.at_m) <= LINE_DISTANCE_M for lane, at in lines
     ):
         yield (
-            f"{where}: expected a line within {BEFORE_LINE_M} m of at_m = {sign.at_m} on lane "
+            f"{where}: expected a line within {LINE_DISTANCE_M} m of at_m = {sign.at_m} on lane "
             f"{sign.lane!r} at which cars {sign.kind.replace('_', ' ')}, got none"
         )
 
@@ -122,7 +122,7 @@ def _way(
 def _reached(start: str, lanes: Mapping[str, Lane]) -> frozenset[str]:
     """Return a lane and those that follow it soon."""
     found, edge = {start}, {start}
-    for _ in range(DEEPEST):
+    for _ in range(MAX_DEPTH):
         edge = {name for lane in edge for name in lanes[lane].next if name in lanes} - found
         found |= edge
     return frozenset(found)

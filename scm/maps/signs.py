@@ -27,9 +27,9 @@ TURNS: Mapping[str, frozenset[Turn]] = {
 }
 SIGN_KINDS = (*CURVES, *PRECEDENCE, SPEED_LIMIT, *TURNS)
 
-TURNS_RAD = math.radians(30.0)
+MIN_TURN_RAD = math.radians(30.0)
 BESIDE_M = 0.5
-BEFORE_LINE_M = 0.5
+LINE_DISTANCE_M = 0.5  # of a sign that belongs to a line
 
 
 class Held(NamedTuple):
@@ -43,7 +43,7 @@ class Held(NamedTuple):
 def turn_of(lane: Lane) -> Turn:
     """Return which way a lane turns from its start to its end."""
     turned = sum(length * curvature for length, curvature in map(extent, lane.segments))
-    if abs(turned) < TURNS_RAD:
+    if abs(turned) < MIN_TURN_RAD:
         return "straight"
     return "left" if turned > 0.0 else "right"
 
@@ -70,7 +70,7 @@ def precedence_at(held: tuple[Held, ...], at_m: float) -> Precedence | None:
     """
     for kind in PRECEDENCE:
         for one in held:
-            if one.sign.kind == kind and -BEFORE_LINE_M <= one.at_m - at_m <= BEFORE_LINE_M:
+            if one.sign.kind == kind and -LINE_DISTANCE_M <= one.at_m - at_m <= LINE_DISTANCE_M:
                 return kind
     return None
 

@@ -30,12 +30,12 @@ from scm.records.city_map import CityMap, Point
 LEAST_RADIUS_M = 0.38  # a Nigel turns on 0.245 m; at 0.35 m drivers swing 40 mm wide, here 8 mm
 WIDE_RADIUS_M = 0.6  # of a street's bend beside another lane: cars swing 37 mm, not 54
 LEAST_WIDTH_M = 0.20  # a Nigel is 0.175 m wide
-ERROR_M = 0.03
+MAX_FIT_ERROR_M = 0.03
 WORST_ERROR_M = 0.25  # a right angle in the middle of a street is cut by 0.16 m
-LEAST_LANE_M = 0.40
-CUT_M = 0.04
-DUST_M = 0.001
-ROUNDS = 60
+MIN_LANE_M = 0.40  # left when lanes are shortened for their turns
+CUT_STEP_M = 0.04
+MIN_CUT_M = 0.001  # a shorter cut is rounding
+MAX_ROUNDS = 60  # of shortening at one junction
 DEFAULT_SCALE = 14.0
 ROOM_M = 0.015  # that turns are given beside others; what is left in the end may be a little less
 LOOK_M = 1.2  # from a junction: so far it matters that lanes are close to each other
@@ -253,7 +253,7 @@ class _Laying:
         """Return a lane as it is laid."""
         if name not in self._curves:
             radius_m = WIDE_RADIUS_M if name in self._wide else LEAST_RADIUS_M
-            self._curves[name] = fit(self.remaining(name), radius_m, ERROR_M)
+            self._curves[name] = fit(self.remaining(name), radius_m, MAX_FIT_ERROR_M)
         return self._curves[name]
 
     def lay(self) -> None:
@@ -268,7 +268,7 @@ class _Laying:
             node = next(iter(todo))
             del todo[node]
             ends = self._ends_in_the_way(node)
-            if ends and rounds[node] < ROUNDS:
+            if ends and rounds[node] < MAX_ROUNDS:
                 rounds[node] += 1
                 for lane in self._cut_back(ends):
                     todo |= dict.fromkeys(link.node for link in self._of_lane[lane])
@@ -349,9 +349,9 @@ class _Laying:
     def _cut_back(self, ends: Iterable[tuple[str, int]]) -> Iterator[str]:
         """Cut lanes back by a little at these ends; yield those that had room for it."""
         for name, end in ends:
-            left_m = length_of(self._lanes[name].points) - sum(self._cuts[name]) - LEAST_LANE_M
-            if left_m >= DUST_M:
-                self._cuts[name][end] += min(CUT_M, left_m)
+            left_m = length_of(self._lanes[name].points) - sum(self._cuts[name]) - MIN_LANE_M
+            if left_m >= MIN_CUT_M:
+                self._cuts[name][end] += min(CUT_STEP_M, left_m)
                 self._curves.pop(name, None)
                 self._strips.pop((name, 0), None)
                 self._strips.pop((name, 1), None)

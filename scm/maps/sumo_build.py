@@ -34,8 +34,8 @@ from scm.records.city_map import (
 )
 from scm.records.floor import Floor
 
-FASTEST_MPS = 0.25
-SLOWEST_MPS = 0.08
+MAX_SPEED_MPS = 0.25  # of the fastest street: a Nigel drives 0.267 m/s
+MIN_SPEED_MPS = 0.08  # of the slowest, so that nobody stands
 PAINT_M = 0.01  # beside each lane: neighbours that touch are no conflict
 LINE_BEFORE_M = 0.06
 BESIDE_M = 0.45
@@ -124,7 +124,7 @@ class CityBuilder:
     def _lane(
         self, name: str, curve: Curve, like: Sequence[NetLane], following: tuple[str, ...]
     ) -> Lane:
-        speed = FASTEST_MPS * min(lane.speed_mps for lane in like) / self._fastest
+        speed = MAX_SPEED_MPS * min(lane.speed_mps for lane in like) / self._fastest
         x, y, yaw = curve.start
         return Lane(
             name=name,
@@ -132,7 +132,7 @@ class CityBuilder:
             start=(*self._at(x, y), round(yaw, DIGITS)),
             segments=tuple(_rounded(segment) for segment in curve.segments),
             next=following,
-            speed_limit_mps=round(max(SLOWEST_MPS, speed), 4),
+            speed_limit_mps=round(max(MIN_SPEED_MPS, speed), 4),
         )
 
     def _at(self, x: float, y: float) -> Point:

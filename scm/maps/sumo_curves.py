@@ -18,8 +18,8 @@ from scm.geometry import Pose2, wrap_angle
 from scm.maps.polyline import advance, extent
 from scm.records.city_map import Point, Segment
 
-DUST_M = 1e-6
-DUST_RAD = 1e-7
+ROUNDING_M = 1e-6
+ROUNDING_RAD = 1e-7
 DOT_M = 0.04
 FINE_M = 0.01
 
@@ -59,7 +59,7 @@ def cut(points: Sequence[Point], from_m: float, to_m: float) -> list[Point]:
     points_left, at = [_point_at(points, from_m)], 0.0
     for before, point in itertools.pairwise(points):
         at += math.dist(before, point)
-        if from_m + DUST_M < at < to_m - DUST_M:
+        if from_m + ROUNDING_M < at < to_m - ROUNDING_M:
             points_left.append(point)
     points_left.append(_point_at(points, to_m))
     return points_left
@@ -119,7 +119,7 @@ def _radii(points: Sequence[Point], least_m: float, error_m: float) -> list[floa
     radii = []
     for k, turn in enumerate(_turns(points), start=1):
         half = math.tan(abs(turn) / 2.0)
-        if half < DUST_RAD:
+        if half < ROUNDING_RAD:
             radii.append(math.inf)
             continue
         before = legs[k - 1] * (1.0 if k == 1 else 0.5)
@@ -149,7 +149,7 @@ def _rounded(points: Sequence[Point], radii: Sequence[float]) -> Curve:
     segments: list[Segment] = []
     for k, leg in enumerate(legs):
         used = (tangents_m[k - 1] if k else 0.0) + (tangents_m[k] if k < len(tangents_m) else 0.0)
-        if leg - used > DUST_M:
+        if leg - used > ROUNDING_M:
             segments.append(Segment(length_m=leg - used))
         if k < len(turns) and math.isfinite(radii[k]):
             segments.append(Segment(radius_m=radii[k], angle_rad=turns[k]))
@@ -169,16 +169,16 @@ def _by_corner(start: Pose2, end: Pose2) -> Curve | None:
     if abs(sine) < 1e-3:
         beside = -math.sin(start.yaw) * dx + math.cos(start.yaw) * dy
         along = math.cos(start.yaw) * dx + math.sin(start.yaw) * dy
-        is_straight = abs(angle) < DUST_RAD and abs(beside) < DUST_M and along > 0.0
+        is_straight = abs(angle) < ROUNDING_RAD and abs(beside) < ROUNDING_M and along > 0.0
         return Curve(start, (Segment(length_m=along),)) if is_straight else None
     before = (dx * math.sin(end.yaw) - dy * math.cos(end.yaw)) / sine
     after = (math.cos(start.yaw) * dy - math.sin(start.yaw) * dx) / sine
     used = min(before, after)
-    if used <= DUST_M:
+    if used <= ROUNDING_M:
         return None
-    pieces = [Segment(length_m=before - used)] if before - used > DUST_M else []
+    pieces = [Segment(length_m=before - used)] if before - used > ROUNDING_M else []
     pieces.append(Segment(radius_m=used / math.tan(abs(angle) / 2.0), angle_rad=angle))
-    pieces += [Segment(length_m=after - used)] if after - used > DUST_M else []
+    pieces += [Segment(length_m=after - used)] if after - used > ROUNDING_M else []
     return Curve(start, tuple(pieces))
 
 
@@ -188,7 +188,7 @@ def _by_two_arcs(start: Pose2, end: Pose2) -> Curve | None:
     squared, along = dx * dx + dy * dy, dx * tx + dy * ty
     bend = 2.0 * (math.cos(end.yaw - start.yaw) - 1.0)
     if bend > -1e-9:
-        if along <= DUST_M:
+        if along <= ROUNDING_M:
             return None
         reach = squared / (2.0 * along)
     else:
@@ -204,10 +204,10 @@ def _by_two_arcs(start: Pose2, end: Pose2) -> Curve | None:
 def _arc(start: Pose2, end: Point) -> tuple[tuple[Segment, ...], float]:
     """Return the arc from a pose to a point, and the heading there."""
     chord = math.dist((start.x, start.y), end)
-    if chord < DUST_M:
+    if chord < ROUNDING_M:
         return (), start.yaw
     half = wrap_angle(math.atan2(end[1] - start.y, end[0] - start.x) - start.yaw)
-    if abs(half) < DUST_RAD:
+    if abs(half) < ROUNDING_RAD:
         return (Segment(length_m=chord),), start.yaw
     radius = chord / (2.0 * math.sin(abs(half)))
     return (Segment(radius_m=radius, angle_rad=2.0 * half),), start.yaw + 2.0 * half

@@ -35,7 +35,7 @@ from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.guard import COMMAND_TIMEOUT_NS, FULL_STOP_NS, Guard
 
 REPORTED_M, REPORTED_RAD, GYRO_RAD_S = 0.002, 0.005, 0.002
-IN_FORCE_NS = NS_PER_S // 4
+MAX_COMMAND_AGE_NS = NS_PER_S // 4  # of a report, for its command to be known
 TICK_NS, RUN_IN_NS = 20 * NS_PER_MS, NS_PER_S
 HIT, BEFORE_HIT_NS, AFTER_HIT_NS, AWAY_M = "contact", NS_PER_S // 10, NS_PER_S, 0.3
 SIMULATED = "simulated"
@@ -252,7 +252,9 @@ class _Drive:
             known |= inside & own & reported.obeys[k]
         reasons[known] = ""
         reasons[known & reported.stands[k]] = STANDS
-        reasons[(t_ns - reported.t_ns[k] > IN_FORCE_NS) | (t_ns < reported.t_ns[k])] = NO_REPORT
+        reasons[(t_ns - reported.t_ns[k] > MAX_COMMAND_AGE_NS) | (t_ns < reported.t_ns[k])] = (
+            NO_REPORT
+        )
         for start_ns, end_ns in self._hits:
             reasons[(t_ns >= start_ns) & (t_ns <= end_ns)] = HIT_LATELY
         for car in np.unique(reported.car)[reported.car[-1] != np.unique(reported.car)]:

@@ -31,7 +31,7 @@ from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 from scm.vehicles.car import load_car
 
 MAP = "map"
-BLOCK = 256 * 1024
+BLOCK_BYTES = 256 * 1024
 CARS_EVERY_NS = NS_PER_S
 NIGEL_M = -0.07, 0.23, 0.175
 LEVELS = {"info": 2, "warning": 3, "error": 4}
@@ -77,7 +77,7 @@ def write_foxglove(index: RunIndex) -> Iterator[bytes]:
         message = _decoded(one, kinds[one.key])
         if message is not None:
             writing.write(one.t_ns, message)
-        if out.held > BLOCK:
+        if out.held > BLOCK_BYTES:
             yield out.pop()
     writing.close()
     yield out.pop()

@@ -36,9 +36,9 @@ from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 
 OWNER = "script"
-LEASE_MS = 5000
+LEASE_MS = 5000  # survives a short break of the link
 RENEW_S = 1.0
-REPEATED_S = 0.05
+REPEAT_S = 0.05  # between two commands
 MAX_STOPPING_NS = 5 * NS_PER_S
 Row = tuple[float, float, float]
 _FILES = {
@@ -194,7 +194,7 @@ class _LeasedCar:
             not monitor.is_at_rest(self._listener.messages.reports) and self._link.now_ns < until_ns
         ):
             self.command(0.0, 0.0)
-            self._listener.listen_until(self._link.now_ns + round(REPEATED_S * 1e9))
+            self._listener.listen_until(self._link.now_ns + round(REPEAT_S * 1e9))
         why = monitor.refuses(self._listener.messages.reports)
         if why:
             msg = f"{self._vehicle}: {why}"
@@ -233,7 +233,7 @@ def read_way(drive: Path) -> list[Pose2]:
 def _repeated(rows: list[Row]) -> Iterator[Row]:
     """Yield each row repeatedly until the next, since commands expire; the last row once."""
     for (t, throttle, steering), (end, _, _) in pairwise(rows):
-        times = max(1, math.ceil((end - t) / REPEATED_S - 1e-6))
+        times = max(1, math.ceil((end - t) / REPEAT_S - 1e-6))
         for k in range(times):
             yield t + k * (end - t) / times, throttle, steering
     yield rows[-1]

@@ -13,9 +13,9 @@ from scm.geometry import Pose2
 from scm.maps.ways import Span, Way, is_inside, laid_from, leaves
 from scm.recorder.driven import CarMessages, Report
 
-AT_REST_M = 0.002
+AT_REST_M = 0.002  # moved in REST_NS
 REST_NS = NS_PER_S // 5
-MAX_DISOBEYING_NS = NS_PER_S // 2
+MAX_DISOBEYING_NS = NS_PER_S // 2  # in which a car's reports must show the command
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

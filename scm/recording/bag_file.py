@@ -145,7 +145,7 @@ def _unpacked(path: Path, stack: ExitStack) -> Path:
 def _as_it_was(data: bytes) -> bytes:
     """Return a message unpacked, where messages were packed one by one."""
     if data.startswith(ZSTD):
-        return zstandard.decompress(data, limits.LARGEST_BYTES)
+        return zstandard.decompress(data, limits.MAX_BYTES)
     return data
 
 
@@ -251,7 +251,7 @@ def _scan_mcap(stream: IO[bytes], path: Path) -> BagFile:
     bag = BagFile([], lambda name: (one for one in found if one[0].name == name))
     size = 0
     try:
-        for record in StreamReader(stream, record_size_limit=limits.LARGEST_BYTES).records:
+        for record in StreamReader(stream, record_size_limit=limits.MAX_BYTES).records:
             match record:
                 case Schema():
                     schemas[record.id] = record
@@ -273,7 +273,7 @@ def _scan_mcap(stream: IO[bytes], path: Path) -> BagFile:
 
 
 def _words(cause: Exception) -> str:
-    return " ".join(str(cause).split())[: limits.MOST_NAMED * 2] or type(cause).__name__
+    return " ".join(str(cause).split())[: limits.MAX_NAMED * 2] or type(cause).__name__
 
 
 def _open_ros1(path: Path, stack: ExitStack) -> BagFile:
@@ -357,7 +357,7 @@ def _ros1_records(stream: IO[bytes]) -> Iterator[tuple[dict[bytes, bytes], bytes
 
 def _ros1_chunk(header: dict[bytes, bytes], data: bytes) -> bytes:
     """Return the content of a chunk; what it declares is not believed."""
-    if _u32(header[b"size"]) > limits.LARGEST_BYTES:
+    if _u32(header[b"size"]) > limits.MAX_BYTES:
         msg = "a chunk that declares more than fits into memory"
         raise ValueError(msg)
     unpack: dict[bytes, Callable[[bytes], Any]] = {
@@ -396,7 +396,7 @@ def _u32(data: bytes) -> int:
 
 
 def _exactly(stream: IO[bytes], length: int) -> bytes:
-    if length > limits.LARGEST_BYTES:
+    if length > limits.MAX_BYTES:
         msg = f"a record that declares {length} bytes"
         raise ValueError(msg)
     data = stream.read(length)

@@ -15,8 +15,8 @@ from scm.arrays import Floats, Ints
 from scm.errors import RecordingError, nearest
 from scm.recording.units import UNITS
 
-LARGEST_BYTES = 1 << 30
-MOST_NAMED = 40
+MAX_BYTES = 1 << 30  # of a table, which is read as a whole
+MAX_NAMED = 40  # columns in an error
 MAX_BAD_CELLS = 0.1  # of a column; where more are no numbers it is no column of numbers
 NS_PER_S = 1_000_000_000
 ROW = "row"
@@ -169,8 +169,8 @@ class Columns(Mapping[str, Floats]):
     def _hint(self, name: str) -> str:
         """Return which column may have been meant, or which there are."""
         known = list(dict.fromkeys(self._known))
-        more = f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
-        return nearest(name, known) or f"; it has {', '.join(known[:MOST_NAMED])}{more}"
+        more = f" and {len(known) - MAX_NAMED} more" if len(known) > MAX_NAMED else ""
+        return nearest(name, known) or f"; it has {', '.join(known[:MAX_NAMED])}{more}"
 
     def _row_count(self) -> Floats:
         """Count the rows from 0; a line that was left out counts too, or later ones would shift."""
@@ -235,10 +235,10 @@ def refuse_large(size: int, path: Path, what: str = "") -> None:
         what: What of it, where it is not the whole file.
 
     Raises:
-        RecordingError: when it is larger than `LARGEST_BYTES`.
+        RecordingError: when it is larger than `MAX_BYTES`.
     """
-    if size > LARGEST_BYTES:
-        msg = f"{path}: {what}holds more than {LARGEST_BYTES >> 20} MiB: split it"
+    if size > MAX_BYTES:
+        msg = f"{path}: {what}holds more than {MAX_BYTES >> 20} MiB: split it"
         raise RecordingError(msg)
 
 

@@ -137,7 +137,7 @@ class _Variables:
             self._stream.seek(begin + length)
 
     def _value(self, kind: int, length: int, order: str) -> Any:
-        left = limits.LARGEST_BYTES - self._size
+        left = limits.MAX_BYTES - self._size
         self._grow(length)
         data = self._stream.read(length)
         if kind == COMPRESSED:

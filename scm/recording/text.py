@@ -59,7 +59,7 @@ def read(path: Path, selection: Selection) -> Columns:
     Raises:
         RecordingError: naming the line, when it has no names, no common width, or is no text.
     """
-    csv.field_size_limit(limits.LARGEST_BYTES)
+    csv.field_size_limit(limits.MAX_BYTES)
     text, is_cut = _text(path)
     return _Table(path, text, selection, is_cut=is_cut).columns()
 
@@ -76,7 +76,7 @@ def _unpacked(path: Path) -> tuple[bytes, bool]:
         is_packed = stream.read(len(GZIP)) == GZIP
         if not is_packed:
             stream.seek(0)
-            data = stream.read(limits.LARGEST_BYTES + 1)
+            data = stream.read(limits.MAX_BYTES + 1)
             refuse_large(len(data), path)
             return data, False
     pieces, size = [], 0

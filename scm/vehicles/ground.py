@@ -20,7 +20,7 @@ from scm.vehicles.slope_hold import standing
 from scm.vehicles.wind import Gusts
 
 CELL_M = 0.25
-MOST_CELLS = 1_000_000
+MAX_CELLS = 1_000_000  # larger ones on a larger floor
 WHEEL_REACH_M = 0.25  # wheels this large touch an edge before their centre is in its cell
 CAR_REACH_M = 1.5  # a car this long reaches a cell with its front wheels
 
@@ -167,7 +167,7 @@ def _cells(
     around = np.array([-1.0, -1.0, 1.0, 1.0])
     low = every[:, :2].min(axis=0) - CAR_REACH_M
     size = every[:, 2:].max(axis=0) + CAR_REACH_M - low
-    cell = max(CELL_M, math.sqrt(float(np.prod(size)) / MOST_CELLS))
+    cell = max(CELL_M, math.sqrt(float(np.prod(size)) / MAX_CELLS))
     columns, rows = (math.floor(length / cell) + 1 for length in size.tolist())
     corner = np.tile(low, 2)
     busy = np.zeros((rows, columns), np.bool_)

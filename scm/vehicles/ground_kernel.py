@@ -19,7 +19,7 @@ from scm.vehicles.jit import array_kernel, kernel_function
 
 CLIMBS = 0.7
 RIM = 0.98  # of the radius: at the very rim the slope has no end
-STEEPEST = 3.0
+MAX_SLOPE = 3.0
 LOOKS = 4  # places looked at on each side of a wheel's middle
 ANYTHING = 1e9
 
@@ -251,6 +251,6 @@ def feel(
                 )  # fmt: skip
                 if up < reached <= top:
                     up, rise_x, rise_y = reached, along_x, along_y
-            less = STEEPEST / max(math.sqrt(rise_x * rise_x + rise_y * rise_y), STEEPEST)
+            less = MAX_SLOPE / max(math.sqrt(rise_x * rise_x + rise_y * rise_y), MAX_SLOPE)
             grip[row, w], rolling[row, w], height[row, w] = held, rolls, up
             slope_x[row, w], slope_y[row, w] = less * rise_x, less * rise_y

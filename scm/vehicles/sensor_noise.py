@@ -17,7 +17,7 @@ from scm.arrays import Floats, Ints
 from scm.vehicles.noise import Keys, bases_of, normals
 from scm.vehicles.sensor import Device
 
-LONGEST_S = 2**20
+MAX_WALK_S = 2**20
 WALK = np.uint64(0xA5A3564E27F88691)
 
 
@@ -43,11 +43,11 @@ def add_device_errors(device: Device, exact: Floats, bias: Floats, bases: Keys) 
 def wander(keys: Keys, seconds: Ints, count: int) -> Floats:
     """Return `count` random walks of each key after whole seconds (k,), shape (k, count)."""
     keys = keys ^ WALK
-    seconds = np.minimum(seconds, LONGEST_S)
-    left, right = np.zeros_like(seconds), np.full_like(seconds, LONGEST_S)
+    seconds = np.minimum(seconds, MAX_WALK_S)
+    left, right = np.zeros_like(seconds), np.full_like(seconds, MAX_WALK_S)
     at_left = np.zeros((len(keys), count))
-    at_right = math.sqrt(LONGEST_S) * normals(bases_of(keys, right), count)
-    span = LONGEST_S
+    at_right = math.sqrt(MAX_WALK_S) * normals(bases_of(keys, right), count)
+    span = MAX_WALK_S
     while span > 1:
         span //= 2
         middle = left + span

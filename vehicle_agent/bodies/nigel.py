@@ -28,7 +28,7 @@ from vehicle_agent.nigel.command_correction import DEADBAND, CommandCorrection, 
 from vehicle_agent.nigel.host import NigelCommand
 from vehicle_agent.nigel.watchdog_client import WatchdogClient
 
-STALE_NS = 250 * NS_PER_MS
+MAX_TRACK_AGE_NS = 250 * NS_PER_MS  # older than that, the car must not move
 LIFTED_M = 0.25
 """At a larger distance from its expected pose the car was carried: the Eye is right within 3 cm."""
 SMOOTH_S = 0.15
@@ -110,7 +110,7 @@ class NigelBody:
         if self._track is None:
             return "the Eye has not seen it yet"
         age_ns = now_ns - self._track_ns + round(1e9 * self._track.age_s)
-        if self._track.stale or age_ns > STALE_NS:
+        if self._track.stale or age_ns > MAX_TRACK_AGE_NS:
             return f"the Eye has not seen it for {seconds(age_ns):.1f} s"
         return ""
 
@@ -202,14 +202,14 @@ class NigelBody:
         return self._pack.charge_at(volts, self._throttle, speed / self._wheel_m)
 
     def _pose(self, now_ns: int) -> Pose2:
-        """Return the last seen pose, extrapolated by at most `STALE_NS`."""
+        """Return the last seen pose, extrapolated by at most `MAX_TRACK_AGE_NS`."""
         track = self._track
         if track is None:
             return self._start
         seen = Pose2(track.x_m, track.y_m, track.yaw_rad)
         if track.stale:
             return seen
-        dt = seconds(min(max(0, now_ns - self._track_ns), STALE_NS))
+        dt = seconds(min(max(0, now_ns - self._track_ns), MAX_TRACK_AGE_NS))
         half = 0.5 * track.yaw_rate_radps * dt
         c, s = math.cos(half) * dt, math.sin(half) * dt
         vx, vy = track.speed_mps, track.lateral_speed_mps

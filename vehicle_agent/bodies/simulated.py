@@ -25,9 +25,9 @@ from scm.vehicles.lights import Switches
 from scm.vehicles.sensor import ENCODERS, all_sensors, sensor_messages
 from vehicle_agent.body import Body, BodyKind, Motion, Wiring
 
-MAX_ADVANCE_NS = 100 * NS_PER_MS
+MAX_ADVANCE_NS = 100 * NS_PER_MS  # after a stall of the process
 GROUND_STEP_NS = 5 * NS_PER_MS
-TICK_S = 0.02
+TICK_S = 0.02  # of the agent, in which a contact is measured
 SENSORS = "scm.vehicles.sensors"
 
 

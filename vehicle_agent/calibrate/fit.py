@@ -30,11 +30,11 @@ STEP_S = 0.001  # coarser steps shift the delay of a servo at its rate limit
 STEPS_PER_SAMPLE = 10  # integration steps from one stored pose to the next
 WINDOW_S = 2.5  # of driving without a rest
 MIN_WINDOW_S, MAX_WINDOW_S = 1.0, 3.0
-MIN_DRIVE_S = 20.0
+MIN_DRIVE_S = 20.0  # shorter drives leave every interval too wide
 DELAYS = ("drive.delay_s", "steering.delay_s")
 PRIOR = 100.0  # prior std of a parameter, in steps of its derivative
 SILENT_S = 0.1  # longer without a command: the agent stalled, commands unknown
-STEER_TRANSIENT_S = 0.2
+STEER_TRANSIENT_S = 0.2  # after a stall, until the wheels are where they were commanded
 MIN_WINDOW_POSES = 5  # fewer poses make a window useless
 MIN_DIFFERENCE = 0.05  # of those steps: smaller differences are rounding errors
 MAX_ITERATIONS = 20
@@ -48,7 +48,7 @@ EYE_SCALED = ("steering.gain", "drive.gain")  # curvature and speed depend on th
 FIRMWARE_STEPS = np.array(
     [1.0 / 255.0, 1.0 / 30.0]
 )  # of the published firmware: throttle, steering
-ROUNDING_OFFSETS = 8
+ROUNDING_OFFSETS = 8  # offsets of a firmware's steps that are tried
 CONVERGED = 0.01  # of half an interval: largest last step
 POSITION_STD_M, YAW_STD_RAD = 5e-3, 1e-2
 WIDEST = {

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 DEFAULT_PORT = 4567
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-FASTEST_HZ = 250.0
+MAX_RATE_HZ = 250.0
 
 
 def _port(text: str) -> int:
@@ -58,7 +58,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="cameras to render; the others stay black (both)",
     )  # fmt: skip
     parser.add_argument(
-        "--max-hz", type=float, default=FASTEST_HZ,
+        "--max-hz", type=float, default=MAX_RATE_HZ,
         help="maximum packets per second; 0: as fast as the script answers (%(default)s)",
     )  # fmt: skip
     brought = parser.add_mutually_exclusive_group()

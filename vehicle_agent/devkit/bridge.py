@@ -40,7 +40,7 @@ from vehicle_agent.devkit.heads import Heads
 from vehicle_agent.devkit.lease import CarLease
 from vehicle_agent.devkit.telemetry import CAMERAS, Telemetry, Version
 
-MISSING_AFTER_NS = 2 * NS_PER_S
+MISSING_AFTER_NS = 2 * NS_PER_S  # without a report a car is not in the city
 FIRST_PICTURE_TIMEOUT_NS = 10 * NS_PER_S  # a renderer loads its car before the first picture
 SPAWN_RETRY_NS = NS_PER_S
 SPAWN_TIMEOUT_S = 10.0

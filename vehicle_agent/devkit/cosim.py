@@ -15,9 +15,9 @@ from scm.v2x.messages.join_request import JoinReply, JoinRequest
 from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 
-REPORT_NS = 20 * NS_PER_MS
+REPORT_EVERY_NS = 20 * NS_PER_MS
 JOIN_RETRY_NS = NS_PER_S
-STANDSTILL_NS = NS_PER_S // 2
+STANDSTILL_NS = NS_PER_S // 2  # without a new pose a car stands
 REQUEST_TIMEOUT_S = 1.0
 
 Placed = tuple[float, float, float]
@@ -69,7 +69,7 @@ class CosimCar:
             return [Call(self._join(now_ns), REQUEST_TIMEOUT_S)]
         if now_ns < self._report_ns:
             return []
-        self._report_ns = now_ns + REPORT_NS
+        self._report_ns = now_ns + REPORT_EVERY_NS
         return [self._state(now_ns, self._epoch)]
 
     def _join(self, now_ns: int) -> JoinRequest:

@@ -36,15 +36,15 @@ from vehicle_agent.devkit.pingpong import PingPong
 
 EVENT = "Bridge"
 PING_EVERY_NS = 20 * NS_PER_S
-PONG_WITHIN_NS = 20 * NS_PER_S
-CONNECT_AFTER_NS = 200 * NS_PER_MS
-JOIN_WITHIN_NS = 5 * NS_PER_S
+PONG_TIMEOUT_NS = 20 * NS_PER_S
+CONNECT_AFTER_NS = 200 * NS_PER_MS  # a server of generation 3 connects by itself before
+JOIN_TIMEOUT_NS = 5 * NS_PER_S
 SILENT_SERVER_NS = NS_PER_S
-ANSWER_WITHIN_NS = 30 * NS_PER_S
+ANSWER_TIMEOUT_NS = 30 * NS_PER_S
 RETRY_NS = NS_PER_S // 2
 POLL_NS = 50 * NS_PER_MS
 MAX_SHOWN_CHARS = 40
-MAX_PING_MS = 86_400_000
+MAX_PING_MS = 86_400_000  # a day; more is a broken welcome
 MAX_MESSAGE_BYTES = 2**20
 OPEN_TIMEOUT_S = 5.0
 
@@ -73,7 +73,7 @@ class Dialogue:
         self._welcome_ns: int | None = None
         self._out: list[str] = []
         self._connect_sent = False
-        self._alarm_ns = now_ns + JOIN_WITHIN_NS
+        self._alarm_ns = now_ns + JOIN_TIMEOUT_NS
         self._ping_timeout_ns = 0
         self._waits_for_pong = False
 
@@ -96,7 +96,7 @@ class Dialogue:
                 self._out.append("40")
         elif self._is_silent(now_ns):
             self.is_open = self.is_bare = True
-            self._alarm_ns = now_ns + ANSWER_WITHIN_NS
+            self._alarm_ns = now_ns + ANSWER_TIMEOUT_NS
         elif now_ns >= self._alarm_ns and not self.ended:
             self._ring(now_ns)
         out, self._out = self._out, []
@@ -117,7 +117,7 @@ class Dialogue:
         else:
             self._out.append("2")
             self._waits_for_pong = True
-            self._alarm_ns = now_ns + PONG_WITHIN_NS
+            self._alarm_ns = now_ns + PONG_TIMEOUT_NS
 
     def feed(self, text: str, now_ns: int) -> list[Any]:
         """Process a frame; return the payloads of its Bridge events. Never raises."""
@@ -139,7 +139,7 @@ class Dialogue:
     def _welcome(self, text: str, now_ns: int) -> None:
         if self.is_bare:  # the server was only slow
             self.is_open = self.is_bare = False
-            self._alarm_ns = now_ns + JOIN_WITHIN_NS
+            self._alarm_ns = now_ns + JOIN_TIMEOUT_NS
         self._welcome_ns = now_ns
         values = self._decoded(text, dict, "its welcome") or {}
         self.generation = 4 if "maxPayload" in values else 0
@@ -162,7 +162,7 @@ class Dialogue:
             self.ended = f"it refused us: {rest[:100] or 'no reason given'}"
         elif kind == "2":
             if self.is_bare:
-                self._alarm_ns = now_ns + ANSWER_WITHIN_NS
+                self._alarm_ns = now_ns + ANSWER_TIMEOUT_NS
             return self._on_event(rest.lstrip("0123456789"))
         elif kind == "3":
             number = rest[:MAX_SHOWN_CHARS].partition("[")[0]

@@ -18,7 +18,7 @@ from scm.clock import NS_PER_S
 PATIENCE_NS = NS_PER_S
 MAX_PATIENCE_NS = 8 * NS_PER_S
 MAX_WAIT_NS = 30 * NS_PER_S
-MAX_EXCESS_REPLIES = 3
+MAX_EXCESS_REPLIES = 3  # more and the script replies twice to each packet
 
 
 class PingPong:

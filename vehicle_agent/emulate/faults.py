@@ -17,7 +17,7 @@ EventKind = Literal["reset", "brownout", "unplug"]
 EVENTS: tuple[str, ...] = get_args(EventKind)
 RATES = ("noise", "flip", "lose", "cut", *EVENTS)
 PER_SECOND = ("noise", *EVENTS)
-UNPLUGGED_S = 3.0
+DEFAULT_UNPLUGGED_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Event:
 
     at_s: float
     kind: str
-    for_s: float = UNPLUGGED_S
+    for_s: float = DEFAULT_UNPLUGGED_S
 
 
 @dataclass(frozen=True, slots=True)

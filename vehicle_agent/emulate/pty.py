@@ -10,7 +10,7 @@ from pathlib import Path
 
 from scm.errors import LinkError
 
-AT_ONCE = 4096
+READ_BYTES = 4096
 TCGETS2 = 0x802C542A
 TERMIOS2 = struct.Struct("=4IB19s2I")
 """Linux's ioctl for speeds without a name in termios, and its data structure."""
@@ -87,7 +87,7 @@ class Cable:
         os.close(self._master)
         self._master = None
 
-    def read(self, most: int = AT_ONCE) -> bytes:
+    def read(self, most: int = READ_BYTES) -> bytes:
         """Return received bytes, if any."""
         if self._master is None or most <= 0:
             return b""

@@ -8,8 +8,8 @@ from collections import deque
 
 from scm.clock import NS_PER_S
 
-BITS = 10
-RING = 63
+BITS_PER_BYTE = 10  # start, eight data, stop
+BUFFER_BYTES = 63  # of HardwareSerial, one of 64 stays empty
 NOTHING = -1
 IDLE = 1
 
@@ -22,7 +22,7 @@ class Uart:
     """
 
     def __init__(self, baud: int) -> None:
-        self.byte_ns = BITS * NS_PER_S // baud
+        self.byte_ns = BITS_PER_BYTE * NS_PER_S // baud
         self.lost = 0
         self._coming: deque[tuple[int, int]] = deque()
         self._ring: deque[int] = deque()
@@ -45,7 +45,7 @@ class Uart:
             _, byte = self._coming.popleft()
             if deaf:
                 continue
-            if len(self._ring) < RING:
+            if len(self._ring) < BUFFER_BYTES:
                 self._ring.append(byte)
             else:
                 self.lost += 1
@@ -59,7 +59,7 @@ class Uart:
         for byte in data:
             self._went_ns = max(self._went_ns, now_ns) + self.byte_ns
             self._going.append((self._went_ns, byte))
-        return max(now_ns, self._went_ns - (RING + 1) * self.byte_ns)
+        return max(now_ns, self._went_ns - (BUFFER_BYTES + 1) * self.byte_ns)
 
     def sent(self, now_ns: int) -> bytes:
         """Return the bytes that have left the device."""

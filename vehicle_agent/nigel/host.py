@@ -50,7 +50,7 @@ NANO_BAUD, MEGA_BAUD = 57600, 115200
 
 BOOT_NS = 2100 * NS_PER_MS
 REQUEST_EVERY_NS = 200 * NS_PER_MS
-SILENCE_NS = 5 * NS_PER_S
+MAX_SILENCE_NS = 5 * NS_PER_S  # of the board before it is addressed anew
 MAX_SILENCES = 3
 TELEMETRY_SILENCE_NS = NS_PER_S
 COMMAND_EVERY_NS = 20 * NS_PER_MS
@@ -224,7 +224,7 @@ class Host:
     def _update_phase(self, now_ns: int) -> None:
         """Update phase and trouble from the known topics and the time since the last frame."""
         if {"steering", "throttle"} <= self._topics.keys():
-            is_lost = now_ns - self._received_ns >= MAX_SILENCES * SILENCE_NS
+            is_lost = now_ns - self._received_ns >= MAX_SILENCES * MAX_SILENCE_NS
             self.phase = "silent" if is_lost else "ready"
             self.trouble = "the Arduino has been silent for 15 s" if is_lost else ""
         elif self._refusal:
@@ -264,8 +264,8 @@ class Host:
         late_ns = now_ns - max(self._received_ns, requested_ns)
         if "telemetry" in self._topics:
             quiet_ns = now_ns - max(self._telemetry_ns, requested_ns)
-            return late_ns >= SILENCE_NS or quiet_ns >= TELEMETRY_SILENCE_NS
-        return late_ns >= SILENCE_NS
+            return late_ns >= MAX_SILENCE_NS or quiet_ns >= TELEMETRY_SILENCE_NS
+        return late_ns >= MAX_SILENCE_NS
 
     def _is_command_due(self, now_ns: int, command: NigelCommand) -> bool:
         """Return whether a command must be sent now: at 50 Hz, and at once to stop a car."""

@@ -29,9 +29,9 @@ from vehicle_agent.nigel.host import REST, Host, NigelCommand, Phase, clamped
 from vehicle_agent.nigel.telemetry import Telemetry
 
 LOOP_NS = 5 * NS_PER_MS
-GOODBYES = 5
+GOODBYES = 5  # zeros at the end, so that one arrives on a bad cable
 GOODBYE_NS = 20 * NS_PER_MS
-DRAIN_NS = 200 * NS_PER_MS
+MAX_DRAIN_NS = 200 * NS_PER_MS  # for their transmission
 MAX_PACKET_BYTES = 65536
 
 _log = logging.getLogger(__name__)
@@ -126,7 +126,7 @@ class SerialWatchdog:
         for _ in range(GOODBYES):
             self._cable.write(self._host.rest())
             clock.wait_until(clock.now_ns() + GOODBYE_NS, never)
-        end_ns = clock.now_ns() + DRAIN_NS
+        end_ns = clock.now_ns() + MAX_DRAIN_NS
         while not self._cable.is_drained() and clock.now_ns() < end_ns:
             clock.wait_until(clock.now_ns() + LOOP_NS, never)
         self._cable.close()

@@ -20,7 +20,7 @@ from scm.errors import EyeError
 from scm.eye.calibrate.solve import Solution, eliminate, inverse
 from scm.eye.camera import camera_model
 
-MIN_VIEWS = 5
+MIN_VIEWS = 5  # fewer cannot separate a lens from its poses
 FOCAL_SHARE = 0.01
 """Maximum standard deviation of fx or fy, over fx or fy."""
 MIDDLE_SHARE = 0.01
@@ -33,9 +33,9 @@ RMS_SHARE = 5e-4
 """Maximum RMS residual at the points, over the frame's width."""
 MIN_COVER = 0.35
 """Minimum share of the frame's cells with points of the board."""
-NOT_SEPARABLE = 0.9
-CELLS = (8, 5)
-MAX_SHOTS = 5
+MAX_CORRELATION = 0.9  # of two lens parameters that count as separable
+COVER_CELLS = (8, 5)  # columns and rows of the picture whose cover is checked
+MAX_SHOTS = 5  # further shots that are proposed
 TILT_RAD = math.radians(35.0)
 _PRIOR = np.array([0.5, 0.5, 0.25, 0.25, 2.0, 2.0, 0.2, 0.2, 2.0])
 _PLACES = (0.2, 0.5, 0.8)
@@ -126,7 +126,7 @@ def _unknown_focus(solution: Solution, tilts: Floats) -> list[str]:
         if np.isfinite(share)
         else "fx could be anything"
     )
-    if abs(correlation) < NOT_SEPARABLE:
+    if abs(correlation) < MAX_CORRELATION:
         return [f"the focal length is not known: {known} (at most {FOCAL_SHARE:.0%})"]
     tilt = f"{math.degrees(tilts.min()):.0f} to {math.degrees(tilts.max()):.0f} deg"
     return [
@@ -137,7 +137,7 @@ def _unknown_focus(solution: Solution, tilts: Floats) -> list[str]:
 
 
 def _cover(solution: Solution) -> Ints:
-    (columns, rows), (width, height) = CELLS, solution.size
+    (columns, rows), (width, height) = COVER_CELLS, solution.size
     pixels = np.concatenate([view.pixels for view in solution.views])
     column = np.clip((pixels[:, 0] + 0.5) * columns / width, 0, columns - 1).astype(int)
     row = np.clip((pixels[:, 1] + 0.5) * rows / height, 0, rows - 1).astype(int)
@@ -158,7 +158,7 @@ def _by_lens(solution: Solution) -> Floats:
     Raises:
         EyeError: The lens is invalid.
     """
-    (columns, rows), (width, height) = CELLS, solution.size
+    (columns, rows), (width, height) = COVER_CELLS, solution.size
     across = (np.arange(columns) + 0.5) * width / columns - 0.5
     down = (np.arange(rows) + 0.5) * height / rows - 0.5
     pixels = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
@@ -173,7 +173,7 @@ def _by_lens(solution: Solution) -> Floats:
 
 def _ray_std(by_lens: Floats, covariance: Floats) -> Floats:
     variance = np.einsum("ij,jk,ik->i", by_lens, covariance, by_lens)
-    columns, rows = CELLS
+    columns, rows = COVER_CELLS
     deviation: Floats = np.sqrt(variance.reshape(rows, columns, 2).mean(axis=2))
     return deviation
 

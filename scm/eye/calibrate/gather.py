@@ -23,8 +23,8 @@ NEW_SHARE = 0.05
 """Minimum distance from every view used so far, over the frame's width."""
 STILL_SHARE = 0.002
 """Maximum movement since the previous frame, likewise."""
-LOOKS_HZ = 10.0
-MAX_VIEWS = 80
+SAMPLE_HZ = 10.0  # frames of a film that are searched
+MAX_VIEWS = 80  # of a film: more take long and add nothing
 
 Progress = Callable[[str], None]
 
@@ -52,7 +52,7 @@ def from_files(board: Board, paths: Sequence[Path], progress: Progress) -> Gathe
     if not films[0].is_file():
         raise EyeError(f"{films[0]}: expected a film, found no file")
     film = cv2.VideoCapture(str(films[0]))
-    step = max(1, round(film.get(cv2.CAP_PROP_FPS) / LOOKS_HZ))
+    step = max(1, round(film.get(cv2.CAP_PROP_FPS) / SAMPLE_HZ))
     return _from_frames(board, str(films[0]), _frames(film, step), MAX_VIEWS, progress)
 
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import EyeError
-from scm.eye.camera import LARGEST_TILT_RAD, LENS_PARAMETERS, CameraModel, camera_model
+from scm.eye.camera import LENS_PARAMETERS, MAX_TILT_RAD, CameraModel, camera_model
 from scm.eye.detect import CORNER_STD_PX
 from scm.geometry import wrap_angle
 from scm.records.city_map import Camera, CityMap, MapTag
@@ -32,9 +32,9 @@ from scm.records.floor import Record
 from scm.scenery.tags import TAG_COUNT, floor_corners
 
 NAMES = ("x_m", "y_m", "z_m", "yaw_rad", "tilt_x_rad", "tilt_y_rad")
-SURE = 0.95
-WRONG_SIGMAS = 8.0
-WRONG_PX = 0.5
+MIN_UNIQUE_WEIGHT = 0.95  # of a pose that counts as the only solution
+OUTLIER_SIGMAS = 8.0  # residual of a tag that is not at its stated place
+MIN_OUTLIER_PX = 0.5  # smaller residuals are never outliers
 _STEPS = np.array([1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6])
 _ITERATIONS = 30
 _LENS_STEP = 1e-6
@@ -97,7 +97,7 @@ class Located:
     @property
     def is_sure(self) -> bool:
         """Whether one pose is clearly more probable than the other."""
-        return self.places[0].weight >= SURE
+        return self.places[0].weight >= MIN_UNIQUE_WEIGHT
 
 
 def known_tags(city_map: CityMap, more: Path | None = None) -> dict[int, MapTag]:
@@ -203,7 +203,7 @@ def _places(
     if not solutions:
         raise EyeError(
             f"locate: no camera above the floor that looks down (below "
-            f"{math.degrees(LARGEST_TILT_RAD):.0f} deg) sees tags {sorted(known)} like this; are "
+            f"{math.degrees(MAX_TILT_RAD):.0f} deg) sees tags {sorted(known)} like this; are "
             "sizes and places right?"
         )
     left = [float(((pixels - model.moved_to(at).project(points)) ** 2).sum()) for at in solutions]
@@ -248,7 +248,7 @@ def _extrinsics(rotation: Floats, position: Floats) -> Floats | None:
     level = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
     tilted = level @ rotation.T
     tilts = math.atan2(tilted[2, 1], tilted[1, 1]), math.atan2(tilted[0, 2], tilted[0, 0])
-    if position[2] <= 0.0 or max(abs(tilt) for tilt in tilts) >= LARGEST_TILT_RAD:
+    if position[2] <= 0.0 or max(abs(tilt) for tilt in tilts) >= MAX_TILT_RAD:
         return None
     return np.array([*position, yaw, *tilts])
 
@@ -272,7 +272,7 @@ def _refine(model: CameraModel, points: Floats, pixels: Floats, start: Floats) -
         at, gain, cost, damping = at + step, cost - new, new, damping / 100.0
         if gain <= 1e-12 * cost:
             break
-    if at[2] <= 0.0 or np.abs(at[4:]).max() >= LARGEST_TILT_RAD:
+    if at[2] <= 0.0 or np.abs(at[4:]).max() >= MAX_TILT_RAD:
         return None
     return np.array([*at[:3], wrap_angle(float(at[3])), *at[4:]])
 
@@ -327,5 +327,5 @@ def _worst_tag(
     }
     worst = max(off, key=lambda tag_id: off[tag_id])
     others = float(np.median(list(off.values())))
-    limit = max(WRONG_SIGMAS * noise, WRONG_PX, 2.5 * others)
+    limit = max(OUTLIER_SIGMAS * noise, MIN_OUTLIER_PX, 2.5 * others)
     return worst if off[worst] > limit else None

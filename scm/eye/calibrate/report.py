@@ -14,7 +14,7 @@ import numpy as np
 
 from scm.arrays import Floats, Image
 from scm.errors import EyeError
-from scm.eye.calibrate.assessment import CELLS, ViewAssessment
+from scm.eye.calibrate.assessment import COVER_CELLS, ViewAssessment
 from scm.eye.calibrate.board import View
 from scm.eye.calibrate.gather import Gathered
 from scm.eye.calibrate.locate import NAMES, Located, off_px
@@ -148,7 +148,7 @@ def _sharpness(board: Board, view: View, grey: Image) -> float:
 
 
 def _cover(views: Sequence[View], size: tuple[int, int]) -> list[list[int]]:
-    columns, rows = CELLS
+    columns, rows = COVER_CELLS
     points = np.vstack([view.pixels for view in views])
     counts, _, _ = np.histogram2d(
         points[:, 1], points[:, 0], bins=(rows, columns), range=((0, size[1]), (0, size[0]))

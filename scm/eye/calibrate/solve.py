@@ -28,12 +28,12 @@ from scm.eye.camera import LENS_PARAMETERS
 
 LEAST_CORNER_STD_PX = 0.02
 """No board is printed and detected better than this, however small the residuals."""
-POINT_SIGMAS = 5.0
-VIEW_RATIO = 3.0
-BLUNDER_PX = 0.3
-MAX_OUT = 0.2
+OUTLIER_SIGMAS = 5.0  # residual at which a point is left out
+OUTLIER_VIEW_RATIO = 3.0  # times the usual residual, at which a view is left out
+MIN_OUTLIER_PX = 0.3  # smaller residuals are never outliers
+MAX_OUTLIER_SHARE = 0.2  # of the views; more and the board is not flat, or not this one
 _POINT_ROUNDS = 12
-WIDEST_TERM = 1.0
+MAX_TERM_STD = 1.0  # of a distortion term that counts as determined
 _ITERATIONS = 60
 _CONVERGED = 1e-10
 _UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
@@ -168,7 +168,7 @@ def _solved(
     for term in _OPTIONAL[solution.lens.kind]:
         progress("solving")
         solution = _without_blunders(solution, len(views))
-        if not np.sqrt(solution.covariance[term, term]) > WIDEST_TERM:
+        if not np.sqrt(solution.covariance[term, term]) > MAX_TERM_STD:
             break
         solution = _optimised(_without(solution, term))
     solution = _without_blunders(solution, len(views))
@@ -322,7 +322,9 @@ def _without(solution: Solution, term: int) -> Solution:
     values, free = lens.values.copy(), lens.free.copy()
     values[term], free[term] = 0.0, False
     name = LENS_NAMES[lens.kind][term]
-    words = f"distortion {name} left out: these views determine it no better than +-{WIDEST_TERM:g}"
+    words = (
+        f"distortion {name} left out: these views determine it no better than +-{MAX_TERM_STD:g}"
+    )
     return replace(
         solution, lens=replace(lens, values=values, free=free), remarks=(*solution.remarks, words)
     )
@@ -335,7 +337,7 @@ def _without_blunders(solution: Solution, views: int) -> Solution:
         name = solution.views[index].name
         words = f"{name}: the whole view is an outlier, {ratio:.1f} times the usual error; removed"
         solution = _optimised(_drop(solution, index, words))
-        if len(solution.views) < (1.0 - MAX_OUT) * views:
+        if len(solution.views) < (1.0 - MAX_OUTLIER_SHARE) * views:
             raise EyeError(
                 f"calibration: more than a fifth of {views} views do not fit one lens (last: "
                 f"{name}); is the board flat, --squares right, the frame size and zoom the same?"
@@ -357,7 +359,7 @@ def _without_points(solution: Solution) -> tuple[View, ...]:
     noise = 1.4826 * float(np.median(np.abs(np.concatenate(errors))))
     for i, (view, error) in enumerate(zip(solution.views, errors, strict=True)):
         off = np.hypot(error[:, 0], error[:, 1])
-        good = off <= max(POINT_SIGMAS * noise, BLUNDER_PX, 0.7 * float(off.max()))
+        good = off <= max(OUTLIER_SIGMAS * noise, MIN_OUTLIER_PX, 0.7 * float(off.max()))
         if not good.all() and good.sum() >= LEAST_POINTS:
             remaining[i] = replace(view, points=view.points[good], pixels=view.pixels[good])
     return tuple(remaining)
@@ -373,7 +375,7 @@ def _worst_view(solution: Solution) -> tuple[int, float] | None:
     typical = np.array([np.median(np.hypot(e[:, 0], e[:, 1])) for e in solution.errors])
     usual = float(np.median(typical))
     worst = int(np.argmax(typical))
-    off = typical[worst] > max(VIEW_RATIO * usual, BLUNDER_PX)
+    off = typical[worst] > max(OUTLIER_VIEW_RATIO * usual, MIN_OUTLIER_PX)
     return (worst, float(typical[worst] / max(usual, 1e-12))) if off else None
 
 

@@ -18,14 +18,14 @@ from scm.v2x.messages.eye_status import Complaint
 
 MISSING_NS = 2 * NS_PER_S
 """How long tags are missing before the first guess is tried."""
-BETWEEN_NS = NS_PER_S // 2
+NEXT_CAUSE_NS = NS_PER_S // 2  # between two causes of one search
 AGAIN_NS, SURE_NS = 60 * NS_PER_S, 10 * NS_PER_S
 """Pause after all guesses failed, and after one was right."""
 LONGEST_PX = 1280
 """Larger frames are downscaled: guesses are about large tags."""
 COARSE_PX = 800
 """In larger frames squares are sought at half the resolution, which is fast."""
-LEAST_SIDE_PX = 12.0
+MIN_SIDE_PX = 12.0  # of a tag that another family could have
 FAMILIES = {
     "tag25h9": cv2.aruco.DICT_APRILTAG_25h9,
     "tag36h10": cv2.aruco.DICT_APRILTAG_36h10,
@@ -79,7 +79,7 @@ class Causes:
         found = _tried(_guesses()[number], _smaller(grey))
         self._next = (number + 1) % len(_guesses())
         self._found = (number, found) if found else None
-        self._due_ns = t_ns + (SURE_NS if found else BETWEEN_NS if self._next else AGAIN_NS)
+        self._due_ns = t_ns + (SURE_NS if found else NEXT_CAUSE_NS if self._next else AGAIN_NS)
 
     def complaints(self) -> tuple[Complaint, ...]:
         """Return the cause that was found last, if one was."""
@@ -149,12 +149,12 @@ def _finder(dictionary: int, border_cells: int = 1) -> Callable[[Image], Sequenc
         settings.markerBorderBits = border_cells
         settings.errorCorrectionRate = 0.0
         settings.maxErroneousBitsInBorderRate = 0.04
-        settings.minMarkerPerimeterRate = 4.0 * LEAST_SIDE_PX / max(grey.shape)
+        settings.minMarkerPerimeterRate = 4.0 * MIN_SIDE_PX / max(grey.shape)
         corners, ids, _ = cv2.aruco.ArucoDetector(family, settings).detectMarkers(grey)
         numbers = np.ravel(ids) if corners else ()  # None if there are no corners
         return [
             int(one) for one, square in zip(numbers, corners, strict=True)
-            if _side(np.asarray(square, dtype=np.float64).reshape(4, 2)) >= LEAST_SIDE_PX
+            if _side(np.asarray(square, dtype=np.float64).reshape(4, 2)) >= MIN_SIDE_PX
         ]  # fmt: skip
 
     return find

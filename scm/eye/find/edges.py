@@ -26,10 +26,10 @@ _SPAN = 0.80
 """Share of a side that is sampled; its ends belong to the corners."""
 _SQUEEZE = 2
 """Maximum relative shift of opposite sides in the first pass [px]."""
-_FINE_STEPS = 8
-_LEAST_INLIERS = 0.6
-_LEAST_STEP = 4.0
-_NO_EDGE = 1.0e3
+_FINE_STEPS = 8  # of the step that refines an edge
+_MIN_INLIERS = 0.6  # share of the samples on one line
+_MIN_STEP = 4.0  # grey levels between the two sides of an edge
+_NO_EDGE = 1.0e3  # offset of a sample without an edge
 
 
 @array_kernel
@@ -205,7 +205,7 @@ def _areas(low: Floats, high: Floats, mean: Floats, h: float, offset: Floats) ->
             black += low[m] / (last - first)
             white += high[m] / (last - first)
         step = white - black
-        if step > _LEAST_STEP:
+        if step > _MIN_STEP:
             moved = 2.0 * h * (0.5 * (black + white) - mean[k]) / step
             offset[k] = min(max(moved, -h), h)
         else:
@@ -232,7 +232,7 @@ def _robust_line(at: Floats, offset: Floats, weight: Floats, away: Floats, ends:
             stt += w * at[k] * at[k]
             sto += w * at[k] * offset[k]
         spread = n * stt - st * st
-        if close < _LEAST_INLIERS * count or not spread > 1e-9:
+        if close < _MIN_INLIERS * count or not spread > 1e-9:
             return False
         slope = (n * sto - st * so) / spread
         level = (so - slope * st) / n

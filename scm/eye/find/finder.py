@@ -27,7 +27,7 @@ from scm.eye.detect import (
 )
 from scm.eye.find.codes import tag_cells
 from scm.eye.find.measure import BITS, BORDER, MARGIN, measure
-from scm.eye.picture import LEAST_PX
+from scm.eye.picture import MIN_SIDE_PX
 from scm.records.eye import TagSeen
 from scm.scenery.tags import TAG_COUNT
 
@@ -105,7 +105,7 @@ class TagFinder:
                 `TagSeen.corners_px`; up to 1.5 of a tag's cells off. Tags of the previous frame are
                 tracked anyway.
         """
-        if min(grey.shape) < LEAST_PX:
+        if min(grey.shape) < MIN_SIDE_PX:
             return ()
         frame = np.require(grey, np.uint8, ["C", "W"])
         first = frame.shape != self._shape

@@ -10,8 +10,8 @@ from scm.vehicles.jit import array_kernel
 
 BITS, BORDER, MARGIN = range(3)
 """Columns of a result: wrong bits of 36, wrong border cells of 28, decision margin [grey]."""
-_LEAST_CELL_PX = 1.5
-FINE_ROUNDS = 2
+_MIN_CELL_PX = 1.5  # smaller cells cannot be read
+REFINEMENTS = 2  # of the edges; a third changes nothing
 _NOT_FOUND = 99.0
 
 
@@ -49,7 +49,7 @@ def _measure_all(
 
 @array_kernel
 def _measure_one(grey: Image, quad: Floats, work: Floats, lines: Floats, ends: Floats) -> bool:
-    if not is_whole(grey, quad) or cell_px(quad) < _LEAST_CELL_PX:
+    if not is_whole(grey, quad) or cell_px(quad) < _MIN_CELL_PX:
         return False
     if not shift_whole(grey, quad, work, lines, ends):
         return False
@@ -57,7 +57,7 @@ def _measure_one(grey: Image, quad: Floats, work: Floats, lines: Floats, ends: F
         return False
     if not lay_coarse(grey, quad, 0.6, work, lines, ends):
         return False
-    for _ in range(FINE_ROUNDS):
+    for _ in range(REFINEMENTS):
         if not lay_fine(grey, quad, work, lines, ends):
             return False
     return is_whole(grey, quad)

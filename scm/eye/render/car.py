@@ -25,7 +25,7 @@ from scm.scenery.solids import (
 from scm.scenery.tags import PRINT_SCALE, TAG_COUNT, tag_corners
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
-SHADOW = 0.42
+SHADOW_SHARE = 0.42  # of the light missing under a car
 SHADOW_BLUR_PX = 11
 
 
@@ -144,7 +144,9 @@ def _cast(canvas: Canvas, outline: Floats) -> None:
     """Darken the floor in the blurred shape of the shadow."""
     height, width = canvas.window.shape[:2]
     keep = np.full((height, width), 255, dtype=np.uint8)
-    cv2.fillConvexPoly(keep, canvas.fixed(outline), round(255 * (1.0 - SHADOW)), cv2.LINE_8, 4)
+    cv2.fillConvexPoly(
+        keep, canvas.fixed(outline), round(255 * (1.0 - SHADOW_SHARE)), cv2.LINE_8, 4
+    )
     soft = cv2.GaussianBlur(keep, (SHADOW_BLUR_PX, SHADOW_BLUR_PX), 0.0)
     three = cv2.cvtColor(soft, cv2.COLOR_GRAY2BGR)
     canvas.window[:] = cv2.multiply(canvas.window, three, scale=1.0 / 255.0)

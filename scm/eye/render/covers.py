@@ -14,7 +14,7 @@ FINE = 2
 SKINS: tuple[Colour, ...] = ((128, 160, 208), (104, 138, 190), (58, 82, 122), (150, 182, 224))
 SLEEVES: tuple[Colour, ...] = ((92, 66, 48), (58, 58, 60), (150, 140, 128), (60, 44, 96))
 CABLES: tuple[Colour, ...] = ((30, 30, 32), (122, 74, 36), (44, 44, 150), (60, 62, 64))
-SHADE = 0.34
+SHADE_SHARE = 0.34  # of the light missing under a hand or cable
 HAND_M = 0.19
 """From wrist to fingertip."""
 CABLE_M = 0.007
@@ -188,5 +188,5 @@ class _Paint:
         shift = np.array([[1.0, 0.0, 1.3 * shadow_px], [0.0, 1.0, 1.0 * shadow_px]])
         cast = cv2.warpAffine(solid, shift, (width, height))
         soft = cv2.GaussianBlur(cast, (0, 0), max(1.0, 0.7 * shadow_px))
-        light = 1.0 - SHADE * np.asarray(soft, dtype=np.float64)
+        light = 1.0 - SHADE_SHARE * np.asarray(soft, dtype=np.float64)
         return Layer((int(self._corner[0]), int(self._corner[1])), colour, solid, light)

@@ -18,7 +18,7 @@ from scm.v2x.messages.world_snapshot import SnapshotVehicle
 STILL_PX = 0.12
 """Cars that move less during the exposure are drawn once."""
 STEP_PX = 0.5
-MOST_STEPS = 64
+MAX_STEPS = 64  # of one exposure
 MARGIN_PX = 4
 Gathered = NDArray[np.float32]
 Rect = tuple[int, int, int, int]
@@ -194,7 +194,7 @@ def paint_moving(
     if way_px < STILL_PX:
         paint_car(frame, placed, gain)
         return rect, placed
-    times = np.linspace(first, last, min(MOST_STEPS, 2 + math.ceil(way_px / STEP_PX)))
+    times = np.linspace(first, last, min(MAX_STEPS, 2 + math.ceil(way_px / STEP_PX)))
     layer = car_layer.cut_out(placed, gain, rect)
     rows = shutter.late(np.arange(rect[1], rect[3], dtype=np.float64))
     weights = gathered(times, rows, shutter.exposure_s)

@@ -22,11 +22,11 @@ from scm.scenery.bodies import car_body
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 RING_STEP_M = 0.25
-TIGHTEST_M = 0.12
-LOOK_S = 0.1
+MIN_RADIUS_M = 0.12  # of a corner on the ring
+SAMPLE_S = 0.1  # between two poses that are kept apart
 NEAR_M = 0.03
 """Minimum gap from bumper to bumper."""
-TRIES = 200
+MAX_TRIES = 200  # to place one car
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,7 @@ def _along_lanes(
 ) -> list[Tour]:
     """Return cars on lanes, at most one for each id: as many as fit."""
     lines = _lane_lines(city_map, speed_mps * duration_s, rng)
-    times = np.arange(0.0, duration_s + LOOK_S, LOOK_S)
+    times = np.arange(0.0, duration_s + SAMPLE_S, SAMPLE_S)
     found: list[tuple[Tour, Floats]] = []
     for tag_id in ids:
         more = _free(lines, found, times, speed_mps, tag_id, car, rng)
@@ -150,8 +150,8 @@ def _free(
 ) -> tuple[Tour, Floats] | None:
     """Return a start from which a car stays clear of all others, and the area it covers."""
     lengths = np.array([line.length_m for line in lines])
-    anywhere = rng.uniform(0.0, 1.0, TRIES // 4)
-    in_turn = np.linspace(0.0, 1.0, TRIES, endpoint=False)  # for crowded lanes
+    anywhere = rng.uniform(0.0, 1.0, MAX_TRIES // 4)
+    in_turn = np.linspace(0.0, 1.0, MAX_TRIES, endpoint=False)  # for crowded lanes
     for share in (*anywhere, *in_turn):
         line = lines[int(rng.choice(len(lines), p=lengths / lengths.sum()))]
         start = float(share) * line.length_m
@@ -217,7 +217,7 @@ def rings(floor: Floor) -> list[Polyline]:
     (x0, x1), (y0, y1) = floor.x_m, floor.y_m
     found: list[Polyline] = []
     inset = 0.15
-    while min(x1 - x0, y1 - y0) / 2.0 - inset >= TIGHTEST_M:
+    while min(x1 - x0, y1 - y0) / 2.0 - inset >= MIN_RADIUS_M:
         ring = _ring(x0 + inset, x1 - inset, y0 + inset, y1 - inset)
         found.append(ring if len(found) % 2 == 0 else _reversed(ring))
         inset += RING_STEP_M
@@ -228,7 +228,7 @@ def rings(floor: Floor) -> list[Polyline]:
 
 def _ring(x0: float, x1: float, y0: float, y1: float) -> Polyline:
     """Return a rectangle with rounded corners, counter-clockwise, from its lower side's start."""
-    radius = max(TIGHTEST_M, min(0.45, (min(x1 - x0, y1 - y0)) / 2.0))
+    radius = max(MIN_RADIUS_M, min(0.45, (min(x1 - x0, y1 - y0)) / 2.0))
     across, up = x1 - x0 - 2.0 * radius, y1 - y0 - 2.0 * radius
     corner = Segment(radius_m=radius, angle_rad=math.pi / 2.0)
     segments = []

@@ -15,13 +15,13 @@ import numpy as np
 
 from scm.clock import NS_PER_S, seconds
 
-SPAN_NS = 5 * NS_PER_S
+SPAN_NS = 5 * NS_PER_S  # of which the quickest frame counts
 SPANS, SPANS_RECENT, SPANS_LEAST = 60, 6, 12
-JUMP_NS = NS_PER_S // 2
-LATE_NS = NS_PER_S // 2
-DRIFT_LARGEST = 1e-3
-DRIFT_ODD = 2e-4
-HOLD_NS = 2 * NS_PER_S
+JUMP_NS = NS_PER_S // 2  # a camera clock that steps back by more has jumped
+MAX_LATE_NS = NS_PER_S // 2  # frames later than usual are reported
+MAX_DRIFT = 1e-3  # of a crystal; more is a jump
+REPORTED_DRIFT = 2e-4
+REPORT_JUMP_NS = 2 * NS_PER_S  # for which a jump is reported
 
 
 class CameraClock:
@@ -62,11 +62,11 @@ class CameraClock:
     def trouble(self, now_ns: int) -> list[str]:
         """Return what is wrong with the camera's time stamps, in words."""
         text = []
-        if self._jump is not None and now_ns - self._jump[0] < HOLD_NS:
+        if self._jump is not None and now_ns - self._jump[0] < REPORT_JUMP_NS:
             text.append(self._jump[1])
-        if self._late_ns > LATE_NS:
+        if self._late_ns > MAX_LATE_NS:
             text.append(f"frames come {seconds(self._late_ns):.1f} s later than the quickest")
-        if abs(self.drift) > DRIFT_ODD:
+        if abs(self.drift) > REPORTED_DRIFT:
             how = "slow" if self.drift > 0.0 else "fast"
             text.append(f"the camera's clock runs {abs(self.drift) * 1e6:.0f} ppm {how}")
         return text
@@ -94,7 +94,7 @@ class CameraClock:
         d = np.array([d_ns - first_difference_ns for _, d_ns in self._spans], dtype=float)
         i, j = np.triu_indices(len(t), 1)
         slope = float(np.median((d[j] - d[i]) / (t[j] - t[i])))
-        return min(max(slope, -DRIFT_LARGEST), DRIFT_LARGEST)
+        return min(max(slope, -MAX_DRIFT), MAX_DRIFT)
 
     def _offset_ns(self, now_ns: int) -> int:
         recent = list(self._spans)[-SPANS_RECENT:]

@@ -17,11 +17,11 @@ from scm.eye.sources.device import (
     open_usb,
 )
 from scm.eye.sources.file import FileSource
-from scm.eye.sources.folder import RATE_HZ, FolderSource
+from scm.eye.sources.folder import DEFAULT_RATE_HZ, FolderSource
 from scm.eye.sources.live import LiveSource
 from scm.eye.sources.mjpeg import MjpegCapture
 
-LONGEST_DELAY_S = 10.0
+MAX_DELAY_S = 10.0
 FORMS = (
     "0 or /dev/video0 (USB), csi:0, rtsp://..., http://... (MJPEG), "
     "a film, a picture, a folder of pictures, bus:CAMERA"
@@ -49,8 +49,8 @@ def source_of(
         EyeError: It names no possible source.
         MessageError: `bus:` with a name that is not valid in a key.
     """
-    if not 0.0 <= delay_s < LONGEST_DELAY_S:
-        longest = round(LONGEST_DELAY_S * 1e3)
+    if not 0.0 <= delay_s < MAX_DELAY_S:
+        longest = round(MAX_DELAY_S * 1e3)
         raise EyeError(f"--delay-ms: expected 0 to {longest}, got {delay_s * 1e3:g}")
     live = _live(text, size_px, rate_hz, delay_s)
     if live is not None:
@@ -59,7 +59,7 @@ def source_of(
         return BusSource(text.removeprefix("bus:"), delay_s)
     path = Path(text)
     if text and path.is_dir():
-        return FolderSource(path, RATE_HZ if rate_hz is None else rate_hz, loop)
+        return FolderSource(path, DEFAULT_RATE_HZ if rate_hz is None else rate_hz, loop)
     if path.is_file() or (path.suffix and ":" not in text):
         return FileSource(path, loop)
     raise EyeError(f"--frames: expected {FORMS}; got {text!r}")

@@ -15,7 +15,7 @@ from scm.eye.sources.player import Player
 
 STILLS = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff")
 TIMES = "timestamps.csv"
-RATE_HZ = 10.0
+DEFAULT_RATE_HZ = 10.0  # of pictures without times
 _COLUMNS = ("file", "t_s")
 _SECONDS = re.compile(r"(\d+\.\d+)$")
 _EPOCH = re.compile(r"(\d{16}|\d{19})$")
@@ -38,7 +38,7 @@ class FolderSource(Player):
         EyeError: No folder, no pictures, or times that do not ascend; names file and line.
     """
 
-    def __init__(self, path: Path, rate_hz: float = RATE_HZ, loop: bool = False) -> None:
+    def __init__(self, path: Path, rate_hz: float = DEFAULT_RATE_HZ, loop: bool = False) -> None:
         if not path.is_dir():
             raise EyeError(f"{path}: expected a folder of pictures, found none")
         if not (math.isfinite(rate_hz) and rate_hz > 0.0):
@@ -80,7 +80,9 @@ class FolderReel:
         """Go back to the first picture; return how long after the previous first it is [ns]."""
         self._at = 0
         count = len(self._files)
-        mean_ns = self._times_ns[-1] // (count - 1) if count > 1 else round(NS_PER_S / RATE_HZ)
+        mean_ns = (
+            self._times_ns[-1] // (count - 1) if count > 1 else round(NS_PER_S / DEFAULT_RATE_HZ)
+        )
         return self._times_ns[-1] + mean_ns
 
     def close(self) -> None:

@@ -13,12 +13,12 @@ from scm.eye.sources.capture import Grabbed
 
 STALL_NS = NS_PER_S
 HOLD_NS = NS_PER_S
-AGE_LARGEST_NS = 5 * NS_PER_S
+MAX_AGE_NS = 5 * NS_PER_S  # that a driver may state
 SAMPLE_STEP_PX = 16
 FROZEN_NS = NS_PER_S
 BLACK, BLACK_SHARE = 20, 0.995
 WHITE, WHITE_SHARE = 252, 0.5
-FLAT_LEVELS = 3
+MIN_GREY_RANGE = 3  # of a picture that is not one flat grey
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ def _empty(some: Image) -> str | None:
     white = np.count_nonzero(some >= WHITE) / some.size
     if white > WHITE_SHARE:
         return f"frames are overexposed: {100.0 * white:.0f} % of the picture is white"
-    if int(some.max()) - int(some.min()) < FLAT_LEVELS:
+    if int(some.max()) - int(some.min()) < MIN_GREY_RANGE:
         return f"frames are one flat grey of {int(some.mean())}"
     return None
 
@@ -163,7 +163,7 @@ class FrameMonitor:
         return size == self._size
 
     def _exposed(self, grabbed: Grabbed, arrival_ns: int) -> tuple[int | None, Stamped]:
-        if grabbed.age_ns is not None and 0 <= grabbed.age_ns <= AGE_LARGEST_NS:
+        if grabbed.age_ns is not None and 0 <= grabbed.age_ns <= MAX_AGE_NS:
             return arrival_ns - grabbed.age_ns, "exposed"
         if grabbed.stamp_ns is None:
             return arrival_ns - self._delay_ns, "arrived"

@@ -14,8 +14,8 @@ from scm.eye.sources.capture import Capture, DamagedFrameError
 from scm.eye.sources.frame_monitor import FrameMonitor, Tally
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
-PAUSES_S = (0.5, 5.0)
-CLOSE_S = 3.5
+PAUSES_S = (0.5, 5.0)  # between attempts to open: first, and at most; doubled each time
+CLOSE_TIMEOUT_S = 3.5
 
 
 class LiveSource:
@@ -81,8 +81,8 @@ class LiveSource:
     def close(self) -> None:
         """End the thread and release the camera; safe to call twice.
 
-        Waits for a blocked driver for at most `CLOSE_S`; its thread ends as soon as the driver
-        returns.
+        Waits for a blocked driver for at most `CLOSE_TIMEOUT_S`; its thread ends as soon as the
+        driver returns.
         """
         self._stop.set()
         with self._lock:
@@ -91,7 +91,7 @@ class LiveSource:
                 with suppress(Exception):
                     self._capture.interrupt()
         if self._thread is not None:
-            self._thread.join(CLOSE_S)
+            self._thread.join(CLOSE_TIMEOUT_S)
 
     def _begin(self) -> None:
         if self._thread is None and not self._stop.is_set():

@@ -17,7 +17,7 @@ from scm.errors import EyeError
 from scm.eye.picture import decode_picture
 from scm.eye.sources.capture import DamagedFrameError, Grabbed
 
-TIMEOUT_S = 2.0
+TIMEOUT_S = 2.0  # without a byte
 LONGEST_LINE, MOST_LINES, LARGEST = 65536, 64, 64 * 2**20
 
 

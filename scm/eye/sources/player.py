@@ -8,7 +8,7 @@ from scm.errors import EyeError
 from scm.eye.source import Frame
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
-MAX_SKIPPED = 30
+MAX_SKIPPED = 30  # frames in one read, so that a read stays short
 HOLD_NS = NS_PER_S
 """How long a single unusable picture is reported as a fault."""
 

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.eye.track.motion import OFFSET, STATES, predict, slip_std
+from scm.eye.track.motion import OFFSET_STATES, STATES, predict, slip_std
 from scm.eye.track.sighting import ROOF_TAG_SIZE, Sighting
 
 KINDS = ("duplicate", "disagree", "wrong_id", "jumped", ROOF_TAG_SIZE)
 """Temporary flags of a track."""
-FIRST_SPEED_MPS = 2.0
-FIRST_TURN_RAD_S = 2.0
+FIRST_SPEED_STD_MPS = 2.0  # of a new track
+FIRST_YAW_RATE_STD_RADPS = 2.0  # of a new track
 
 
 def _none(*shape: int) -> Floats:
@@ -46,8 +46,8 @@ class Fleet:
     cameras: tuple[str, ...] = ()
     mean: Floats = field(default_factory=lambda: _none(0, STATES))
     covariance: Floats = field(default_factory=lambda: _none(0, STATES, STATES))
-    shared: Floats = field(default_factory=lambda: _none(0, 0, OFFSET, OFFSET))
-    common_mode: Floats = field(default_factory=lambda: _none(0, OFFSET, OFFSET))
+    shared: Floats = field(default_factory=lambda: _none(0, 0, OFFSET_STATES, OFFSET_STATES))
+    common_mode: Floats = field(default_factory=lambda: _none(0, OFFSET_STATES, OFFSET_STATES))
     t_ns: Ints = field(default_factory=lambda: _counts(0))
     seen_ns: Ints = field(default_factory=lambda: _counts(0, 0))
     count: Ints = field(default_factory=lambda: _counts(0))
@@ -64,7 +64,7 @@ class Fleet:
 
     def place(self, camera: int) -> slice:
         """Return the slice of a camera's offset in the states."""
-        return slice(STATES + OFFSET * camera, STATES + OFFSET * (camera + 1))
+        return slice(STATES + OFFSET_STATES * camera, STATES + OFFSET_STATES * (camera + 1))
 
     def with_camera(self, camera: str, flags: tuple[str, ...]) -> "Fleet":
         """Return it with states for a camera's offset, and with the camera's present flags."""
@@ -73,12 +73,12 @@ class Fleet:
             if self.flags[index] == flags:
                 return self
             return replace(self, flags=(*self.flags[:index], flags, *self.flags[index + 1 :]))
-        more = ((0, 0), (0, OFFSET))
+        more = ((0, 0), (0, OFFSET_STATES))
         return replace(
             self,
             cameras=(*self.cameras, camera),
             mean=np.pad(self.mean, more),
-            covariance=np.pad(self.covariance, ((0, 0), (0, OFFSET), (0, OFFSET))),
+            covariance=np.pad(self.covariance, ((0, 0), (0, OFFSET_STATES), (0, OFFSET_STATES))),
             shared=np.pad(self.shared, ((0, 0), (0, 1), (0, 0), (0, 0))),
             seen_ns=np.pad(self.seen_ns, ((0, 0), (0, 1))),
             flags=(*self.flags, flags),
@@ -123,6 +123,6 @@ def first_covariance(pose: Floats) -> Floats:
     """Return the covariance of a car seen for the first time, (6, 6), from its pose's (3, 3)."""
     covariance = np.zeros((STATES, STATES))
     covariance[:3, :3] = pose
-    slip = float(slip_std(np.array([FIRST_SPEED_MPS]))[0])
-    covariance[3:, 3:] = np.diag([FIRST_SPEED_MPS, slip, FIRST_TURN_RAD_S]) ** 2
+    slip = float(slip_std(np.array([FIRST_SPEED_STD_MPS]))[0])
+    covariance[3:, 3:] = np.diag([FIRST_SPEED_STD_MPS, slip, FIRST_YAW_RATE_STD_RADPS]) ** 2
     return covariance

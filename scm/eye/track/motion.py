@@ -16,13 +16,13 @@ import numpy as np
 
 from scm.arrays import Floats
 
-STATES = 6
-OFFSET = 3
-SLIP_S = 0.15
+STATES = 6  # x, y, yaw, v, u, yaw rate
+OFFSET_STATES = 3  # x, y, yaw of a camera's common offset
+SLIP_S = 0.15  # correlation time of slip
 ACCEL_S = 0.2
 """Duration of an acceleration: converts its deviation to a density of white noise."""
-OFFSET_M = 1.0
-MAX_PREDICTION_S = 5.0
+OFFSET_M = 1.0  # correlation distance of a camera's offset
+MAX_PREDICTION_S = 5.0  # a track is dropped then
 
 
 def predict(mean: Floats, covariance: Floats, shared: Floats, dt: Floats) -> tuple[Floats, Floats]:
@@ -62,7 +62,7 @@ def predict(mean: Floats, covariance: Floats, shared: Floats, dt: Floats) -> tup
     _add_process_noise(grown, v, dt, c, s)
     changed = (1.0 - held**2)[:, None, None]
     for camera in range(shared.shape[1]):
-        place = slice(STATES + OFFSET * camera, STATES + OFFSET * (camera + 1))
+        place = slice(STATES + OFFSET_STATES * camera, STATES + OFFSET_STATES * (camera + 1))
         grown[:, place, place] += changed * shared[:, camera]
     return moved, grown
 

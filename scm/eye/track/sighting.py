@@ -11,8 +11,8 @@ from scm.scenery.tags import TAG_COUNT
 
 ROOF_TAG_SIZE = "roof_tag_size"
 """Flag of a sighting whose tag has another size than in its car file, and of its track."""
-FARTHEST_M = 1e4
-LARGEST_STD = 100.0
+MAX_POSITION_M = 1e4  # beyond: a broken sighting
+MAX_STD = 100.0
 LEAST_STD = 1e-6
 """Minimum of a sighting's own noise, [m] and [rad]: below it, differing ones contradict."""
 
@@ -60,8 +60,8 @@ def usable(sightings: Sequence[Sighting]) -> Bools:
     with np.errstate(invalid="ignore", over="ignore"):
         components = np.array([one.components() for one in sightings])
         components = (components + components.swapaxes(2, 3)) / 2.0
-    good = np.isfinite(poses).all(axis=1) & (np.abs(poses) < FARTHEST_M).all(axis=1)
-    good &= (np.abs(components) < LARGEST_STD**2).all(axis=(1, 2, 3))
+    good = np.isfinite(poses).all(axis=1) & (np.abs(poses) < MAX_POSITION_M).all(axis=1)
+    good &= (np.abs(components) < MAX_STD**2).all(axis=(1, 2, 3))
     good &= np.array([0 <= one.tag_id < TAG_COUNT for one in sightings])
     least = np.linalg.eigvalsh(np.where(good[:, None, None, None], components, 0.0))[..., 0]
     return np.asarray(good & (least > (LEAST_STD**2, -(LEAST_STD**2), -(LEAST_STD**2))).all(axis=1))

@@ -17,13 +17,13 @@ from scm.eye.track.sighting import Sighting, Track, usable
 from scm.eye.track.update import updated
 from scm.geometry import wrap_angle
 
-STALE_NS = NS_PER_S // 2
-DROPPED_NS = 5 * NS_PER_S
+STALE_NS = NS_PER_S // 2  # without a sighting a track is stale
+MEMORY_NS = 5 * NS_PER_S  # of a track without a sighting
 LATE_NS = 300 * NS_PER_MS
 """Maximum delay of a network camera's frames; older ones are refused."""
 AHEAD_NS = 50 * NS_PER_MS
 """Frames further in the future have a wrong clock."""
-SURE_COUNT = 3
+MIN_SIGHTINGS = 3  # of a track that is not tentative
 MAX_CAMERAS, MAX_CARS, MAX_PENDING = 8, 1000, 2000
 OVERLAP_M = 0.05
 """Minimum distance of two cars' rear axles."""
@@ -83,7 +83,7 @@ class Tracks:
         """Return every track at a time, also of cars out of view."""
         self._process_pending()
         fleet = self._fleet()
-        rows = np.flatnonzero(fleet.t_ns >= t_ns - DROPPED_NS)
+        rows = np.flatnonzero(fleet.t_ns >= t_ns - MEMORY_NS)
         if not len(rows):
             return ()
         times = np.full(len(rows), t_ns)
@@ -99,7 +99,7 @@ class Tracks:
     def _is_ours(self, one: Sighting, now_ns: int) -> bool:
         """Return whether a sighting is recent, and of one of our cameras."""
         ours = self._cameras is None or one.camera in self._cameras
-        return ours and now_ns - DROPPED_NS <= one.t_ns <= now_ns + AHEAD_NS
+        return ours and now_ns - MEMORY_NS <= one.t_ns <= now_ns + AHEAD_NS
 
     def _with_room(self, frame: tuple[Sighting, ...]) -> tuple[Sighting, ...]:
         """Return the sightings of a frame of known cars, and of new ones while there is room."""
@@ -128,7 +128,7 @@ class Tracks:
         if not self._recent:
             return
         newest, seen, fleet = self._recent[-1]
-        self._recent[-1] = newest, seen, fleet.without(now_ns - DROPPED_NS)
+        self._recent[-1] = newest, seen, fleet.without(now_ns - MEMORY_NS)
         old = sum(one[0] < newest - LATE_NS for one in self._recent)
         if old:
             self._before = self._recent[old - 1][2]
@@ -156,7 +156,7 @@ def _track(
         if until >= t_ns
     }
     flags.update(flag for index in cameras for flag in fleet.flags[index])
-    if fleet.count[row] < SURE_COUNT:
+    if fleet.count[row] < MIN_SIGHTINGS:
         flags.add("tentative")
     if vehicle == f"tag-{tag_id}":
         flags.add("unknown")

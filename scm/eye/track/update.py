@@ -24,12 +24,12 @@ from scm.eye.track.sighting import ROOF_TAG_SIZE, Sighting
 
 GATE = 30.0
 """Squared Mahalanobis distance of three values, exceeded by noise once in a million."""
-MIN_AGREEING = 3
-OUTLIER_NS = NS_PER_S // 2
+MIN_AGREEING = 3  # outliers in a row at one place: the car was moved
+MAX_OUTLIER_GAP_NS = NS_PER_S // 2  # between two of them
 NEAR_M, FASTEST_MPS = 0.03, 4.5
 APART_M = 0.1
 """Outliers nearer than this are another camera's estimate, not another car."""
-FLAG_NS = 2 * NS_PER_S
+FLAG_NS = 2 * NS_PER_S  # for which a flag stays
 STILL_M = 0.001
 """A tag that moves less between frames has nearly the same corner errors again."""
 
@@ -147,7 +147,7 @@ def _joins(fleet: Fleet, rows: Ints, camera: int, times: Ints) -> Bools:
     cameras would be slightly better, but a jump. It counts fully once the car has moved on.
     """
     ago = times[:, None] - fleet.seen_ns[rows]
-    sees = (fleet.seen_ns[rows] > 0) & (ago < OUTLIER_NS)
+    sees = (fleet.seen_ns[rows] > 0) & (ago < MAX_OUTLIER_GAP_NS)
     mine = sees[:, camera].copy()
     sees[:, camera] = False
     return np.asarray(sees.any(axis=1) & ~mine, dtype=np.bool_)
@@ -175,7 +175,7 @@ def _put_aside(fleet: Fleet, rows: Ints, frame: list[Sighting], fits: Bools) -> 
         span = one.t_ns - last_ns
         reach = NEAR_M + FASTEST_MPS * abs(span) * 1e-9
         near = math.dist(one.pose[:2], fleet.outlier_pose[row, :2]) < reach
-        if count and span < OUTLIER_NS and near:
+        if count and span < MAX_OUTLIER_GAP_NS and near:
             fleet.outlier[row, :2] = one.t_ns, count + 1
         else:
             fleet.outlier[row] = one.t_ns, 1, 0

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.errors import DemandError, nearest
-from scm.maps.route import MOST_PASSES, Roads
+from scm.maps.route import MAX_PASSES, Roads
 from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, Subscription
 from scm.traffic.demand.table import Flow, departures
@@ -240,8 +240,8 @@ class Ways:
         if not entries:
             raise DemandError(f"{where}: from: {flow.start!r} has no spawn place to enter at")
         route = self._quickest(entries, goals)
-        if route is None or len(route) > MOST_PASSES:
-            what = "no way" if route is None else f"a way of over {MOST_PASSES} lanes"
+        if route is None or len(route) > MAX_PASSES:
+            what = "no way" if route is None else f"a way of over {MAX_PASSES} lanes"
             via = f" by {', '.join(map(repr, flow.via))}" if flow.via else ""
             raise DemandError(f"{where}: {what} from {flow.start!r}{via} to {flow.end!r}")
         return entries[route[0]], route

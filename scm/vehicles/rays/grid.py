@@ -16,9 +16,9 @@ from scm.vehicles.jit import array_kernel, kernel_function
 Numbers = NDArray[np.int32]
 
 CELLS_IN_REACH = 24.0
-SMALLEST_M = 0.5
-MOST_CELLS = 4_000_000
-SLACK = 1e-9
+MIN_CELL_M = 0.5
+MAX_CELLS = 4_000_000
+ROUNDING = 1e-9
 
 
 class Window(NamedTuple):
@@ -51,7 +51,7 @@ class Cells(NamedTuple):
 
 def cell_size(farthest: float) -> float:
     """Return the edge of cells that suits a scanner of some reach: a power of two, both in m."""
-    return float(2.0 ** math.ceil(math.log2(max(farthest / CELLS_IN_REACH, SMALLEST_M))))
+    return float(2.0 ** math.ceil(math.log2(max(farthest / CELLS_IN_REACH, MIN_CELL_M))))
 
 
 class WallGrid:
@@ -87,15 +87,15 @@ def window_of(points: Floats, size: float, margin: float = 0.0) -> Window:
     """Return the cells of a size about points (n, 2) and a margin around them [m]."""
     if len(points) == 0:
         return Window(size, 0, 0, 0, 0)
-    low = np.floor((points.min(axis=0) - margin) / size - SLACK).astype(int)
-    high = np.floor((points.max(axis=0) + margin) / size + SLACK).astype(int)
+    low = np.floor((points.min(axis=0) - margin) / size - ROUNDING).astype(int)
+    high = np.floor((points.max(axis=0) + margin) / size + ROUNDING).astype(int)
     ni, nj = (high - low + 1).tolist()
     return Window(size, int(low[0]), int(low[1]), ni, nj)
 
 
 def fits(window: Window) -> bool:
     """Return whether a window has few enough cells to be laid out."""
-    return window.ni * window.nj <= MOST_CELLS
+    return window.ni * window.nj <= MAX_CELLS
 
 
 def _sorted(edges: Floats, faces: int, window: Window) -> Cells:
@@ -135,7 +135,7 @@ def _span(edges: Floats, first: int, last: int, axis: int, size: float) -> tuple
     for face in range(first, last):
         low = min(low, edges[face, axis], edges[face, axis + 2])
         high = max(high, edges[face, axis], edges[face, axis + 2])
-    return math.floor(low / size - SLACK), math.floor(high / size + SLACK)
+    return math.floor(low / size - ROUNDING), math.floor(high / size + ROUNDING)
 
 
 @kernel_function
@@ -148,4 +148,4 @@ def _within(edge: Floats, left: float, right: float, size: float) -> tuple[int, 
         at_left, at_right = y0 + (left - x0) * slope, y0 + (right - x0) * slope
         low = max(low, min(at_left, at_right))
         high = min(high, max(at_left, at_right))
-    return math.floor(low / size - SLACK), math.floor(high / size + SLACK)
+    return math.floor(low / size - ROUNDING), math.floor(high / size + ROUNDING)

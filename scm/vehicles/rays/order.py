@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scm.arrays import Floats
-from scm.vehicles.rays.grid import SLACK, Numbers
+from scm.vehicles.rays.grid import ROUNDING, Numbers
 
 Bits = NDArray[np.uint64]
 
@@ -60,7 +60,7 @@ def order_of(size: float, farthest: float) -> Order:
     start, span = centre + aside.min(axis=0), aside.max(axis=0) - aside.min(axis=0)
     touches = np.maximum(np.abs(i), np.abs(j)) <= 1
     start, span = np.where(touches, 0.0, start), np.where(touches, 2.0 * math.pi, span)
-    lows, highs = np.floor(start / WIDTH - SLACK), np.floor((start + span) / WIDTH + SLACK)
+    lows, highs = np.floor(start / WIDTH - ROUNDING), np.floor((start + span) / WIDTH + ROUNDING)
     sectors = np.array([_bits(int(a), int(b)) for a, b in zip(lows, highs, strict=True)], np.uint64)
     return Order(i.astype(np.int32), j.astype(np.int32), near, sectors)
 
@@ -77,6 +77,6 @@ def _bits(low: int, high: int) -> int:
 @cache
 def sectors_of(step: float, beams: int) -> Sectors:
     """Return the beams of each sector; there may be none."""
-    edges = np.ceil(np.arange(SECTORS + 1) * (WIDTH / step) - SLACK).clip(0, beams)
+    edges = np.ceil(np.arange(SECTORS + 1) * (WIDTH / step) - ROUNDING).clip(0, beams)
     edges[-1] = beams
     return Sectors(edges[:-1].astype(np.int32), edges[1:].astype(np.int32))

@@ -9,7 +9,7 @@ import pytest
 from scm.eye.track.motion import predict
 from scm.eye.track.perception import collective_perception
 from scm.eye.track.sighting import Sighting
-from scm.eye.track.tracks import DROPPED_NS, MAX_CAMERAS, MAX_CARS, Tracks
+from scm.eye.track.tracks import MAX_CAMERAS, MAX_CARS, MEMORY_NS, Tracks
 from scm.geometry import Pose2
 from scm.v2x.message import decode, encode
 from scm.v2x.messages.cpm import CpmTx
@@ -88,7 +88,7 @@ def test_doubt_grows_while_a_car_is_hidden_until_it_is_stale_and_dropped():
     assert stds[0] < stds[1] < stds[2] < 0.1
     assert not only(tracks, last + 499_000_000).stale
     assert only(tracks, last + 501_000_000).stale
-    assert tracks.at(last + DROPPED_NS + 1) == ()
+    assert tracks.at(last + MEMORY_NS + 1) == ()
 
 
 def test_one_cameras_sightings_do_not_average_its_offset_away():

@@ -16,7 +16,7 @@ from scm.maps.conflicts import conflicting_groups
 from scm.maps.load import load_map
 from scm.maps.polyline import extent
 from scm.maps.route import Roads
-from scm.maps.sumo import ERROR_M, LEAST_RADIUS_M, import_sumo
+from scm.maps.sumo import LEAST_RADIUS_M, MAX_FIT_ERROR_M, import_sumo
 from scm.maps.sumo_program import stages_of
 from scm.maps.sumo_read import NetPhase
 from scm.maps.sumo_toml import map_toml
@@ -244,7 +244,7 @@ def test_a_bent_street_stays_close_to_the_network(tmp_path):
     source.write_text(stadium())
     net = made("netconvert", "--opendrive-files", str(source), out=tmp_path / "r.net.xml")
     imported = import_sumo(net)
-    assert imported.error_m < ERROR_M
+    assert imported.error_m < MAX_FIT_ERROR_M
     bend = max(imported.city_map.lanes, key=lambda lane: len(lane.segments))
     turned = sum(length * curvature for length, curvature in map(extent, bend.segments))
     assert abs(turned) > 2.5

@@ -21,7 +21,7 @@ from scm.vehicles.car import Quantity, load_car
 from scm.vehicles.lights import Switches
 from tests.unit.vehicle_agent.test_agent import EPOCH, Desk, command, lease, one, welcome
 from vehicle_agent.bodies import nigel
-from vehicle_agent.bodies.nigel import BODY, LIFTED_M, STALE_NS, NigelBody
+from vehicle_agent.bodies.nigel import BODY, LIFTED_M, MAX_TRACK_AGE_NS, NigelBody
 from vehicle_agent.body import Obeyed, Wiring
 from vehicle_agent.nigel.host import REST, NigelCommand
 from vehicle_agent.nigel.serial_watchdog import WatchdogReport, Written
@@ -89,7 +89,7 @@ def test_a_seen_pose_is_carried_forward_on_its_arc(body):
         (1.0 + radius * math.sin(turned), 0.5 + radius * (1.0 - math.cos(turned)), turned), abs=1e-4
     )
     body.advance(BEGIN_NS + 10**10)
-    assert body.motion().pose.x < 1.0 + 0.2 * STALE_NS / 1e9 + 1e-9
+    assert body.motion().pose.x < 1.0 + 0.2 * MAX_TRACK_AGE_NS / 1e9 + 1e-9
 
 
 def test_the_charge_of_a_real_battery_is_estimated_from_its_voltage(body):

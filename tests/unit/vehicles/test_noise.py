@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
 from scm.vehicles.noise import bases_of, key_of, normals, uniforms
-from scm.vehicles.sensor_noise import LONGEST_S, wander
+from scm.vehicles.sensor_noise import MAX_WALK_S, wander
 
 COUNT = 400_000
 
@@ -76,5 +76,5 @@ def test_a_walk_has_independent_steps_of_one():
 def test_a_walk_begins_at_nought_and_goes_on_for_days():
     keys = np.array([key_of(1, str(i)) for i in range(2000)])
     assert_array_equal(wander(keys, np.zeros(2000, np.int64), 1), 0.0)
-    far = wander(keys, np.full(2000, LONGEST_S - 1), 1)
-    assert np.std(far) == pytest.approx(np.sqrt(LONGEST_S), rel=0.08)
+    far = wander(keys, np.full(2000, MAX_WALK_S - 1), 1)
+    assert np.std(far) == pytest.approx(np.sqrt(MAX_WALK_S), rel=0.08)
