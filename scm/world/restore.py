@@ -13,7 +13,7 @@ from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.store.records import CarRecord, EpochRecord, StopRecord, record, records
 from scm.store.repository import Repository
-from scm.v2x.exchange import PersistedState, Outgoing
+from scm.v2x.exchange import Outgoing, PersistedState
 from scm.world.alerts import NAME, city_event
 from scm.world.cars import lease_record
 from scm.world.driving import hand_over

@@ -17,7 +17,7 @@ from scm.maps.route import Roads
 from scm.maps.segments import wall_segments
 from scm.maps.vehicle_tags import bound_tag, reserved_tags
 from scm.records.city_map import CityMap
-from scm.v2x.exchange import PersistedState, Outgoing
+from scm.v2x.exchange import Outgoing, PersistedState
 from scm.v2x.messages.city_stop import CityStop
 from scm.vehicles.bank import Bank
 from scm.vehicles.car import car_names as all_car_names
