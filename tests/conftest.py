@@ -24,7 +24,6 @@ os.environ["SCM_CARS"] = ""  # no car files of whoever runs the tests
 AT_ANY_PACE = {
     f"tests/e2e/{name}.py"
     for name in (
-        "pages/test_mismatch_page",
         "pages/test_recordings_page",
         "pages/test_shell",
         "pages/test_signals_of_a_town",

@@ -21,12 +21,6 @@ CHANNELS = "    channels: {command.throttle: {column: u}, pose.x: {column: x, un
 
 
 @pytest.fixture(scope="module")
-def running(town_city):
-    """The city in lockstep: nothing here is bound to real time."""
-    return town_city
-
-
-@pytest.fixture(scope="module")
 def reports(running):
     """The folder of reports, with some in it."""
     with made_reports(running.folder / "reports") as folder:
@@ -152,6 +146,7 @@ def test_a_recording_of_ones_own_is_sent_and_searched(visit, reports, running, t
     page.wait_for_selector(".jobs li:has-text('short-drive')")
 
     def report():
+        running.hasten()
         rows = running.get("/mismatch/reports")["items"]
         return next((row for row in rows if row["name"].startswith("short-drive")), None)
 
@@ -167,6 +162,7 @@ def test_a_recording_of_ones_own_is_sent_and_searched(visit, reports, running, t
 
 def test_a_real_search_ends_in_a_report_that_can_be_read(visit, reports, running, searching):
     def ended():
+        running.hasten()
         row = running.get(f"/operations/{searching}")
         return row if row["state"] not in ("waiting", "running") else None
 
