@@ -52,7 +52,7 @@ export function requestFor(what, group) {
 }
 
 export function Overrides({ current }) {
-  const held = status()?.overrides ?? [];
+  const held = status()?.wishes ?? [];
   return html`
     <section class="panel overrides" aria-label="Overrides">
       <div class="panel-head">
