@@ -61,7 +61,7 @@ function Row({ row }) {
         <a href=${path}>${row.title || row.name}</a>
         ${row.title && html`<small>${row.name}</small>`}
         <small class="slim">${row.begin_ns && `${began} · `}${counted(row.cars)} · ${size(row.size_bytes)}</small>
-        ${row.form-error && html`<small class="why">${coded(row.form-error)}</small>`}
+        ${row.trouble && html`<small class="why">${coded(row.trouble)}</small>`}
         ${row.notes && html`<small class="note">${row.notes}</small>`}
       </td>
       <td class="wide">${began}</td>

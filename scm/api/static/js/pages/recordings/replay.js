@@ -137,7 +137,7 @@ function Banner({ recording, map }) {
         <h2>${recording.title || recording.name}</h2>
         <p>${facts.join(" · ")}</p>
         <p class="hint">The bar above shows the city now; everything below is recorded.</p>
-        ${recording.form-error && html`<p>${recording.form-error}</p>`}
+        ${recording.trouble && html`<p>${recording.trouble}</p>`}
         ${recording.notes && html`<p>“${recording.notes}”</p>`}
       </div>
       <div class="tools">
