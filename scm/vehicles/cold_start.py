@@ -20,7 +20,7 @@ from scm.vehicles.jit import version_folder
 
 Job = Callable[[], object]
 
-_TYPICAL_S = 26  # on two idle cores of a slow computer
+_TYPICAL_S = 30  # on two idle cores of a slow computer
 _LOG = logging.getLogger(__name__)
 
 
