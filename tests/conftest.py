@@ -21,12 +21,18 @@ SHARED = ROOT.parent / "shared"
 
 os.environ["SCM_CARS"] = ""  # no car files of whoever runs the tests
 
+PAGES = "tests/e2e/pages/"
 AT_ANY_PACE = {
     f"tests/e2e/{name}.py"
     for name in (
+        "pages/test_cars_page",
+        "pages/test_events_page",
+        "pages/test_eye_page",
+        "pages/test_map_page",
         "pages/test_recordings_page",
         "pages/test_shell",
         "pages/test_signals_of_a_town",
+        "pages/test_signals_page",
         "test_first_car",
         "test_mismatch_report",
         "test_own_car_example",
@@ -109,13 +115,16 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Let one process run all tests that are bound to real time, and one all of any other file.
 
     The first mostly wait for cities, two of which would starve each other; the others stay
-    together for what they share.
+    together for what they share, as pages share a city and a browser.
     """
     from xdist.scheduler import LoadScopeScheduling
 
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return "tests/e2e" if is_bound_to_real_time(nodeid) else nodeid.partition("::")[0]
+            path = nodeid.partition("::")[0]
+            if is_bound_to_real_time(nodeid):
+                return "tests/e2e"
+            return PAGES if path.startswith(PAGES) else path
 
     return ByFile(config, log)
 

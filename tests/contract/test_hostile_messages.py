@@ -60,6 +60,7 @@ SENT = [
 
 def extreme(of, name, turn):
     """Return the `turn`-th value for a field, through all its ends and in another order each."""
+    of = of.type if isinstance(of, inspect.Metadata) else of
     if name in PLACES and isinstance(of, inspect.StrType):
         return PLACES[name][turn % len(PLACES[name])]
     return MAKERS[type(of)](of, turn)
@@ -85,7 +86,6 @@ MAKERS = {
     inspect.StrType: words,
     inspect.BytesType: lambda *_: b"\xff",
     inspect.NoneType: lambda *_: None,
-    inspect.Metadata: lambda of, turn: extreme(of.type, "", turn),
     inspect.LiteralType: lambda of, turn: of.values[turn % len(of.values)],
     inspect.UnionType: lambda of, turn: extreme(of.types[turn % len(of.types)], "", turn),
     inspect.StructType: lambda of, turn: fields(of.cls, turn),

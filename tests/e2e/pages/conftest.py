@@ -1,10 +1,11 @@
 """A whole city, and a real browser that looks at its pages.
 
-`running` is a city as a user starts it. Tests that nothing binds to real time (no process that is
-killed, no bus, no hands at a wheel) look at `town_city` instead, the same in lockstep: it takes a
-third of the time, and slows down where the machine is busy; `tests/conftest.py` lists their files.
-One city serves all tests that one process runs: each leaves it as it found it (no stop engaged,
-cars of its own taken off). Set SCM_PICTURES to a folder to keep what `look` photographs.
+`running` is a city in lockstep, with all its parts: it takes a third of the time of a real one, and
+slows down where the machine is busy. Files whose tests need processes, a bus or real time (a part
+is killed, hands drive a car) take the city as a user starts it, `live_city`, for `running`;
+`tests/conftest.py` lists the others. One city serves all tests that one process runs: each leaves
+it as it found it (no stop engaged, cars of its own removed).
+Set SCM_PICTURES to a folder to keep what `look` photographs.
 """
 
 import os
@@ -25,7 +26,7 @@ CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 ARGUMENTS = [
     "--no-sandbox",
     "--disable-gpu",
-    "--in-process-gpu",  # it paints in software: a process of its own would only be told all twice
+    "--in-process-gpu",  # it paints in software: a process of its own would copy everything
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
@@ -59,7 +60,7 @@ def slow_eye(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.fixture(scope="package")
-def running(slow_eye: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
+def live_city(slow_eye: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
     """`scm up driving_school`: four hosted cars, two agents, signals, Eye and recorder."""
     with city(tmp_path_factory.mktemp("pages"), city_map=slow_eye) as process:
         wait_for(lambda: len(process.get("/vehicles")["vehicles"]) == 6, 90.0, "six cars are there")
@@ -67,8 +68,8 @@ def running(slow_eye: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator
 
 
 @pytest.fixture(scope="package")
-def town_city(slow_eye: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Town]:
-    """The same in lockstep, with all parts."""
+def running(slow_eye: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Town]:
+    """The same in lockstep."""
     with town(slow_eye, tmp_path_factory.mktemp("town"), cars=4, whole=True) as process:
         assert len(process.get("/vehicles")["vehicles"]) == 6
         yield process

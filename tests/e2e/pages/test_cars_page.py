@@ -8,6 +8,14 @@ MADE = ".new-car .above"
 COMPILING_MS = 120_000  # the first car of a file
 
 
+@pytest.fixture(scope="module", autouse=True)
+def own_cars(tmp_path_factory):
+    """Give the city a folder for people's car files."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SCM_CARS", str(tmp_path_factory.mktemp("cars")))
+        yield
+
+
 @pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_the_page_lists_car_files_and_draws_the_new_one(look, size, theme):
     page = look("/cars", "cars", size, theme, ready=MADE).page

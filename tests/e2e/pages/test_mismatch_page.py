@@ -21,6 +21,12 @@ CHANNELS = "    channels: {command.throttle: {column: u}, pose.x: {column: x, un
 
 
 @pytest.fixture(scope="module")
+def running(live_city):
+    """The city as a user starts it: its searches get a city's priority."""
+    return live_city
+
+
+@pytest.fixture(scope="module")
 def reports(running):
     """The folder of reports, with some in it."""
     with made_reports(running.folder / "reports") as folder:

@@ -1,7 +1,15 @@
 """Parts of a real city fall silent, die and come back: what its pages say of it."""
 
+import pytest
+
 from tests.e2e.city_process import wait_for
 from tests.e2e.pages.visiting import judge, photograph
+
+
+@pytest.fixture(scope="module")
+def running(live_city):
+    """The city as a user starts it: its parts are killed."""
+    return live_city
 
 
 def release(running):

@@ -32,12 +32,6 @@ IN_REACH = """words => {
 SCRIPT = '"""Say a word."""\nimport time\nprint("a word", flush=True)\ntime.sleep(60)\n'
 
 
-@pytest.fixture(scope="module")
-def running(town_city):
-    """The city in lockstep: nothing here is bound to real time."""
-    return town_city
-
-
 def judge_everywhere(visited, name):
     """Judge and photograph a page in every size and theme; it is left wide and light."""
     for size in reversed(SIZES):

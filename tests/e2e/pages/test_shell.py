@@ -10,12 +10,6 @@ from tests.e2e.pages.visiting import Visit, judge
 PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
 
 
-@pytest.fixture(scope="module")
-def running(town_city):
-    """The city in lockstep: nothing here is bound to real time."""
-    return town_city
-
-
 def release(running):
     """Let the city drive again."""
     running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()

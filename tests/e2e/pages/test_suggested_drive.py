@@ -7,6 +7,12 @@ from tests.e2e.pages.visiting import judge
 
 
 @pytest.fixture(scope="module")
+def running(live_city):
+    """The city as a user starts it: a program drives its car over the bus."""
+    return live_city
+
+
+@pytest.fixture(scope="module")
 def reports(running):
     """The folder of reports, one of which asks for a drive."""
     with made_reports(running.folder / "reports", "undecided") as folder:

@@ -25,6 +25,12 @@ navigator.getGamepads = () => [window.gamepad];
 """
 
 
+@pytest.fixture(scope="module")
+def running(live_city):
+    """The city as a user starts it: hands drive its cars."""
+    return live_city
+
+
 def row(running, name=CAR):
     return running.get(f"/vehicles/{name}")
 

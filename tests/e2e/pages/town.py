@@ -17,6 +17,7 @@ from scm.api.app import create_app
 from scm.api.based import Site
 from scm.api.folders import folders_in
 from scm.api.server import serve
+from scm.api.trace import traced
 from scm.api.view import CityView
 from scm.camera.part import CameraPart
 from scm.clock import nanoseconds
@@ -121,7 +122,7 @@ class Town:
 
     def _ask(self, request: Request, timeout_s: float) -> Message:
         with self._lock:
-            return self.city.call(request, timeout_s)
+            return self.city.call(traced(request), timeout_s)
 
     def _drive(self) -> None:
         due_s = time.monotonic()

@@ -129,7 +129,7 @@ def test_a_topic_that_is_too_large_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = write_bag(tmp_path / "drive.bag")
-    monkeypatch.setattr(limits, "LARGEST_BYTES", 200)
+    monkeypatch.setattr(limits, "MAX_BYTES", 200)
     with pytest.raises(RecordingError, match=r"topic '/odom' holds more than .* split it"):
         read_table(file, "/odom")
     assert read_table(file, "/said", ["data"]).rows == ROWS, "another topic is small enough"

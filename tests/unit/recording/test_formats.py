@@ -160,9 +160,9 @@ def test_a_large_parquet_file_is_refused_by_what_is_asked_of_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = write_parquet(tmp_path, t=np.zeros(500), picture=[b"x" * 10**5] + [b""] * 499)
-    monkeypatch.setattr(limits, "LARGEST_BYTES", 4100)
+    monkeypatch.setattr(limits, "MAX_BYTES", 4100)
     assert read_table(file, None, ["t"]).rows == 500
-    monkeypatch.setattr(limits, "LARGEST_BYTES", 3900)  # some bytes in the file: all are zero
+    monkeypatch.setattr(limits, "MAX_BYTES", 3900)  # some bytes in the file: all are zero
     with pytest.raises(RecordingError, match="split it"):
         read_table(file, None, ["t"])
 
@@ -315,7 +315,7 @@ def test_a_mat_file_that_is_large_when_unpacked_is_refused(
 ) -> None:
     file = write_mat(tmp_path, t=np.zeros(100_000))
     assert file.stat().st_size < 2000
-    monkeypatch.setattr(limits, "LARGEST_BYTES", 700_000)
+    monkeypatch.setattr(limits, "MAX_BYTES", 700_000)
     with pytest.raises(RecordingError, match="split it"):
         read_table(file, None, ["t"])
 

@@ -82,7 +82,7 @@ def test_a_folder_is_no_table(tmp_path: Path) -> None:
 def test_a_file_that_is_too_large_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(limits, "LARGEST_BYTES", 8)
+    monkeypatch.setattr(limits, "MAX_BYTES", 8)
     with pytest.raises(RecordingError, match="split it"):
         columns(tmp_path, PLAIN)
     np.savez(tmp_path / "large.npz", t=np.zeros(9))

@@ -92,7 +92,7 @@ def test_a_car_of_an_agent_is_judged_by_its_own_throttle_and_place(city):
 
     for seq in range(1, 60):
         city.run(5, report(seq, 1.0 + 0.2 * MOVED_M * (seq % 2)))
-    assert told(city) == ["n7 is stuck: it is told to drive, touches nothing and stays"]
+    assert told(city) == ["n7 is stuck: it is commanded to drive, touches nothing and stays"]
     assert city.shown("n7").stuck == ()
     city.run(15, report(60, 1.0 + 2 * MOVED_M))
     assert told(city)[1:] == ["n7 is free again"]
