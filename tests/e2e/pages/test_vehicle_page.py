@@ -394,7 +394,7 @@ def test_a_second_taker_is_told_who_has_it_and_takes_it_only_with_a_reason(visit
     second = visit(f"/vehicles/{CAR}")
     page = second.page
     page.wait_for_selector(".steal")
-    assert page.locator("text=Take over").count() == 0
+    assert page.get_by_text("Take over", exact=True).count() == 0
     lease = running.get(f"/leases/{CAR}")
     refused = running.web.post(f"/leases/{CAR}", json={"program": "lane_keeper"})
     assert (refused.status_code, refused.json()["code"]) == (409, "owned")
