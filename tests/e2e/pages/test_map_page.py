@@ -220,9 +220,12 @@ def test_names_of_lanes_junctions_and_places_are_a_layer(visit):
     visited.until(lambda: 3 <= page.evaluate(names) < 11, "a small map shows what has room")
     photograph(visited, "map_names_narrow_dark")
     page.focus(".sheet")
-    for _ in range(6):
+
+    def is_close():
         page.keyboard.press("+")
-    visited.until(lambda: page.evaluate(names) < 3, "only names that are in sight are drawn")
+        return page.evaluate(names) < 3
+
+    visited.until(is_close, "only names that are in sight are drawn")
     assert visited.complaints == []
 
 

@@ -422,7 +422,7 @@ def test_of_too_many_cars_for_one_answer_fewer_pictures_a_second_are_read(visit,
     page.wait_for_selector(READY)
     page.click("button.play")
     page.wait_for_timeout(500)
-    page.unroute("**/frames?*")
+    page.unroute_all(behavior="wait")
     assert [hz for from_s, hz in asked if from_s == asked[0][0]] == [10.0, 5.0, 2.5]
     assert len(set(asked)) == len(asked)
 
