@@ -6,7 +6,7 @@
     @routes.get("/{name}.mcap", summary="Download", responses=answer_file("application/mcap"))
 
 A record's docstring becomes its description and the lines below `Attributes:` those of its fields;
-what they leave out is said by the field's type, as in `scm.records.fields`.
+what they leave out stands in the field's type, as in `scm.records.fields`.
 """
 
 from functools import cache

@@ -319,7 +319,7 @@ def heading_fault(poses: Track, raw: Floats) -> float:
     """Return the factor by which a pose's yaw is wrong against its own direction of travel.
 
     57.3 where degrees were taken for radians, -1 where it turns the other way, 1 where it is right
-    or cannot be told. `raw` is the yaw as it was recorded, at the poses' stamps.
+    or cannot be known. `raw` is the yaw as it was recorded, at the poses' stamps.
     """
     step_s, width_s = max(STEP_S, 0.5 * poses.period_s), max(0.1, 1.5 * poses.period_s)
     on = grid(poses.t[0], poses.t[-1], step_s, width_s, long_gaps(poses.t))

@@ -111,7 +111,7 @@ def collide(
         cars: All cars; their motion changes.
         contacts: The solver.
         impulses: Collects what contacts did.
-        stuck: Is told who touched whom.
+        stuck: Is notified of who touched whom.
         t_ns: The instant.
         is_subscribed: Whether anybody subscribes to `Contact`.
     """
