@@ -132,11 +132,14 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def pytest_collection_finish() -> None:
     """Keep thousands of collected tests out of every later collection of garbage.
 
+    It comes when five thousand objects are new, not 700: tests leave whole applications behind.
+
     Libraries calculate on one thread, as searches and the Eye let them: for small matrices a second
     one only waits, and takes a core for that.
     """
     gc.collect()
     gc.freeze()
+    gc.set_threshold(5_000, 10, 10)
     threadpool_limits(1)
     if "cv2" in sys.modules:
         sys.modules["cv2"].setNumThreads(1)

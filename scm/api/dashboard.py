@@ -70,6 +70,21 @@ class _Place(NamedTuple):
 _STATIC = _Place("/static/{file}")
 
 
+@functools.cache
+def _files_in(folder: Path) -> dict[str, Path]:
+    """Return the files by their address; each is read and compressed."""
+    files = {
+        f"/static/{path.relative_to(folder).as_posix()}": path
+        for path in folder.rglob("*")
+        if path.is_file() and path.suffix != ".html"
+    }
+    for page in PAGES:
+        files.setdefault(f"/static/css/pages/{page}.css", PLAIN)
+    for path in files.values():
+        _file(path, _version(path))
+    return files
+
+
 class Dashboard:
     """ASGI middleware behind the gate: pages and their files; all else is passed on.
 
@@ -82,15 +97,7 @@ class Dashboard:
     def __init__(self, app: ASGIApp, base: str = "") -> None:
         self._app = app
         self._base = base
-        self._files = {
-            f"/static/{path.relative_to(STATIC_DIR).as_posix()}": path
-            for path in STATIC_DIR.rglob("*")
-            if path.is_file() and path.suffix != ".html"
-        }
-        for page in PAGES:
-            self._files.setdefault(f"/static/css/pages/{page}.css", PLAIN)
-        for path in self._files.values():
-            _file(path, _version(path))
+        self._files = _files_in(STATIC_DIR)
         for page in PAGES:
             _page(page, base, _version(INDEX))
 

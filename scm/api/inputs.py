@@ -9,6 +9,7 @@ msgspec decodes it. Each wrong field is named in the problem that the caller get
 import json
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar, get_args
 
 import msgspec
@@ -94,12 +95,16 @@ else:
     class Json:
         """`Json[Record]`: the body."""
 
+        @classmethod
+        @cache
         def __class_getitem__(cls, kind: type[T]) -> Any:
             return Annotated[kind, Depends(JsonInput(kind))]
 
     class FromQuery:
         """`FromQuery[Record]`: the query."""
 
+        @classmethod
+        @cache
         def __class_getitem__(cls, kind: type[T]) -> Any:
             return Annotated[kind, Depends(QueryInput(kind))]
 

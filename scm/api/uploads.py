@@ -5,22 +5,19 @@ those that the city knows, for a car file may bring laws of its own.
 """
 
 import re
-import resource
 import secrets
 import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 import msgspec
-import yaml
 
 from scm.api.problem import DISK_TROUBLE, RefusedError
-from scm.errors import RecordingError
-from scm.recording.description import FILE_NAME, Description, read_description
+from scm.api.upload_reader import MOST_READING_BYTES, MOST_READING_S, Read
+from scm.recording.description import FILE_NAME
 from scm.recording.table import KINDS
 from scm.records.mismatch import Upload
 from scm.runtime.parent_watch import with_parent
@@ -31,8 +28,6 @@ MOST_UNPACKED_BYTES = 512 * 2**20
 MOST_FILES = 200
 MOST_ENTRIES = 10 * MOST_FILES  # folders and what is left out among them
 MOST_DESCRIPTION_BYTES = 256 * 1024
-MOST_NESTED = 20  # each level costs the reader all that follow
-MOST_READING_S, MOST_READING_BYTES = 10, 2**30  # of a description, processor time and memory
 PATIENCE_S = 120.0  # on a busy computer
 MAX_UPLOADS = 20
 ID = r"^[a-z0-9][a-z0-9_-]{0,63}$"
@@ -157,73 +152,17 @@ def _check(folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
         most = MOST_DESCRIPTION_BYTES // 1024
         raise _refused(f"{FILE_NAME}: got {size // 1024} KiB, expected at most {most} KiB")
     words = [str(MOST_READING_S), str(folder), *cars]
-    program = with_parent([sys.executable, "-m", "scm.api.uploads", *words])
+    program = with_parent([sys.executable, "-m", "scm.api.upload_reader", *words])
     reading = subprocess.run(
         program, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=PATIENCE_S
     )
     if reading.returncode != 0:
         limits = f"{MOST_READING_S} s and {MOST_READING_BYTES // 2**20} MiB"
         raise _refused(f"{FILE_NAME}: to read it takes more than {limits}: send a simpler one")
-    read = msgspec.json.decode(reading.stdout, type=_Read)
+    read = msgspec.json.decode(reading.stdout, type=Read)
     if read.refusal:
         raise _refused(read.refusal)
     return read.vehicles
-
-
-class _Read(msgspec.Struct, kw_only=True, frozen=True):
-    """The result of the process that reads a description."""
-
-    vehicles: tuple[str, ...] = ()
-    refusal: str = ""
-
-
-def main(argv: Sequence[str]) -> None:
-    """Read the description in the folder `argv[1]` in at most `argv[0]` s; print a `_Read`."""
-    most_s, folder, cars = int(argv[0]), Path(argv[1]), tuple(argv[2:])
-    resource.setrlimit(resource.RLIMIT_CPU, (most_s, most_s))
-    resource.setrlimit(resource.RLIMIT_AS, (MOST_READING_BYTES, MOST_READING_BYTES))
-    try:
-        _check_nesting(folder / FILE_NAME)
-        read = _Read(vehicles=_vehicles(read_description(folder / FILE_NAME), folder, cars))
-    except RecordingError as cause:
-        read = _Read(refusal=str(cause).replace(f"{folder}/", ""))
-    sys.stdout.buffer.write(msgspec.json.encode(read))
-
-
-def _check_nesting(description: Path) -> None:
-    """Refuse a description that would take minutes to read: deep, or one that unfolds."""
-    depth = 0
-    try:
-        with description.open("rb") as text:
-            for event in yaml.parse(text, Loader=getattr(yaml, "CLoader", yaml.Loader)):
-                if isinstance(event, yaml.AliasEvent):
-                    wanted = "got an alias (*name), expected everything written out"
-                    raise RecordingError(f"{FILE_NAME}: {wanted}")
-                depth += isinstance(event, yaml.CollectionStartEvent)
-                depth -= isinstance(event, yaml.CollectionEndEvent)
-                if depth > MOST_NESTED:
-                    msg = f"{FILE_NAME}: lists within lists, more than {MOST_NESTED} deep"
-                    raise RecordingError(msg)
-    except yaml.YAMLError:
-        return  # its reader reports what is wrong
-
-
-def _vehicles(description: Description, folder: Path, cars: tuple[str, ...]) -> tuple[str, ...]:
-    paths = [table.file for table in description.tables]
-    paths += [table.definitions for table in description.tables if table.definitions is not None]
-    for path in paths:
-        lies = (folder / path).resolve()
-        if not lies.is_relative_to(folder.resolve()) or not lies.exists():
-            raise RecordingError(f"{FILE_NAME}: table {path!r}: no such file in the zip")
-    named = [description.vehicle, *(table.vehicle for table in description.tables)]
-    vehicles = tuple(dict.fromkeys(name for name in named if name))
-    unknown = next((name for name in vehicles if name not in cars), None)
-    if unknown is not None:
-        known = ", ".join(cars)
-        raise RecordingError(
-            f"{FILE_NAME}: vehicle {unknown!r}: expected one of the city's: {known}"
-        )
-    return vehicles
 
 
 def _forget(folder: Path) -> None:
@@ -235,7 +174,3 @@ def _forget(folder: Path) -> None:
 
 def _refused(detail: str) -> RefusedError:
     return RefusedError.of("invalid", f"upload: {detail}")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

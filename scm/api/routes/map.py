@@ -1,5 +1,7 @@
 """The map: as data, and drawn."""
 
+from functools import cache
+
 import msgspec
 from fastapi import APIRouter, Request, Response
 
@@ -18,10 +20,13 @@ class SvgResponse(Response):
 
 
 def router(city: City) -> APIRouter:
-    """Return the routes; both forms are made once, a map does not change while the city runs."""
+    """Return the routes; both forms are made once: a map does not change while the city runs."""
     routes = APIRouter(tags=["map"], dependencies=[VIEWER])
     as_json = msgspec.json.encode(city.city_map)
-    as_svg = draw_svg(city.city_map, movable=False).encode()  # the page draws those live
+
+    @cache
+    def as_svg() -> bytes:
+        return draw_svg(city.city_map, movable=False).encode()  # the page draws what moves
 
     @routes.get("/map", summary="The map as JSON", responses=answer(CityMap))
     async def map_json(request: Request) -> Response:
@@ -33,8 +38,8 @@ def router(city: City) -> APIRouter:
         response_class=SvgResponse,
         responses=answer_file("image/svg+xml", "The drawing, a metre a unit."),
     )
-    async def map_svg(request: Request) -> Response:
-        return _tagged(request, as_svg, "image/svg+xml")
+    def map_svg(request: Request) -> Response:
+        return _tagged(request, as_svg(), "image/svg+xml")
 
     return routes
 

@@ -1,13 +1,15 @@
 """A view that received a little, a city that answers from a list, and a client without sockets."""
 
 import asyncio
+import inspect
 import json
 import threading
-from functools import lru_cache
+from dataclasses import replace
 
 import httpx
 import pytest
-from fastapi.dependencies import utils
+from fastapi import routing
+from fastapi.dependencies import models
 
 from scm.api import openapi
 from scm.api.acknowledgements import Acknowledgements
@@ -66,24 +68,51 @@ class Client:
         return asyncio.run(call())
 
 
+class SameCode(models._CallIdentity):
+    """Tells FastAPI's functions apart by their code: closures of two applications are alike."""
+
+    __slots__ = ("code",)
+
+    def __init__(self, call):
+        super().__init__(call)
+        self.code = [getattr(each, "__code__", each) for each in (call, inspect.unwrap(call))]
+
+    def __hash__(self):
+        return hash(self.code[-1])
+
+    def __eq__(self, other):
+        return isinstance(other, SameCode) and self.code == other.code
+
+
 @pytest.fixture(scope="package", autouse=True)
 def routes_read_once():
-    """Let FastAPI read each route once: hundreds of applications here have the same routes."""
-    analyze = lru_cache(maxsize=1024, typed=True)(utils.analyze_param)
-    read, describe = utils._get_signature, openapi.get_openapi
-    signatures, documents = {}, {}
+    """Let FastAPI read each route once: hundreds of applications here have the same routes.
 
-    def analyze_param(*, path_param_names, **parameter):
-        return analyze(path_param_names=frozenset(path_param_names), **parameter)
+    What it remembers of functions would otherwise keep dozens of applications in memory.
+    """
+    read, describe = routing.get_dependant, openapi.get_openapi
+    read_required = routing.get_parameterless_sub_dependant
+    read_returned = routing.get_typed_return_annotation
+    found, required, returned, documents = {}, {}, {}, {}
 
-    def signature_of(call):
-        code, hints = getattr(call, "__code__", None), getattr(call, "__annotations__", {})
-        if code is None or call.__defaults__ or call.__kwdefaults__ or hasattr(call, "__wrapped__"):
-            return read(call)
-        key = (code, *map(id, hints.values()))
-        if key not in signatures:
-            signatures[key] = read(call), tuple(hints.values())  # which keeps their ids
-        return signatures[key][0]
+    def get_dependant(*, path, call, scope):
+        key = (path, SameCode(call))
+        if key not in found:
+            found[key] = read(path=path, call=call, scope=scope)
+        same = found[key]
+        return replace(same, call=call, dependencies=list(same.dependencies))
+
+    def get_required(*, depends, path):
+        key = (path, id(depends))
+        if key not in required:
+            required[key] = read_required(depends=depends, path=path), depends  # keeps its id
+        return required[key][0]
+
+    def get_returned(call):
+        key = SameCode(call)
+        if key not in returned:
+            returned[key] = read_returned(call)
+        return returned[key]
 
     def get_openapi(*, routes, servers, **words):
         key = repr((servers, len(routes)))
@@ -92,8 +121,10 @@ def routes_read_once():
         return json.loads(documents[key])
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(utils, "analyze_param", analyze_param)
-        patch.setattr(utils, "_get_signature", signature_of)
+        patch.setattr(models, "_CallIdentity", SameCode)
+        patch.setattr(routing, "get_dependant", get_dependant)
+        patch.setattr(routing, "get_parameterless_sub_dependant", get_required)
+        patch.setattr(routing, "get_typed_return_annotation", get_returned)
         patch.setattr(openapi, "get_openapi", get_openapi)
         yield
 

@@ -3,9 +3,11 @@
 import io
 import json
 import os
+import shutil
 import time
 import zipfile
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -60,9 +62,23 @@ def ran(monkeypatch):
     return run
 
 
-def put(folders, name, case="pair"):
-    write_report(*made_up.CASES[case](), folders.reports / name)
-    return folders.reports / name
+@pytest.fixture(scope="module")
+def reports_once():
+    """Folder of reports by case, each written once and then copied."""
+    with TemporaryDirectory() as folder:
+        yield Path(folder)
+
+
+@pytest.fixture
+def put(folders, reports_once):
+    """Put a report among those of the city."""
+
+    def write(name, case="pair"):
+        if not (reports_once / case).exists():
+            write_report(*made_up.CASES[case](), reports_once / case)
+        return Path(shutil.copytree(reports_once / case, folders.reports / name))
+
+    return write
 
 
 def with_drive(folder):
@@ -99,36 +115,36 @@ def test_a_city_without_a_shelf_has_no_reports_and_says_how_to_have_some(client)
     assert "--data" in answer.json()["detail"]
 
 
-def test_reports_are_listed_with_what_they_found(call, folders):
-    put(folders, "monday")
+def test_reports_are_listed_with_what_they_found(call, put):
+    put("monday")
     (row,) = call("GET", f"{API}/reports").json()["items"]
     assert (row["name"], row["verdict"]) == ("monday", "mismatch")
     assert len(row["effects"]) == 2
     assert row["before_m"] > row["after_m"] > 0.0
 
 
-def test_a_search_that_time_cut_short_is_listed_as_such(call, folders):
+def test_a_search_that_time_cut_short_is_listed_as_such(call, put):
     for case in ("none", "cut_short"):
-        put(folders, case.replace("_", "-"), case)
+        put(case.replace("_", "-"), case)
     rows = call("GET", f"{API}/reports").json()["items"]
     assert {row["name"]: row["cut_short"] for row in rows} == {"none": False, "cut-short": True}
     report = call("GET", f"{API}/reports/cut-short").json()["report"]
     assert [question["name"] for question in report["unasked"]] == ["effects", "laws"]
 
 
-def test_the_newest_report_comes_first_and_pages_go_on(call, folders):
+def test_the_newest_report_comes_first_and_pages_go_on(call, put):
     for age, name in enumerate(("new", "middle", "old")):
         at = 1_700_000_000 - age
-        os.utime(put(folders, name, "none") / "report.json", (at, at))
+        os.utime(put(name, "none") / "report.json", (at, at))
     first = call("GET", f"{API}/reports?limit=2").json()
     second = call("GET", f"{API}/reports?limit=2&cursor={first['next']}").json()
     assert [row["name"] for row in first["items"] + second["items"]] == ["new", "middle", "old"]
 
 
-def test_of_several_cars_each_has_its_report(call, folders):
+def test_of_several_cars_each_has_its_report(call, folders, put):
     folder = folders.reports / "fleet"
     for car in ("n1", "n2"):
-        put(folders, f"fleet/{car}", "none")
+        put(f"fleet/{car}", "none")
     told = {"said": "They share a camera.", "conclusions": ["It is tilted."], "common": []}
     (folder / "cars.json").write_text(json.dumps(told), "utf-8")
     names = {row["name"] for row in call("GET", f"{API}/reports").json()["items"]}
@@ -140,16 +156,16 @@ def test_of_several_cars_each_has_its_report(call, folders):
     assert report["together"]["cars"] == ["fleet.n1", "fleet.n2"]
 
 
-def test_a_damaged_report_is_listed_as_such_and_takes_nothing_down(call, folders):
-    folder = put(folders, "monday")
+def test_a_damaged_report_is_listed_as_such_and_takes_nothing_down(call, put):
+    folder = put("monday")
     (folder / "report.json").write_text('{"verdict": 3', "utf-8")
     (row,) = call("GET", f"{API}/reports").json()["items"]
     assert row["verdict"] == "unreadable"
     assert call("GET", f"{API}/reports/monday").status_code == 200
 
 
-def test_a_report_tells_its_fields_what_it_draws_and_its_files(call, folders):
-    with_drive(put(folders, "monday"))
+def test_a_report_tells_its_fields_what_it_draws_and_its_files(call, put):
+    with_drive(put("monday"))
     body = call("GET", f"{API}/reports/monday").json()
     assert body["report"]["effects"][0]["name"] == "drive_lag"
     drawn = body["drawn"]
@@ -168,8 +184,8 @@ def test_a_report_tells_its_fields_what_it_draws_and_its_files(call, folders):
     }
 
 
-def test_files_are_downloads_and_nothing_else_can_be_had(call, folders):
-    put(folders, "monday")
+def test_files_are_downloads_and_nothing_else_can_be_had(call, put):
+    put("monday")
     answer = call("GET", f"{API}/reports/monday/files/report.html")
     assert answer.headers["content-disposition"].startswith("attachment")
     for file in ("job.json", "..%2F..%2Fsecret", "pictures"):
@@ -177,8 +193,8 @@ def test_files_are_downloads_and_nothing_else_can_be_had(call, folders):
     assert call("GET", f"{API}/reports/..%2Fmonday").status_code in (404, 422)
 
 
-def test_a_removed_report_is_gone(call, folders):
-    folder = put(folders, "monday")
+def test_a_removed_report_is_gone(call, put):
+    folder = put("monday")
     assert call("DELETE", f"{API}/reports/monday").status_code == 204
     assert not folder.exists()
     assert call("DELETE", f"{API}/reports/monday").status_code == 404
@@ -269,8 +285,8 @@ def test_a_span_that_ends_before_it_begins_is_refused_in_the_models_own_words(ca
     assert told["detail"] == "body: to_s: got 4, expected more than from_s, 5"
 
 
-def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, folders, ran, city_map):
-    with_drive(put(folders, "monday", "undecided"))
+def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, folders, ran, city_map, put):
+    with_drive(put("monday", "undecided"))
     (part,) = call("GET", f"{API}/reports/monday/drives/next_drive").json()["parts"]
     assert (part["lasts_s"], part["commands"][1]) == (2.0, [2, 0.3, 0.1])
     assert part["way"] == [[1, 2, 0.5]]
@@ -294,9 +310,9 @@ def test_a_drive_is_shown_and_sent_to_a_car_on_the_citys_floor(call, folders, ra
 
 
 def test_a_car_goes_on_with_its_trip_when_a_drive_has_ended(
-    call, folders, ran, fake_city, hear, snapshot
+    call, put, ran, fake_city, hear, snapshot
 ):
-    with_drive(put(folders, "monday", "undecided"))
+    with_drive(put("monday", "undecided"))
     trip = Trip(
         vehicle="n1", trip_id="t1", t_ns=1, route=("a", "b", "a", "b"), done_m=0.1,
         started_ns=0, length_m=None, via=("a", "b"), then="repeat",
@@ -315,8 +331,8 @@ def test_a_car_goes_on_with_its_trip_when_a_drive_has_ended(
     assert (asked.vehicle, asked.via, asked.then) == ("n1", ("a", "b"), trip.then)
 
 
-def test_a_drive_that_ends_early_is_no_recording(call, folders, ran):
-    folder = put(folders, "monday", "undecided")
+def test_a_drive_that_ends_early_is_no_recording(call, put, ran):
+    folder = put("monday", "undecided")
     with_drive(folder)
 
     def play(words, tell, hear):
@@ -338,8 +354,8 @@ def told(folder, *names):
     return [str(folder / name) for name in names]
 
 
-def test_a_search_again_takes_what_was_driven_since(call, folders, ran):
-    folder = put(folders, "monday", "undecided")
+def test_a_search_again_takes_what_was_driven_since(call, folders, ran, put):
+    folder = put("monday", "undecided")
     run = str(folders.recordings / "city-1.mcap")
     Path(run).write_bytes(b"")
     assert call("POST", f"{API}/jobs", json={"again": "monday"}).status_code == 409
@@ -368,8 +384,8 @@ def test_a_search_again_takes_what_was_driven_since(call, folders, ran):
     assert words[words.index("--budget-s") + 1] == "30"
 
 
-def test_a_search_again_of_one_of_several_cars_is_of_that_car(call, folders, ran):
-    folder = put(folders, "fleet/n1", "undecided")
+def test_a_search_again_of_one_of_several_cars_is_of_that_car(call, folders, ran, put):
+    folder = put("fleet/n1", "undecided")
     (folders.recordings / "city-1.mcap").write_bytes(b"")
     job = {"recordings": [str(folders.recordings / "city-1.mcap")], "source": "x"}
     (folders.reports / "fleet" / "job.json").write_text(json.dumps(job), "utf-8")
