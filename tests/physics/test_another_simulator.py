@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from scm.geometry import Pose2
-from scm.vehicles.car import all_terms, load_car
+from scm.vehicles.car import all_terms
 from scm.vehicles.fleet import Fleet
+from tests.every_effect import car_with
 
 TRIALS = Path(__file__).parents[3] / "shared" / "trials"
 CASES = {
@@ -35,11 +36,7 @@ def table(folder, name):
 
 def yaw_rate_error(folder, numbers):
     """Root mean square of gyro less yaw rate over 40 s from the commands alone [rad/s]."""
-    terms, names = all_terms(), sorted(CASES.values())
-    neutral = {
-        p.key: terms[n].neutral.get(p.name, p.default) for n in names for p in terms[n].params
-    }
-    car = load_car("nigel").with_terms(names, {**neutral, "drive.axle_lock": 1.0, **numbers})
+    car = car_with([], {"drive.axle_lock": 1.0, **numbers})
     commands, pose, imu = (table(folder, name) for name in ("commands", "pose", "imu"))
     fleet = Fleet(car, 1)
     fleet.add(Pose2(*pose[0, 1:4]))

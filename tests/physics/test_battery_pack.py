@@ -12,15 +12,16 @@ from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
 from scm.vehicles.lipo import cell_voltage
+from tests.every_effect import car_with
 
 HERE = Pose2(0.0, 0.0, 0.0)
 ROW = np.array([0])
 
 
-def driven(terms=(), **numbers):
+def driven(car=None, **numbers):
     """Return a nigel with a battery as given, and the packs of its fleet."""
     values = {f"battery.{key}": value for key, value in numbers.items()}
-    fleet = Fleet(load_car("nigel").with_terms(terms, values), 1)
+    fleet = Fleet((car or load_car("nigel")).with_terms([], values), 1)
     packs = Packs(fleet)
     packs.renew(fleet.add(HERE))
     return fleet, packs
@@ -101,7 +102,7 @@ def test_each_car_of_a_fleet_drains_its_own_pack_by_its_own_throttle():
 
 
 def test_motors_that_feel_their_battery_count_the_same_charge():
-    fleet, packs = driven(terms=("battery_charge", "battery_curve", "battery_resistance"))
+    fleet, packs = driven(car_with(["battery_charge", "battery_curve", "battery_resistance"]))
     for step in range(300):
         fleet.throttle[0] = 1.0 if step < 200 else 0.5
         fleet.advance(0.01)

@@ -1,7 +1,6 @@
 """Each effect of body, floor and tyre does what its equation says, on a whole car."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +10,8 @@ from scm.vehicles.body14 import GRAVITY
 from scm.vehicles.car import all_terms, load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
-from scm.vehicles.term import flat
+from tests import every_effect
+from tests.every_effect import with_combined_slip
 
 FREE = {
     "drive.stall_torque_nm": 0.0,
@@ -20,35 +20,12 @@ FREE = {
     "wheel.damping_linear_nms": 0.0,
     "wheel.rolling_resistance": 0.0,
 }
-BODY = (
-    "grade", "wind", "corner_drag", "understeer", "surface_patch", "payload", "com_shift",
-    "load_transfer", "tyre_grip", "tyre_stiffness", "tyre_relaxation", "tyre_windup",
-)  # fmt: skip
 
 
 def car_with(*names, base="f1tenth", free=True, **numbers):
-    """A car with further effects; keys are written with __ for the dot.
-
-    Those of BODY that are not named are there at rest: so nearly all tests share one kernel.
-    """
+    """A car with further effects; keys are written with __ for the dot."""
     values = {key.replace("__", "."): number for key, number in numbers.items()}
-    known = all_terms()
-    at_rest = {
-        param.key: part.neutral[param.name]
-        for name in BODY
-        if name not in names
-        for part in flat([known[name]])
-        for param in part.params
-        if param.name in part.neutral
-    }
-    car = load_car(base).with_terms([*BODY, *names])
-    return car.with_terms([], {**at_rest, **(FREE if free else {}), **values})
-
-
-def without_pure_slip(car):
-    """The car with only the tyre that it was given beside the nominal ones."""
-    pure = {"tyre_longitudinal", "tyre_lateral"}
-    return replace(car, terms=tuple(term for term in car.terms if term.name not in pure))
+    return every_effect.car_with(names, {**(FREE if free else {}), **values}, base)
 
 
 def placed(car, speed=0.0, yaw=0.0, **state):
@@ -235,9 +212,9 @@ def test_reverse_is_as_fast_as_forward_and_steers_the_same_circle():
 
 def test_combined_slip_is_the_pure_curve_when_driving_straight():
     ends = []
-    for names in ((), ("tyre_combined",)):
-        car = car_with(*names, free=False)
-        car = without_pure_slip(car) if names else car
+    for combined in (False, True):
+        car = car_with(free=False)
+        car = with_combined_slip(car) if combined else car
         fleet = placed(car)
         fleet.throttle[0] = 0.6
         fleet.advance(1.0)
@@ -248,8 +225,8 @@ def test_combined_slip_is_the_pure_curve_when_driving_straight():
 def test_a_car_with_combined_slip_cannot_brake_and_turn_with_full_force_both():
     most = {}
     for combined in (False, True):
-        car = car_with(*(("tyre_combined",) if combined else ()), drive__hold_torque_nm=0.4)
-        car = without_pure_slip(car) if combined else car
+        car = car_with(drive__hold_torque_nm=0.4)
+        car = with_combined_slip(car) if combined else car
         fleet = placed(car, speed=2.5, lateral_speed=0.35)
         felt = []
         for _ in range(60):

@@ -1,8 +1,6 @@
 """Each effect between throttle command and wheel does what its equation says."""
 
 import math
-from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -12,31 +10,13 @@ from scm.vehicles.car import all_terms, load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
 from scm.vehicles.lipo import cell_voltage, loaded_voltage, pack_current
+from tests.every_effect import GENESIS, car_with
 
 BATTERY = ["battery_charge", "battery_curve", "battery_resistance"]
-# one kernel for all tests: whatever a test does not name stays neutral
-DRIVE = [
-    "drive_curve", "drive_saturation", "drive_delay", "drive_lag", "drive_deadband", "drive_gain",
-    "motor_gain", "drive_asymmetry", "battery_sag", "motor_fade", "motor_heating", "motor_warmth",
-    "stiction",
-]  # fmt: skip
-
-
-@cache
-def car_with(names):
-    terms = all_terms()
-    numbers = {
-        p.key: terms[n].neutral.get(p.name, p.default) for n in DRIVE for p in terms[n].params
-    }
-    more = [name for name in names if name not in DRIVE]
-    return load_car("nigel").with_terms([*DRIVE, *more], numbers)
 
 
 def fleet_with(names, values=None, throttle=1.0):
-    terms = all_terms()
-    own = {p.key: p.default for n in names if n in DRIVE for p in terms[n].params}
-    car = car_with(tuple(sorted(n for n in names if n not in DRIVE)))
-    fleet = Fleet(car.with_terms([], own | (values or {})), 1)
+    fleet = Fleet(car_with(names, values), 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
     fleet.throttle[0] = throttle
     return fleet
@@ -257,12 +237,9 @@ def test_a_throttle_curve_gives_small_throttles_less_and_full_ones_all():
 
 
 def speed_driven(**numbers):
-    """An F1TENTH whose throttle asks for a speed: 1 is 5 m/s."""
-    car = load_car("f1tenth")
-    terms = tuple(term for term in car.terms if not term.name.startswith("motor_"))
+    """A car whose throttle commands a speed: 1 is 5 m/s."""
     own = {"drive.full_speed_m_s": 5.0, "drive.acceleration_m_s2": 3.0} | numbers
-    car = replace(car, terms=terms).with_terms(["speed_control"], own)
-    fleet = Fleet(car, 1)
+    fleet = Fleet(car_with([], own, GENESIS), 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
     return fleet
 

@@ -12,9 +12,9 @@ from scm.vehicles.body14 import GRAVITY
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.layout import columns_of
+from tests.every_effect import car_with, with_combined_slip
 
 FEW = settings(max_examples=20, derandomize=True)
-HOLDING = ("tyre_relaxation", "tyre_windup")
 DRAGS = {
     "body.drag_linear_ns_m": (0.0, 5.0),
     "body.drag_quadratic_ns2_m2": (0.0, 2.0),
@@ -69,7 +69,7 @@ def motion_energy(fleet):
 )
 def test_rest_stays_at_rest_on_the_level(name, yaw, steering, length):
     lengths = {"tyre_relaxation.length_m": length, "tyre_windup.length_m": length}
-    fleet = one(load_car(name).with_terms(HOLDING, lengths), yaw)
+    fleet = one(car_with([], lengths, name), yaw)
     fleet.steering[0] = steering
     fleet.advance(1.0)
     assert abs(fleet.x[0]) + abs(fleet.y[0]) < 1e-9
@@ -86,7 +86,7 @@ def test_rest_stays_at_rest_on_the_level(name, yaw, steering, length):
 def test_a_car_whose_tyres_remember_stands_on_a_slope(slope, uphill, steering, length):
     held = {"tyre_relaxation.length_m": length, "tyre_windup.length_m": length}
     hill = {"grade.slope": slope, "grade.uphill_rad": uphill}
-    fleet = one(load_car("nigel").with_terms((*HOLDING, "grade"), {**held, **hill}))
+    fleet = one(car_with([], {**held, **hill}))
     fleet.steering[0] = steering
     fleet.advance(4.0)  # the patches take the weight
     settled = np.array([fleet.x[0], fleet.y[0], fleet.yaw[0]])
@@ -104,7 +104,7 @@ def test_a_car_whose_tyres_remember_stands_on_a_slope(slope, uphill, steering, l
 @given(slope_x=st.floats(-0.1, 0.1), slope_y=st.floats(-0.1, 0.1), yaw=st.floats(-3.1, 3.1))
 def test_it_stands_on_a_floor_that_slopes_too(slope_x, slope_y, yaw):
     held = {"tyre_relaxation.length_m": 0.02, "tyre_windup.length_m": 0.02}
-    fleet = one(load_car("nigel").with_terms((*HOLDING, "grade"), held), yaw)
+    fleet = one(car_with([], held), yaw)
     fleet.floor_slope_x[0], fleet.floor_slope_y[0] = slope_x, slope_y
     fleet.floor_height[0] = slope_x * fleet.wheel_x[0] + slope_y * fleet.wheel_y[0]
     fleet.advance(4.0)
@@ -125,10 +125,8 @@ def test_it_stands_on_a_floor_that_slopes_too(slope_x, slope_y, yaw):
 )
 def test_a_coasting_car_never_speeds_up(drags, speed, sideways, rate, steer, length):
     lost = {"drive.stall_torque_nm": 0.0, "drive.front_driven": 1.0}
-    car = load_car("f1tenth").with_terms(
-        ("corner_drag", "tyre_grip", "tyre_stiffness", *HOLDING),
-        {**drags, **lost, "tyre_relaxation.length_m": length, "tyre_windup.length_m": length},
-    )
+    lengths = {"tyre_relaxation.length_m": length, "tyre_windup.length_m": length}
+    car = car_with([], {**drags, **lost, **lengths}, "f1tenth")
     fleet = one(car, 0.0, speed, lateral_speed=sideways, yaw_rate=rate, steer_angle=steer)
     fleet.throttle[0], fleet.steering[0] = 0.02, steer / car.value("steering.limit_rad")
     start = motion_energy(fleet)
@@ -153,9 +151,8 @@ def test_a_coasting_car_never_speeds_up(drags, speed, sideways, rate, steer, len
 def test_the_mirrored_world_gives_the_mirrored_motion(throttle, steering, slope, uphill, push):
     ends = []
     for side in (1.0, -1.0):
-        names = ("grade", "wind", "tyre_relaxation", "corner_drag", "understeer")
-        car = load_car("nigel").with_terms(
-            names,
+        car = car_with(
+            [],
             {
                 "grade.slope": slope, "grade.uphill_rad": side * uphill, "wind.force_x_n": push,
                 "wind.force_y_n": side * push, "tyre_relaxation.length_m": 0.05,
@@ -206,13 +203,9 @@ def test_a_steady_turn_is_that_of_the_bicycle(steering, throttle):
 
 @pytest.mark.parametrize("name", ["tyre_relaxation", "tyre_combined"])
 def test_halving_the_substep_halves_the_error_with_further_tyres(name):
-    car = load_car("f1tenth")
-    if name == "tyre_relaxation":
-        car = car.with_terms([name], {"tyre_relaxation.length_m": 0.1})
-    else:
-        pure = {"tyre_longitudinal", "tyre_lateral"}
-        terms = tuple(term for term in car.terms if term.name not in pure)
-        car = type(car)(car.name, car.scale, car.path, terms, car.values).with_terms([name])
+    length = {"tyre_relaxation.length_m": 0.1} if name == "tyre_relaxation" else {}
+    car = car_with([], length, "f1tenth")
+    car = with_combined_slip(car) if name == "tyre_combined" else car
     ends = {}
     for dt in (2e-3, 1e-3, 5e-4, 1.25e-4):
         fleet = one(car)

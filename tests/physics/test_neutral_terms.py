@@ -9,6 +9,7 @@ from scm.vehicles.car import Quantity, all_terms, load_car
 from scm.vehicles.compiler.assemble import write_page
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.term import flat
+from tests.every_effect import at_rest
 
 FEW = (
     "suspension_spring", "tyre_contact", "tyre_longitudinal", "tyre_lateral", "motor_dc",
@@ -16,19 +17,22 @@ FEW = (
 )  # fmt: skip
 
 
-def car_with(names, neutral):
-    """Nigel with these effects, those of `neutral` at their neutral values."""
-    terms = flat(all_terms()[name] for name in names)
+def only(names):
+    """Nigel with these effects alone."""
     nigel = load_car("nigel")
-    values = dict(nigel.values)
-    for term in terms:
-        for param in term.params:
-            number = param.default
-            if term.name.startswith(tuple(neutral)):
-                number = term.neutral.get(param.name, number)
-            if param.key not in values or term.name.startswith(tuple(neutral)):
-                values[param.key] = Quantity(number, None, param.unit, "test")
-    return replace(nigel, name="few", terms=terms, values=values)
+    return replace(nigel, name="few", terms=flat(all_terms()[name] for name in names))
+
+
+def all_neutral_but(names):
+    """Nigel with every effect, at its neutral values unless named."""
+    car = at_rest()
+    neutral = [term for term in car.terms if term.name not in names]
+    values = {
+        param.key: Quantity(term.neutral.get(param.name, param.default), None, param.unit, "test")
+        for term in neutral
+        for param in term.params
+    }
+    return replace(car, values=car.values | values), neutral
 
 
 def drive(car):
@@ -44,34 +48,18 @@ def drive(car):
 
 
 def test_every_neutral_effect_at_once_leaves_the_trajectory_bit_for_bit():
-    neutral = [name for name, term in all_terms().items() if term.neutral and name not in FEW]
-    assert len(neutral) >= 12
-    few, many = drive(car_with(FEW, [])), drive(car_with([*FEW, *neutral], neutral))
+    car, neutral = all_neutral_but(FEW)
+    assert len(neutral) >= 50
+    few, many = drive(only(FEW)), drive(car)
     for name in ("x", "y", "z", "roll", "pitch", "yaw", "speed", "wheel_speed", "wheel_load"):
         assert np.array_equal(getattr(few, name), getattr(many, name)), name
     assert few.x[0] > 0.1
 
 
 def test_nigel_with_every_neutral_effect_it_lacks_drives_as_before_bit_for_bit():
-    nigel = load_car("nigel")
-    own, set_already = (
-        {term.name for term in nigel.terms},
-        {term.sets for term in nigel.terms if term.sets},
-    )
-    lacking = [
-        term
-        for term in all_terms().values()
-        if term.neutral and term.name not in own and term.sets not in set_already
-    ]
-    numbers = {
-        param.key: part.neutral[param.name]
-        for term in lacking
-        for part in flat([term])
-        for param in part.params
-        if param.name in part.neutral
-    }
-    assert len(lacking) >= 30
-    before, after = drive(nigel), drive(nigel.with_terms([t.name for t in lacking], numbers))
+    nigel, car = load_car("nigel"), at_rest()
+    assert len(car.terms) >= len(nigel.terms) + 30
+    before, after = drive(nigel), drive(car)
     for name in ("x", "y", "z", "roll", "pitch", "yaw", "speed", "wheel_speed", "wheel_load"):
         assert np.array_equal(getattr(before, name), getattr(after, name)), name
     assert before.x[0] > 0.1

@@ -7,6 +7,7 @@ from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
+from tests.every_effect import car_with
 
 MOVED = {
     "com_shift": {"com_shift.shift_m": 0.045},
@@ -19,7 +20,8 @@ CARS = [(name, ()) for name in ("nigel", "f1tenth", "dart")] + [
 
 
 def standing(name, moved=(), **numbers):
-    car = load_car(name).with_terms(moved, {k: v for m in moved for k, v in MOVED[m].items()})
+    offsets = {key: value for effect in moved for key, value in MOVED[effect].items()}
+    car = car_with(moved, offsets, name) if moved else load_car(name)
     fleet = Fleet(car, 1)
     fleet.add(Pose2(0.0, 0.0, 0.3))
     for key, value in numbers.items():

@@ -1,7 +1,6 @@
 """Each effect between steering command and road wheel does what its equation says."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,25 +9,13 @@ from scm.geometry import Pose2
 from scm.vehicles.car import all_terms, load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
+from tests.every_effect import GENESIS, car_with
 
 LIMIT = 0.5235988
-GENESIS = Path(__file__).parents[2] / "recordings/cars/genesis.toml"
-# one kernel for all tests: whatever a test does not name stays neutral
-STEERING = [
-    "steer_saturation", "steer_gain", "steer_delay", "steer_lag", "servo_torque", "steer_rate",
-    "steer_backlash", "steer_trim", "steer_compliance",
-]  # fmt: skip
 
 
 def fleet_with(names, values=None, car="nigel"):
-    terms = all_terms()
-    numbers = {
-        p.key: p.default if n in names else terms[n].neutral.get(p.name, p.default)
-        for n in STEERING
-        for p in terms[n].params
-    }
-    more = [name for name in names if name not in STEERING]
-    fleet = Fleet(load_car(car).with_terms([*STEERING, *more], numbers | (values or {})), 1)
+    fleet = Fleet(car_with(names, values, car), 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
     return fleet
 
@@ -162,12 +149,12 @@ def test_wheels_have_given_way_by_63_percent_after_a_millisecond():
     assert yielded == pytest.approx(0.2 * 0.5 * (1.0 - math.exp(-1.0)), rel=0.03)
 
 
-@pytest.mark.parametrize("car", ["nigel", "f1tenth", str(GENESIS)])
+@pytest.mark.parametrize("car", ["nigel", "f1tenth", GENESIS])
 @pytest.mark.parametrize("substep", [1e-3, 2e-3, 5e-3])
 def test_no_steering_chatters_whatever_it_gives_way_and_however_long_a_substep(car, substep):
-    full_size = car == str(GENESIS)
+    full_size = car == GENESIS
     soft = (0.0, 0.02, 0.1, 0.2, 0.5, 1.0)
-    fleet = Fleet(load_car(car).with_terms(["steer_compliance"]), len(soft))
+    fleet = Fleet(car_with(["steer_compliance"], base=car), len(soft))
     for row, give in enumerate(soft):
         fleet.add(Pose2(0.0, 0.0, 0.0), speed=15.0 if full_size else 0.2)
         fleet.set_parameter(row, "steering.compliance_rad", give)

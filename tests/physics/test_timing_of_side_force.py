@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scm.geometry import Pose2
-from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
+from tests.every_effect import car_with
 from tests.reality.motion import COMMAND_S, ROW, Moving
 from tests.reality.numbers import nominal
 
@@ -30,7 +30,7 @@ def zigzag():
 
 def ours(name, number, substep):
     numbers = {"drive.axle_lock": 1.0, TERMS[name][0]: number}
-    fleet = Fleet(load_car("f1tenth").with_terms([name], numbers), 1)
+    fleet = Fleet(car_with([name], numbers, "f1tenth"), 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
     per = round(COMMAND_S / STEP_S)
     throttle, steering = (np.repeat(part, per) for part in zigzag())
