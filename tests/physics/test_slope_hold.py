@@ -14,7 +14,7 @@ from scm.world.step import move
 from scm.world.world import PERIOD_NS, World
 from vehicle_agent.bodies.simulated import SimulatedBody
 
-MINUTE_TICKS = 60 * 1_000_000_000 // PERIOD_NS
+PARKED_TICKS = 20 * 1_000_000_000 // PERIOD_NS
 HEADINGS = (0.0, 0.7, 1.57, -2.4)
 
 
@@ -30,13 +30,13 @@ def hill(slope):
 
 
 def parked(slope, cars):
-    """Return how far each car moved in a minute, and in the last half of it [m]."""
+    """Return how far each car moved in 20 s, and in the last half of them [m]."""
     world = World(hill(slope), prepare=())
     for i, (car, yaw) in enumerate(cars):
         world.host(f"c{i}", car, Pose2(1.5 * (i // 4) - 2.0, 1.5 * (i % 4) - 2.0, yaw), 0)
     places = []
-    for i in range(MINUTE_TICKS + 1):
-        if i in {0, MINUTE_TICKS // 2, MINUTE_TICKS}:
+    for i in range(PARKED_TICKS + 1):
+        if i in {0, PARKED_TICKS // 2, PARKED_TICKS}:
             world.cars.locate(world.sensors.external)
             of = [world.cars.get(f"c{k}").index for k in range(len(cars))]
             places.append(np.column_stack((world.cars.arrays.x[of], world.cars.arrays.y[of])))

@@ -8,6 +8,7 @@ from scm.geometry import Pose2
 from scm.vehicles.car import load_car
 from scm.vehicles.compiler.kernel_file import compile_kernel
 from scm.vehicles.fleet import Fleet, VehicleStatus
+from tests.every_effect import car_with
 
 
 def driving(cars, capacity=None, threads=1):
@@ -144,8 +145,7 @@ def test_a_number_outside_its_bounds_is_refused(value):
 
 
 def late(delay_s, call_s=0.01):
-    car = load_car("nigel").with_terms(["drive_delay", "steer_delay"], {})
-    fleet = Fleet(car, 1)
+    fleet = Fleet(car_with(["drive_delay", "steer_delay"]), 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
     fleet.set_parameter(0, "drive.delay_s", delay_s)
     fleet.throttle[0] = 1.0

@@ -42,7 +42,7 @@ def test_labels_are_escaped():
 
 
 def test_the_same_effect_is_drawn_the_same_every_time():
-    drag = next(term for term in load_car("f1tenth").terms if term.name == "viscous_drag")
+    drag = next(term for term in load_car("f1tenth").terms if term.name == "yaw_drag")
     assert draw_term(drag) == draw_term(drag)
 
 

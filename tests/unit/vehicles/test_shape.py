@@ -10,9 +10,10 @@ from scm.vehicles.fleet import Fleet
 from scm.vehicles.sensors.imu import lever_arm
 from scm.vehicles.shape import Shape, shape_of
 from scm.world.solids import cog_motion, hull_of, outline
+from tests.every_effect import car_with
 
 NIGEL = load_car("nigel")
-LADEN = NIGEL.with_terms(
+LADEN = car_with(
     ["payload", "com_shift", "load_transfer"],
     {"payload.mass_kg": 0.6, "com_shift.shift_m": 0.03, "load_transfer.height_m": 0.01},
 )
