@@ -11,12 +11,14 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import msgspec
 from fastapi import APIRouter, FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
 from scm.api.inputs import JsonInput, QueryInput
 from scm.api.roles import ROLES, SCHEME
+from scm.api.schemas import DEFINITIONS
 from scm.errors import RunError
 
 PUBLISHED = {
@@ -57,6 +59,7 @@ def install(app: FastAPI, nouns: Nouns) -> None:
                 routes=app.routes,
                 servers=app.servers or None,
             )
+            document["$defs"] = msgspec.to_builtins(DEFINITIONS)  # copies
             _add_inputs(document, nouns)
             app.openapi_schema = described(document)
         return app.openapi_schema

@@ -15,6 +15,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.routing import Match
 
+from scm.api.schemas import schema_of
 from scm.api.trace import trace_id
 from scm.errors import StoreError
 from scm.records.problems import Problem
@@ -59,7 +60,7 @@ _STATUSES = (400, 401, 403, 404, 409, 412, 413, 415, 422, 428, 429, 500, 503, 50
 RESPONSES: dict[int | str, dict[str, Any]] = {
     status: {
         "description": HTTPStatus(status).phrase,
-        "content": {"application/problem+json": {"schema": msgspec.json.schema(Problem)}},
+        "content": {"application/problem+json": {"schema": schema_of(Problem)}},
     }
     for status in _STATUSES
 }

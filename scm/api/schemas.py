@@ -14,11 +14,13 @@ from typing import Any
 
 import msgspec
 
+from scm.errors import RunError
 from scm.records.page import Page
 
 Responses = dict[int | str, dict[str, Any]]
 
-_schema = cache(msgspec.json.schema)  # shared by all routes: never changed
+DEFINITIONS: dict[str, dict[str, Any]] = {}
+"""The records of all answers by name: FastAPI copies what a route answers, they are added once."""
 
 _CURSOR = {
     "Link": {
@@ -26,6 +28,24 @@ _CURSOR = {
         "schema": {"type": "string", "examples": ['</api/v1/operations?cursor=x>; rel="next"']},
     }
 }
+
+
+@cache
+def schema_of(kind: Any) -> dict[str, Any]:
+    """Return a schema that refers to its records, for all routes: it is never changed."""
+    schema = msgspec.json.schema(kind)
+    for name, definition in _without_nulls(schema.pop("$defs", {})).items():
+        if DEFINITIONS.setdefault(name, definition) != definition:
+            msg = f"openapi: two records are named {name!r}; expected one, or another name"
+            raise RunError(msg)
+    return schema
+
+
+def _without_nulls(node: Any) -> Any:
+    """Leave out what is null, as FastAPI does with all that it copies: a field's default, say."""
+    if isinstance(node, dict):
+        return {key: _without_nulls(part) for key, part in node.items() if part is not None}
+    return [_without_nulls(part) for part in node] if isinstance(node, list) else node
 
 
 def answer(kind: Any, status: int = 200, about: str = "What was requested.") -> Responses:
@@ -36,7 +56,7 @@ def answer(kind: Any, status: int = 200, about: str = "What was requested.") -> 
         status: Of the answer: 200, 201 or 202.
         about: What it is, in a sentence.
     """
-    content = {"application/json": {"schema": _schema(kind)}}
+    content = {"application/json": {"schema": schema_of(kind)}}
     return {status: {"description": about, "content": content}}
 
 

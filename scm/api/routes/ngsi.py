@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
 
-import msgspec
 from fastapi import APIRouter, Path, Query, Request, Response
 from msgspec import Meta
 
@@ -13,7 +12,7 @@ from scm.api.encoding import encode
 from scm.api.ngsi import CONTEXT, CORE, TYPES, Entity, entities, key_values
 from scm.api.problem import RefusedError
 from scm.api.roles import VIEWER
-from scm.api.schemas import Responses
+from scm.api.schemas import Responses, schema_of
 from scm.errors import nearest
 
 JSON_LD, JSON = "application/ld+json", "application/json"
@@ -99,8 +98,7 @@ def router(city: City) -> APIRouter:
 
 
 def _answer(kind: Any, about: str) -> Responses:
-    schema = msgspec.json.schema(kind)
-    return {200: {"description": about, "content": {JSON: {"schema": schema}}}}
+    return {200: {"description": about, "content": {JSON: {"schema": schema_of(kind)}}}}
 
 
 def _types(kind: str) -> list[str]:
