@@ -40,7 +40,13 @@ def _leave_out_of_navigation(app: Sphinx, _document: nodes.document) -> None:
         app.env.metadata[name]["orphan"] = "true"
 
 
+def _leave_out_search(app: Sphinx) -> None:
+    app.builder.search = False
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Connect what is done to each page."""
+    """Connect what is done to each page; with `-t check`, leave out the index for the search."""
     app.connect("doctree-read", _leave_out_of_navigation)
+    if app.tags.has("check"):
+        app.connect("builder-inited", _leave_out_search)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -46,10 +46,14 @@ class Links(HTMLParser):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
-    """The whole site, in a plain theme: the navigation of its own takes as long as all else."""
+    """The whole site, in a plain theme: the navigation of its own takes as long as all else.
+
+    Without search and typographic quotes as well.
+    """
     pytest.importorskip("sphinx", reason="Sphinx comes with `make test`")
     folder = tmp_path_factory.mktemp("site")
     options = ["-q", "-W", "--keep-going", "-b", "html", "-D", "html_theme=basic"]
+    options += ["-t", "check", "-D", "smartquotes=0"]
     command = [sys.executable, "-m", "sphinx", *options, "-d", str(folder / "trees")]
     done = subprocess.run(
         [*command, str(root / "docs"), str(folder)], capture_output=True, text=True, check=False
