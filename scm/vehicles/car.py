@@ -8,7 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -195,8 +195,14 @@ def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
         msg = f"{name_or_path}: no such {what}; cars by name: {', '.join(car_names())}{hint}{own}"
         raise CarError(msg)
     with reading(path, "a TOML file", CarError):
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = _parsed(path.read_text(encoding="utf-8"))
     return car_of(data, path, trusted=trusted)
+
+
+@lru_cache(maxsize=64)
+def _parsed(text: str) -> Mapping[str, Any]:
+    """Parse a car file; the same few are loaded again and again."""
+    return tomllib.loads(text)
 
 
 def car_of_text(text: str, path: Path) -> Car:

@@ -202,7 +202,7 @@ def test_tags_sought_at_half_size_are_measured_as_well_as_those_sought_at_full_s
 
 
 OPEN_CITY = msgspec.structs.replace(CITY, walls=(), boxes=(), lights=())
-CARS, RATE_HZ, FILM_FRAMES, SETTLED, DRAWS, SPEED_MPS = 10, 30.0, 14, 8, 6, 0.26
+CARS, RATE_HZ, FILM_FRAMES, SETTLED, DRAWS, SPEED_MPS = 10, 30.0, 11, 5, 6, 0.26
 LOOK = Look(exposure_s=0.004, defocus_px=0.7, noise_sigma=2.0, colour=False)
 ROLLING = replace(LOOK, rolling_s=0.010)
 

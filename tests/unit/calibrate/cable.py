@@ -12,6 +12,7 @@ from scm.vehicles.car import load_car
 from scm.vehicles.car_text import set_entry, set_list, term_names
 from tests.unit.calibrate.rig import LIMITS, START, STEP_NS, T0, Eye, Hidden
 from vehicle_agent.bodies.nigel import NigelBody
+from vehicle_agent.calibrate.fit import TERMS
 from vehicle_agent.calibrate.part import CalibrationPart
 from vehicle_agent.calibrate.pattern import FULL
 from vehicle_agent.emulate.firmware import Firmware
@@ -23,7 +24,6 @@ from vehicle_agent.nigel.serial_watchdog import Written
 LINE_NS = 10 * NS_PER_MS
 DEADBAND = 0.2
 LONGEST = 9000
-TERMS = ("steer_trim", "steer_gain", "drive_gain")
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,8 @@ class Emulated:
         car = load_car("nigel")
         text = set_list(car.path.read_text(), "terms", term_names(car.with_terms(TERMS)), "mine")
         own = (("steering", "trim_rad", self.trim), ("steering", "gain", self.gain),
-               ("drive", "gain", self.drive), ("steering", "rate_rad_s", self.rate))  # fmt: skip
+               ("drive", "gain", self.drive), ("drive", "deadband", 0.0),
+               ("steering", "rate_rad_s", self.rate))  # fmt: skip
         for section, name, value in own:
             text = set_entry(text, section, name, f'{{ value = {value}, source = "hidden" }}')
         path.write_text(text)

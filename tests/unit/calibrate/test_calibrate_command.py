@@ -50,7 +50,7 @@ def bodies(monkeypatch):
 
 def test_it_drives_writes_the_drive_and_the_car_and_says_what_it_found(bodies, tmp_path, capsys):
     more = ("--name", "tag-7", "--out", str(tmp_path), "--eye-delay-ms", "60")
-    assert main([*ARGUMENTS, *FLOOR, *more]) == 0
+    assert main([*ARGUMENTS, *FLOOR, *more, "--short"]) == 0
     car = load_car(tmp_path / "car.toml")
     assert car.value("ips.tag_id") == 7
     assert car.value("drive.deadband") == pytest.approx(0.15, abs=0.004)

@@ -12,7 +12,7 @@ from scm.vehicles.fleet import Fleet
 from scm.vehicles.param import Param
 from scm.vehicles.physics_variables import VARIABLES, Per, Role
 from scm.vehicles.term import Term
-from tests.unit.vehicles.fresh import Compiling, nigel_after_a_second
+from tests.unit.vehicles.fresh import Compiling, small_car_after_a_second
 
 STANDARD = [all_terms()[name] for name in STANDARD_TERMS]
 
@@ -160,7 +160,7 @@ def test_cars_of_the_same_effects_share_one_kernel():
 
 @pytest.mark.slow
 def test_processes_that_compile_at_the_same_time_all_get_a_kernel(tmp_path):
-    processes = [Compiling(nigel_after_a_second, tmp_path) for _ in range(2)]
+    processes = [Compiling(small_car_after_a_second, tmp_path) for _ in range(2)]
     assert len({process.result() for process in processes}) == 1
     assert len(list(tmp_path.glob("*.py"))) == 1
     assert not list(tmp_path.glob("*.tmp"))

@@ -46,16 +46,16 @@ class Promises:
 
 
 @pytest.mark.parametrize("late_ms", [0, 40, 90])
-def test_no_promise_is_broken_in_hours_of_random_plan_changes(late_ms):
+def test_no_promise_is_broken_by_random_plan_changes(late_ms):
     dice = random.Random(late_ms)
     controller = Controller("x", CROSSING, "calm")
     promises, plans = Promises(), set()
-    for spat in run(controller, 24_000, jitter=lambda: dice.randrange(late_ms + 1) * 10**6):
+    for spat in run(controller, 12_000, jitter=lambda: dice.randrange(late_ms + 1) * 10**6):
         promises.check(spat)
         plans.add(spat.plan)
         if dice.random() < 0.005:
             controller.request_plan(dice.choice(["calm", "brisk"]))
-    assert promises.kept > 500
+    assert promises.kept > 250
     assert plans == {"calm", "brisk"}
     assert controller.late_steps == 0
 

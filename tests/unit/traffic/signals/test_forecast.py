@@ -2,6 +2,7 @@
 
 import random
 from collections import defaultdict
+from functools import cache
 
 import pytest
 
@@ -94,6 +95,14 @@ def judged(spats):
     return [one for one in ended if one[0].likely_end_ns is not None]
 
 
+STEPS_OF = {40.0: 6000, 15.0: 12_000}  # confidences of dense traffic vary from cycle to cycle
+
+
+@cache
+def judged_under(policy, every_s):
+    return judged(queued(policy, STEPS_OF[every_s], every_s))
+
+
 @pytest.mark.parametrize("plan", plan_names())
 def test_under_a_timetable_every_colours_likely_end_is_the_true_one(plan):
     spats = list(driven(Controller("x", CROSSING, plan), 2500))
@@ -132,7 +141,7 @@ def test_a_likely_end_lies_between_the_earliest_and_the_latest(policy):
             controller.request_plan(dice.choice(["calm", "brisk", policy]))
         return Observations(queues.step(now_ns / NS_PER_S, green), sees=dice.random() < 0.9)
 
-    for spat in driven(controller, 6000, each):
+    for spat in driven(controller, 3000, each):
         for group in spat.groups:
             if group.likely_end_ns is None:
                 assert group.likely_confidence is None
@@ -142,14 +151,14 @@ def test_a_likely_end_lies_between_the_earliest_and_the_latest(policy):
             assert group.max_end_ns is None or group.likely_end_ns <= group.max_end_ns
             assert spat.t_ns <= group.likely_end_ns or group.max_end_ns is not None
             assert 0.0 < group.likely_confidence <= 1.0
-    assert known > 6000
+    assert known > 3000
 
 
 @pytest.mark.parametrize("policy", ["actuated", "max_pressure"])
-@pytest.mark.parametrize("every_s", [40.0, 15.0])
+@pytest.mark.parametrize("every_s", STEPS_OF)
 def test_no_more_confidence_is_told_than_comes_true(policy, every_s):
     shares = defaultdict(list)
-    for group, _, end_ns in judged(queued(policy, 12_000, every_s)):
+    for group, _, end_ns in judged_under(policy, every_s):
         hit = abs(group.likely_end_ns - end_ns) <= NS_PER_S
         shares[group.likely_confidence].append(hit)
     assert len(shares) >= 4
@@ -160,7 +169,7 @@ def test_no_more_confidence_is_told_than_comes_true(policy, every_s):
 
 @pytest.mark.parametrize("policy", ["actuated", "max_pressure"])
 def test_a_red_is_foreseen_nearer_to_the_truth_than_its_earliest_end(policy):
-    reds = [one for one in judged(queued(policy, 6000)) if one[0].colour == "red"]
+    reds = [one for one in judged_under(policy, 15.0) if one[0].colour == "red"]
     likely = sum(abs(group.likely_end_ns - end_ns) for group, _, end_ns in reds)
     earliest = sum(abs(group.min_end_ns - end_ns) for group, _, end_ns in reds)
     assert len(reds) > 1000

@@ -99,7 +99,7 @@ def test_promises_are_kept_while_cars_wishes_plans_and_policies_come_and_go(poli
         if dice.random() < 0.002:
             drive.controller.request_plan(dice.choice(["calm", "brisk"]))
 
-    drive.run(12_000, change)
+    drive.run(6000, change)
     assert drive.kept > 100
 
 

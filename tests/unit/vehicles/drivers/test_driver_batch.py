@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -100,13 +101,13 @@ def on_streets(roads, count, seed=0):
 def touching(city):
     """Return the pairs of cars whose outlines overlap."""
     middles = np.column_stack([city.x + 0.08 * np.cos(city.yaw), city.y + 0.08 * np.sin(city.yaw)])
-    pairs = []
-    for a, b in itertools.combinations(range(len(city.x)), 2):
-        if math.dist(middles[a], middles[b]) < 0.36 and not (
-            apart(city.yaw, middles, a, b) or apart(city.yaw, middles, b, a)
-        ):
-            pairs.append((a, b))
-    return pairs
+    one, other = np.triu_indices(len(middles), 1)
+    near = np.hypot(*(middles[one] - middles[other]).T) < 0.36
+    return [
+        (a, b)
+        for a, b in zip(one[near], other[near], strict=True)
+        if not (apart(city.yaw, middles, a, b) or apart(city.yaw, middles, b, a))
+    ]
 
 
 def apart(yaw, middles, a, b):
@@ -121,19 +122,21 @@ def test_dense_traffic_flows_without_touching_running_red_or_blocking_a_junction
     lines = {line.lane: line for line in grid.city_map.stop_lines}
     inside = {m.lane for j in grid.city_map.junctions for g in j.groups for m in g.movements}
     names, drivers = city.drivers.lane_graph.names, city.drivers
-    passed, began, driven = 0, {}, np.zeros(60)
+    line_m = np.array([lines[name].at_m if name in lines else math.inf for name in names])
+    is_inside = np.array([name in inside for name in names])
+    passed, began, driven = 0, np.zeros(60), np.zeros(60)
     for tick in range(6000):
-        before = [(names[drivers.lane[k]], drivers.s[k] + NIGEL.front) for k in range(60)]
+        before, was_at_m = drivers.lane.copy(), drivers.s + NIGEL.front
         city.tick()
         driven += city.speed * 0.02
-        for slot, (lane, front) in enumerate(before):
-            line = lines.get(lane)
-            now = names[drivers.lane[slot]]
-            if line and now == lane and front <= line.at_m < drivers.s[slot] + NIGEL.front:
-                passed += 1
-                assert city.colours[line.junction, line.group] in ("green", "yellow")
-            began[slot] = tick if now not in inside else began.get(slot, tick)
-            assert tick - began[slot] < 1000, f"car {slot} has been in a junction for 20 s"
+        lane, is_at_m = drivers.lane, drivers.s + NIGEL.front
+        crosses = (lane == before) & (was_at_m <= line_m[lane]) & (line_m[lane] < is_at_m)
+        for slot in np.flatnonzero(crosses):
+            line = lines[names[lane[slot]]]
+            assert city.colours[line.junction, line.group] in ("green", "yellow")
+        passed += np.count_nonzero(crosses)
+        began = np.where(is_inside[lane], began, tick)
+        assert (tick - began).max() < 1000, "a car has been in a junction for 20 s"
         if tick % 25 == 0:
             assert touching(city) == []
         if tick > 250:
@@ -261,9 +264,13 @@ def test_with_some_frames_lost_cars_still_keep_apart(eight):
     assert touching(city) == []
 
 
+@cache
+def air_of(loss, receivers):
+    return channel_of(RadioChannel(loss=loss), 20.0, receivers, np.zeros((0, 4)))
+
+
 def reached(loss, seed, sender, receiver, frame):
-    air = channel_of(RadioChannel(loss=loss), 20.0, 1 + receiver, np.zeros((0, 4)))
-    return has_arrived(air, seed, sender, receiver, frame, 0.0, 0.0, 0)
+    return has_arrived(air_of(loss, 1 + receiver), seed, sender, receiver, frame, 0.0, 0.0, 0)
 
 
 def test_luck_takes_its_share_of_frames_evenly():
