@@ -29,18 +29,17 @@ def room(half):
 
 def brute_force(scanners, edges, beams=360):
     """Every ray against every face, by solving the two-by-two system."""
-    out = np.full((len(scanners), beams), np.inf)
-    for k, (x, y, yaw) in enumerate(scanners):
-        for i in range(beams):
-            angle = yaw + i * 2 * np.pi / beams
-            u = np.array([np.cos(angle), np.sin(angle)])
-            for x0, y0, x1, y1 in edges:
-                matrix = np.column_stack((u, [x0 - x1, y0 - y1]))
-                if abs(np.linalg.det(matrix)) < 1e-12:
-                    continue
-                distance, share = np.linalg.solve(matrix, [x0 - x, y0 - y])
-                if distance > 0 and -1e-12 <= share <= 1 + 1e-12:
-                    out[k, i] = min(out[k, i], distance)
+    angles = scanners[:, 2:] + np.arange(beams) * 2 * np.pi / beams
+    matrices = np.empty((*angles.shape, len(edges), 2, 2))
+    matrices[..., 0] = np.stack((np.cos(angles), np.sin(angles)), axis=-1)[:, :, None]
+    matrices[..., 1] = edges[:, :2] - edges[:, 2:]
+    ends = np.broadcast_to((edges[:, :2] - scanners[:, None, :2])[:, None], matrices.shape[:-1])
+    solvable = np.abs(np.linalg.det(matrices)) >= 1e-12
+    distance, share = np.linalg.solve(matrices[solvable], ends[solvable][..., None])[..., 0].T
+    hits = (distance > 0) & (share >= -1e-12) & (share <= 1 + 1e-12)
+    distances = np.full(solvable.shape, np.inf)
+    distances[solvable] = np.where(hits, distance, np.inf)
+    out = distances.min(axis=-1)
     out[(out < NEAREST) | (out > FARTHEST)] = np.inf
     return out
 
