@@ -29,13 +29,16 @@ AT_ANY_PACE = {
         "pages/test_events_page",
         "pages/test_eye_page",
         "pages/test_map_page",
+        "pages/test_mismatch_page",
         "pages/test_recordings_page",
         "pages/test_shell",
         "pages/test_signals_of_a_town",
         "pages/test_signals_page",
+        "pages/test_vehicle_page",
         "test_first_car",
         "test_mismatch_report",
         "test_own_car_example",
+        "test_rest_fuzz",
     )
 }
 """Files of `tests/e2e` that nothing binds to real time: their cities run in lockstep, or not."""

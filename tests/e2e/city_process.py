@@ -8,13 +8,12 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import httpx
 
-from scm.api.priority import NICER
 from scm.runtime.parent_watch import with_parent
 
 START_S = 180.0  # a cold start compiles the physics
@@ -91,14 +90,6 @@ class CityProcess:
     def descendants(self) -> set[int]:
         """Return the process ids of everything the city started and that still runs."""
         return {pid for pid in _pids() if _is_below(pid, self.process.pid)}
-
-    def hasten(self) -> None:
-        """Give long work the priority of the city's parts: other tests left it no time at all."""
-        for pid in self.descendants():
-            with suppress(OSError):  # it has ended, or we may not
-                if os.getpriority(os.PRIO_PROCESS, pid) == NICER:
-                    os.setpriority(os.PRIO_PROCESS, pid, 0)
-                    Path(f"/proc/{pid}/autogroup").write_text("0", "utf-8")
 
     def close(self) -> None:
         """Make sure that nothing is left, whatever the test did."""

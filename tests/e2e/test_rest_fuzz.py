@@ -1,6 +1,8 @@
-"""The web address of a living city, asked whatever its own description allows, and more."""
+"""A city's REST interface gets whatever its own description allows, and more.
 
-import socket
+The city runs in lockstep: on a busy machine it goes slower, and refuses nothing for being late.
+"""
+
 import time
 
 import hypothesis
@@ -9,14 +11,13 @@ import schemathesis
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import response_schema_conformance
 
-from scm.selftest.city import City
+from tests.e2e.pages.town import town
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
-PARTS = ("traffic", "monitor", "world", "api")
 ENDLESS = ("/stream", "/live", ".mjpeg", ".bin", "/events/stream")
-SPAN_S = 20.0
-EXAMPLES = 12
+SPAN_S = 20.0  # of this process' own time
+MAX_EXAMPLES = 12
 CHECKS = [not_a_server_error, response_schema_conformance]
 
 
@@ -25,16 +26,10 @@ def as_bytes(_context, value):
     return value if isinstance(value, bytes) else str(value).encode()
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 @pytest.fixture(scope="module")
 def schema(tmp_path_factory):
-    with City("driving_school", tmp_path_factory.mktemp("runs"), PARTS, port=free_port()) as city:
-        url = f"http://127.0.0.1:{city.port}/api/v1/openapi.json"
+    with town("driving_school", tmp_path_factory.mktemp("runs")) as city:
+        url = f"{city.url}/api/v1/openapi.json"
         yield schemathesis.openapi.from_url(url, wait_for_schema=20.0)
 
 
@@ -45,9 +40,9 @@ def is_endless(operation):
     return bool(streams & set(answers)) or operation.path.endswith(ENDLESS)
 
 
-def ask(operation, until_s):
+def call(operation, until_s):
     @hypothesis.settings(
-        max_examples=EXAMPLES,
+        max_examples=MAX_EXAMPLES,
         deadline=None,
         derandomize=True,
         database=None,
@@ -55,23 +50,23 @@ def ask(operation, until_s):
     )
     @hypothesis.given(case=operation.as_strategy())
     def once(case):
-        if time.monotonic() < until_s:
-            answer = case.call(timeout=10.0)
+        if time.process_time() < until_s:
+            answer = case.call(timeout=60.0)
             case.validate_response(answer, checks=CHECKS)
 
     once()
 
 
-def test_no_question_breaks_the_server_and_answers_are_as_described(schema):
-    operations = [found.ok() for found in schema.get_all_operations()]
-    asked = [operation for operation in operations if not is_endless(operation)]
-    assert len(asked) > 10
+def test_no_request_breaks_the_server_and_answers_are_as_described(schema):
+    found = [operation.ok() for operation in schema.get_all_operations()]
+    operations = [operation for operation in found if not is_endless(operation)]
+    assert len(operations) > 10
     failed = []
-    for number, operation in enumerate(asked):
-        began_s = time.monotonic()
+    for number, operation in enumerate(operations):
+        began_s = time.process_time()
         try:
-            ask(operation, began_s + SPAN_S / len(asked))
-        except Exception as wrong:  # noqa: BLE001  every operation shall be asked
+            call(operation, began_s + SPAN_S / len(operations))
+        except Exception as wrong:  # noqa: BLE001  every operation shall be called
             inner = " | ".join(map(str, getattr(wrong, "exceptions", ())))
             failed.append(f"{number} {operation.label}: {wrong} {inner}")
     assert not failed, "\n\n".join(failed)

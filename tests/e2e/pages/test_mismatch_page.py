@@ -21,12 +21,6 @@ CHANNELS = "    channels: {command.throttle: {column: u}, pose.x: {column: x, un
 
 
 @pytest.fixture(scope="module")
-def running(live_city):
-    """The city as a user starts it: its searches get a city's priority."""
-    return live_city
-
-
-@pytest.fixture(scope="module")
 def reports(running):
     """The folder of reports, with some in it."""
     with made_reports(running.folder / "reports") as folder:
@@ -152,11 +146,11 @@ def test_a_recording_of_ones_own_is_sent_and_searched(visit, reports, running, t
     page.wait_for_selector(".jobs li:has-text('short-drive')")
 
     def report():
-        running.hasten()
         rows = running.get("/mismatch/reports")["items"]
         return next((row for row in rows if row["name"].startswith("short-drive")), None)
 
-    row = wait_for(report, SEARCH_S, "the report of what was sent", every_s=0.5)
+    with running.paused():
+        row = wait_for(report, SEARCH_S, "the report of what was sent", every_s=0.5)
     assert "does not allow a verdict" in row["said"]
     page.click(f".reports a[href='/mismatch/{row['name']}']")
     page.wait_for_selector(".head >> text=No verdict")
@@ -168,11 +162,11 @@ def test_a_recording_of_ones_own_is_sent_and_searched(visit, reports, running, t
 
 def test_a_real_search_ends_in_a_report_that_can_be_read(visit, reports, running, searching):
     def ended():
-        running.hasten()
         row = running.get(f"/operations/{searching}")
         return row if row["state"] not in ("waiting", "running") else None
 
-    row = wait_for(ended, SEARCH_S, "the search ends", every_s=0.5)
+    with running.paused():
+        row = wait_for(ended, SEARCH_S, "the search ends", every_s=0.5)
     assert row["state"] == "done", row
     assert row["result"].startswith("/mismatch/turns-")
     page = visit(row["result"]).page

@@ -3,6 +3,7 @@
 import pytest
 
 from tests.e2e.city_process import wait_for
+from tests.e2e.pages.driving import CAR, drives_by_itself, row, take
 from tests.e2e.pages.visiting import judge, photograph
 
 
@@ -90,3 +91,50 @@ def test_a_fault_of_the_monitor_is_shown_kept_and_cleared_with_a_reason(visit, r
     wait_for(
         lambda: running.get("/signals/crossing")["mode"] == "plan", 30.0, "the plan runs again"
     )
+
+
+def test_a_wheel_on_a_dead_line_says_so_and_is_given_back(visit, running):
+    visited = visit(f"/vehicles/{CAR}")
+    page = visited.page
+    take(visited, running)
+    page.keyboard.down("w")
+    page.wait_for_selector('.now[data-why="driving"]')
+    with running.frozen("api"):
+        page.wait_for_selector('.now[data-why="no_reply"]')
+        page.wait_for_selector(".banner.lost >> text=No connection to the server")
+        page.wait_for_selector('.over[data-code="cut"]')
+        page.keyboard.up("w")
+        page.click("#city-stop")
+        page.wait_for_selector(".banner.lost >> text=The stop is not confirmed")
+        page.wait_for_selector(".notice >> text=The city did not answer in time.")
+    wait_for(lambda: running.get("/stop")["engaged"], 60.0, "the late stop has arrived")
+    running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
+    page.wait_for_selector('.page[data-link="live"]')
+    wait_for(lambda: row(running)["lease_left_ms"] is None, 90.0, "its lease has ended")
+    page.click("text=Let it drive")
+    drives_by_itself(running)
+
+
+GREY = """() => [...document.querySelectorAll("main .moves")].map(
+    (one) => getComputedStyle(one).filter.includes("grayscale(1)"))"""
+
+
+def test_what_moves_is_grey_while_nobody_tells_it_and_comes_back_by_itself(visit, running):
+    visited = visit(f"/vehicles/{CAR}")
+    page = visited.page
+    page.evaluate("() => { window.sameDocument = true }")
+    page.wait_for_selector('.film[data-seen="true"]')
+    page.wait_for_selector(".lidar canvas")
+    told = page.locator(".facts dd:has-text('ago')")
+    with running.frozen("world"):
+        visited.wait(f"() => (({GREY})()).every(Boolean)")
+        assert page.locator("main .moves").count() == 6
+        visited.until(lambda: " s" in told.inner_text(), "its age goes on")
+        page.wait_for_selector(".film .late:has-text('old')")
+        photograph(visited, "vehicle_silent")
+    fresh = f"() => !({GREY})().some(Boolean)"
+    visited.wait(fresh)
+    running.kill("api")
+    page.wait_for_selector(".film .late")
+    visited.wait(fresh)
+    assert page.evaluate("() => window.sameDocument")

@@ -1,55 +1,31 @@
-"""The vehicle page in a real city: looked at, driven by keys, pads and a gamepad, given back."""
+"""The vehicle page: looked at, driven by keys, pads and a gamepad, given back."""
 
-import threading
 from contextlib import contextmanager
 
 import pytest
 
-from scm.clock import NS_PER_MS, WallClock
-from scm.runtime.live import run
-from scm.runtime.part import BasePart, Service
-from scm.v2x.bus_zenoh import ZenohBus
+from scm.clock import NS_PER_MS
+from scm.runtime.part import BasePart, Service, Subscription
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.messages.echo_request import EchoReply, EchoRequest
 from scm.v2x.messages.join_request import JoinRequest
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
+from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from tests.e2e.city_process import wait_for
+from tests.e2e.pages.driving import CAR, drives_by_itself, row, take
 from tests.e2e.pages.visiting import LOOKS, judge, photograph
 
-CAR, AGENT, TIRED = "n1", "n5", "n9"
+AGENT, TIRED = "n5", "n9"
 PADS = """
 window.gamepad = null;
 navigator.getGamepads = () => [window.gamepad];
 """
 
 
-@pytest.fixture(scope="module")
-def running(live_city):
-    """The city as a user starts it: hands drive its cars."""
-    return live_city
-
-
-def row(running, name=CAR):
-    return running.get(f"/vehicles/{name}")
-
-
 def speed(running, name=CAR):
     return row(running, name)["speed_mps"]
-
-
-def take(visited, running, name=CAR):
-    """Take a car over on its open page, and wait until it stands under the wheel."""
-    page = visited.page
-    page.click("text=Take over")
-    page.wait_for_selector('.wheel[data-state="held"]')
-
-    def stands():
-        car = row(running, name)
-        return car["lease_left_ms"] is not None and abs(car["speed_mps"]) < 0.01
-
-    visited.until(stands, "it stands under the wheel")
 
 
 def give_back(visited, running, name=CAR):
@@ -58,38 +34,33 @@ def give_back(visited, running, name=CAR):
     drives_by_itself(running, name)
 
 
-def drives_by_itself(running, name=CAR):
-    def drives():
-        car = row(running, name)
-        return car["lease_left_ms"] is None and car["mode"] == "drive" and car["trip"]
-
-    wait_for(drives, 60.0, f"{name} drives by itself again")
-
-
 class Tired(BasePart):
     """A real car's agent, as far as the city sees: it stands, and its battery is nearly empty.
 
     With a throttle it wants to drive.
     """
 
-    name, role, period_ns, subscriptions = TIRED, "v", 50 * NS_PER_MS, ()
+    name, role, period_ns = TIRED, "v", 50 * NS_PER_MS
+    subscriptions = (Subscription(Presence, {"role": role, "station": TIRED}),)
     services = (Service(EchoRequest, {"vehicle": TIRED}),)
 
-    def __init__(self, session, throttle):
-        self.session, self.throttle, self.seq = session, throttle, 0
+    def __init__(self, throttle):
+        self.throttle, self.seq, self.place = throttle, 0, None
 
     def step(self, now_ns, inbox):
         self.seq += 1
-        echoes = []
+        outbox = []
         for item in inbox:
-            if isinstance(item.message, EchoRequest):
-                echoes.append(Answer(item, EchoReply(vehicle=TIRED, t_ns=now_ns)))
+            message = item.message
+            if isinstance(message, EchoRequest):
+                outbox.append(Answer(item, EchoReply(vehicle=TIRED, t_ns=now_ns)))
+            elif isinstance(message, Presence):
+                request = JoinRequest(vehicle=TIRED, session=message.session, kind="real")
+                outbox.append(Call(request))
             else:
-                self.place = item.message
-        if self.seq == 1:
-            return [Call(JoinRequest(vehicle=TIRED, session=self.session, kind="real"))]
-        if not hasattr(self, "place"):
-            return []
+                self.place = message
+        if self.place is None:
+            return outbox
         state = VehicleState(
             vehicle=TIRED, t_ns=now_ns, seq=self.seq, x_m=self.place.x_m, y_m=self.place.y_m,
             yaw_rad=self.place.yaw_rad, speed_mps=0.0, yaw_rate_radps=0.0, steering_rad=0.0,
@@ -100,7 +71,7 @@ class Tired(BasePart):
             suspect=TIRED, suspect_id=9, t_ns=now_ns, since_ns=now_ns, score=6.0, observations=(),
             evidence=(),
         )  # fmt: skip
-        return [*echoes, state, report]
+        return [*outbox, state, report]
 
     def finish(self, now_ns):
         return [Call(RemoveRequest(vehicle=TIRED))]
@@ -109,16 +80,9 @@ class Tired(BasePart):
 @contextmanager
 def tired(running, throttle=0.0):
     """Have a car in the city whose battery is low, and that was reported once."""
-    bus, stop = ZenohBus("city", TIRED, running.endpoint), threading.Event()
-    agent = Tired(bus.session, throttle)
-    thread = threading.Thread(target=run, args=(agent, bus, WallClock(), stop))
-    thread.start()
-    try:
+    with running.joined(Tired(throttle)):
         yield
-    finally:
-        stop.set()
-        thread.join(10.0)
-        wait_for(lambda: len(running.get("/vehicles")["vehicles"]) == 6, 60.0, "it left")
+    wait_for(lambda: len(running.get("/vehicles")["vehicles"]) == 6, 60.0, "it left")
 
 
 def looks_right(visited, name):
@@ -280,53 +244,6 @@ def by_a_field(page):
         field.focus();
         field.remove();
     }""")
-
-
-def test_a_wheel_on_a_dead_line_says_so_and_is_given_back(visit, running):
-    visited = visit(f"/vehicles/{CAR}")
-    page = visited.page
-    take(visited, running)
-    page.keyboard.down("w")
-    page.wait_for_selector('.now[data-why="driving"]')
-    with running.frozen("api"):
-        page.wait_for_selector('.now[data-why="no_reply"]')
-        page.wait_for_selector(".banner.lost >> text=No connection to the server")
-        page.wait_for_selector('.over[data-code="cut"]')
-        page.keyboard.up("w")
-        page.click("#city-stop")
-        page.wait_for_selector(".banner.lost >> text=The stop is not confirmed")
-        page.wait_for_selector(".notice >> text=The city did not answer in time.")
-    wait_for(lambda: running.get("/stop")["engaged"], 60.0, "the late stop has arrived")
-    running.web.put("/stop", json={"engaged": False, "by": "tests"}).raise_for_status()
-    page.wait_for_selector('.page[data-link="live"]')
-    wait_for(lambda: row(running)["lease_left_ms"] is None, 90.0, "its lease has ended")
-    page.click("text=Let it drive")
-    drives_by_itself(running)
-
-
-GREY = """() => [...document.querySelectorAll("main .moves")].map(
-    (one) => getComputedStyle(one).filter.includes("grayscale(1)"))"""
-
-
-def test_what_moves_is_grey_while_nobody_tells_it_and_comes_back_by_itself(visit, running):
-    visited = visit(f"/vehicles/{CAR}")
-    page = visited.page
-    page.evaluate("() => { window.sameDocument = true }")
-    page.wait_for_selector('.film[data-seen="true"]')
-    page.wait_for_selector(".lidar canvas")
-    told = page.locator(".facts dd:has-text('ago')")
-    with running.frozen("world"):
-        visited.wait(f"() => (({GREY})()).every(Boolean)")
-        assert page.locator("main .moves").count() == 6
-        visited.until(lambda: " s" in told.inner_text(), "its age goes on")
-        page.wait_for_selector(".film .late:has-text('old')")
-        photograph(visited, "vehicle_silent")
-    fresh = f"() => !({GREY})().some(Boolean)"
-    visited.wait(fresh)
-    running.kill("api")
-    page.wait_for_selector(".film .late")
-    visited.wait(fresh)
-    assert page.evaluate("() => window.sameDocument")
 
 
 def test_two_windows_share_connections_and_leave_one_for_what_is_done(visit, running):

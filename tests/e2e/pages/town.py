@@ -15,10 +15,12 @@ import httpx
 
 from scm.api.app import create_app
 from scm.api.based import Site
+from scm.api.city import Link
 from scm.api.folders import folders_in
 from scm.api.server import serve
 from scm.api.trace import traced
 from scm.api.view import CityView
+from scm.api.wire import BusWire
 from scm.camera.part import CameraPart
 from scm.clock import nanoseconds
 from scm.eye.part import EyePart
@@ -27,6 +29,7 @@ from scm.recorder.part import RecorderPart
 from scm.records.city_map import CityMap
 from scm.registry import names
 from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Part
 from scm.store.memory import MemoryStore
 from scm.traffic.misbehaviour.part import MisbehaviourPart
 from scm.traffic.monitor.part import MonitorPart
@@ -75,8 +78,16 @@ class Town:
             junction.name: names("scm.traffic.signals.plans") for junction in city_map.junctions
         }
         folders, site = folders_in(folder), Site(base)
+        link = Link(wire=BusWire(self.city.bus))
         app = create_app(
-            view, self._ask, city_map, folders=folders, plans=plans, site=site, state=store
+            view,
+            self._ask,
+            city_map,
+            folders=folders,
+            plans=plans,
+            site=site,
+            state=store,
+            link=link,
         )
         self._threads = [
             threading.Thread(target=self._drive),
@@ -106,6 +117,21 @@ class Town:
         answer = self.web.get(path)
         answer.raise_for_status()
         return answer.json()
+
+    @contextmanager
+    def joined(self, part: Part) -> Iterator[None]:
+        """Have another part in the city."""
+        with self._lock:
+            self.city.add(part)
+        yield
+        with self._lock:
+            self.city.remove(part)
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Let the city stand still: other work gets its processor time."""
+        with self._lock:
+            yield
 
     def close(self) -> None:
         """End all of it."""
