@@ -361,11 +361,6 @@ class Path:
         """Return the name of the lane at a distance."""
         return self.lanes[self._lane_index(s)]
 
-    def place_at(self, s: float) -> tuple[str, float]:
-        """Return the lane at a distance, and the distance from that lane's start [m]."""
-        index, on_lane = self.index_at(s)
-        return self.lanes[index], on_lane
-
     def index_at(self, s: float) -> tuple[int, float]:
         """Return which lane of the route holds a distance, and the distance from its start [m]."""
         index = self._lane_index(s)
@@ -375,24 +370,6 @@ class Path:
         """Return the limit at a distance: of the lane, or of the last sign on it."""
         index, on_lane = self.index_at(s)
         return next(limit for at, limit in reversed(self._limits[index]) if at <= on_lane)
-
-    def next_stop_line(self, s: float) -> tuple[float, StopLine] | None:
-        """Return the first stop line at or after a distance; of a closed path, round for ever."""
-        base = s - self._inside(s) if self.closed else 0.0
-        rounds = (base, base + self.length_m) if self.closed else (0.0,)
-        for offset in rounds:
-            for at, line in self.stop_lines:
-                if at + offset >= s:
-                    return at + offset, line
-        return None
-
-    def conflict_at(self, s: float) -> tuple[float, float, str] | None:
-        """Return the conflict stretch (from, to, junction) that holds a distance, or None."""
-        inside = self._inside(s)
-        for start, end, junction in self.conflicts:
-            if start <= inside <= end:
-                return start + s - inside, end + s - inside, junction
-        return None
 
     def _lane_index(self, s: float) -> int:
         """Return which lane of the route holds a distance."""

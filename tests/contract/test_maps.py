@@ -182,10 +182,11 @@ def test_no_car_is_put_into_a_junction_or_over_its_stop_line(city_map, roads):
             continue
         path = Path.circulation(roads, spawn.lane)
         tail, nose = spawn.at_m - 0.07, spawn.at_m + 0.23
-        line = path.next_stop_line(tail)
-        assert line is None or line[0] > nose
-        for s in np.linspace(tail, nose, 31):
-            assert path.conflict_at(s) is None
+        for at_m, _ in path.stop_lines:
+            assert (at_m - tail) % path.length_m > nose - tail
+        for begin, end, _ in path.conflicts:
+            assert (begin - tail) % path.length_m > nose - tail
+            assert (tail - begin) % path.length_m > end - begin
 
 
 def test_there_are_enough_spawns(city_map):

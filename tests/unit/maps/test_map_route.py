@@ -90,35 +90,12 @@ def test_a_path_knows_its_stop_lines_and_conflicts_in_driving_order(roads):
         assert junction == "crossing"
 
 
-def test_the_next_stop_line_is_found_in_every_lap(roads):
-    path = Path.circulation(roads, "east_loop")
-    first, _ = path.stop_lines[0]
-    at, line = path.next_stop_line(3 * path.length_m + 0.1)
-    assert (at, line.name) == (pytest.approx(3 * path.length_m + first), "south_west")
-    at, line = path.next_stop_line(first + 0.01)
-    assert line.name == "south_east"
-
-
-def test_an_open_path_has_no_stop_line_behind_the_last(roads):
-    path = Path(roads, ("east_loop", "crossing_south_west"))
-    assert path.next_stop_line(path.length_m - 0.1) is None
-
-
-def test_the_middle_of_the_crossing_is_a_conflict_and_the_loop_is_not(roads):
-    path = Path.circulation(roads, "crossing_south_east")
-    s, _ = path.project(1.384, 0.655, 0.8)
-    assert path.conflict_at(s)[2] == "crossing"
-    shifted = path.conflict_at(s + path.length_m)
-    assert shifted[0] == pytest.approx(path.conflict_at(s)[0] + path.length_m)
-    assert path.conflict_at(2.0) is None
-
-
 def test_a_path_knows_the_lane_at_every_distance(roads):
     path = Path.circulation(roads, "east_loop")
     for s in np.linspace(-7.0, 14.0, 50):
-        name, along = path.place_at(s)
-        assert name == path.lane_at(s)
-        pose, expected = path.at(s), roads.lanes[name].at(along)
+        index, along = path.index_at(s)
+        assert path.lanes[index] == path.lane_at(s)
+        pose, expected = path.at(s), roads.lanes[path.lanes[index]].at(along)
         np.testing.assert_allclose(pose[:2], expected[:2], atol=1e-6)
         assert abs(wrap_angle(pose.yaw - expected.yaw)) < 1e-5
 

@@ -15,7 +15,7 @@ from scm.v2x.etsi.convert import spatem_of
 from scm.v2x.messages.spat import Spat
 from scm.vehicles.driver import CarLimits, Other, RouteView
 from scm.vehicles.drivers.signal_table import SignalTable
-from scm.vehicles.drivers.single_car import RouteDriver
+from tests.unit.vehicles.drivers.route_driver import RouteDriver
 
 NIGEL = CarLimits(
     wheelbase=0.14154,
