@@ -32,10 +32,15 @@ CELL_M = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strip:
-    """What cars on a lane cover, (n, 2): where their sides go, where their middle may stand."""
+    """What cars on a lane cover, (n, 2): where their sides go, where their middle may stand.
+
+    `least` and `most` are the corners of a box around the sides.
+    """
 
     sides: Floats
     middle: Floats
+    least: tuple[float, float]
+    most: tuple[float, float]
 
 
 class Close(NamedTuple):
@@ -53,16 +58,21 @@ def strip_of(dots: Dots, *, stand: Bools | None = None) -> Strip:
     points = ((FRONT_M, HALF_WIDTH_M), (FRONT_M, -HALF_WIDTH_M), (0.0, HALF_WIDTH_M),
               (0.0, -HALF_WIDTH_M))  # fmt: skip
     sides = [dots.points + turned(np.full_like(dots.points, at), dots.yaw) for at in points]
-    return Strip(np.concatenate(sides), dots.points if stand is None else dots.points[stand])
+    covered = np.concatenate(sides)
+    (x, y), (far_x, far_y) = covered.min(axis=0).tolist(), covered.max(axis=0).tolist()
+    middle = dots.points if stand is None else dots.points[stand]
+    return Strip(covered, middle, (x, y), (far_x, far_y))
 
 
 def is_clear(one: Strip, other: Strip, least_m: float = STRAY_M) -> bool:
     """Return whether cars on two lanes keep clear of each other, by so much or more."""
-    apart = np.maximum(
-        one.sides.min(axis=0) - other.sides.max(axis=0),
-        other.sides.min(axis=0) - one.sides.max(axis=0),
+    apart_m = max(
+        one.least[0] - other.most[0],
+        one.least[1] - other.most[1],
+        other.least[0] - one.most[0],
+        other.least[1] - one.most[1],
     )
-    return bool(apart.max() >= least_m) or gap(one, other)[0] >= least_m
+    return apart_m >= least_m or gap(one, other)[0] >= least_m
 
 
 def gap(one: Strip, other: Strip) -> tuple[float, Floats]:

@@ -30,7 +30,7 @@ def points_ahead(view, count=200, seed=0):
 @pytest.mark.parametrize("distortion", [(0.0,) * 5, BARREL, PINCUSHION])
 @pytest.mark.parametrize("camera", ["front", "rear"])
 def test_points_are_shown_where_opencv_projects_them(optics, car, camera, distortion):
-    lens = Lens(optics(camera, distortion=distortion))
+    lens = Lens(optics(camera, distortion=distortion, width_px=160, height_px=90))
     pose = car(0.7, 0.4, 1.1, roll_rad=0.03, pitch_rad=-0.02)
     view = lens.view(car_rotation(pose), np.array([pose.x_m, pose.y_m, 0.0]))
     points = points_ahead(view)

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from scm.camera.floor import Floor
 from scm.camera.part import CameraPart
 from scm.camera.tween import between, near
 from scm.clock import NS_PER_MS, NS_PER_S
@@ -47,8 +48,25 @@ class Spy(CameraPart):
         return super().step(now_ns, inbox)
 
 
+@pytest.fixture(scope="module")
+def floors():
+    return {}
+
+
 @pytest.fixture
-def spy(city_map):
+def floor_drawn_once(floors, monkeypatch):
+    """Share the drawn floor between tests: it takes longer than all frames of most of them."""
+
+    def floor_of(city_map, daylight, seed):
+        if seed not in floors:
+            floors[seed] = Floor(city_map, daylight, seed)
+        return floors[seed]
+
+    monkeypatch.setattr("scm.camera.studio.Floor", floor_of)
+
+
+@pytest.fixture
+def spy(city_map, floor_drawn_once):
     return Spy(city_map)
 
 
@@ -77,14 +95,16 @@ def test_a_subscriber_gets_frames_at_the_cameras_rate_and_times(city):
     assert picture.shape == (720, 1280, 3) == (got[-1].height_px, got[-1].width_px, 3)
 
 
-def test_only_what_is_asked_for_is_pictured(city):
+def test_only_what_is_asked_for_is_pictured(city, own_facts):
+    own_facts()
     city.subscribe(N1_FRONT)
     every = city.subscribe(Subscription(CameraFrame, {"vehicle": "n2"}))
     city.run_for(0.5)
     assert {item.message.camera for item in every.drain()} == {"front", "rear"}
 
 
-def test_rendering_ends_with_the_last_subscriber(city, spy):
+def test_rendering_ends_with_the_last_subscriber(city, spy, own_facts):
+    own_facts()
     frames = city.subscribe(N1_FRONT)
     city.run_for(0.5)
     assert frames.drain()
@@ -102,8 +122,9 @@ def test_rendering_ends_with_the_last_subscriber(city, spy):
     ("cameras_hz", "cars", "kept"), [(0.0, (), 0), (5.0, (), 4 * 6), (5.0, ("n1",), 2 * 6)]
 )
 def test_a_recorder_makes_cameras_run_only_when_told_to(
-    city, spy, tmp_path, cameras_hz, cars, kept
+    city, spy, tmp_path, own_facts, cameras_hz, cars, kept
 ):
+    own_facts()
     recorder = RecorderPart(tmp_path / "run.mcap", "city", 1.0, cameras_hz, cars)
     city.add(recorder)
     city.run_for(1.3)
@@ -169,6 +190,7 @@ def test_frames_under_way_end_with_the_last_subscriber(city, own_facts):
     assert all(t_ns >= NS_PER_S - 50 * NS_PER_MS for t_ns, _ in arrivals(city, 1.4))
 
 
+@pytest.mark.usefixtures("floor_drawn_once")
 def test_drop_out_loses_some_frames_and_no_others_change(city_map, car, own_facts):
     def run(wanted, drop_out):
         own_facts(drop_out=drop_out, read_noise=2.0)
