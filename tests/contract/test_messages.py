@@ -165,7 +165,7 @@ def structs(kind):
 
 
 @every_class
-@settings(max_examples=25)
+@settings(max_examples=10)  # of each of 140 classes; a field that is lost is seen in the first
 @given(data=st.data())
 def test_it_is_read_back_equal_from_bytes_of_now_of_old_and_of_the_future(kind, data):
     message = data.draw(structs(kind))

@@ -254,6 +254,7 @@ def test_a_car_on_the_map_tag_lets_the_correction_age_while_others_are_seen(eye)
     assert [pose.map_tag_age_ms for pose in poses] == [300.0, 300.0]
 
 
+@pytest.mark.usefixtures("sceneries_drawn_anew")
 def test_same_seed_same_messages_bit_for_bit():
     first, second = (see(EyePart(CITY, seed=5), light(1, CAR)) for _ in range(2))
     assert first == second

@@ -12,10 +12,9 @@ from scm.errors import EyeError
 from scm.eye.camera import camera_model
 from scm.eye.detect import detect_tags
 from scm.eye.picture import read_picture
-from scm.eye.render import effects, shots
+from scm.eye.render import effects
 from scm.eye.render.car import tag_on_roof
 from scm.eye.render.covers import Layer, common
-from scm.eye.render.floor import draw_scenery
 from scm.eye.render.motion import Driven, gathered
 from scm.eye.render.scene import bare_floor, camera_over
 from scm.eye.render.shots import Look, Studio
@@ -53,22 +52,6 @@ def off_px(shot):
     found = found_in(shot)
     assert set(found) == {i for i, tag in shot.tags.items() if tag.visible > 0.99}
     return np.sqrt(np.mean([(found[i] - shot.tags[i].corners_px) ** 2 for i in found]))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def floors_drawn_once():
-    """Share the drawn floor between pictures by one camera: they differ in cars and effects."""
-    drawn = {}
-
-    def draw_once(city_map, model, rng):
-        key = (city_map.name, id(model), str(rng.bit_generator.state))
-        if key not in drawn:
-            drawn[key] = draw_scenery(city_map, model, rng), model
-        return drawn[key][0]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(shots, "draw_scenery", draw_once)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -268,8 +251,8 @@ def test_a_frame_depends_on_its_cars_alone_not_on_frames_before(overhead):
     assert np.array_equal(used.shoot(moving, 50).image, fresh.shoot(moving, 50).image)
 
 
-def test_the_same_seed_gives_the_same_pictures(overhead, monkeypatch):
-    monkeypatch.setattr(shots, "draw_scenery", draw_scenery)  # the floor's grain as well
+@pytest.mark.usefixtures("sceneries_drawn_anew")
+def test_the_same_seed_gives_the_same_pictures(overhead):
     look = Look(noise_sigma=4.0, hands=1, lamps=1, jpeg=80)
     first, again = (Studio(FLOOR, overhead, look, 7).shoot(PARKED).image for _ in range(2))
     assert np.array_equal(first, again)
