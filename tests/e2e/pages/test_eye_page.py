@@ -104,10 +104,11 @@ def test_a_lens_is_measured_from_uploaded_pictures(visit, running, tmp_path, loo
     assert page.input_value("input[name=square_mm]") == "100.00"
     page.set_input_files("input[type=file]", [str(path) for path in paths])
     all_found = f".eye-lens .facts:has-text('{len(paths)} of {len(paths)} pictures')"
-    page.wait_for_selector(all_found, timeout=MEASURING_MS)
-    page.wait_for_selector(".coverage canvas[data-percent]")
-    page.click("text=Measure the lens")
-    page.wait_for_selector(".eye-lens .result dl", timeout=MEASURING_MS)
+    with running.paused():
+        page.wait_for_selector(all_found, timeout=MEASURING_MS)
+        page.wait_for_selector(".coverage canvas[data-percent]")
+        page.click("text=Measure the lens")
+        page.wait_for_selector(".eye-lens .result dl", timeout=MEASURING_MS)
     (row,) = running.get("/eye/calibrations")["items"]
     found = tomllib.loads(running.get(f"/eye/calibrations/{row['name']}")["toml"])
     assert found["fx_px"] == pytest.approx(camera.fx_px, rel=0.01)

@@ -329,7 +329,8 @@ def test_a_part_is_cut_out_and_opened(visit, running, drive, last_s):
     page.fill(f"{PART} input[name=start]", f"{begin_s:g}")
     page.fill(f"{PART} input[name=stop]", f"{end_s:g}")
     page.click(f"{PART} >> text=Cut")
-    visited.until(lambda: page.url.endswith(name), "the part is opened")
+    with running.paused():
+        visited.until(lambda: page.url.endswith(name), "the part is opened")
     page.wait_for_function(ALL_SHOWN)
     part = running.get(f"/recordings/{name}")
     assert part["length_s"] == pytest.approx(5.0, abs=0.5)

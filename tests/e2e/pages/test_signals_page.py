@@ -124,7 +124,8 @@ def test_a_plan_is_made_proven_saved_asked_for_and_deleted(visit, running):
     assert save.is_disabled()
     prove.click()
     proven = ".verdict[data-state=good] >> text=Proven: 212 states"
-    page.wait_for_selector(proven, timeout=120_000)  # the search stands back behind all else
+    with running.paused():
+        page.wait_for_selector(proven, timeout=120_000)  # the search stands back behind all else
     judged(visited, "signals_editor_proven")
     page.fill(green, "14.5")  # what is proven is not this any more
     page.wait_for_selector(".verdict >> text=The search has to prove it")
