@@ -63,6 +63,7 @@ class Repairs:
 
     recording: Recording
     repairs: list[Repair] = field(default_factory=list)
+    _tracked: tuple[Recording, Track | None] | None = field(default=None, init=False, repr=False)
 
     def repair(
         self, repair: Repair, name: str, text: str, corrected: str, instead: str = DESCRIBE,
@@ -83,10 +84,13 @@ class Repairs:
 
     @property
     def poses(self) -> Track | None:
-        """The poses, None where there are too few to compare."""
-        found = track(self.recording)
-        long = found is not None and recorded_s(found.t) > SHORTEST_S
-        return found if found is not None and long and moves(found) else None
+        """The poses, None where there are too few to compare; computed once for each repair."""
+        if self._tracked is None or self._tracked[0] is not self.recording:
+            found = track(self.recording)
+            long = found is not None and recorded_s(found.t) > SHORTEST_S
+            usable = found if found is not None and long and moves(found) else None
+            self._tracked = self.recording, usable
+        return self._tracked[1]
 
 
 def repair_heading(now: Repairs) -> Iterator[DataProblem]:

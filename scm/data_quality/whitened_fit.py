@@ -82,23 +82,34 @@ def whiten(values: Floats, theta: float, parts: Sequence[slice]) -> Floats:
 
     Rows of no part become zero.
     """
-    result = np.zeros_like(values)
+    n = len(values)
+    flat = np.ascontiguousarray(values, dtype=np.float64).reshape(n, -1)
+    result = np.zeros_like(flat)
     for part in parts:
-        n = part.stop - part.start
-        e = np.ascontiguousarray(np.diff(values[part], axis=0, prepend=0.0).reshape(n, -1))
-        _filter(e, theta)
-        start = theta ** np.arange(n)
-        level = start @ e / (start @ start)
-        result[part] = (e - np.outer(start, level)).reshape(n, *values.shape[1:])
-    return result
+        _filter(flat[part], theta, result[part])
+    return result.reshape(values.shape)
 
 
 @array_kernel
-def _filter(e: Floats, theta: float) -> None:
-    """Add to each row so much of the one before, which has become its own, (n, columns)."""
-    for i in range(1, e.shape[0]):
-        for j in range(e.shape[1]):
-            e[i, j] += theta * e[i - 1, j]
+def _filter(values: Floats, theta: float, e: Floats) -> None:
+    """Write one part's errors less those that its likeliest level leaves, (n, columns)."""
+    n, columns = values.shape
+    level, total, share = np.zeros(columns), 0.0, 1.0  # share of the level in a row's error
+    for i in range(n):
+        for j in range(columns):
+            e[i, j] = values[i, j]
+            if i > 0:
+                e[i, j] += theta * e[i - 1, j] - values[i - 1, j]
+            level[j] += share * e[i, j]
+        total += share * share
+        share = share * theta if share > TINY else 0.0
+    share = 1.0
+    for i in range(n):
+        if share < TINY:
+            break
+        for j in range(columns):
+            e[i, j] -= share * level[j] / total
+        share *= theta
 
 
 def _solve(
@@ -111,15 +122,21 @@ def _solve(
 ) -> tuple[Floats, Floats, Floats]:
     """Return factors, whitened columns `(n, axes, k)` and whitened residual `(n, axes)`."""
     rows, y = whiten(columns, theta, parts), whiten(measured, theta, parts)
-    scale = np.sqrt(np.einsum("nak,nak->k", rows, rows)) + 1e-12
-    unit = rows / scale
-    normal = np.einsum("nak,nal,na->kl", unit, unit, weights)
-    right = np.einsum("nak,na,na->k", unit, y, weights)
+    unit, scale = _unit(rows)
+    weighted = unit * weights.reshape(-1, 1)
+    normal, right = weighted.T @ unit, weighted.T @ y.ravel()
     free = np.linalg.lstsq(normal, right, rcond=1e-12)[0] / scale
     noise = _spread(y - rows @ free)
     normal = normal + np.diag((noise / (allowed * scale)) ** 2)
     values = np.linalg.lstsq(normal, right, rcond=1e-15)[0] / scale
     return values, rows, y - rows @ values
+
+
+def _unit(rows: Floats) -> tuple[Floats, Floats]:
+    """Return columns of length 1, all axes below each other, `(n * axes, k)`, and their lengths."""
+    flat = rows.reshape(-1, rows.shape[2])
+    scale = np.sqrt((flat * flat).sum(axis=0)) + 1e-12
+    return flat / scale, scale
 
 
 def _spread(e: Floats) -> float:
@@ -144,13 +161,12 @@ def _likeliest(residual: Floats, parts: Sequence[slice]) -> float:
 def _errors(rows: Floats, e: Floats, weights: Floats, allowed: Floats) -> tuple[Floats, Floats]:
     """Return standard errors and leaks, shape `(k,)` each."""
     n, _, k = rows.shape
-    scale = np.sqrt(np.einsum("nak,nak->k", rows, rows)) + 1e-12
-    unit = rows / scale
+    unit, scale = _unit(rows)
     variance = float(np.mean(weights * e**2))
-    normal = np.einsum("nak,nal,na->kl", unit, unit, weights)
+    normal = (unit * weights.reshape(-1, 1)).T @ unit
     normal = normal + np.diag(variance / (allowed * scale) ** 2)
     inverse = np.linalg.pinv(normal, rcond=1e-15, hermitian=True)
-    scores = np.einsum("nak,na->nk", unit, weights * e)
+    scores = (unit * (weights * e).reshape(-1, 1)).reshape(rows.shape).sum(axis=1)
     edges = np.linspace(0, n, min(BLOCKS, n) + 1).astype(int)[:-1]
     sums = np.add.reduceat(scores, edges, axis=0)
     spread = inverse @ (sums.T @ sums) @ inverse * (len(sums) / max(1, len(sums) - k))

@@ -35,7 +35,7 @@ from scm.vehicles.fleet_rows import (
 from scm.vehicles.jit import plain
 from scm.vehicles.layout import columns_of, find_column, rows_of
 from scm.vehicles.physics_variables import VARIABLES
-from scm.vehicles.shape import Shape, shape_of
+from scm.vehicles.shape import Shape, shape_function
 from scm.vehicles.term import reads
 
 SUBSTEP_S = 1e-3
@@ -104,6 +104,9 @@ class Fleet:
         self.car, self.capacity = car, capacity
         self.threads = 1
         self.columns = columns_of(car.terms)
+        self._places = {column.param.key: i for i, column in enumerate(self.columns)}
+        self._shape_of = shape_function(car)
+        self._states = {term.target: term.keeps for term in car.terms if term.keeps is not None}
         self._offsets = rows_of(car.terms)
         self._variable_offsets = offsets_of_variables(self._offsets)
         self._kernel = compile_kernel(car.terms)
@@ -215,8 +218,7 @@ class Fleet:
         """
         self._check(row)
         car = self._block[:, row]
-        lags = [term.target for term in self.car.terms if term.keeps is not None]
-        actuators = {name: self._view(name)[row].copy() for name in {*lags, "steer_angle"}}
+        actuators = {name: self._view(name)[row].copy() for name in {*self._states, "steer_angle"}}
         car[:] = 0.0
         shape = self.shape(row)
         cog, c, s = shape.cog_to_rear_axle, math.cos(pose.yaw), math.sin(pose.yaw)
@@ -232,10 +234,8 @@ class Fleet:
         self._set(row, "floor_grip", 1.0)
         self.contact_accel_x[row] = self.contact_accel_y[row] = self.contact_yaw_accel[row] = 0.0
         at_rest = {"steer": steer_angle, "throttle": throttle}
-        for term in self.car.terms:
-            if term.keeps is not None:
-                start = at_rest.get(VARIABLES[term.target].starts_at)
-                self._set(row, term.target, start or term.keeps)
+        for name, initial in self._states.items():
+            self._set(row, name, at_rest.get(VARIABLES[name].starts_at) or initial)
         self._set(row, "steer_angle", steer_angle or 0.0)
         for name in actuators if keep_actuators else ():
             self._set(row, name, actuators[name])
@@ -288,8 +288,7 @@ class Fleet:
 
     def shape(self, row: int) -> Shape:
         """Return one car's mass properties, effects included."""
-        places = {column.param.key: i for i, column in enumerate(self.columns)}
-        return shape_of(self.car, lambda key: float(self.parameters[row, places[key]]))
+        return self._shape_of(lambda key: float(self.parameters[row, self._places[key]]))
 
     def advance(self, duration: float, substep: float = SUBSTEP_S) -> None:
         """Advance all cars by whole substeps in one call, without the interpreter lock [s].
@@ -457,13 +456,12 @@ class Fleet:
         delayed = {name for term in self.car.terms for name in reads(term.function)} & DELAYS.keys()
         if not delayed:
             return None
-        keys = {column.param.key: i for i, column in enumerate(self.columns)}
         for name in sorted(delayed):
-            if DELAYS[name] not in keys:
+            if DELAYS[name] not in self._places:
                 msg = f"an effect reads {name}, but no effect has the parameter {DELAYS[name]}"
                 raise TermError(msg)
         offsets = [self._offsets[name][0] for name in (*COMMANDS, *DELAYS)]
-        columns = [keys.get(key, -1) for key in DELAYS.values()]
+        columns = [self._places.get(key, -1) for key in DELAYS.values()]
         return CommandHistory(padded, np.array(offsets), np.array(columns))
 
     def _offset_of(self, name: str) -> int:

@@ -28,18 +28,24 @@ class Shape:
     cog_height: float
 
 
-def shape_of(car: Car, number: Callable[[str], float] | None = None) -> Shape:
-    """Return a car's mass properties.
+def shape_of(car: Car) -> Shape:
+    """Return the mass properties of a car as its file says; its effects may add to the body's."""
+    return shape_function(car)(car.value)
 
-    Args:
-        car: Its effects may add to the body's values.
-        number: Returns a number by its key; default: from the car file.
-    """
-    value = number or car.value
-    totals = {key: value(key) for key in _ADDED.values()}
+
+def shape_function(car: Car) -> Callable[[Callable[[str], float]], Shape]:
+    """Return what gives a car's mass properties for numbers by their keys."""
+    added = list[tuple[str, Callable[..., float], list[str]]]()
     for term in car.terms:
         if VARIABLES[term.target].role is Role.SHAPE:
             keys = {param.name: param.key for param in term.params}
-            more = plain(term.function)(*(value(keys[name]) for name in reads(term.function)))
-            totals[_ADDED[term.target]] += more
-    return Shape(*totals.values())
+            arguments = [keys[name] for name in reads(term.function)]
+            added.append((_ADDED[term.target], plain(term.function), arguments))
+
+    def shape(value: Callable[[str], float]) -> Shape:
+        totals = {key: value(key) for key in _ADDED.values()}
+        for key, function, arguments in added:
+            totals[key] += function(*map(value, arguments))
+        return Shape(*totals.values())
+
+    return shape

@@ -186,8 +186,10 @@ class Rollouts:
         delays = np.zeros((2, fleet.capacity))
         for row in range(fleet.capacity):
             fleet.remove(row)
-        for numbers in sets:
-            row = fleet.add(Pose2(self._x[0], self._y[0], self._yaw[0]))
+        fleet.add(Pose2(self._x[0], self._y[0], self._yaw[0]))
+        for row in range(1, len(sets)):
+            fleet.copy_row(0, row)
+        for row, numbers in enumerate(sets):
             for key, value in numbers.items():
                 if key in _LATE:
                     delays[int(key == STEERING_DELAY), row] += value
