@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import fields, is_dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -172,10 +173,8 @@ def _is_whole(value: Any) -> bool:
 
 def _pick(message: Any, name: str) -> float | str | None:
     """Return a field of a message; None where it has none of that name, or no single value."""
-    if not _FIELD.fullmatch(STAMP_FIELD if name == STAMP else name):
-        return None
     value = message
-    for part in _PART.findall(STAMP_FIELD if name == STAMP else name):
+    for part in _path(name):
         if part.isdigit():
             if not isinstance(value, list | np.ndarray) or int(part) >= len(value):
                 return None
@@ -184,21 +183,34 @@ def _pick(message: Any, name: str) -> float | str | None:
             value = getattr(value, part)
         else:
             return None
-    return _single(value)
+    return _single(value) if _path(name) else None
+
+
+@lru_cache
+def _path(name: str) -> tuple[str, ...]:
+    """Return the parts of a field's name, none where it names no field."""
+    field = STAMP_FIELD if name == STAMP else name
+    return tuple(_PART.findall(field)) if _FIELD.fullmatch(field) else ()
 
 
 def _single(value: Any) -> float | str | None:
     """Return a number, a word or a time as it is, anything larger as None."""
     if isinstance(value, np.generic):
         value = value.item()
-    if is_dataclass(value) and _fields(value) == ["sec", "nanosec"]:
-        sec, nanosec = (getattr(value, name) for name in _fields(value))
+    if is_dataclass(value) and _fields(value) == ("sec", "nanosec"):
+        sec, nanosec = (getattr(value, name) for name in ("sec", "nanosec"))
         return _Instant(sec * NS_PER_S + nanosec)
     return value if isinstance(value, int | float | str) else None
 
 
-def _fields(value: Any) -> list[str]:
-    return [field.name for field in fields(value) if not field.name.startswith("__")]
+def _fields(value: Any) -> tuple[str, ...]:
+    kind: Any = type(value)
+    return _fields_of(kind)
+
+
+@lru_cache
+def _fields_of(kind: Any) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind) if not field.name.startswith("__"))
 
 
 def _names(message: Any) -> list[str]:

@@ -100,7 +100,8 @@ def typed_kernel(signature: str) -> Callable[[Function], Function]:
     """Compile a kernel of a generated file now, for one signature, cached beside that file."""
 
     def compiled(function: Function) -> Function:
-        delete_damaged(Path(function.__code__.co_filename).parent)
+        file = Path(function.__code__.co_filename)
+        delete_damaged(file.parent / "__pycache__", f"{file.stem}.*")
         return _cached("", function, signature)
 
     return compiled
@@ -137,12 +138,12 @@ def version_folder(package: Path) -> Path:
     return own
 
 
-def delete_damaged(folder: Path) -> None:
-    """Delete compiled files that were cut off, so that they are written anew.
+def delete_damaged(folder: Path, names: str = "*") -> None:
+    """Delete compiled files that were cut off, of those names, so that they are written anew.
 
     numba's are pickles, which end with a full stop.
     """
-    for path in folder.rglob("*.nb[ic]"):
+    for path in folder.rglob(f"{names}.nb[ic]"):
         if not path.read_bytes().endswith(b"."):
             path.unlink(missing_ok=True)
 

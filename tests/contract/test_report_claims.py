@@ -38,7 +38,7 @@ def late(name, _t, values):
 
 FEW = ("steer_trim", "pose_scale")  # what there is to choose from: all takes half a minute
 CASES = {
-    "5 s": (TRIM, None, {"budget_s": 5.0}),
+    "2 s": (TRIM, None, {"budget_s": 2.0}),
     "a fault of the camera": ((), late, {"finds": "pose_scale"}),
     "interrupted at once": (TRIM, None, {"batches": 3}),
     "interrupted in a round": (TRIM, None, {"batches": 40}),
@@ -49,7 +49,7 @@ CASES = {
 def test_every_figure_of_a_report_is_that_of_its_car_file(case, tmp_path, monkeypatch):
     numbers, sense, how = CASES[case]
     more = {} if sense is None else {"sense": sense}
-    recording = made_drive(numbers, seconds=20.0, **more)
+    recording = made_drive(numbers, seconds=14.0, **more)
     made = Budget
     if "batches" in how:
         made = interrupted_after(how["batches"])
@@ -68,7 +68,7 @@ def test_every_figure_of_a_report_is_that_of_its_car_file(case, tmp_path, monkey
 @pytest.fixture(scope="module")
 def untimed():
     """A drive, and what is found in it in no time."""
-    recording = made_drive(TRIM, seconds=20.0)
+    recording = made_drive(TRIM, seconds=14.0)
     return recording, diagnose_car([recording], nigel(), budget=Budget(0.0, WallClock()))
 
 
@@ -78,9 +78,9 @@ def test_every_figure_of_a_report_made_in_no_time_is_that_of_its_car_file(untime
 
 
 def test_every_figure_of_a_recording_with_a_pause_of_a_day_is_that_of_its_car_file(tmp_path):
-    recording = made_drive(TRIM, seconds=20.0)
+    recording = made_drive(TRIM, seconds=14.0)
     for name, channel in recording.channels.items():
-        late = np.where(channel.t >= 9.0, channel.t + 86_400.0, channel.t)
+        late = np.where(channel.t >= 6.0, channel.t + 86_400.0, channel.t)
         recording.channels[name] = replace(channel, t=late)
     found = diagnose_car([recording], nigel(), budget=Budget(0.0, WallClock()))
     write(found, tmp_path)
@@ -91,9 +91,9 @@ def test_every_figure_of_a_recording_with_a_pause_of_a_day_is_that_of_its_car_fi
 
 
 def test_every_figure_of_pieces_that_a_budget_allows_is_that_of_its_car_file(tmp_path, monkeypatch):
-    monkeypatch.setattr(budget, "MIN_COMPARED_S", 15.0)
+    monkeypatch.setattr(budget, "MIN_COMPARED_S", 10.0)
     monkeypatch.setattr(sample, "PIECE_S", 4.0)
-    recording = made_drive(TRIM, seconds=20.0)
+    recording = made_drive(TRIM, seconds=14.0)
     found = diagnose_car([recording], nigel(), budget=Budget(0.0, WallClock()))
     assert "partly_compared" in {problem.name for problem in found.diagnosis.data}
     write(found, tmp_path)

@@ -39,7 +39,7 @@ def tagged(recording, ahead_m, left_m):
     return replace(recording, channels=recording.channels | seen)
 
 
-def drive_of(seed, seconds=13.0):
+def drive_of(seed, seconds=9.0):
     """One healthy car's drive."""
     return made_drive(seconds=seconds, seed=seed)
 

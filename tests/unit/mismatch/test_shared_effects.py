@@ -11,12 +11,17 @@ from scm.mismatch.several.shared_effects import compared
 from tests.unit.mismatch.made_cars import drive_of, selected, tagged, tilted
 
 CARS = ("a", "b", "c")
-TILT, WEAK, TAG_M = 0.03, 0.009, 0.03
+TILT, WEAK, TAG_M = 0.04, 0.022, 0.03
 
 
 @cache
 def drives():
     return {name: drive_of(seed) for seed, name in enumerate(CARS, start=1)}
+
+
+@cache
+def healthy():
+    return {name: selected(drive) for name, drive in drives().items()}
 
 
 @cache
@@ -56,8 +61,7 @@ def test_a_car_that_found_nothing_gets_what_all_share_at_the_shared_value():
 
 def test_a_wrong_tag_is_the_car_s_own():
     wrong = selected(tagged(drives()["b"], TAG_M, 0.0), pose_point=(0.02, 0.0))
-    cars = {"a": selected(drives()["a"]), "b": wrong, "c": selected(drives()["c"])}
-    (point,), adopted = compared(cars, lambda _: None)
+    (point,), adopted = compared({**healthy(), "b": wrong}, lambda _: None)
     assert not point.shared
     assert [one.agreement for one in point.cars] == [
         Agreement.CONTRADICTS,
@@ -85,10 +89,9 @@ def test_a_tilt_too_weak_for_one_car_is_found_by_all_together():
 
 
 def test_healthy_cars_have_nothing_in_common():
-    cars = {name: selected(drive) for name, drive in drives().items()}
-    common, adopted = compared(cars, lambda _: None)
+    common, adopted = compared(healthy(), lambda _: None)
     assert not common
-    assert adopted == cars
+    assert adopted == healthy()
 
 
 def test_cars_with_tags_wrong_by_unlike_amounts_share_nothing():

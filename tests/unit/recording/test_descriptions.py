@@ -1,5 +1,6 @@
 """The recordings that the project describes are read and replayed, where their data is at hand."""
 
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ REPLAYED = {  # name: most error of 1 s of free run with the car as its authors 
 }
 
 
+@lru_cache(maxsize=8)  # the bags of the real Nigel are read by several tests
 def recording_of(path: Path, shared: Path) -> Recording:
     """Read a description, or skip where one of its files is not here."""
     own = path.stem if path.parent == FOLDER else path.parent.name

@@ -116,7 +116,7 @@ def discovered():
 @cache
 def lens():
     """A camera whose scale grows with |x|, as a cheap lens."""
-    model = Likelihood.of([lawful_drive(seconds=30.0, sense=_bent())], lawful_nigel())
+    model = Likelihood.of([lawful_drive(seconds=14.0, sense=_bent())], lawful_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))
     (base,) = fitter.refine([fitter.unfitted()], rounds=2, fresh=True)
     fitter = fitter.under(model.with_signatures(signatures_of(base)))
