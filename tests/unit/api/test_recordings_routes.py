@@ -389,7 +389,7 @@ def test_a_part_becomes_a_recording_of_its_own(ask, client, folder):
     for name in ("drive-2-4s", "drive-2-4s-2"):
         row = ask("/drive/parts", 202, "POST", json={"from_s": 2.0, "to_s": 4.0})
         assert row["what"] == "2 to 4 s of drive"
-        wait_for(lambda at=row["id"]: over(client, at), 120.0, "it is cut")
+        wait_for(lambda at=row["id"]: over(client, at), 120.0, "it is cut", every_s=0.2)
         assert over(client, row["id"])["result"] == f"/recordings/{name}"
         part = ask(f"/{name}")
         assert (part["state"], part["length_s"], part["cars"]) == ("complete", 2.0, ["n1", "n10"])
