@@ -21,7 +21,7 @@ from tests.unit.mismatch.made_fit import by_name
 
 @pytest.fixture(scope="module")
 def healthy():
-    return Drive(made_drive(seconds=12.0), big_nigel())
+    return Drive(made_drive(seconds=9.0), big_nigel())
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +163,7 @@ def test_a_step_within_bounds_is_the_best_there():
     ],
 )
 def test_a_fit_finds_what_was_concealed(name, key, value):
-    drive = Drive(made_drive(((key, value),), seconds=12.0), big_nigel())
+    drive = Drive(made_drive(((key, value),), seconds=9.0), big_nigel())
     model = Likelihood.of([drive], big_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))
     (base,) = fitter.refine([fitter.unfitted()], rounds=3, fresh=True)
@@ -235,7 +235,7 @@ def test_no_effect_is_tried_beside_its_twin(healthy):
 
 
 def test_a_delay_is_told_from_a_lag():
-    made = made_drive(seconds=12.0)
+    made = made_drive(seconds=9.0)
     sent = made.channels["command.steering"]
     early = {**made.channels, "command.steering": replace(sent, t=sent.t - 0.03)}
     drive = Drive(replace(made, channels=early), big_nigel())

@@ -35,7 +35,7 @@ from tests.unit.mismatch.made_fit import candidate
 
 @pytest.fixture(scope="module")
 def model():
-    return Likelihood.of([driven(seconds=8.0)], big_nigel())
+    return Likelihood.of([driven(seconds=6.0)], big_nigel())
 
 
 def context_of(model, *names, **more):

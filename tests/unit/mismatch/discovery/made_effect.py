@@ -43,7 +43,7 @@ def side():
     return law("wheel angle against steering sign", "side")
 
 
-def lawful_drive(numbers=(), seconds=9.0, **more):
+def lawful_drive(numbers=(), seconds=7.0, **more):
     """A drive of a car whose general effect has these numbers."""
     recording = made_drive(tuple(dict(numbers).items()), seconds, car=lawful_nigel(), **more)
     return Drive(recording, lawful_nigel())
