@@ -6,12 +6,13 @@ checked: four numbers of a car's state, instead of all 570 bytes of its text.
 
 from collections.abc import Callable
 from functools import lru_cache
+from operator import attrgetter
 from typing import Any
 
 import msgspec
 from msgspec import inspect
 
-_LARGEST = 2**63 - 1
+_SMALLEST, _LARGEST = -(2**63), 2**63 - 1
 _WITHOUT = (
     inspect.BoolType,
     inspect.BytesType,
@@ -57,20 +58,35 @@ def _is_bounded(info: inspect.IntType) -> bool:
 
 
 def _is_short(value: int) -> bool:
-    return -_LARGEST - 1 <= value <= _LARGEST
+    return _SMALLEST <= value <= _LARGEST
 
 
 def _of_struct(info: inspect.StructType) -> Check | None:
-    fields = [(field.name, _check(field.type)) for field in info.fields]
-    checks = [(name, check) for name, check in fields if check is not None]
+    """Return a check of a struct's fields, all its plain integers in one pass: Spat has dozens."""
+    fields = [(field.name, field.type) for field in info.fields if _check(field.type) is not None]
+    numbers = [name for name, kind in fields if _is_number(kind)]
+    checks = [(name, _check(kind)) for name, kind in fields if name not in numbers]
+    # One name more, since `attrgetter` of a single one returns no tuple.
+    numbers_of = attrgetter(*numbers, numbers[0]) if numbers else lambda _value: ()
 
     def check_fields(value: object) -> bool:
-        for name, check in checks:  # noqa: SIM110  a third of the time of `all`
-            if not check(getattr(value, name)):
+        for number in numbers_of(value):
+            if number is not None and not _SMALLEST <= number <= _LARGEST:
+                return False
+        for name, check in checks:
+            if check is not None and not check(getattr(value, name)):
                 return False
         return True
 
-    return check_fields if checks else None
+    return check_fields if fields else None
+
+
+def _is_number(info: inspect.Type) -> bool:
+    """Return whether values of a type are integers, or None."""
+    info = info.type if isinstance(info, inspect.Metadata) else info
+    if isinstance(info, inspect.UnionType):
+        return all(isinstance(one, inspect.NoneType) or _is_number(one) for one in info.types)
+    return isinstance(info, inspect.IntType)
 
 
 def _of_each(check: Check | None) -> Check | None:

@@ -37,6 +37,7 @@ MIN_WAIT_SHARE = 0.1  # of a silence, to be an overload; an idle computer waits 
 OVERLOAD = "overload"
 
 _GOING = ("green", "yellow")
+_MAY_GO = (*_GOING, "flashing_red")
 _MAY_FOLLOW: dict[Colour, tuple[Colour, ...]] = {
     "red": ("green", "flashing_red"),
     "green": ("yellow", "flashing_red"),
@@ -89,6 +90,7 @@ class Monitor:
         self.since_ns = now_ns
         self._groups: dict[str, _Group] = {}
         self._suspects: dict[str, int] = {}
+        self._right_colours: list[tuple[str, Colour]] | None = None  # of the last sample
         self._stamp_ns: int | None = None
         self._ahead_ns: deque[int] = deque(maxlen=20)
         self._received_ns = now_ns
@@ -134,8 +136,14 @@ class Monitor:
             self.fault, self.detail, self.since_ns = None, "", arrived_ns
         self._is_new = False
         self._judge_clock(spat.t_ns, arrived_ns)
-        self._judge_sample(spat, arrived_ns)
-        self._judge_changes(spat, arrived_ns)
+        colours = [(group.group, group.colour) for group in spat.groups]
+        if colours == self._right_colours:
+            for name, colour in colours:
+                self._remember(name, colour, spat.t_ns)
+        else:
+            is_right = self._judge_sample(spat, arrived_ns)
+            self._judge_changes(spat, arrived_ns)
+            self._right_colours = colours if is_right else None
         self._stamp_ns = spat.t_ns
 
     def _latch(self, fault: str, detail: str, now_ns: int) -> None:
@@ -152,14 +160,19 @@ class Monitor:
             self._latch("clock_jump", f"time stamps ran ahead by {jump_ms} ms", arrived_ns)
         self._ahead_ns.append(ahead_ns)
 
-    def _judge_sample(self, spat: Spat, arrived_ns: int) -> None:
-        """Suspect what one sample alone can show; latch what was suspected before."""
+    def _judge_sample(self, spat: Spat, arrived_ns: int) -> bool:
+        """Suspect what one sample alone can show; latch what was suspected before.
+
+        Returns:
+            Whether there was nothing to suspect.
+        """
         found = self._wrong_in(spat)
         for fault, detail in found.items():
             before_ns = self._suspects.get(fault)
             if before_ns is not None and arrived_ns - before_ns <= CONFIRM_WITHIN_NS:
                 self._latch(fault, detail, arrived_ns)
             self._suspects[fault] = arrived_ns
+        return not found
 
     def _wrong_in(self, spat: Spat) -> dict[str, str]:
         shown: dict[str, list[Colour]] = {name: [] for name in self._limits}
@@ -203,7 +216,7 @@ class Monitor:
         if group.colour != colour:
             group.colour, group.other_ns = colour, group.seen_ns
         group.seen_ns = stamp_ns
-        if colour in (*_GOING, "flashing_red"):
+        if colour in _MAY_GO:
             group.going_ns = stamp_ns
 
     def _wrong_change(

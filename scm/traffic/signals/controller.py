@@ -17,6 +17,7 @@ from scm.traffic.signals.controller_state import (
     COLOUR_OF,
     NEXT_COLOUR,
     NO_OBSERVATIONS,
+    LastShown,
     Observations,
     Outlook,
     PolicyState,
@@ -119,6 +120,7 @@ class Controller:
         self._times = StepTimes()
         self._seq = 0
         self._outlook = Outlook()
+        self._last = LastShown()
         self._restart_ns = max(times.clearance for times in program.times) + STEP_NS
 
     @property
@@ -152,8 +154,8 @@ class Controller:
     @property
     def needs_detectors(self) -> bool:
         """Whether what runs, or what is to come, needs the cars' positions."""
-        names = (self.policy, self._target_policy())
-        return any(self._policies[name].needs_detectors for name in names)
+        running, coming = self._policies[self.policy], self._policies[self._target_policy()]
+        return running.needs_detectors or coming.needs_detectors
 
     def request_plan(self, plan: str) -> None:
         """Request a plan, and with it fixed time, or a policy, until further notice.
@@ -210,9 +212,10 @@ class Controller:
     def step(self, now_ns: int, observations: Observations = NO_OBSERVATIONS) -> None:
         """Advance to `now_ns`."""
         dt_ns = self._elapsed_ns(now_ns)
-        self.overrides = operator_overrides.expire(
-            self.overrides, now_ns, *self._shown.changed_at(self._times.shown_ns)
-        )
+        if self.overrides:
+            self.overrides = operator_overrides.expire(
+                self.overrides, now_ns, *self._shown.changed_at(self._times.shown_ns)
+            )
         if self.is_flashing:
             self.mode = FLASH
             self.priority = {one.key: "rejected" for one in observations.priority}
@@ -236,9 +239,7 @@ class Controller:
             seq=self._seq,
             mode=self.mode,
             plan=self.running,
-            groups=tuple(
-                self._signal_group(name, shown, now_ns) for name, shown in self._shown.items()
-            ),
+            groups=self._signal_groups(now_ns),
             revision=self._revision,
         )
 
@@ -252,11 +253,13 @@ class Controller:
 
     def _target_policy(self) -> str:
         """Return the policy that should run: requested, default, or one that overrides need."""
-        target = next(
-            (one.policy for one in self.overrides if one.verb == "policy"),
-            self._policy_state.default,
-        )
+        target = self._policy_state.default
+        if self.overrides:
+            requested = (one.policy for one in self.overrides if one.verb == "policy")
+            target = next(requested, target)
         policy = FIXED if target == self._policy_state.failed else target
+        if not self.overrides:
+            return policy
         needs_rings = any(one.verb in NEED_RINGS for one in self.overrides)
         needs_override_policy = (
             needs_rings
@@ -347,6 +350,7 @@ class Controller:
         """Update when the present colours will likely end, by timetable or policy."""
         self._outlook.updated_ns = now_ns
         self._outlook.ends, self._outlook.coming = {}, ()
+        self._last.groups = None
         if self.mode == FLASH:
             return
         if self.policy == FIXED:
@@ -382,8 +386,11 @@ class Controller:
             raise PlanError(msg)
 
     def _show(self, now_ns: int) -> None:
+        """Show the kernel's phases, and guarantee when they end."""
         self.changed = False
         self._times.shown_ns = now_ns
+        if self._is_as_shown(now_ns):
+            return
         before = self._shown.guarantees()
         for index, name in enumerate(self._program.groups):
             colour = COLOUR_OF[self._state[index].phase]
@@ -399,6 +406,26 @@ class Controller:
                 )
             elif colour == "green" and not shown.guaranteed.is_exact:
                 shown.guaranteed = self._of_green(index, shown, now_ns)
+
+    def _is_as_shown(self, now_ns: int) -> bool:
+        """Return whether all that guaranteed times follow from is as at the last step.
+
+        A timetable gives them until its next stage begins or ends; another policy may change them
+        at every step.
+        """
+        last, timetables = self._last, self._timetables
+        basis = (
+            [group.phase for group in self._state],
+            self._target_policy(),
+            timetables.cycle,
+            timetables.staying_green,
+        )
+        is_timed = self.policy == FIXED and not self._times.is_late
+        if is_timed and now_ns < last.until_ns and basis == last.basis:
+            return True
+        last.basis, last.groups = basis, None
+        last.until_ns = timetables.cycle.next_change_ns(now_ns) if is_timed else now_ns
+        return False
 
     def _of_green(self, index: int, shown: ShownColour, now_ns: int) -> GuaranteedTime:
         """Return the guaranteed time of a green whose end was not known."""
@@ -429,6 +456,17 @@ class Controller:
                 return end_after(now_ns + times.yellow)
             case _:
                 return GuaranteedTime(now_ns, None)
+
+    def _signal_groups(self, now_ns: int) -> tuple[SignalGroup, ...]:
+        """Return what all groups show; at most steps that is as before."""
+        last = self._last
+        if last.groups is None or now_ns > last.groups_until_ns:
+            last.groups = tuple(
+                self._signal_group(name, shown, now_ns) for name, shown in self._shown.items()
+            )
+            ends = [one.likely_end_ns for one in last.groups if one.likely_end_ns is not None]
+            last.groups_until_ns = min(ends, default=last.until_ns)
+        return last.groups
 
     def _signal_group(self, name: str, shown: ShownColour, now_ns: int) -> SignalGroup:
         likely = None

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from scm.records.signals import Colour
+from scm.records.signals import Colour, SignalGroup
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.forecast import Coming
 from scm.traffic.signals.guaranteed_time import LATE_STEPS_NS, GuaranteedTime
@@ -101,6 +101,23 @@ class Outlook:
     updated_ns: int = 0
     ends: Mapping[str, int | None] = field(default_factory=dict)
     coming: tuple[Coming, ...] = ()
+
+
+@dataclass(slots=True)
+class LastShown:
+    """What the last step showed, for as long as nothing changes it.
+
+    Attributes:
+        basis: What the guaranteed times follow from, beside the time.
+        until_ns: When they may change though the basis does not.
+        groups: As published; None: to be made anew.
+        groups_until_ns: Until when a likely end of theirs stays ahead.
+    """
+
+    basis: tuple[object, ...] = ()
+    until_ns: int = 0
+    groups: tuple[SignalGroup, ...] | None = None
+    groups_until_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,14 @@ class Cycle:
     began_ns: int
     ends_ns: int
 
+    def next_change_ns(self, now_ns: int) -> int:
+        """Return when a stage begins or ends next, or the cycle ends; now, if that is over."""
+        stages = self.timetable.timed_stages if self.timetable is not None else ()
+        changes = [self.ends_ns]
+        for timed in stages:
+            changes += (self.began_ns + timed.start_ns, self.began_ns + timed.end_ns)
+        return min((change for change in changes if change > now_ns), default=now_ns)
+
 
 def end_after(end_ns: int) -> GuaranteedTime:
     """Return the guaranteed time of an end that is due at a known time."""

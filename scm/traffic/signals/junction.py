@@ -58,6 +58,7 @@ class JunctionSignals:
         reports: StatusReports,
     ) -> None:
         self.junction = junction
+        self._station = roadside_station(junction.name)
         self._reports = reports
         self._names = {*(plan.plan for plan in reports.site.plans), *policy_names()}
         self._mapem = mapem
@@ -194,7 +195,7 @@ class JunctionSignals:
             self._why_restart = ENDS.get(reason, self._why_restart)
 
     def _on_air(self, spat: Spat) -> list[Outgoing]:
-        station, now_ns = roadside_station(spat.junction), spat.t_ns
+        station, now_ns = self._station, spat.t_ns
         sent: list[Outgoing] = []
         if self.controller.changed or is_due(self._sent_ns, now_ns, SPATEM_EVERY_NS):
             self._sent_ns = now_ns

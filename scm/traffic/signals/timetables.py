@@ -23,6 +23,7 @@ class Timetables:
         plan: In force.
         pending: To come with the next cycle; empty: none.
         cycle: That runs.
+        staying_green: Who stays green into the next cycle; None: not decided yet.
     """
 
     def __init__(self, tables: Tables, plan: str) -> None:
@@ -31,7 +32,7 @@ class Timetables:
         self._entering_plans: dict[str, tuple[Timetable, Wave | None]] = {}
         self.plan = plan
         self.pending = ""
-        self._staying_green: frozenset[str] | None = None
+        self.staying_green: frozenset[str] | None = None
         self._committed_plan = ""
         self.clear(0, 0)
 
@@ -77,23 +78,23 @@ class Timetables:
     def commit_next(self, now_ns: int, *, goes_on: bool) -> None:
         """Once the last stage has begun, decide who stays green into the next cycle."""
         cycle = self.cycle
-        if self._staying_green is not None or cycle.timetable is None:
+        if self.staying_green is not None or cycle.timetable is None:
             return
         if now_ns >= cycle.began_ns + cycle.timetable.timed_stages[-1].start_ns:
-            self._staying_green = cycle.timetable.into(self._next()) if goes_on else frozenset()
-            self._committed_plan = self._next_plan() if self._staying_green else ""
+            self.staying_green = cycle.timetable.into(self._next()) if goes_on else frozenset()
+            self._committed_plan = self._next_plan() if self.staying_green else ""
 
     def requested(self, now_ns: int) -> frozenset[str]:
         """Return what the timetable requests."""
         table, position_ns = self.cycle.timetable, now_ns - self.cycle.began_ns
-        staying = self._staying_green or frozenset()
+        staying = self.staying_green or frozenset()
         return table.requested(position_ns, staying) if table else frozenset()
 
     def green_end(self, group: str, now_ns: int, least_ns: int) -> GuaranteedTime:
         """Return when a green that is on will end, `least_ns` at the earliest."""
         onward: list[Timetable | None] = [*self.coming, None]
-        if self._staying_green is not None:
-            onward = [self._next() if group in self._staying_green else None]
+        if self.staying_green is not None:
+            onward = [self._next() if group in self.staying_green else None]
         return green_end(group, self.cycle, now_ns, least_ns, onward)
 
     def likely_end_ns(self, group: str, now_ns: int, *, red: bool) -> int | None:
@@ -148,7 +149,7 @@ class Timetables:
         return dwelling(table, dwell_ns(wave, began_ns))
 
     def _begin(self, cycle: Cycle) -> None:
-        self._staying_green, self._committed_plan = None, ""
+        self.staying_green, self._committed_plan = None, ""
         self._set(cycle)
 
     def _set(self, cycle: Cycle) -> None:
