@@ -35,7 +35,6 @@ AT_ANY_PACE = {
         "pages/test_signals_of_a_town",
         "pages/test_signals_page",
         "pages/test_vehicle_page",
-        "test_first_car",
         "test_mismatch_report",
         "test_own_car_example",
         "test_rest_fuzz",

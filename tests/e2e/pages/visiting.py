@@ -77,9 +77,13 @@ def judge(visited: Visit, within: str | None = None) -> None:
 
 def faults_of(page: Any, within: str | None = None) -> list[str]:
     """Return what axe-core calls serious or critical, each with what it is about."""
-    from axe_playwright_python.sync_playwright import Axe
+    from axe_playwright_python.base import AXE_SCRIPT
 
-    found = Axe().run(page, within).response["violations"]
+    if not page.evaluate("() => 'axe' in window"):
+        page.evaluate(AXE_SCRIPT)
+    options = {"resultTypes": ["violations"]}
+    looked = "([where, options]) => axe.run(where, options)"
+    found = page.evaluate(looked, [within or "html", options])["violations"]
     return [
         f"{fault['id']}: {node['html'][:160]} ({node['failureSummary'][:300]})"
         for fault in found
