@@ -90,7 +90,8 @@ def in_order(running: CityProcess | Town) -> None:
             running.web.post(path, json=body).raise_for_status()
     for row in running.get("/vehicles")["vehicles"]:
         if row["owner"] == "world" and row["trip"] is None:  # a script drove it, and went
-            running.web.post(f"/vehicles/{row['vehicle']}/route", json={}).raise_for_status()
+            answer = running.web.post(f"/vehicles/{row['vehicle']}/route", json={})
+            assert answer.is_success or answer.status_code == 404  # it has left just now
 
 
 @pytest.fixture(scope="package")

@@ -8,7 +8,7 @@ from scm.clock import NS_PER_MS
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.v2x.exchange import Answer, Call
 from scm.v2x.messages.echo_request import EchoReply, EchoRequest
-from scm.v2x.messages.join_request import JoinRequest
+from scm.v2x.messages.join_request import JoinReply, JoinRequest
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.remove_request import RemoveRequest
@@ -45,7 +45,7 @@ class Tired(BasePart):
     services = (Service(EchoRequest, {"vehicle": TIRED}),)
 
     def __init__(self, throttle):
-        self.throttle, self.seq, self.place = throttle, 0, None
+        self.throttle, self.seq, self.session, self.place = throttle, 0, None, None
 
     def step(self, now_ns, inbox):
         self.seq += 1
@@ -55,11 +55,13 @@ class Tired(BasePart):
             if isinstance(message, EchoRequest):
                 outbox.append(Answer(item, EchoReply(vehicle=TIRED, t_ns=now_ns)))
             elif isinstance(message, Presence):
-                request = JoinRequest(vehicle=TIRED, session=message.session, kind="real")
-                outbox.append(Call(request))
-            else:
+                self.session = message.session
+            elif isinstance(message, JoinReply):
                 self.place = message
         if self.place is None:
+            if self.session is not None and self.seq % 20 == 0:  # cars may stand everywhere now
+                join = JoinRequest(vehicle=TIRED, session=self.session, kind="real")
+                outbox.append(Call(join))
             return outbox
         state = VehicleState(
             vehicle=TIRED, t_ns=now_ns, seq=self.seq, x_m=self.place.x_m, y_m=self.place.y_m,
