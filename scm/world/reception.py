@@ -6,8 +6,10 @@ Input from outside never stops the city: messages without effect are counted in 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+from scm.errors import MessageError
 from scm.runtime.part import Subscription
-from scm.v2x.exchange import Answer, Incoming, Outgoing
+from scm.v2x.exchange import Answer, Incoming, Outgoing, RawSample
+from scm.v2x.key import names_in
 from scm.v2x.message import Message, Request
 from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.drive_command import DriveCommand
@@ -17,17 +19,20 @@ from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.alerts import city_event
 from scm.world.remote import is_plausible
 from scm.world.requests import reply_to
-from scm.world.transmission import RECEIVED, Frame, transmit
+from scm.world.transmission import RECEIVED, UNREAD, Frame, relay, transmit
 from scm.world.watch import lose
 from scm.world.world import World
 
 VEHICLE_ROLE = "v"
 
 
-def receive(world: World, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+def receive(world: World, now_ns: int, inbox: Sequence[Incoming | RawSample]) -> list[Outgoing]:
     """Handle what arrived, in order; return answers and what follows from them."""
     out: list[Outgoing] = []
     for item in inbox:
+        if isinstance(item, RawSample):
+            out += _unread_frame(world, item, now_ns)
+            continue
         message = item.message
         if isinstance(message, Request):
             reply = reply_to(world, message, now_ns, out)
@@ -67,6 +72,22 @@ def _frame(world: World, frame: Frame, now_ns: int) -> Sequence[Outgoing]:
     return transmit(world, frame, now_ns)
 
 
+def _unread_frame(world: World, sample: RawSample, now_ns: int) -> Sequence[Outgoing]:
+    for kind in UNREAD:
+        names = names_in(kind, sample.key)
+        if names is None:
+            continue
+        station = dict(names)["station"]
+        if station in world.cars.hosted:  # as above
+            return ()
+        try:
+            return relay(world, kind, station, sample, now_ns)
+        except MessageError:
+            break
+    world.ignored += 1
+    return ()
+
+
 def _monitor_status(world: World, status: MonitorStatus, now_ns: int) -> Sequence[Outgoing]:
     del now_ns
     world.drivers.receive_monitor_status(status)
@@ -104,9 +125,10 @@ def subscriptions_of(cars: Iterable[str]) -> tuple[Subscription, ...]:
     shared = [
         Subscription(kind, {"role": VEHICLE_ROLE} if kind is Presence else {})
         for kind in _HANDLERS
-        if kind not in OF_CARS
+        if kind not in OF_CARS and kind not in UNREAD
     ]
     return (
         *shared,
+        *(Subscription(kind, raw=True) for kind in UNREAD),
         *(Subscription(kind, {key: car}) for car in cars for kind, key in OF_CARS.items()),
     )

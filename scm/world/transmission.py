@@ -11,10 +11,13 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import MessageError
 from scm.records.city_map import Point
 from scm.v2x.etsi.cam_spatem import CamBody
 from scm.v2x.etsi.convert import ASSUMED_LENGTH_M, ASSUMED_WIDTH_M, cam_of, read_cam
-from scm.v2x.exchange import Outgoing
+from scm.v2x.exchange import Outgoing, RawSample
+from scm.v2x.key import agrees
+from scm.v2x.message import decode
 from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.messages.cpm import CpmRx, CpmTx
 from scm.v2x.messages.denm import DenmRx, DenmTx
@@ -42,6 +45,8 @@ RECEIVED: dict[type[Frame], type[ReceivedFrame]] = {
     SsemTx: SsemRx,
 }
 """All frame types: as sent, and as received."""
+UNREAD = (CpmTx, MapemTx, SremTx, SsemTx)
+"""Whose bodies only receivers read: a MAPEM takes longer than all else of its junction."""
 TOUCHES_NS = NS_PER_S // 2  # for which a pushed car counts as touching: some CAMs long
 OF_ROADSIDE = (MapemTx, SpatemTx, SsemTx)  # nobody else may send these
 EYE = "eye"
@@ -66,21 +71,46 @@ def send_radio(world: World, now_ns: int) -> list[Outgoing]:
 
 def transmit(world: World, frame: Frame, now_ns: int) -> list[Outgoing]:
     """Return a frame as every station receives it now; one of an unknown sender is dropped."""
-    if isinstance(frame, OF_ROADSIDE) and frame.station not in world.radio.roadside:
-        world.ignored += 1
+    reached = _reached(world, type(frame), frame.station)
+    if reached is None:
         return []
+    out = _deliver_to_drivers(world, frame, now_ns)
+    return out + _deliver(world, [frame], reached, receivers_of(world), now_ns)
+
+
+def relay(
+    world: World, kind: type[Frame], station: str, sample: RawSample, now_ns: int
+) -> list[Outgoing]:
+    """Return a station's frame as every station receives it now; it is read only if one does.
+
+    Raises:
+        MessageError: when it cannot be read.
+    """
+    reached = _reached(world, kind, station)
+    if reached is None or not reached.any():
+        return []
+    frame = decode(kind, sample.body, sample.attachment)
+    if not agrees(sample.key, frame):
+        msg = f"{sample.key}: the names inside are not those of its key"
+        raise MessageError(msg)
+    return _deliver(world, [frame], reached, receivers_of(world), now_ns)
+
+
+def _reached(world: World, kind: type[Frame], station: str) -> Bools | None:
+    """Send a frame; return which receivers (1, n) get it and listen, None if nobody may send it."""
+    if kind in OF_ROADSIDE and station not in world.radio.roadside:
+        world.ignored += 1
+        return None
     receivers = receivers_of(world)
-    place = antenna_of(world, frame.station)
+    place = antenna_of(world, station)
     if place is None:
         world.radio.link.counts.sent += 1
         world.radio.link.counts.unknown += 1
-        return []
+        return None
     x, y = np.array([place[0]]), np.array([place[1]])
-    world.radio.load.note(kind_of(frame), x, y)
-    out = _deliver_to_drivers(world, frame, now_ns)
-    received = world.radio.link.reach([frame.station], x, y, receivers, _load(world, receivers))
-    listen = _listens(world, RECEIVED[type(frame)], receivers)
-    return out + _deliver(world, [frame], received & listen, receivers, now_ns)
+    world.radio.load.note(kind_of(kind), x, y)
+    received = world.radio.link.reach([station], x, y, receivers, _load(world, receivers))
+    return received & _listens(world, RECEIVED[kind], receivers)
 
 
 def receivers_of(world: World) -> Receivers:
@@ -101,9 +131,9 @@ def antenna_of(world: World, station: str) -> Point | None:
     return world.radio.roadside.get(station)
 
 
-def kind_of(frame: Frame) -> str:
+def kind_of(kind: type[Frame]) -> str:
     """Return a frame's message type, as in `scm.v2x.congestion.BYTES`."""
-    return frame.KEY.rpartition("/")[2]
+    return kind.KEY.rpartition("/")[2]
 
 
 def status(world: World, now_ns: int) -> RadioStatus:
