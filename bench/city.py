@@ -138,7 +138,11 @@ def report(name: str, stages: Stages, row: dict[str, float]) -> None:
         f"of it the world {row['world_us_a_car']:.2f}   {row['kib_a_car']:.2f} KiB a car   "
         f"mean {row['speed']:.2f} m/s{scans}"
     )
-    print(f"    ms a tick: {parts}  other parts and bus {others * 1e3:.2f}", flush=True)
+    each = others / max(1.0, row["junctions"]) * 1e6
+    print(
+        f"    ms a tick: {parts}  other parts and bus {others * 1e3:.2f}, {each:.0f} us a junction",
+        flush=True,
+    )
 
 
 def flat(stages: Stages) -> None:
