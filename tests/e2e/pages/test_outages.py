@@ -125,11 +125,11 @@ def test_what_moves_is_grey_while_nobody_tells_it_and_comes_back_by_itself(visit
     page.evaluate("() => { window.sameDocument = true }")
     page.wait_for_selector('.film[data-seen="true"]')
     page.wait_for_selector(".lidar canvas")
-    told = page.locator(".facts dd:has-text('ago')")
+    age = page.locator(".facts dd:has-text('ago')")
     with running.frozen("world"):
         visited.wait(f"() => (({GREY})()).every(Boolean)")
         assert page.locator("main .moves").count() == 6
-        visited.until(lambda: " s" in told.inner_text(), "its age goes on")
+        visited.until(lambda: " s" in age.inner_text(), "its age goes on")
         page.wait_for_selector(".film .late:has-text('old')")
         photograph(visited, "vehicle_silent")
     fresh = f"() => !({GREY})().some(Boolean)"

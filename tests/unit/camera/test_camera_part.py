@@ -95,7 +95,7 @@ def test_a_subscriber_gets_frames_at_the_cameras_rate_and_times(city):
     assert picture.shape == (720, 1280, 3) == (got[-1].height_px, got[-1].width_px, 3)
 
 
-def test_only_what_is_asked_for_is_pictured(city, own_facts):
+def test_only_requested_cameras_are_pictured(city, own_facts):
     own_facts()
     city.subscribe(N1_FRONT)
     every = city.subscribe(Subscription(CameraFrame, {"vehicle": "n2"}))
