@@ -79,12 +79,17 @@ class Tired(BasePart):
         return [Call(RemoveRequest(vehicle=TIRED))]
 
 
+def cars(running):
+    return len(running.get("/vehicles")["vehicles"])
+
+
 @contextmanager
 def tired(running, throttle=0.0):
     """Have a car in the city whose battery is low, and that was reported once."""
     with running.joined(Tired(throttle)):
+        wait_for(lambda: cars(running) == 7, 120.0, "a place is free for it")
         yield
-    wait_for(lambda: len(running.get("/vehicles")["vehicles"]) == 6, 60.0, "it left")
+    wait_for(lambda: cars(running) == 6, 60.0, "it left")
 
 
 def looks_right(visited, name):

@@ -123,9 +123,11 @@ class Town:
         """Have another part in the city."""
         with self._lock:
             self.city.add(part)
-        yield
-        with self._lock:
-            self.city.remove(part)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self.city.remove(part)
 
     @contextmanager
     def paused(self) -> Iterator[None]:
