@@ -20,7 +20,7 @@ from scm.records.city_map import CityMap
 from scm.runtime.part import IsWanted, Part, Service, Subscription
 from scm.traffic.misbehaviour.attack import Frame, Scene, Transform, load_attack
 from scm.traffic.misbehaviour.ground import Ground
-from scm.v2x.exchange import Incoming, Outgoing, RawSample
+from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 
@@ -95,15 +95,14 @@ class Attacker:
         """Let the part check for subscribers."""
         self._part.attach(is_wanted)
 
-    def step(self, now_ns: int, inbox: Sequence[Incoming | RawSample]) -> list[Outgoing]:
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Step the part, and change what its attackers send."""
-        for item in inbox:
-            if isinstance(item, RawSample):  # what a world relays undecoded: neither of the two
-                continue
-            if isinstance(item.message, CamRx):
-                self._overhear(item.message)
-            elif isinstance(item.message, MisbehaviourReport):
-                self._is_reported(item.message)
+        # A world subscribes to some frames undecoded; none of these is meant here.
+        for message in (item.message for item in inbox if isinstance(item, Incoming)):
+            if isinstance(message, CamRx):
+                self._overhear(message)
+            elif isinstance(message, MisbehaviourReport):
+                self._is_reported(message)
         outbox: list[Outgoing] = []
         copies_of: dict[tuple[str, int], list[Cam]] = {}
         for sent in self._part.step(now_ns, inbox):
