@@ -36,7 +36,7 @@ $(VENV)/bin/python:
 
 $(RUNS): pyproject.toml | $(VENV)/bin/python
 	@echo "installing into $(VENV), 1 GB (once; half a minute to some minutes)"
-	@$(INSTALL) -e '.[formats,postgres,ros2,sumo,v2x]'
+	@$(INSTALL) -e '.[formats,postgres,ros2,study,sumo,v2x]'
 	@echo "compiling its Python and physics (once; a minute or two)"
 	@$(COMPILE)
 	@$(KERNELS)

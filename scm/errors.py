@@ -8,6 +8,7 @@
     ├── RecordingError(ValueError)       a recording or its description
     ├── PlanError     (ValueError)       a signal plan or program card
     ├── DemandError   (ValueError)       a table of who wants to drive where, and when
+    ├── StudyError    (ValueError)       a study file, a factor or a scenario
     ├── EyeError      (ValueError)       a camera or its calibration
     ├── LinkError     (ConnectionError)  the bus, a serial line, a peer that is not there
     ├── StoreError    (OSError)          state that must survive, and cannot be read or written
@@ -56,6 +57,10 @@ class PlanError(ScmError, ValueError):
 
 class DemandError(ScmError, ValueError):
     """A demand table that cannot be."""
+
+
+class StudyError(ScmError, ValueError):
+    """A study file, what its factors name, or a scenario that cannot be."""
 
 
 class EyeError(ScmError, ValueError):

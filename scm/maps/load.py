@@ -1,6 +1,5 @@
 """Reads a map file and doubts it: a bad map is refused with file, key, expected and got."""
 
-import re
 import tomllib
 from pathlib import Path
 
@@ -14,32 +13,13 @@ from scm.maps.grid_city import named_city
 from scm.maps.occupancy import map_from_occupancy
 from scm.records.city_map import CityMap
 from scm.records.floor import Record
+from scm.toml_file import record_of
 
 MAPS_DIR = Path(scm.__file__).parent.parent / "maps"
 
 _YAML = {".yaml", ".yml"}
 _PICTURES = {".pgm", ".png", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff"}
-
-_PATH = re.compile(r" - at `\$\.?(?P<path>.*)`$")
-_PLAIN = (
-    (re.compile(r"^Expected `([^`]+)`, got `([^`]+)`$"), r"expected \1, got \2"),
-    (re.compile(r"^Object missing required field `([^`]+)`$"), r"key \1 is missing"),
-    (re.compile(r"^Object contains unknown field `([^`]+)`$"), r"key \1 is not known here"),
-    # The only value that is fixed is the format's number: `map = 1`.
-    (re.compile(r"^Invalid enum value (.+)$"), r"expected 1 (the map format), got \1"),
-    (re.compile(r"^Expected `array` of length (\d+), got (\d+)$"), r"expected \1 values, got \2"),
-)
-_UNKNOWN = re.compile(r"^key (?P<key>\S+) is not known here$")
 _KEYS = sorted({key for kind in Record.__subclasses__() for key in kind.__struct_fields__})
-_TYPES = {
-    "str": "text in quotes",
-    "float": "a number",
-    "int": "a whole number",
-    "bool": "true or false",
-    "array": "a list",
-    "object": "a table",
-    "null": "nothing",
-}
 
 
 def map_names() -> list[str]:
@@ -110,10 +90,7 @@ def _read(text: str, path: Path) -> CityMap:
     """Return the file as a map whose keys and types are right."""
     with reading(path, "a TOML file", MapError):
         data = tomllib.loads(text)
-    try:
-        return msgspec.convert(data, CityMap)
-    except msgspec.ValidationError as error:
-        raise MapError(f"{path}: {_in_plain_words(str(error), data)}") from error
+    return record_of(data, CityMap, path, MapError, _KEYS)
 
 
 def _with_pictures(city_map: CityMap, path: Path) -> CityMap:
@@ -130,34 +107,3 @@ def _with_pictures(city_map: CityMap, path: Path) -> CityMap:
         picture = msgspec.structs.replace(picture, samples=samples)
         floor = msgspec.structs.replace(floor, **{key: picture})
     return city_map if floor is city_map.floor else msgspec.structs.replace(city_map, floor=floor)
-
-
-def _in_plain_words(message: str, data: object) -> str:
-    """Return msgspec's sentence as `key: expected .., got ..` with the record's name."""
-    found = _PATH.search(message)
-    path = found["path"] if found else ""
-    text = message[: found.start()] if found else message
-    for pattern, plain in _PLAIN:
-        if pattern.match(text):
-            text = pattern.sub(plain, text)
-            break
-    if unknown := _UNKNOWN.match(text):
-        text += nearest(unknown["key"], _KEYS)
-    for python, word in _TYPES.items():
-        text = re.sub(rf"\b(expected|got|\|) {python}\b", rf"\1 {word}", text)
-    where = f"{path}{_name_at(path, data)}"
-    return f"{where}: {text.replace(' | ', ' or ')}" if where else text
-
-
-def _name_at(path: str, data: object) -> str:
-    """Return ` (name)` of the innermost record on the way to a key that has a name or an id."""
-    name = ""
-    for step in re.findall(r"[^.\[\]]+", path):
-        if isinstance(data, list) and step.isdigit() and int(step) < len(data):
-            data = data[int(step)]
-        elif isinstance(data, dict):
-            data = data.get(step)
-        if isinstance(data, dict):
-            named = data.get("name", data.get("light_id", data.get("sign_id", "")))
-            name = f" ({named})" if named != "" else name
-    return name

@@ -7,6 +7,7 @@ names too; any other TOML file is loaded by its path.
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -121,6 +122,36 @@ class Car:
         numbers = _filled(self, numbers, values or {}, problems)
         return replace(self, measures=(*others, *new), values=numbers)
 
+    def with_values(self, values: Mapping[str, Value]) -> "Car":
+        """Return this car with other values by `section.key`: numbers, several, or words.
+
+        Raises:
+            CarError: naming every unknown key, and every value outside its bounds.
+        """
+        known, problems = _known_keys(self.terms), list[str]()
+        new = dict(self.values)
+        for key, value in values.items():
+            kind = known.get(key)
+            if kind is None or key not in new:
+                problems.append(f"{key}: not in this car{nearest(key, sorted(new))}")
+                continue
+            plain = list(value) if isinstance(value, tuple) else value
+            problems += _value_problems(key, plain, kind)
+            number = float(value) if isinstance(value, int | float) else value
+            new[key] = Quantity(number, None, kind.unit, "given")
+        if problems:
+            raise CarError("\n".join(f"{self.path}: {problem}" for problem in problems))
+        return replace(self, values=new)
+
+    def bounds(self, key: str) -> tuple[float, float]:
+        """Return the lowest and highest number that a key may have.
+
+        Raises:
+            CarError: when the car has no such key.
+        """
+        self.quantity(key)
+        return _known_keys(self.terms)[key].bounds
+
     def value(self, key: str) -> float:
         """Return a number such as `value("body.mass_kg")`, in the unit of its key."""
         value = self.quantity(key).value
@@ -174,6 +205,23 @@ def all_terms() -> Mapping[str, Term]:
     return {name: registry.load(TERMS, name, "TERM", Term) for name in registry.names(TERMS)}
 
 
+@contextmanager
+def varied_cars(cars: Mapping[str, Car]) -> Iterator[None]:
+    """Let these cars be what `load_car` returns for their names, in this process, for a while.
+
+    A study's case runs alone in its process, with numbers of its own for a car of a known name.
+    """
+    _varied.update(cars)
+    try:
+        yield
+    finally:
+        for name in cars:
+            del _varied[name]
+
+
+_varied: dict[str, Car] = {}
+
+
 def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
     """Read a car by its name, or by the path of any car file.
 
@@ -185,6 +233,8 @@ def load_car(name_or_path: str | Path, *, trusted: bool = True) -> Car:
     Raises:
         CarError: naming every problem of the file at once.
     """
+    if str(name_or_path) in _varied:
+        return _varied[str(name_or_path)]
     path = Path(name_or_path)
     if path.suffix != ".toml":
         path = car_files().get(str(name_or_path), TYPES_DIR / f"{name_or_path}.toml")

@@ -1,0 +1,1 @@
+"""Scenarios that come with the program, one file each; see `scm.study.scenario`."""
