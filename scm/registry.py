@@ -2,6 +2,7 @@
 
 import importlib
 import pkgutil
+import sys
 from typing import TypeVar
 
 from scm.errors import ScmError, TermError, nearest
@@ -23,12 +24,15 @@ def load(
     Raises:
         ScmError: (as `error`) when there is no such module or its constant is of another type.
     """
-    known = names(package)
-    if name not in known:
-        hint = nearest(name, known) or f"; there are {', '.join(known)}"
-        msg = f"{package}: no {constant.lower()} named {name!r}{hint}"
-        raise error(msg)
-    plugin = getattr(importlib.import_module(f"{package}.{name}"), constant, None)
+    module = sys.modules.get(f"{package}.{name}")
+    if module is None:
+        known = names(package)
+        if name not in known:
+            hint = nearest(name, known) or f"; there are {', '.join(known)}"
+            msg = f"{package}: no {constant.lower()} named {name!r}{hint}"
+            raise error(msg)
+        module = importlib.import_module(f"{package}.{name}")
+    plugin = getattr(module, constant, None)
     if not isinstance(plugin, kind):
         msg = f"{package}.{name}: expected {constant} = {kind.__name__}(...), got {plugin!r}"
         raise error(msg)

@@ -17,7 +17,7 @@ _PLAIN = (
     (re.compile(r"^Object missing required field `([^`]+)`$"), r"key \1 is missing"),
     (re.compile(r"^Object contains unknown field `([^`]+)`$"), r"key \1 is not known here"),
     # The only number that is fixed is the format's: `map = 1`.
-    (re.compile(r"^Invalid enum value (\d+)$"), r"expected 1 (the format), got \1"),
+    (re.compile(r"^Invalid enum value (\d+)$"), r"expected 1 (the {path} format), got \1"),
     (re.compile(r"^Invalid enum value (.+)$"), r"\1 is not one of the words allowed here"),
     (re.compile(r"^Expected `array` of length (\d+), got (\d+)$"), r"expected \1 values, got \2"),
 )
@@ -67,7 +67,7 @@ def _in_plain_words(message: str, data: object, keys: Sequence[str], within: str
     text = message[: found.start()] if found else message
     for pattern, plain in _PLAIN:
         if pattern.match(text):
-            text = pattern.sub(plain, text)
+            text = pattern.sub(plain.replace("{path}", path), text)
             break
     if unknown := _UNKNOWN.match(text):
         text += nearest(unknown["key"], keys)

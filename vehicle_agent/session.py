@@ -8,7 +8,7 @@ import logging
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import MapError
 from scm.log import event
-from scm.maps.route import Roads
+from scm.maps.route import roads_of
 from scm.records.city_map import CityMap
 from scm.v2x.cam_trigger import CamTrigger
 from scm.v2x.congestion import StationControl
@@ -69,7 +69,7 @@ class CitySession:
         self.signals = SignalTable(city_map)
         self.cars = CamTracker()
         self.guard = Guard(epoch)
-        self._roads = Roads(city_map)
+        self._roads = roads_of(city_map)
         self.trips = TripDriver(vehicle, self._roads, body.limits, body.motion().pose, now_ns)
         self.gate = ActuationGate(body, real)
         self.off_lane = ""

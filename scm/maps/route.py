@@ -11,6 +11,7 @@ from scm.arrays import Floats
 from scm.errors import MapError, nearest
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.coordinates import EXAMPLE, are_coordinates, pose_at
+from scm.maps.once_per_map import once_per_map
 from scm.maps.polyline import Polyline, advance, extent, join, sample
 from scm.maps.signs import SPEED_LIMIT, Held, allowed_next, is_obeyed, looks_along
 from scm.records.city_map import Approach, CityMap, Conflict, Lane, Spawn, StopLine
@@ -297,6 +298,12 @@ class Roads:
         if spawn.lane is None or spawn.at_m is None:
             raise MapError(f"spawn {spawn.name!r}: expected lane and at_m, or pose; got neither")
         return self.lane(spawn.lane).at(spawn.at_m)
+
+
+@once_per_map
+def roads_of(city_map: CityMap) -> Roads:
+    """Return the roads of a map, shared by all who are given the same map."""
+    return Roads(city_map)
 
 
 class Path:

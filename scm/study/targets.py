@@ -23,7 +23,7 @@ from scm.errors import CarError, StudyError, nearest
 from scm.geometry import wrap_angle
 from scm.maps.check import problems_of
 from scm.maps.load import load_map
-from scm.maps.route import Roads
+from scm.maps.route import roads_of
 from scm.records.city_map import CityMap, Spawn, Wall
 from scm.study.study_file import Apply, Factor, StudyFile, Value
 from scm.v2x.faults import FaultRates
@@ -436,7 +436,7 @@ def _pose_target(complete: str, ways: Way, owner: Wall | Spawn, city_map: CityMa
     if isinstance(owner, Wall):
         nominal = 0.0
     else:
-        nominal = Roads(city_map).spawn_pose(owner.name)[POSE.index(name)]
+        nominal = roads_of(city_map).spawn_pose(owner.name)[POSE.index(name)]
 
     def put(setting: Setting, value: Value) -> Setting:
         if not _is_number(value):
@@ -445,7 +445,7 @@ def _pose_target(complete: str, ways: Way, owner: Wall | Spawn, city_map: CityMa
         if isinstance(old, Wall):
             new: Wall | Spawn = _moved(old, name, float(value))
         else:
-            pose = [*Roads(setting.city_map).spawn_pose(old.name)]
+            pose = [*roads_of(setting.city_map).spawn_pose(old.name)]
             pose[POSE.index(name)] = float(value)
             place = (pose[0], pose[1], wrap_angle(pose[2]))
             new = Spawn(name=old.name, pose=place)

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
-from scm.maps.route import Roads
+from scm.maps.route import roads_of
 from scm.maps.segments import wall_segments
 from scm.maps.vehicle_tags import bound_tag, reserved_tags
 from scm.records.city_map import CityMap
@@ -111,7 +111,7 @@ class World:
     ) -> None:
         self.city_map = city_map
         self.seed = seed
-        self.roads = Roads(city_map)
+        self.roads = roads_of(city_map)
         self.ground = Ground(city_map, seed)
         self.cars = Cars(VehicleArrays(capacity), Garage(capacity, self.ground.fit))
         self.contacts = Contacts(city_map)

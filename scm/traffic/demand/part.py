@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.errors import DemandError, nearest
-from scm.maps.route import MAX_PASSES, Roads
+from scm.maps.route import MAX_PASSES, roads_of
 from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, Subscription
 from scm.traffic.demand.table import Flow, departures
@@ -206,7 +206,7 @@ class Ways:
     """Finds the entries and lanes of a map that a table names."""
 
     def __init__(self, city_map: CityMap) -> None:
-        self._roads = Roads(city_map)
+        self._roads = roads_of(city_map)
         self._map = city_map.name
         self._lanes = {lane.name: lane for lane in city_map.lanes}
         self._edges: dict[str, list[str]] = {}

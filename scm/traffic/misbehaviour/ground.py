@@ -11,7 +11,7 @@ import numpy as np
 
 from scm.geometry import wrap_angle
 from scm.maps.roadside import roadside_place
-from scm.maps.route import Roads
+from scm.maps.route import roads_of
 from scm.records.city_map import Camera, CityMap, Point
 from scm.v2x.etsi.convert import roadside_station
 
@@ -40,7 +40,7 @@ class Ground:
 
     def __init__(self, city_map: CityMap, sees: Sees | None = None) -> None:
         """Use a map; `sees` is what the Eye overlooks, the map's cameras if it is None."""
-        roads = Roads(city_map)
+        roads = roads_of(city_map)
         self.range_m = city_map.radio_range_m
         self.receivers = {
             roadside_station(junction.name): roadside_place(city_map, junction.name)

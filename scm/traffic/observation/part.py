@@ -7,7 +7,7 @@ it. Counts are published every five seconds, each violation once and also as a c
 from collections.abc import Sequence
 
 from scm.clock import NS_PER_MS, NS_PER_S
-from scm.maps.route import Roads
+from scm.maps.route import roads_of
 from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, Subscription
 from scm.traffic.observation.car_estimates import CarEstimates
@@ -39,7 +39,7 @@ class ObserverPart(BasePart):
             Subscription(Spat),
             Subscription(Contact),
         )
-        roads = Roads(city_map)
+        roads = roads_of(city_map)
         lines = rules_of(roads)
         self._estimates = CarEstimates()
         self._follower = Follower(roads)

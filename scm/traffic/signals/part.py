@@ -9,11 +9,13 @@ detectors also uses the CAMs that the roadside unit receives, and the overhead c
 
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from scm.errors import PlanError, nearest
 from scm.log import event
-from scm.maps.route import Roads
+from scm.maps.once_per_map import once_per_map
+from scm.maps.route import Roads, roads_of
 from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.store.records import PlanRecord
@@ -32,6 +34,7 @@ from scm.traffic.signals.status_reports import StatusReports
 from scm.traffic.signals.timetables import Tables
 from scm.traffic.signals.timing import NIGEL, CarFacts
 from scm.v2x.etsi.convert import roadside_station
+from scm.v2x.etsi.mapem import MapemBody
 from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.exchange import Answer, Incoming, Outgoing, PersistedState
 from scm.v2x.message import Refused
@@ -75,29 +78,27 @@ class TrafficPart(BasePart):
         self.role = "part"
         self.period_ns = STEP_NS
         self.services = (Service(PlanRequest), Service(SignalRequest))
-        roads = Roads(city_map)
-        programs = {j.name: program_of(j, roads, car) for j in city_map.junctions}
-        tables = timetables_of(city_map, roads, programs, car)
-        for name, program in programs.items():
-            check_junction(name, program, (table for table, _ in tables[name].values()))
+        roads, given = roads_of(city_map), _junctions_of(city_map, car)
         self._sightings = Sightings()
         self._junctions = {
             junction.name: JunctionSignals(
                 junction,
                 Controller(
                     junction.name,
-                    programs[junction.name],
+                    given[junction.name].program,
                     plan or junction.plan,
                     city_map.revision,
                     policy=policy,
-                    tables=tables[junction.name],
+                    tables=given[junction.name].tables,
                     learned=learned,
                     car=car,
                 ),
-                JunctionDetectors(junction, roads, reach_of(programs[junction.name], roads)),
+                JunctionDetectors(junction, roads, reach_of(given[junction.name].program, roads)),
                 PriorityRequests(junction, roads),
-                mapem_of(roads, junction),
-                StatusReports(junction.name, programs[junction.name], tables[junction.name]),
+                given[junction.name].topology,
+                StatusReports(
+                    junction.name, given[junction.name].program, given[junction.name].tables
+                ),
             )
             for junction in city_map.junctions
         }
@@ -178,6 +179,35 @@ class TrafficPart(BasePart):
             is_override = isinstance(request, SignalRequest) or request.stages
             code = "invalid" if is_override else "not_found"
             return [Answer(item, Refused(code=code, detail=str(refusal)))]
+
+
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """What follows for a junction from the map: checked once, and shared by cities of one map."""
+
+    program: Program
+    tables: Tables
+    topology: MapemBody
+
+
+@once_per_map
+def _junctions_of(city_map: CityMap, car: CarFacts) -> dict[str, _Given]:
+    """Return what follows for each junction.
+
+    Raises:
+        PlanError: when a plan is not safe for a junction.
+    """
+    roads = roads_of(city_map)
+    programs = {j.name: program_of(j, roads, car) for j in city_map.junctions}
+    tables = timetables_of(city_map, roads, programs, car)
+    for name, program in programs.items():
+        check_junction(name, program, (table for table, _ in tables[name].values()))
+    return {
+        junction.name: _Given(
+            programs[junction.name], tables[junction.name], mapem_of(roads, junction)
+        )
+        for junction in city_map.junctions
+    }
 
 
 def timetables_of(
