@@ -2,15 +2,10 @@
 
 import argparse
 import sys
-from contextlib import AbstractContextManager, closing, nullcontext
+from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from scm.command import Command
-
-if TYPE_CHECKING:
-    from scm.study.engine import Engine
-    from scm.study.results import Results
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,15 +29,21 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from scm.study.engine import engine_of
     from scm.study.live_table import LiveTable
     from scm.study.loaded_study import load
     from scm.study.results import STUDIES, create_results
     from scm.study.run import run_study
+    from scm.study.text_report import text_report
 
     study = load(arguments.study)
     folder = arguments.out or STUDIES / study.file.name
     results = create_results(study, folder, sys.argv)
-    with _engine(arguments, results) as engine, closing(LiveTable(sys.stderr, results)) as table:
+    chosen = arguments.workers, arguments.scheduler, arguments.slurm
+    with (
+        engine_of(study, folder, *chosen) as engine,
+        closing(LiveTable(sys.stderr, results, len(study.design))) as table,
+    ):
         table.show(engine.about)
         try:
             end = run_study(results, engine, table.add, fail_fast=arguments.fail_fast)
@@ -52,22 +53,9 @@ def _run(arguments: argparse.Namespace) -> int:
             rows = len(results.rows)
             print(f"stopped with {rows} of {len(study.design)} cases: the same command goes on")
             return 130
-    from scm.study.text_report import text_report
-
     print("\n".join(text_report(results)))
     print(f"\n{end.why}; written to {folder}; scm study show {folder} --html")
     return 0
-
-
-def _engine(arguments: argparse.Namespace, results: "Results") -> "AbstractContextManager[Engine]":
-    from scm.study.engine import cores, dask_engine, local_engine, slurm_engine
-
-    study, folder = results.study, results.folder
-    if arguments.slurm is not None:
-        return nullcontext(slurm_engine(study, folder, arguments.slurm))
-    if arguments.scheduler is not None:
-        return dask_engine(study, folder, arguments.scheduler)
-    return local_engine(study, folder, arguments.workers or cores())
 
 
 COMMAND = Command(

@@ -25,7 +25,7 @@ def once_per_map(
     lock = Lock()
 
     @wraps(make)
-    def remembered(city_map: CityMap, *args: P.args, **kwargs: P.kwargs) -> T:
+    def remembered(city_map: CityMap, /, *args: P.args, **kwargs: P.kwargs) -> T:
         key = (id(city_map), (args, tuple(kwargs.items())))
         with lock:
             if key in found:

@@ -29,6 +29,11 @@ class Engine(Protocol):
     about: str
     """Where, for people."""
 
+    @property
+    def cores(self) -> int:
+        """How many cases run at a time."""
+        ...
+
     def run(self, tasks: Iterable[Task]) -> Iterator[Row]:
         """Yield the row of each task as it comes, in any order."""
         ...
@@ -46,24 +51,24 @@ class DaskEngine:
 
     def __init__(self, client: Client, study: LoadedStudy, folder: Path, about: str) -> None:
         self._client, self._study, self.about = client, study, about
-        self._packed = _packed(study, folder)
-        self._key = hashlib.blake2s(self._packed).hexdigest()
+        packed = _packed(study, folder)
+        self._key = hashlib.blake2s(packed).hexdigest()
+        self._sent = client.scatter(packed, broadcast=True)
 
     def run(self, tasks: Iterable[Task]) -> Iterator[Row]:
         """Yield the row of each task as it comes, in any order."""
         study, waiting = iter(tasks), dict[Any, Task]()
         name = self._study.file.name
-        packed = self._client.scatter(self._packed, broadcast=True, hash=True)
 
         def submit(task: Task) -> Future[Row]:
             future = self._client.submit(
-                run_on_worker, packed, self._key, name, task, pure=False, priority=-task.case
+                run_on_worker, self._sent, self._key, name, task, pure=False, priority=-task.case
             )
             waiting[future.key] = task
             return future
 
-        cores = max(1, sum(self._client.nthreads().values()))
-        coming = as_completed(map(submit, islice(study, AHEAD * cores)), raise_errors=False)
+        first = map(submit, islice(study, AHEAD * self.cores))
+        coming = as_completed(first, raise_errors=False)
         try:
             for future in coming:
                 task = waiting.pop(future.key)
@@ -74,6 +79,12 @@ class DaskEngine:
         finally:
             coming.clear()
             self._client.cancel([Future(key, self._client) for key in waiting])
+
+    @property
+    def cores(self) -> int:
+        """How many cases run at a time."""
+        threads: dict[str, int] = self._client.nthreads()
+        return max(1, sum(threads.values()))
 
     def close(self) -> None:
         """End the case processes of this study on all workers."""
@@ -91,6 +102,29 @@ class DaskEngine:
         else:
             text = f"{type(cause).__name__}: {cause}"
         return self._study.row(task.case, task.values, "error", 0.0, text)
+
+
+@contextmanager
+def engine_of(
+    study: LoadedStudy,
+    folder: Path,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    slurm: str | None = None,
+) -> Iterator[Engine]:
+    """Use what a command line chose: a Dask cluster, Slurm, or else cores of this machine.
+
+    Raises:
+        RunError: when there is no such cluster.
+    """
+    if slurm is not None:
+        yield slurm_engine(study, folder, slurm)
+    elif scheduler is not None:
+        with dask_engine(study, folder, scheduler) as engine:
+            yield engine
+    else:
+        with local_engine(study, folder, workers or own_cores()) as engine:
+            yield engine
 
 
 @contextmanager
@@ -144,13 +178,14 @@ class SlurmEngine:
     """
 
     def __init__(self, executor: Any, study: LoadedStudy, folder: Path, jobs: int) -> None:
-        self._executor, self._study, self._folder, self._jobs = executor, study, folder, jobs
+        self._executor, self._study, self._folder = executor, study, folder
+        self.cores = jobs
         self.about = f"{jobs} Slurm jobs"
 
     def run(self, tasks: Iterable[Task]) -> Iterator[Row]:
         """Yield the row of each task, job by job as they end."""
         all_tasks = list(tasks)
-        shares = [share for n in range(self._jobs) if (share := all_tasks[n :: self._jobs])]
+        shares = [share for n in range(self.cores) if (share := all_tasks[n :: self.cores])]
         folder, name = str(self._folder.resolve()), self._study.file.name
         jobs = self._executor.map_array(
             run_share, [folder] * len(shares), [name] * len(shares), shares
@@ -264,6 +299,6 @@ def _packed(study: LoadedStudy, folder: Path) -> bytes:
     return packed.getvalue()
 
 
-def cores() -> int:
+def own_cores() -> int:
     """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

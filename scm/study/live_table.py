@@ -15,12 +15,13 @@ class LiveTable:
     Args:
         stream: Where to.
         results: Of the study; rows that are there already count as done.
+        cases: How many there will be.
     """
 
-    def __init__(self, stream: TextIO, results: Results) -> None:
+    def __init__(self, stream: TextIO, results: Results, cases: int) -> None:
         self._stream, self._clock = stream, WallClock()
         self._began_ns = self._clock.now_ns()
-        self._all, self._done, self._new = len(results.study.design), len(results.rows), 0
+        self._all, self._done, self._new = cases, len(results.rows), 0
         rows = list(results.rows.values())
         self._successes = sum(row.outcome == "success" for row in rows)
         self._bad = sum(not row.has_ended for row in rows)
