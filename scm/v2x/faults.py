@@ -33,7 +33,8 @@ class Faults:
     """
 
     def __init__(self, seed: int, rates: FaultRates | None = None) -> None:
-        self._rng = random.Random(seed)
+        self._seed = seed
+        self._rngs: dict[tuple[str, str], random.Random] = {}
         self.rates = rates or FaultRates()
         self._partitioned: frozenset[str] = frozenset()
 
@@ -45,13 +46,16 @@ class Faults:
         """Return the delays of all copies of one message [ns]; empty: it is lost."""
         if (sender in self._partitioned) != (receiver in self._partitioned):
             return ()
-        rng, rates = self._rng, self.rates
+        rng, rates = self._rngs.get((sender, receiver)), self.rates
+        if rng is None:  # each pair has its own: a further receiver changes nothing for the others
+            rng = random.Random(f"{self._seed} {sender} {receiver}")
+            self._rngs[sender, receiver] = rng
         if rng.random() < rates.drop:
             return ()
         copies = 2 if rng.random() < rates.duplicate else 1
-        return tuple(self._delay() for _ in range(copies))
+        return tuple(self._delay(rng) for _ in range(copies))
 
-    def _delay(self) -> int:
-        if self._rng.random() >= self.rates.late:
+    def _delay(self, rng: random.Random) -> int:
+        if rng.random() >= self.rates.late:
             return 0
-        return nanoseconds(self._rng.uniform(0.0, self.rates.late_s))
+        return nanoseconds(rng.uniform(0.0, self.rates.late_s))

@@ -8,6 +8,7 @@ roadside units at their junctions. The drivers of hosted cars receive theirs in
 import heapq
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from scm.vehicles.drivers.channel import (
     Channel,
     link_losses,
 )
+from scm.vehicles.noise import bases_of, key_of, uniforms
 from scm.world.alerts import WarningState
 from scm.world.cam_triggers import CamTriggers
 from scm.world.channel_load import ChannelLoad
@@ -74,27 +76,40 @@ class Receivers:
         return self._number.get(name)
 
 
-class Radio:
-    """The channel to all stations but hosted cars."""
+class Burst(NamedTuple):
+    """Frames of one kind that are sent at the same time, one a sender.
 
-    def __init__(self, channel: Channel, rng: np.random.Generator) -> None:
+    Attributes:
+        x, y: Where the senders' antennas are, map frame (k,) [m].
+    """
+
+    kind: str
+    senders: Sequence[str]
+    x: Floats
+    y: Floats
+    t_ns: int
+
+
+class Radio:
+    """The channel to all stations but hosted cars.
+
+    Whether a frame is lost or late is a hash of its sender, kind and time, so it does not depend on
+    which other frames anybody subscribes to: who watches a city does not change it.
+    """
+
+    def __init__(self, channel: Channel, seed: int) -> None:
         self._channel = channel
-        self._rng = rng
+        self._seed = seed
+        self._keys: dict[tuple[str, str, str], np.uint64] = {}
         self.counts = RadioCounts()
 
-    def reach(
-        self,
-        senders: Sequence[str],
-        x: Floats,
-        y: Floats,
-        receivers: Receivers,
-        load: Floats | None = None,
-    ) -> Bools:
-        """Return who receives the frames of senders at x (k,), y (k,): (k, number of receivers).
+    def reach(self, burst: Burst, receivers: Receivers, load: Floats | None = None) -> Bools:
+        """Return who receives the frames of a burst, (k, number of receivers).
 
         Nobody receives its own. `load` (n,) is the share of frames that each loses to a full
         channel.
         """
+        x, y, senders = burst.x, burst.y, burst.senders
         numbers = self._channel.numbers
         sharp = numbers[FADING] <= 0.0
         near: Bools = np.hypot(receivers.x - x[:, None], receivers.y - y[:, None]) <= numbers[RANGE]
@@ -106,7 +121,7 @@ class Radio:
             if column is not None:
                 own[row, column] = True
         near &= ~own
-        received = near & ~self._lost(near, x, y, receivers, load)
+        received = near & ~self._lost(burst, near, receivers, load)
         counts = self.counts
         counts.sent += len(senders)
         counts.delivered += int(received.sum())
@@ -114,22 +129,32 @@ class Radio:
         counts.out_of_range += int((~near & ~own).sum())
         return received
 
-    def delays(self, count: int) -> Ints:
-        """Return the delays of received frames [ns], (count,)."""
+    def delays(self, burst: Burst, received: Bools) -> Ints:
+        """Return by how much each received frame of a burst is late [ns], (k, n)."""
         numbers = self._channel.numbers
-        late = np.full(count, numbers[DELAY_NS])
+        late = np.full(received.shape, numbers[DELAY_NS])
         if numbers[JITTER_NS]:
-            late += numbers[JITTER_NS] * self._rng.random(count)
+            late += numbers[JITTER_NS] * self._luck(burst, "delay", received.shape[1])
         if late.any():
-            self.counts.late += count
-            self.counts.late_ns += int(late.sum())
+            self.counts.late += int(received.sum())
+            self.counts.late_ns += int(late[received].sum())
         return late.astype(np.int64)
 
-    def _lost(
-        self, near: Bools, x: Floats, y: Floats, receivers: Receivers, load: Floats | None
-    ) -> Bools:
+    def _luck(self, burst: Burst, use: str, count: int) -> Floats:
+        """Return numbers from 0 to 1 for each frame and receiver, (k, count)."""
+        keys, names = self._keys, [(use, burst.kind, sender) for sender in burst.senders]
+        for name in names:
+            if name not in keys:
+                keys[name] = key_of(self._seed, "radio", *name)
+        bases = bases_of(
+            np.array([keys[name] for name in names], np.uint64),
+            np.full(len(names), burst.t_ns, np.int64),
+        )
+        return uniforms(bases, count)
+
+    def _lost(self, burst: Burst, near: Bools, receivers: Receivers, load: Floats | None) -> Bools:
         """Return which frames to near receivers get lost, and count why."""
-        numbers, walls = self._channel.numbers, self._channel.walls
+        numbers, walls, x, y = self._channel.numbers, self._channel.walls, burst.x, burst.y
         link = np.zeros(near.shape)
         if numbers[FADING] or len(walls):
             places = (np.ascontiguousarray(x), np.ascontiguousarray(y))
@@ -137,7 +162,7 @@ class Radio:
         busy = np.zeros(near.shape[1]) if load is None else load
         if not (numbers[LOSS] or link.any() or busy.any()):
             return np.zeros_like(near)
-        luck = self._rng.random(near.shape)
+        luck = self._luck(burst, "loss", near.shape[1])
         by_chance = np.full(near.shape, numbers[LOSS])
         by_distance = by_chance + (1.0 - by_chance) * link
         by_load = by_distance + (1.0 - by_distance) * busy

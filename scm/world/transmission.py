@@ -28,7 +28,7 @@ from scm.v2x.messages.srem import SremRx, SremTx
 from scm.v2x.messages.ssem import SsemRx, SsemTx
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.publish import states_of
-from scm.world.radio import Receivers
+from scm.world.radio import Burst, Receivers
 from scm.world.warnings import due_denms, log_warning, note_hard_braking
 from scm.world.world import World
 
@@ -71,11 +71,13 @@ def send_radio(world: World, now_ns: int) -> list[Outgoing]:
 
 def transmit(world: World, frame: Frame, now_ns: int) -> list[Outgoing]:
     """Return a frame as every station receives it now; one of an unknown sender is dropped."""
-    reached = _reached(world, type(frame), frame.station)
-    if reached is None:
+    burst = _burst_of(world, type(frame), frame.station, now_ns)
+    if burst is None:
         return []
     out = _deliver_to_drivers(world, frame, now_ns)
-    return out + _deliver(world, [frame], reached, receivers_of(world), now_ns)
+    receivers = receivers_of(world)
+    reached = _reached(world, burst, RECEIVED[type(frame)], receivers)
+    return out + _deliver(world, burst, [frame], reached, receivers)
 
 
 def relay(
@@ -86,22 +88,25 @@ def relay(
     Raises:
         MessageError: when it cannot be read.
     """
-    reached = _reached(world, kind, station)
-    if reached is None or not reached.any():
+    burst = _burst_of(world, kind, station, now_ns)
+    if burst is None:
+        return []
+    receivers = receivers_of(world)
+    reached = _reached(world, burst, RECEIVED[kind], receivers)
+    if not reached.any():
         return []
     frame = decode(kind, sample.body, sample.attachment)
     if not agrees(sample.key, frame):
         msg = f"{sample.key}: the names inside are not those of its key"
         raise MessageError(msg)
-    return _deliver(world, [frame], reached, receivers_of(world), now_ns)
+    return _deliver(world, burst, [frame], reached, receivers)
 
 
-def _reached(world: World, kind: type[Frame], station: str) -> Bools | None:
-    """Send a frame; return which receivers (1, n) get it and listen, None if nobody may send it."""
+def _burst_of(world: World, kind: type[Frame], station: str, now_ns: int) -> Burst | None:
+    """Send a frame of a station that is no hosted car; None: it may not send, or is nowhere."""
     if kind in OF_ROADSIDE and station not in world.radio.roadside:
         world.ignored += 1
         return None
-    receivers = receivers_of(world)
     place = antenna_of(world, station)
     if place is None:
         world.radio.link.counts.sent += 1
@@ -109,8 +114,13 @@ def _reached(world: World, kind: type[Frame], station: str) -> Bools | None:
         return None
     x, y = np.array([place[0]]), np.array([place[1]])
     world.radio.load.note(kind_of(kind), x, y)
-    received = world.radio.link.reach([station], x, y, receivers, _load(world, receivers))
-    return received & _listens(world, RECEIVED[kind], receivers)
+    return Burst(kind_of(kind), [station], x, y, now_ns)
+
+
+def _reached(world: World, burst: Burst, kind: type[ReceivedFrame], receivers: Receivers) -> Bools:
+    """Return which receivers (k, n) get the frames of a burst, and subscribe to them."""
+    received = world.radio.link.reach(burst, receivers, _load(world, receivers))
+    return received & _listens(world, kind, receivers)
 
 
 def receivers_of(world: World) -> Receivers:
@@ -196,10 +206,9 @@ def _send_denm(world: World, frame: DenmTx, now_ns: int) -> list[Outgoing]:
     )
     world.radio.load.note("denm", x, y)
     out = _deliver_to_drivers(world, frame, now_ns)
-    receivers = receivers_of(world)
-    reached = world.radio.link.reach([frame.station], x, y, receivers, _load(world, receivers))
-    listen = _listens(world, DenmRx, receivers)
-    return out + _deliver(world, [frame], reached & listen, receivers, now_ns, also_sent=True)
+    receivers, burst = receivers_of(world), Burst("denm", [frame.station], x, y, now_ns)
+    reached = _reached(world, burst, DenmRx, receivers)
+    return out + _deliver(world, burst, [frame], reached, receivers, also_sent=True)
 
 
 def _deliver_to_drivers(world: World, frame: Frame, now_ns: int) -> list[Outgoing]:
@@ -237,32 +246,38 @@ def _deliver_cams(world: World, due: Ints, x: Floats, y: Floats, now_ns: int) ->
         world.radio.link.counts.sent += len(due)
         return []
     names = [world.cars.arrays.names[index] for index in due.tolist()]
-    reached = world.radio.link.reach(names, x, y, receivers, _load(world, receivers)) & listen
-    is_received = reached.any(axis=1) | on_bus
+    burst = Burst("cam", names, x, y, now_ns)
+    reached = world.radio.link.reach(burst, receivers, _load(world, receivers)) & listen
+    is_received = np.asarray(reached.any(axis=1) | on_bus)
     frames: list[Frame] = [
         _cam(world, s, now_ns) for s in states_of(world, due[is_received], now_ns)
     ]
-    return _deliver(world, frames, reached[is_received], receivers, now_ns, also_sent=True)
+    made = burst._replace(
+        senders=[name for name, sends in zip(names, is_received, strict=True) if sends],
+        x=x[is_received],
+        y=y[is_received],
+    )
+    return _deliver(world, made, frames, reached[is_received], receivers, also_sent=True)
 
 
 def _deliver(
     world: World,
+    burst: Burst,
     frames: Sequence[Frame],
     reached: Bools,
     receivers: Receivers,
-    now_ns: int,
     *,
     also_sent: bool = False,
 ) -> list[Outgoing]:
     """Return frames (k,) as receivers (k, n) get them now; delayed ones wait for their arrival."""
     out: list[Outgoing] = []
-    delays = iter(world.radio.link.delays(int(reached.sum())).tolist())
+    now_ns, delays = burst.t_ns, world.radio.link.delays(burst, reached)
     for row, frame in enumerate(frames):
         if also_sent:
             out.append(frame)
         for i in np.flatnonzero(reached[row]).tolist():
             received = _received(world, receivers.names[i], frame, now_ns)
-            delay_ns = next(delays)
+            delay_ns = int(delays[row, i])
             if delay_ns:
                 world.radio.in_flight.put(now_ns + delay_ns, received)
             else:

@@ -121,7 +121,7 @@ class World:
         self.trips = Trips(self.drivers, spread=True)
         channel, roadside = self.drivers.channel, roadside_places(city_map)
         self.radio = RadioState(
-            Radio(channel, generator(seed, NAME, "radio")),
+            Radio(channel, seed),
             ChannelLoad(radio, float(channel.numbers[RANGE]), channel.load),
             CamTriggers(capacity),
             roadside,

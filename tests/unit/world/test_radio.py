@@ -10,7 +10,7 @@ from scm.records.city_map import Conflict as Stretch
 from scm.records.floor import Floor
 from scm.v2x.messages.part_status import PartStatus
 from scm.vehicles.drivers.channel import channel_of
-from scm.world.radio import DelayQueue, Radio, Receivers, roadside_places
+from scm.world.radio import Burst, DelayQueue, Radio, Receivers, roadside_places
 
 PLACES = {"n1": (0.0, 0.0), "n2": (3.0, 4.0), "n3": (0.0, 5.1), "rsu-x": (1.0, 0.0)}
 STATIONS = Receivers(PLACES)
@@ -20,14 +20,17 @@ WALLS = [[2.0, -1.0, 2.0, 9.0]]
 def radio(range_m=5.0, loss=0.0, seed=0, **more):
     settings = RadioChannel(loss=loss, **more)
     channel = channel_of(settings, range_m, 0, np.array(WALLS))
-    return Radio(channel, np.random.default_rng(seed))
+    return Radio(channel, seed)
 
 
 def heard(air, *senders):
-    """Return who hears a frame of each sender, sent from where it is, or from the origin."""
-    x, y = np.array([PLACES.get(sender, (0.0, 0.0)) for sender in senders]).T
-    reached = air.reach(senders, x, y, STATIONS)
-    return [[STATIONS.names[i] for i in np.flatnonzero(row)] for row in reached]
+    """Return who receives a frame of each sender, one after the other, from where it is."""
+    found = []
+    for t_ns, sender in enumerate(senders):
+        x, y = (np.array([number]) for number in PLACES.get(sender, (0.0, 0.0)))
+        (row,) = air.reach(Burst("cam", [sender], x, y, t_ns), STATIONS)
+        found.append([STATIONS.names[i] for i in np.flatnonzero(row)])
+    return found
 
 
 def test_everybody_in_range_hears_it_but_the_sender():
@@ -40,7 +43,7 @@ def test_a_sender_that_is_no_receiver_itself_is_heard_by_all_in_range():
 
 def test_nobody_hears_where_there_is_nobody():
     x = np.zeros(2)
-    assert radio().reach(["a", "b"], x, x, Receivers({})).shape == (2, 0)
+    assert radio().reach(Burst("cam", ["a", "b"], x, x, 0), Receivers({})).shape == (2, 0)
 
 
 def test_loss_takes_its_share_of_the_frames():
@@ -52,6 +55,16 @@ def test_loss_takes_its_share_of_the_frames():
 def test_equal_seeds_lose_the_same_frames():
     first, second = (heard(radio(loss=0.5), *["n1"] * 50) for _ in range(2))
     assert first == second
+
+
+def test_who_is_lost_does_not_depend_on_what_else_is_sent():
+    alone, among = radio(loss=0.5), radio(loss=0.5)
+    x = np.zeros(2)
+    for t_ns in range(50):
+        first = alone.reach(Burst("cam", ["a"], x[:1], x[:1], t_ns), STATIONS)
+        among.reach(Burst("denm", ["c"], x[:1], x[:1], t_ns), STATIONS)
+        both = among.reach(Burst("cam", ["b", "a"], x, x, t_ns), STATIONS)
+        assert (both[1] == first[0]).all()
 
 
 def test_every_station_but_the_sender_is_counted_once_a_frame():
@@ -85,7 +98,8 @@ def shares(air, distance_m, load=0.0, frames=4000):
     """Return what share of frames is heard at a distance."""
     places = Receivers({"there": (distance_m, 0.0)})
     x = np.zeros(frames)
-    return air.reach(["here"] * frames, x, x, places, np.array([load])).mean()
+    senders = [f"here{number}" for number in range(frames)]
+    return air.reach(Burst("cam", senders, x, x, 0), places, np.array([load])).mean()
 
 
 @pytest.mark.parametrize("distance_m", [2.0, 5.0, 8.0])
@@ -113,7 +127,8 @@ def test_a_wall_between_shadows_and_one_beside_does_not():
 
 def test_delays_lie_between_the_least_and_the_most():
     air = radio(delay_ms=30.0, jitter_ms=50.0)
-    delays_ms = air.delays(2000) / 1e6
+    senders, x = [f"here{number}" for number in range(2000)], np.zeros(2000)
+    delays_ms = air.delays(Burst("cam", senders, x, x, 0), np.ones((2000, 1), np.bool_)) / 1e6
     assert delays_ms.min() >= 30.0
     assert delays_ms.max() <= 80.0
     assert delays_ms.mean() == pytest.approx(55.0, abs=2.0)
