@@ -94,7 +94,7 @@ class MemoryNetwork:
         self._routes: dict[str, list[_Subscription]] = {}
         self._matched: dict[str, bool] = {}
         self._opened = 0
-        self._delayed: list[tuple[int, int, Callable[[], None]]] = []
+        self._delayed: list[tuple[int, int, Callable[[int], None]]] = []
         self._sent = 0
 
     def bus(self, city: str, station: str) -> "MemoryBus":
@@ -109,7 +109,8 @@ class MemoryNetwork:
         """Deliver delayed items that are due, and refuse calls that have timed out."""
         while self._delayed and self._delayed[0][0] <= self.clock.now_ns():
             with self.lock:
-                heapq.heappop(self._delayed)[2]()
+                due_ns, _, deliver = heapq.heappop(self._delayed)
+                deliver(due_ns)
         if not self.pending:
             return
         with self.lock:
@@ -120,19 +121,22 @@ class MemoryNetwork:
                 pending.finish(no_answer(pending.call, pending.key), now_ns)
 
     def transmit(
-        self, sender: "MemoryBus", receiver: "MemoryBus", deliver_now: Callable[[], None]
+        self, sender: "MemoryBus", receiver: "MemoryBus", deliver: Callable[[int], None]
     ) -> None:
-        """Deliver something from one station to another, subject to the faults."""
-        if self.faults is None or sender is receiver:
-            deliver_now()
-            return
+        """Deliver something from one station to another, subject to the faults.
+
+        `deliver` is called with the time of arrival.
+        """
         now_ns = self.clock.now_ns()
+        if self.faults is None or sender is receiver:
+            deliver(now_ns)
+            return
         for delay_ns in self.faults.delays(sender.station, receiver.station):
             if delay_ns:
                 self._sent += 1
-                heapq.heappush(self._delayed, (now_ns + delay_ns, self._sent, deliver_now))
+                heapq.heappush(self._delayed, (now_ns + delay_ns, self._sent, deliver))
             else:
-                deliver_now()
+                deliver(now_ns)
 
     def route(self, sample: RawSample, sender: "MemoryBus | None" = None) -> None:
         """Deliver a sample to all its subscribers, in the order of their subscriptions.
@@ -154,14 +158,16 @@ class MemoryNetwork:
                         sender, subscription.owner, partial(self._deliver, subscription, sample)
                     )
 
-    def _deliver(self, subscription: _Subscription, sample: RawSample) -> None:
+    def _deliver(self, subscription: _Subscription, sample: RawSample, now_ns: int) -> None:
         if subscription.owner.connected:
-            subscription.deliver(replace(sample, t_ns=self.clock.now_ns()))
+            subscription.deliver(replace(sample, t_ns=now_ns))
 
-    def deliver_request(self, service: _Service, pending: _PendingCall, sample: RawSample) -> None:
+    def deliver_request(
+        self, service: _Service, pending: _PendingCall, sample: RawSample, now_ns: int
+    ) -> None:
         """Deliver a request to a service if that is still connected."""
         if service.owner.connected:
-            service.deliver(pending, replace(sample, t_ns=self.clock.now_ns()))
+            service.deliver(pending, replace(sample, t_ns=now_ns))
 
     def add_subscription(self, subscription: _Subscription) -> None:
         """Add a subscription and deliver what others retain for late joiners."""
@@ -340,9 +346,7 @@ class MemoryBus:
             network = self._network
             reply = decode(type(answer.reply), *encode(answer.reply))
             with network.lock:
-                network.transmit(
-                    self, pending.by, lambda: pending.receive(self, reply, network.clock.now_ns())
-                )
+                network.transmit(self, pending.by, partial(pending.receive, self, reply))
 
     def call(self, call: Call, on_reply: OnReply) -> None:
         """Send a request and pass the reply (or a `Refused`) to `on_reply` later; never blocks."""
@@ -358,8 +362,8 @@ class MemoryBus:
             pending.open.update(o.owner for o in services)
             self._network.pending.append(pending)
             for service in services:
-                deliver_now = partial(self._network.deliver_request, service, pending, sample)
-                self._network.transmit(self, service.owner, deliver_now)
+                deliver = partial(self._network.deliver_request, service, pending, sample)
+                self._network.transmit(self, service.owner, deliver)
         if not services:
             pending.finish(no_server(call.request, key), now_ns)
 

@@ -5,6 +5,7 @@ import numpy as np
 from scm.arrays import Bools, Ints
 from scm.v2x.cam_trigger import HEADING_RAD, N_GEN_CAM, POSITION_M, SPEED_MPS, T_MAX_NS, T_MIN_NS
 from scm.v2x.congestion import ReactiveControl
+from scm.v2x.etsi.path import EVERY_NS
 from scm.world.vehicle_arrays import VehicleArrays
 
 FEW, TICKS_BETWEEN = 100, 5  # CAMs that one tick always allows; ticks in 100 ms
@@ -20,13 +21,15 @@ class CamTriggers:
 
     def __init__(self, capacity: int) -> None:
         self._sent_ns = np.full(capacity, _NEVER_NS)
+        self._low_ns = np.full(capacity, _NEVER_NS)
         self._interval_ns = np.full(capacity, T_MAX_NS)
         self._quiet = np.zeros(capacity, np.int64)
         self._x, self._y, self._yaw, self._speed = (np.zeros(capacity) for _ in range(4))
 
     def forget(self, index: int) -> None:
         """Reset an index for its next car."""
-        self._sent_ns[index], self._interval_ns[index], self._quiet[index] = _NEVER_NS, T_MAX_NS, 0
+        self._sent_ns[index] = self._low_ns[index] = _NEVER_NS
+        self._interval_ns[index], self._quiet[index] = T_MAX_NS, 0
 
     def due(
         self, vehicles: VehicleArrays, now_ns: int, control: ReactiveControl | None = None
@@ -53,6 +56,12 @@ class CamTriggers:
         ):  # fmt: skip
             last[due] = now[due]
         return due
+
+    def low_frequency_due(self, due: Ints, now_ns: int) -> Bools:
+        """Return which CAMs that are sent now have the low-frequency container, (k,)."""
+        is_due: Bools = now_ns - self._low_ns[due] >= EVERY_NS
+        self._low_ns[due[is_due]] = now_ns
+        return is_due
 
     def _moved(self, vehicles: VehicleArrays, candidates: Ints) -> Bools:
         turned = np.abs(vehicles.yaw[candidates] - self._yaw[candidates])

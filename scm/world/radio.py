@@ -89,6 +89,11 @@ class Burst(NamedTuple):
     y: Floats
     t_ns: int
 
+    def of(self, rows: Bools) -> "Burst":
+        """Return the frames of some rows (k,)."""
+        senders = [name for name, wanted in zip(self.senders, rows, strict=True) if wanted]
+        return self._replace(senders=senders, x=self.x[rows], y=self.y[rows])
+
 
 class Radio:
     """The channel to all stations but hosted cars.

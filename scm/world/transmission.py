@@ -194,7 +194,12 @@ def _send_cams(world: World, due: Ints, now_ns: int) -> list[Outgoing]:
     world.drivers.receive_cams(
         due, now_ns, bumper_x, bumper_y, yaw, vehicles.speed[due], vehicles.yaw_rate[due]
     )
-    return _deliver_cams(world, due, x, y, now_ns)
+    made, out = _deliver_cams(world, due, x, y, now_ns)
+    unmade = world.radio.cams.low_frequency_due(due, now_ns) & ~made
+    bumpers = np.column_stack((bumper_x, bumper_y))[unmade].tolist()
+    for index, bumper in zip(due[unmade].tolist(), bumpers, strict=True):
+        world.cars.hosted[vehicles.names[index]].slow_news.note_sent(now_ns, *bumper)
+    return out
 
 
 def _send_denm(world: World, frame: DenmTx, now_ns: int) -> list[Outgoing]:
@@ -238,13 +243,18 @@ def _deliver_cam(world: World, index: int, body: CamBody, now_ns: int) -> None:
     world.drivers.receive_cams(np.array([index]), now_ns, *columns)
 
 
-def _deliver_cams(world: World, due: Ints, x: Floats, y: Floats, now_ns: int) -> list[Outgoing]:
-    """Return hosted cars' CAMs for all other receivers and the bus, if anybody subscribes."""
+def _deliver_cams(
+    world: World, due: Ints, x: Floats, y: Floats, now_ns: int
+) -> tuple[Bools, list[Outgoing]]:
+    """Return which CAMs of hosted cars were made (k,), and these for all but drivers.
+
+    Only those are made that somebody receives, or that anybody on the bus subscribes to.
+    """
     receivers, on_bus = receivers_of(world), world.subscribers.any(CamTx)
     listen = _listens(world, CamRx, receivers)
     if not (on_bus or listen.any()):
         world.radio.link.counts.sent += len(due)
-        return []
+        return np.zeros(len(due), np.bool_), []
     names = [world.cars.arrays.names[index] for index in due.tolist()]
     burst = Burst("cam", names, x, y, now_ns)
     reached = world.radio.link.reach(burst, receivers, _load(world, receivers)) & listen
@@ -252,12 +262,9 @@ def _deliver_cams(world: World, due: Ints, x: Floats, y: Floats, now_ns: int) ->
     frames: list[Frame] = [
         _cam(world, s, now_ns) for s in states_of(world, due[is_received], now_ns)
     ]
-    made = burst._replace(
-        senders=[name for name, sends in zip(names, is_received, strict=True) if sends],
-        x=x[is_received],
-        y=y[is_received],
-    )
-    return _deliver(world, made, frames, reached[is_received], receivers, also_sent=True)
+    made = burst.of(is_received)
+    out = _deliver(world, made, frames, reached[is_received], receivers, also_sent=True)
+    return is_received, out
 
 
 def _deliver(

@@ -51,22 +51,33 @@ class LowFrequencySender:
             state: The car's, at the CAM's time.
             front_m: From its rear axle to its front bumper.
         """
-        if self._sent_ns is not None and state.t_ns - self._sent_ns < EVERY_NS:
+        if not self._is_due(state.t_ns):
             return None
-        self._sent_ns = state.t_ns
-        here = _At(
-            state.x_m + front_m * math.cos(state.yaw_rad),
-            state.y_m + front_m * math.sin(state.yaw_rad),
-            state.t_ns,
-        )
+        x_m = state.x_m + front_m * math.cos(state.yaw_rad)
+        y_m = state.y_m + front_m * math.sin(state.yaw_rad)
+        here = _At(x_m, y_m, state.t_ns)
         content = VehicleLowFrequency(
             vehicle_role=self._role,
             exterior_lights=lights_of(state),
             path_history=self._history(here),
         )
+        self._pass(here)
+        return LowFrequencyContainer(basic_vehicle_container_low_frequency=content)
+
+    def note_sent(self, t_ns: int, x_m: float, y_m: float) -> None:
+        """Note a CAM that was sent and that nobody received, with its front bumper there."""
+        if self._is_due(t_ns):
+            self._pass(_At(x_m, y_m, t_ns))
+
+    def _is_due(self, t_ns: int) -> bool:
+        if self._sent_ns is not None and t_ns - self._sent_ns < EVERY_NS:
+            return False
+        self._sent_ns = t_ns
+        return True
+
+    def _pass(self, here: _At) -> None:
         if not self._path or math.dist(self._path[0][:2], here[:2]) >= APART_M:
             self._path.appendleft(here)
-        return LowFrequencyContainer(basic_vehicle_container_low_frequency=content)
 
     def _history(self, here: _At) -> tuple[PathPoint, ...]:
         points, length_m = [], 0.0

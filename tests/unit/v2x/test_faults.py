@@ -60,7 +60,8 @@ def test_what_is_late_has_the_time_of_its_arrival():
     assert net.heard.drain() == []
     net.clock.set_ns(NS_PER_S)
     net.network.expire()
-    assert [item.t_ns for item in net.heard.drain()] == [NS_PER_S]
+    (item,) = net.heard.drain()
+    assert 0 < item.t_ns <= 0.5 * NS_PER_S, "and not that of the next look"
 
 
 def test_one_seed_is_one_history_and_another_is_another():
