@@ -24,8 +24,8 @@ from scm.study.engine import Engine
 from scm.study.results import Results
 from scm.study.row import Row
 from scm.study.study_file import Search, Value
+from scm.study.tables import values_text, varied
 from scm.study.targets import Axis
-from scm.study.text_report import values_text, varied
 
 JOURNAL = "search.journal"
 FIRST = 20  # cases drawn at random before the model of good and bad ones begins

@@ -5,13 +5,13 @@ turn. A car that finds no room on its street waits outside the city; that wait i
 The junctions around have the same policy.
 """
 
-from scm.runtime.part import Subscription
+import math
+
 from scm.study.case import Case
 from scm.traffic.demand.part import DemandPart
 from scm.traffic.demand.table import Flow
 from scm.traffic.monitor.part import MonitorPart
 from scm.traffic.signals.part import TrafficPart
-from scm.v2x.messages.demand_status import DemandStatus
 
 MAP = "grid:3x3"
 STREETS = {"e": "j0_1_e", "w": "j2_1_w", "n": "j1_0_n", "s": "j1_2_s"}
@@ -37,16 +37,15 @@ def run(
         duration_s: How long the city runs.
     """
     signals = TrafficPart(case.map, plan, policy=policy)
-    parts = [case.world(room=ROOM), signals, MonitorPart(case.map)]
-    parts.append(DemandPart(case.map, _flows(case.seed, cars_per_hour, duration_s)))
+    demand = DemandPart(case.map, _flows(case.seed, cars_per_hour, duration_s))
+    parts = (case.world(room=ROOM), signals, MonitorPart(case.map), demand)
     with case.lockstep(parts) as city:
-        statuses = city.subscribe(Subscription(DemandStatus))
         city.run_for(duration_s)
-        last = statuses.drain()[-1].message
+    counts = demand.status
     return {
-        "travel_time_s": last.waited_s + last.travel_s if last.arrived else float("nan"),
-        "waited_s": last.waited_s,
-        "arrived_share": last.arrived / max(1, last.wanted),
+        "travel_time_s": counts.waited_s + counts.travel_s if counts.arrived else math.nan,
+        "waited_s": counts.waited_s,
+        "arrived_share": counts.arrived / max(1, counts.wanted),
     }
 
 
