@@ -1,9 +1,12 @@
 """A study with all that its cases share, and one case of it run in this process."""
 
+import numbers
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from scm.clock import WallClock, seconds
 from scm.errors import StudyError, nearest
@@ -123,7 +126,7 @@ class LoadedStudy:
                     f"{name}: returned by the scenario, not declared by the study"
                     f"{nearest(str(name), list(declared))}"
                 )
-            elif not isinstance(value, int | float):
+            elif not isinstance(value, numbers.Real | np.bool_):
                 problems.append(f"{name}: expected a number, got {value!r}")
         if problems:
             raise StudyError("; ".join(problems))

@@ -132,7 +132,8 @@ def _draw(
 
 def _themed(svg: str) -> str:
     """Return an SVG for a page: no header, the page's colours, as wide as there is room."""
-    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    svg = re.sub(r'<g id="[^"]*"', "<g", svg)  # several pictures on one page
     for colour, name in _CSS.items():
         svg = svg.replace(colour, name)
     svg = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", svg, count=1)

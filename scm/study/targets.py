@@ -268,17 +268,10 @@ def _of_cars(path: str, steps: Sequence[str], base: Setting) -> Iterator[Target]
 def _of_car(
     path: str, name: str, section: str, key: str, index: Sequence[str], base: Setting
 ) -> Target:
-    car, effect = base.car(name), _effect_of(section, key)
-    if not any(known.startswith(f"{section}.") for known in car.values) and effect is not None:
+    car = base.car(name)
+    whole, effect = _key_of(path, car, section, key)
+    if effect is not None:
         car = car.with_terms([effect])
-    else:
-        effect = None
-    keys = [known.partition(".")[2] for known in car.values if known.startswith(f"{section}.")]
-    if not keys:
-        sections = sorted({known.partition(".")[0] for known in car.values} | set(all_terms()))
-        msg = f"factors.{path}: {name} has no section {section!r}{nearest(section, sections)}"
-        raise StudyError(msg)
-    whole = f"{section}.{_completed(path, key, keys)}"
     quantity = car.quantity(whole)
     nominal, at = quantity.value, None
     if index:
@@ -318,15 +311,27 @@ def _index_of(path: str, text: str, nominal: object) -> int:
     return int(text)
 
 
-def _effect_of(section: str, key: str) -> Term | None:
-    """Return the effect that has such a number, for a car that has none of the section."""
-    found = [
-        term
+def _key_of(path: str, car: Car, section: str, key: str) -> tuple[str, Term | None]:
+    """Return a whole key of a car file, and the effect that has it if the car has none such.
+
+    A section may also be the name of an effect: `steer_trim.trim_rad` is `steering.trim_rad`.
+    """
+    own = [known for known in car.values if known.startswith(f"{section}.")]
+    lacking = {
+        param.key: term
         for term in all_terms().values()
-        if any(param.key.startswith(f"{section}.{key}") for param in term.params)
-    ]
-    named = [term for term in found if term.name == section]
-    return next(iter(named or found), None)
+        for param in term.params
+        if param.key not in car.values
+        and (param.key.startswith(f"{section}.") or term.name == section)
+    }
+    named = [p.key for term in all_terms().values() if term.name == section for p in term.params]
+    by_last = {known.partition(".")[2]: known for known in (*lacking, *named, *own)}
+    if not by_last:
+        sections = sorted({known.partition(".")[0] for known in car.values} | set(all_terms()))
+        msg = f"factors.{path}: {car.name} has no section {section!r}{nearest(section, sections)}"
+        raise StudyError(msg)
+    whole = by_last[_completed(path, key, list(by_last))]
+    return whole, lacking.get(whole)
 
 
 def _of_map(path: str, steps: Sequence[str], city_map: CityMap) -> Iterator[Target]:
