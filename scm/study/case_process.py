@@ -56,12 +56,15 @@ class CaseProcess:
         study: What is run, loaded here too.
         folder: Of the study file, `study.toml`, and all that it names.
 
+    Attributes:
+        folder: The same.
+
     Raises:
         StudyError: when the process cannot load the study.
     """
 
     def __init__(self, study: LoadedStudy, folder: Path) -> None:
-        self._study, self._folder = study, folder
+        self._study, self.folder = study, folder
         self._start()
 
     def run(self, task: Task) -> Row:
@@ -106,8 +109,8 @@ class CaseProcess:
         down_read, down_write = os.pipe()
         up_read, up_write = os.pipe()
         command = [sys.executable, "-m", "scm.study.case_process", str(down_read), str(up_write)]
-        command += [str(self._folder), self._study.file.name]
-        with (self._folder / OUTPUT).open("ab") as output:
+        command += [str(self.folder), self._study.file.name]
+        with (self.folder / OUTPUT).open("ab") as output:
             self._process = subprocess.Popen(
                 command, pass_fds=(down_read, up_write), stdin=subprocess.DEVNULL,
                 stdout=output, stderr=output, env={**os.environ, **ONE_THREAD},

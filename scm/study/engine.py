@@ -20,6 +20,7 @@ from scm.study.case_process import STUDY, CaseProcesses, Task
 from scm.study.loaded_study import LoadedStudy, load
 from scm.study.row import Row
 
+CONNECT_S = 5
 AHEAD = 4  # cases that a core has waiting: a worker never waits for the next one
 
 
@@ -156,7 +157,7 @@ def dask_engine(study: LoadedStudy, folder: Path, address: str) -> Iterator[Engi
         RunError: when there is no scheduler at the address.
     """
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=CONNECT_S)
     except (OSError, TimeoutError, ValueError) as cause:
         raise RunError(f"--scheduler {address}: no Dask scheduler there: {cause}") from cause
     with client:

@@ -78,7 +78,7 @@ class LoadedStudy:
                 returned = self.scenario.run(case, **case.setting.arguments)
             measures = self._checked(returned)
             outcome = self._outcome(measures)
-        except Exception as cause:  # noqa: BLE001  a scenario is somebody else's code
+        except (Exception, SystemExit) as cause:  # noqa: BLE001  somebody else's code
             outcome, detail = "error", _detail(cause)
         return self.row(
             number, given, outcome, seconds(clock.now_ns() - began_ns), detail, measures
@@ -156,7 +156,7 @@ def load(path: Path, name: str = "") -> LoadedStudy:
     return LoadedStudy(file, scenario, base, design_of(file, base, scenario.parameters))
 
 
-def _detail(cause: Exception) -> str:
+def _detail(cause: BaseException) -> str:
     """Return an error in one line: what it says, and the line of the scenario where it arose."""
     text = " ".join(f"{type(cause).__name__}: {cause}".split())
     frames = traceback.extract_tb(cause.__traceback__)
