@@ -11,16 +11,17 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from statistics import NormalDist
 from typing import cast
 
 import numpy as np
-from scipy.special import ndtr, ndtri
-from scipy.stats import qmc
 
 from scm.arrays import Floats
 from scm.errors import StudyError
 from scm.study.study_file import MAX_CASES, Sampling, Study, StudyFile, Value
 from scm.study.targets import Axis, Setting, axes_of
+
+INNERMOST = 1e-15  # a normal distribution has no share 0 and 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,8 +131,10 @@ def value_at(axis: Axis, share: float) -> float:
         return math.exp(low + (high - low) * share)
     mean, std = spread_of(axis)
     low, high = limits_of(axis)
-    below, above = ndtr((low - mean) / std), ndtr((high - mean) / std)
-    return float(np.clip(mean + std * ndtri(below + (above - below) * share), low, high))
+    normal = NormalDist(mean, std)
+    below, above = normal.cdf(low), normal.cdf(high)
+    within = min(max(below + (above - below) * share, INNERMOST), 1.0 - INNERMOST)
+    return min(max(normal.inv_cdf(within), low), high)
 
 
 def spread_of(axis: Axis) -> tuple[float, float]:
@@ -167,12 +170,14 @@ def _shares(sampling: Sampling, samples: int, factors: int, draws: str) -> Float
     `draws` names them: equal names, equal draws.
     """
     rng = np.random.default_rng(hashed(draws))
+    if sampling == "random":
+        return rng.random((samples, factors))
+    from scipy.stats import qmc  # noqa: PLC0415  a second, at the start of each case process
+
     if sampling == "latin_hypercube":
         shares: Floats = qmc.LatinHypercube(factors, rng=rng).random(samples)
-    elif sampling == "sobol":
-        shares = qmc.Sobol(factors, rng=rng).random(samples)
     else:
-        shares = rng.random((samples, factors))
+        shares = qmc.Sobol(factors, rng=rng).random(samples)
     return shares
 
 

@@ -4,10 +4,11 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
+from scipy.special import fdtrc, stdtrit
 
 from scm.study.design import Design
 from scm.study.row import Row
@@ -15,7 +16,7 @@ from scm.study.study_file import Value
 from scm.study.targets import Axis
 
 CONFIDENCE = 0.95
-Z = float(ndtri(0.5 + 0.5 * CONFIDENCE))
+Z = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE)
 BINS = 5  # of a drawn factor, for its effect
 SUCCESS = "success"
 
@@ -160,8 +161,6 @@ def _value(row: Row, measure: str) -> float:
 
 def _explained(groups: Sequence[np.ndarray]) -> tuple[float, float]:
     """Return the share of variance between groups, and its p value by the F test."""
-    from scipy.stats import f as fisher  # noqa: PLC0415  half a second
-
     values = np.concatenate(groups)
     total = float(((values - values.mean()) ** 2).sum())
     between = sum(len(group) * float(group.mean() - values.mean()) ** 2 for group in groups)
@@ -171,4 +170,4 @@ def _explained(groups: Sequence[np.ndarray]) -> tuple[float, float]:
     share = min(1.0, between / total)
     if rest <= 0 or share >= 1.0:
         return share, math.nan
-    return share, float(fisher.sf(share / more / ((1.0 - share) / rest), more, rest))
+    return share, float(fdtrc(more, rest, share / more / ((1.0 - share) / rest)))
