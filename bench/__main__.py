@@ -10,6 +10,7 @@ BENCHMARKS = (
     "contacts",
     "city",
     "start",
+    "study",
     "bus",
     "agents",
     "codec",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from scm.camera.daylight import Daylight
 from scm.fleet import City, LockstepLink
 from scm.records.city_map import CityMap
 from scm.runtime.lockstep import Lockstep
@@ -61,6 +62,11 @@ class Case:
     def network(self) -> FaultRates:
         """What happens to messages between parts."""
         return self.setting.network
+
+    @property
+    def daylight(self) -> Daylight:
+        """The light for `scm.camera.part.CameraPart`."""
+        return self.setting.daylight
 
     def generator(self, *names: str) -> np.random.Generator:
         """Return random numbers of this case; equal names, equal numbers."""

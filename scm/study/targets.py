@@ -5,6 +5,7 @@
     cars.nigel.tyre.slip_extremum       a number of a car file; of an effect that it lacks, too
     radio.loss, junctions.crossing.plan, lights.3.yaw_rad, cameras.ceiling.tilt_x_rad, ...
     network.drop                        messages lost between parts, see `scm.v2x.faults`
+    daylight.azimuth                    of cars' cameras, see `scm.camera.daylight`
     policy                              an argument of the scenario
 
 A unit at the end may be left out where only one fits: `walls.*.yaw`.
@@ -19,7 +20,8 @@ from typing import Any, cast
 
 import msgspec
 
-from scm.errors import CarError, StudyError, nearest
+from scm.camera.daylight import Daylight
+from scm.errors import CarError, ScmError, StudyError, nearest
 from scm.geometry import wrap_angle
 from scm.maps.check import problems_of
 from scm.maps.load import load_map
@@ -30,10 +32,11 @@ from scm.v2x.faults import FaultRates
 from scm.vehicles.car import Car, all_terms, car_names, load_car
 from scm.vehicles.term import Term
 
-CARS, NETWORK = "cars", "network"
+CARS = "cars"
 POSE = ("x_m", "y_m", "yaw_rad")
 DEFAULT_CAR = "nigel"
 UNBOUNDED = (-math.inf, math.inf)
+_SETTINGS: dict[str, Any] = {"network": FaultRates, "daylight": Daylight}
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +51,7 @@ class Setting:
     city_map: CityMap
     cars: Mapping[str, Car] = field(default_factory=dict)
     network: FaultRates = field(default_factory=FaultRates)
+    daylight: Daylight = field(default_factory=Daylight)
     arguments: Mapping[str, Value] = field(default_factory=dict)
 
     def car(self, name: str) -> Car:
@@ -148,12 +152,12 @@ def targets_of(
         StudyError: when it leads nowhere.
     """
     steps = path.split(".")
-    if len(steps) == 1:
+    if len(steps) == 1 and (path in parameters or path not in CityMap.__struct_fields__):
         return [_argument(path, parameters)]
     if steps[0] == CARS:
         return list(_of_cars(path, steps[1:], base))
-    if steps[0] == NETWORK:
-        return [_of_network(path, steps[1:])]
+    if steps[0] in _SETTINGS:
+        return [_of_settings(path, steps[0], ".".join(steps[1:]))]
     return list(_of_map(path, steps, base.city_map))
 
 
@@ -221,19 +225,22 @@ def _argument(path: str, parameters: Mapping[str, inspect.Parameter]) -> Target:
     return Target(path, None if default is inspect.Parameter.empty else default, put)
 
 
-def _of_network(path: str, steps: Sequence[str]) -> Target:
-    rates = FaultRates()
-    names = list(FaultRates.__dataclass_fields__)
-    name = _completed(path, ".".join(steps), names)
-
-    high = math.inf if name == "late_s" else 1.0
+def _of_settings(path: str, root: str, name: str) -> Target:
+    """Return a number of the network's faults or of the daylight."""
+    kind = _SETTINGS[root]
+    name = _completed(path, name, list(kind.__dataclass_fields__))
 
     def put(setting: Setting, value: Value) -> Setting:
-        if isinstance(value, str) or not 0.0 <= value <= high:
-            raise StudyError(f"{path}: expected a number from 0 to {high:g}, got {value!r}")
-        return replace(setting, network=replace(setting.network, **{name: float(value)}))
+        if not _is_number(value):
+            raise StudyError(f"{path}: expected a number, got {value!r}")
+        try:
+            new = replace(getattr(setting, root), **{name: float(value)})
+        except ScmError as cause:
+            raise StudyError(f"{path}: {cause}") from cause
+        return replace(setting, **{root: new})
 
-    return Target(f"{NETWORK}.{name}", getattr(rates, name), put, (0.0, high))
+    bounds = (0.0, 1.0) if kind is FaultRates and name != "late_s" else UNBOUNDED
+    return Target(f"{root}.{name}", getattr(kind(), name), put, bounds)
 
 
 def _completed(path: str, name: str, known: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from scm.clock import nanoseconds
+from scm.errors import RunError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,12 +18,22 @@ class FaultRates:
 
     Attributes:
         late_s: The longest delay [s].
+
+    Raises:
+        RunError: naming what cannot be.
     """
 
     drop: float = 0.0
     duplicate: float = 0.0
     late: float = 0.0
     late_s: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name in ("drop", "duplicate", "late"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise RunError(f"{name}: expected 0 to 1, got {getattr(self, name):g}")
+        if self.late_s < 0.0:
+            raise RunError(f"late_s: expected a time, got {self.late_s:g}")
 
 
 class Faults:

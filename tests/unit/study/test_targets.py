@@ -121,6 +121,14 @@ def test_the_network_s_faults_are_factors():
     assert changed.network.late == 0.2
 
 
+def test_the_light_and_plain_values_of_the_map_are_factors():
+    _, changed = put("daylight.azimuth", 1.0)
+    assert changed.daylight.azimuth == 1.0
+    axis, changed = put("speed_advice", True)
+    assert axis.path == "speed_advice"
+    assert changed.city_map.speed_advice
+
+
 def test_the_boundaries_of_a_car_s_numbers_and_their_stated_scatter_are_known():
     (mass,) = targets_of("cars.nigel.body.mass_kg", TOWN, {})
     car = load_car("nigel")
@@ -147,7 +155,9 @@ def test_the_boundaries_of_a_car_s_numbers_and_their_stated_scatter_are_known():
         ("cars.nigel.body.mass_kg", -1.0, "got -1"),
         ("cars.nigel.lidar.range_m", 1.0, "cars.nigel.lidar.range_m.0 to"),
         ("cars.nigel.lidar.range_m.7", 1.0, "expected a number below 2"),
-        ("network.drop", 1.5, "expected a number from 0 to 1"),
+        ("network.drop", 1.5, "drop: expected 0 to 1, got 1.5"),
+        ("daylight.elevation", 3.0, "expected 0.05 to 1.57 rad"),
+        ("daylight.colour", 3.0, "no 'colour' there"),
         ("network.dorp", 0.5, "did you mean 'drop'?"),
         ("polcy", 1.0, "no such argument (did you mean 'policy'?)"),
     ],
