@@ -19,6 +19,7 @@ mismatch    what the simulator left out, found in recordings; blind trials
 ros2        the city as ROS 2 sees it
 selftest    faults injected into a running city
 api, client     REST, event stream, dashboard; the typed client of it
+study       one scenario in many cities: factors, seeds, engines, results, search
 fleet       scripts that spawn, route and time cars, live or in lockstep
 commands    the command line, one file per command
 """

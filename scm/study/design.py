@@ -6,9 +6,8 @@ study has run, all combinations are equally far.
 
 import hashlib
 import inspect
-import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import NormalDist
@@ -29,7 +28,7 @@ class Design:
     """All cases of a study.
 
     Attributes:
-        listed: The factors of which each value is used.
+        factorial: The factors of which each value is used.
         drawn: Those whose values are drawn.
     """
 
@@ -38,7 +37,7 @@ class Design:
     axes: tuple[Axis, ...]
 
     @property
-    def listed(self) -> list[Axis]:
+    def factorial(self) -> list[Axis]:
         """The factors of which each value is used."""
         return [axis for axis in self.axes if not axis.factor.is_drawn]
 
@@ -50,7 +49,7 @@ class Design:
     @property
     def points(self) -> int:
         """Cases of one replication."""
-        combinations = math.prod(len(axis.factor.levels) for axis in self.listed)
+        combinations = math.prod(len(axis.factor.levels) for axis in self.factorial)
         return combinations * (self.study.samples if self.drawn else 1)
 
     def __len__(self) -> int:
@@ -72,7 +71,7 @@ class Design:
         samples = self.study.samples if self.drawn else 1
         combination, sample = divmod(point, samples)
         found: dict[str, Value] = {}
-        for axis in reversed(self.listed):
+        for axis in reversed(self.factorial):
             levels = axis.factor.levels
             combination, level = divmod(combination, len(levels))
             found[axis.path] = levels[level]
@@ -179,13 +178,3 @@ def _shares(sampling: Sampling, samples: int, factors: int, draws: str) -> Float
     else:
         shares = qmc.Sobol(factors, rng=rng).random(samples)
     return shares
-
-
-def combinations(design: Design) -> Sequence[dict[str, Value]]:
-    """Return all combinations of the listed factors."""
-    listed = design.listed
-    levels = (axis.factor.levels for axis in listed)
-    return [
-        dict(zip((axis.path for axis in listed), values, strict=True))
-        for values in itertools.product(*levels)
-    ]

@@ -125,8 +125,8 @@ def level_text(level: Value) -> str:
 
 def half_width(rows: Sequence[Row], measure: str, design: Design) -> float:
     """Return the half width of a measure's interval in that combination where it is widest."""
-    listed = [axis.path for axis in design.listed]
-    groups = grouped(rows, lambda row: tuple(row.values[path] for path in listed))
+    factorial = [axis.path for axis in design.factorial]
+    groups = grouped(rows, lambda row: tuple(row.values[path] for path in factorial))
     return max((estimate(group, measure).half_width for group in groups.values()), default=math.inf)
 
 
