@@ -259,6 +259,7 @@ class Box(Record, kw_only=True, frozen=True):
     Attributes:
         mass_kg: Of one that cars can push; without it the box is fixed.
         friction: Between the box and the floor.
+        mapped: Whether agents' maps have it; false: only their sensors can tell them of it.
     """
 
     name: Name
@@ -270,6 +271,7 @@ class Box(Record, kw_only=True, frozen=True):
     height_m: HeightM = 0.2
     mass_kg: float | None = None
     friction: float = 0.5
+    mapped: bool = True
 
 
 class Spawn(Record, kw_only=True, frozen=True):

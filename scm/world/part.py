@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
+from msgspec.structs import replace
+
 from scm.clock import NS_PER_S
 from scm.errors import RunError, ScmError
 from scm.records.city_map import CityMap, Spawn
@@ -67,7 +69,7 @@ class WorldPart(BasePart):
         first: list[Outgoing] = []
         if self._definition is None:
             self._definition = WorldDefinition(
-                t_ns=now_ns, seed=self.world.seed, map=self.world.city_map
+                t_ns=now_ns, seed=self.world.seed, map=_mapped(self.world.city_map)
             )
             first = [self._definition, *self._open(now_ns)]
             self._definition_due_ns = now_ns + DEFINITION_EVERY_NS
@@ -126,3 +128,9 @@ class WorldPart(BasePart):
             if not isinstance(answer, Refused) or answer.code != "occupied":
                 return answer
         return reply_to(self.world, SpawnRequest(vehicle=name, car=car_file), now_ns, out)
+
+
+def _mapped(city_map: CityMap) -> CityMap:
+    """Return the map as agents get it: without boxes that nobody has mapped."""
+    boxes = tuple(box for box in city_map.boxes if box.mapped)
+    return city_map if len(boxes) == len(city_map.boxes) else replace(city_map, boxes=boxes)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import Pose2
@@ -20,7 +21,9 @@ from scm.v2x.messages.spatem import SpatemTx
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
+from scm.world.part import WorldPart
 
 MAP = load_map("driving_school")
 
@@ -170,3 +173,13 @@ def test_cars_tell_of_their_trips_in_turns(make_city):
         told = [trip.t_ns // NS_PER_MS for trip in city.heard(Trip) if trip.vehicle == name]
         assert len(told) >= 6
         assert all(0 <= (t_ms - turn_ms) % 500 < 20 for t_ms in told[2:])
+
+
+def test_a_box_that_nobody_mapped_is_there_and_not_in_agents_maps():
+    city_map = load_map("parking_school_obstacles")
+    first, *others = city_map.boxes
+    hidden = replace(city_map, boxes=(replace(first, mapped=False), *others))
+    part = WorldPart(hidden, room=1)
+    (definition,) = (m for m in part.step(0, []) if isinstance(m, WorldDefinition))
+    assert [box.name for box in definition.map.boxes] == [box.name for box in others]
+    assert not part.world.has_room("nigel", Pose2(first.x_m, first.y_m, 0.0))
