@@ -144,7 +144,7 @@ def main_effects(rows: Sequence[Row], axes: Sequence[Axis], measure: str) -> lis
             for level, group in by_level(rows, axis).items()
         }
         groups = {level: values for level, values in groups.items() if values}
-        if len(groups) < 2:
+        if len(groups) < 2 or len({value for values in groups.values() for value in values}) < 2:
             continue
         means = {level: float(np.mean(values)) for level, values in groups.items()}
         low, high = min(means, key=means.__getitem__), max(means, key=means.__getitem__)
