@@ -5,7 +5,7 @@ most 200 m back. Source: EN 302 637-2 v1.4.1, 6.1.3 and annex B.
 """
 
 import math
-from collections import deque
+from array import array
 from typing import NamedTuple
 
 from scm.clock import NS_PER_MS
@@ -32,16 +32,18 @@ ROLE_NUMBERS = {"default": 0, "publicTransport": 1, "emergency": 6, "safetyCar":
 class _At(NamedTuple):
     x_m: float
     y_m: float
-    t_ns: int
+    t_ns: float
 
 
 class LowFrequencySender:
-    """The low-frequency container of one car."""
+    """The low-frequency container of one car; a city has thousands of these, so it is small."""
+
+    __slots__ = ("_path", "_role", "_sent_ns")
 
     def __init__(self, role: str = "default") -> None:
         """Start with the car's role, one of `ROLE_NUMBERS`."""
         self._role = ROLE_NUMBERS[role]
-        self._path: deque[_At] = deque(maxlen=MAX_POINTS)
+        self._path = array("d")  # x, y, t of each place, the newest last
         self._sent_ns: int | None = None
 
     def due(self, state: VehicleState, front_m: float) -> LowFrequencyContainer | None:
@@ -76,12 +78,14 @@ class LowFrequencySender:
         return True
 
     def _pass(self, here: _At) -> None:
-        if not self._path or math.dist(self._path[0][:2], here[:2]) >= APART_M:
-            self._path.appendleft(here)
+        if not self._path or math.dist(self._path[-3:-1], here[:2]) >= APART_M:
+            self._path.extend(here)
+            del self._path[: -3 * MAX_POINTS]
 
     def _history(self, here: _At) -> tuple[PathPoint, ...]:
         points, length_m = [], 0.0
-        for before in self._path:
+        for end in range(len(self._path), 0, -3):
+            before = _At(*self._path[end - 3 : end])
             length_m += math.dist(before[:2], here[:2])
             if length_m > FARTHEST_M:
                 break
@@ -91,7 +95,7 @@ class LowFrequencySender:
 
 
 def _point(before: _At, here: _At) -> PathPoint:
-    steps = (here.t_ns - before.t_ns) // _TIME_STEP_NS
+    steps = int(here.t_ns - before.t_ns) // _TIME_STEP_NS
     return PathPoint(
         path_position=DeltaPosition(
             delta_latitude=_delta(latitude_of(before.y_m) - latitude_of(here.y_m)),
