@@ -9,11 +9,17 @@ are noticed by their missing heartbeat and run again.
 import threading
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import optuna
-from optuna.storages import BaseStorage, JournalStorage, RDBStorage, RetryFailedTrialCallback
+from optuna.storages import (
+    BaseStorage,
+    JournalStorage,
+    RDBStorage,
+    RetryHeartbeatStaleTrialCallback,
+)
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, Trial, TrialState
 
@@ -54,7 +60,7 @@ def run_search(
     """Run cases until one goes beyond the limit, or as many as the file says.
 
     Args:
-        results: Where rows go; those that are there count.
+        results: Where rows go; the cases of all commands that share a storage count.
         engine: Where cases run.
         on_row: Called with each new row.
         storage: URL of a PostgreSQL database; empty: a journal in the results' folder.
@@ -67,7 +73,21 @@ def run_search(
         path = results.folder / "study.toml"
         raise StudyError(f"{path}: search: missing; expected [search] with measure and goal")
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    study = _optuna_study(results, goal, storage)
+    warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)  # three of its options
+    with _opened(results.folder, storage) as opened:
+        _search(results, engine, on_row, goal, _optuna_study(results, goal, opened))
+    results.finish(state="complete", why="the search has ended")
+    return worst_of(results, goal)
+
+
+def _search(
+    results: Results,
+    engine: Engine,
+    on_row: Callable[[Row], None],
+    goal: Search,
+    study: optuna.Study,
+) -> None:
+    """Run the cases that are left."""
     lock = threading.Lock()
 
     def objective(trial: Trial) -> float:
@@ -84,13 +104,12 @@ def run_search(
         if trial.value is not None and _is_beyond(trial.value, goal):
             study.stop()
 
-    left = goal.cases - len(results.rows)
-    found = worst_of(results, goal)
-    if left > 0 and not found.is_beyond:
-        study.optimize(objective, left, n_jobs=min(left, engine.cores), callbacks=[stop_beyond])
-    found = worst_of(results, goal)
-    results.finish(state="complete", why="the search has ended")
-    return found
+    ended = (TrialState.COMPLETE, TrialState.PRUNED)
+    left = goal.cases - len(study.get_trials(deepcopy=False, states=ended))
+    if left > 0 and not worst_of(results, goal).is_beyond:
+        enough = optuna.study.MaxTrialsCallback(goal.cases, states=ended)
+        jobs = min(left, engine.cores)
+        study.optimize(objective, left, n_jobs=jobs, callbacks=[stop_beyond, enough])
 
 
 def worst_of(results: Results, goal: Search) -> Found:
@@ -123,9 +142,8 @@ def _is_beyond(value: float, goal: Search) -> bool:
     return below or (goal.stop_above is not None and value > goal.stop_above)
 
 
-def _optuna_study(results: Results, goal: Search, storage: str) -> optuna.Study:
+def _optuna_study(results: Results, goal: Search, storage: BaseStorage) -> optuna.Study:
     name = results.study.file.name
-    warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)  # of two of its options
     sampler = optuna.samplers.TPESampler(
         seed=hashed(f"{results.study.file.study.seed}/{name}/search") % 2**32,
         n_startup_trials=FIRST,
@@ -134,26 +152,33 @@ def _optuna_study(results: Results, goal: Search, storage: str) -> optuna.Study:
         constant_liar=True,  # cases that run at the same time do not all look at one place
     )
     study = optuna.create_study(
-        storage=_storage(results.folder, storage), sampler=sampler, study_name=name,
-        direction=goal.goal, load_if_exists=True,
-    )  # fmt: skip
-    if not storage:
+        storage=storage, sampler=sampler, study_name=name, direction=goal.goal, load_if_exists=True
+    )
+    if not isinstance(storage, RDBStorage):
         _run_again(study)
     return study
 
 
-def _storage(folder: Path, url: str) -> BaseStorage:
+@contextmanager
+def _opened(folder: Path, url: str) -> Iterator[BaseStorage]:
+    """Open a database, or else the journal of a folder."""
     if not url:
-        return JournalStorage(JournalFileBackend(str(folder / JOURNAL)))
+        yield JournalStorage(JournalFileBackend(str(folder / JOURNAL)))
+        return
     scheme, _, rest = url.partition("://")
     if scheme not in {"postgresql", "postgres"}:
         raise StudyError(f"--storage: expected postgresql://..., got {url!r}")
-    return RDBStorage(
+    storage = RDBStorage(
         f"postgresql+psycopg://{rest}",
         heartbeat_interval=HEARTBEAT_S,
         grace_period=GRACE_S,
-        heartbeat_stale_trial_callback=RetryFailedTrialCallback(MAX_RETRIES),
+        heartbeat_stale_trial_callback=RetryHeartbeatStaleTrialCallback(MAX_RETRIES),
     )
+    try:
+        yield storage
+    finally:
+        storage.remove_session()
+        storage.engine.dispose()
 
 
 def _run_again(study: optuna.Study) -> None:

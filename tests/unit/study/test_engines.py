@@ -1,0 +1,75 @@
+"""Slurm's jobs by submitit, options of sbatch, and a database that searches share."""
+
+import logging
+
+import pytest
+import submitit
+
+from scm.errors import RunError, StudyError
+from scm.study.case_process import Task
+from scm.study.engine import SlurmEngine, slurm_options
+from scm.study.results import create_results
+from scm.study.search import run_search
+from tests.unit.study.studying import Here, loaded
+
+
+def test_slurm_s_jobs_share_the_cases_and_a_bad_one_costs_only_its_own(tmp_path):
+    """Submitit's local executor runs jobs as Slurm does, on this machine."""
+    scenario = (
+        "import os\ndef run(case, a=1.0):\n    if a > 2.5: os._exit(4)\n    return {'total': a}\n"
+    )
+    study = loaded(tmp_path, scenario=scenario)
+    folder = create_results(study, tmp_path / "out", []).folder
+    logging.getLogger("submitit").setLevel(logging.ERROR)
+    engine = SlurmEngine(submitit.LocalExecutor(tmp_path / "jobs"), study, folder, 2)
+    rows = {row.case: row for row in engine.run(Task(case=n) for n in range(4))}
+    assert {n: row.outcome for n, row in rows.items()} == {
+        0: "success", 1: "success", 2: "error", 3: "success",
+    }  # fmt: skip
+    assert rows[2].detail == "its process ended: exit status 4"
+
+
+def test_options_of_sbatch_are_those_of_the_jobs():
+    given, jobs = slurm_options("-p cpu -n 64 -t 30 --mem 4G --account=lab")
+    assert jobs == 64
+    assert given == {
+        "partition": "cpu", "time": 30, "mem": "4G", "account": "lab", "cpus_per_task": 1,
+        "array_parallelism": 64,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "words"), [("-n many", "invalid int value"), ("--gres gpu:1", "no option '--gres'")]
+)
+def test_options_that_are_not_known_are_named(text, words):
+    with pytest.raises(RunError, match=words):
+        slurm_options(text)
+
+
+SEARCH = '[search]\nmeasure = "total"\ngoal = "minimize"\ncases = 6'
+
+
+def test_commands_share_a_search_through_a_database(tmp_path):
+    pgserver = pytest.importorskip("pgserver")
+    server = pgserver.get_server(tmp_path / "pg", cleanup_mode="stop")
+    url = server.get_uri()
+    try:
+        numbers = []
+        for name, cases in (("one", 4), ("two", 6)):
+            folder = tmp_path / name
+            folder.mkdir()
+            tables = SEARCH.replace("6", str(cases))
+            study = loaded(folder, tables=tables, factors="b = { uniform = [0.0, 1.0] }")
+            results = create_results(study, folder / "out", [])
+            run_search(results, Here(study), lambda _: None, url)
+            numbers.append(sorted(results.rows))
+    finally:
+        server.cleanup()
+    assert numbers == [[0, 1, 2, 3], [4, 5]]
+
+
+def test_a_storage_that_is_no_database_is_refused(tmp_path):
+    study = loaded(tmp_path, tables=SEARCH)
+    results = create_results(study, tmp_path / "out", [])
+    with pytest.raises(StudyError, match=r"--storage: expected postgresql://\.\.\., got 'redis"):
+        run_search(results, Here(study), lambda _: None, "redis://here")
