@@ -13,13 +13,13 @@ from fastapi import APIRouter, FastAPI
 from scm import registry
 from scm.api import openapi, problem, uploads
 from scm.api.acknowledgements import Acknowledgements
+from scm.api.audit_text import AuditText
 from scm.api.audit_trail import Audited
 from scm.api.based import HERE, Based, Site, check_base
 from scm.api.body_limit import Bounded
 from scm.api.calibration_jobs import LARGEST_PICTURE
 from scm.api.city import City, Link, SendRequest
 from scm.api.dashboard import Dashboard, astray, index_text
-from scm.api.deeds import Words
 from scm.api.folders import Folders
 from scm.api.gate import Gate, content_policy
 from scm.api.head import Headed
@@ -106,7 +106,7 @@ def create_app(
         for noun in routers:
             app.include_router(noun, prefix=prefix, responses=problem.RESPONSES)
     openapi.install(app, nouns)
-    app.state.words = Words(nouns)
+    app.state.words = AuditText(nouns)
     return app
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from scm.api.deeds import Words
+from scm.api.audit_text import AuditText
 from scm.api.event_log import as_read
 from scm.api.idempotency import CHANGES
 from scm.api.trace import trace_id
@@ -56,7 +56,7 @@ class AuditFilter(msgspec.Struct, kw_only=True, frozen=True):
         )
 
 
-def newest_first(store: Repository, words: Words) -> Iterator[AuditRow]:
+def newest_first(store: Repository, words: AuditText) -> Iterator[AuditRow]:
     """Yield entries newest first, at most `MOST_LOOKED_AT`."""
     log = AuditLog(store)
     last = log.head().number
@@ -143,7 +143,7 @@ def _raw(body: object) -> msgspec.Raw:
     return msgspec.Raw(msgspec.json.encode(body))
 
 
-def _row(number: int, deed: Deed, words: Words) -> AuditRow:
+def _row(number: int, deed: Deed, words: AuditText) -> AuditRow:
     request = _object(deed.request)
     return AuditRow(
         number=number,

@@ -308,11 +308,11 @@ class EyePart:
         return messages
 
     def _status(self, now_ns: int) -> EyeStatus:
-        trouble, spoiled = self._source.trouble, self.monitor.flags(now_ns)
+        problem, spoiled = self._source.problem, self.monitor.flags(now_ns)
         complaints = self._complaints(now_ns)
-        if trouble:
-            complaints = (*complaints, Complaint(code=SOURCE, said=trouble))
-        good = not trouble and not spoiled
+        if problem:
+            complaints = (*complaints, Complaint(code=SOURCE, said=problem))
+        good = not problem and not spoiled
         return EyeStatus(
             camera=self.camera,
             t_ns=now_ns,

@@ -49,7 +49,7 @@ class Source(Protocol):
     """
 
     @property
-    def trouble(self) -> str | None:
+    def problem(self) -> str | None:
         """What is wrong now, in words; None if nothing is."""
         ...
 

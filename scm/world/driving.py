@@ -26,7 +26,7 @@ def steer(world: World, now_ns: int) -> list[Outgoing]:
     for car in list(world.cars.leased.values()):
         lost = _loss(car, now_ns)
         if lost is not None:
-            out.append(hand_over(world, car, rules.sent_home(car.lease), now_ns))
+            out.append(hand_over(world, car, rules.returned(car.lease), now_ns))
             world.cars.arrays.hazard[car.index] = True
             world.cars.arrays.mode[car.index] = STOP
             text = f"{car.name} stands: {lost}"
@@ -43,7 +43,7 @@ def hand_over(world: World, car: HostedCar, lease: rules.Lease, now_ns: int) -> 
 
     Its trip is over, and older commands are refused.
     """
-    if lease.is_at_home:
+    if not lease.is_leased:
         world.cars.leased.pop(car.name, None)
         car.guard = None
         world.cars.arrays.throttle[car.index] = 0.0

@@ -33,9 +33,9 @@ class Lease:
     expires_ns: int | None = None
 
     @property
-    def is_at_home(self) -> bool:
-        """Whether nobody but the home owner holds it."""
-        return self.owner == self.home
+    def is_leased(self) -> bool:
+        """Whether somebody other than the home owner holds it."""
+        return self.owner != self.home
 
 
 def grant(home: str, epoch: int = 1) -> Lease:
@@ -51,9 +51,9 @@ def acquire(lease: Lease, owner: str, ttl_ms: int, now_ns: int) -> Lease:
     Raises:
         LeaseError: when somebody else holds it.
     """
-    if owner == lease.owner and not lease.is_at_home:
+    if owner == lease.owner and lease.is_leased:
         return _extended(lease, ttl_ms, now_ns)
-    if not lease.is_at_home:
+    if lease.is_leased:
         msg = f"the car is leased to {lease.owner!r} (epoch {lease.epoch}); wait, or steal it"
         raise LeaseError(msg)
     return _handed_over(lease, owner, ttl_ms, now_ns)
@@ -76,7 +76,7 @@ def release(lease: Lease, owner: str, epoch: int) -> Lease:
         LeaseError: when `owner` does not hold it under this epoch.
     """
     _check_holder(lease, owner, epoch)
-    return sent_home(lease)
+    return returned(lease)
 
 
 def steal(lease: Lease, owner: str, ttl_ms: int, reason: str, now_ns: int) -> Lease:
@@ -101,7 +101,7 @@ def left_ms(lease: Lease, now_ns: int) -> float | None:
     return None if lease.expires_ns is None else max(0.0, (lease.expires_ns - now_ns) / NS_PER_MS)
 
 
-def sent_home(lease: Lease) -> Lease:
+def returned(lease: Lease) -> Lease:
     """Return the home owner's lease that follows this one."""
     return grant(lease.home, lease.epoch + 1)
 
@@ -116,7 +116,7 @@ def _check_holder(lease: Lease, owner: str, epoch: int) -> None:
 
 
 def _extended(lease: Lease, ttl_ms: int, now_ns: int) -> Lease:
-    if lease.is_at_home:
+    if not lease.is_leased:
         return lease
     ttl_ms = _bounded(ttl_ms)
     return replace(lease, ttl_ms=ttl_ms, expires_ns=now_ns + ttl_ms * NS_PER_MS)
@@ -124,7 +124,7 @@ def _extended(lease: Lease, ttl_ms: int, now_ns: int) -> Lease:
 
 def _handed_over(lease: Lease, owner: str, ttl_ms: int, now_ns: int) -> Lease:
     if owner == lease.home:
-        return sent_home(lease)
+        return returned(lease)
     return _extended(replace(lease, owner=owner, epoch=lease.epoch + 1), ttl_ms, now_ns)
 
 

@@ -98,7 +98,7 @@ class WorldPart(BasePart):
             self._spawn_all(now_ns, out)
         for name, _ in self._to_spawn:
             car = world.cars.hosted.get(name)
-            if car is not None and car.lease.is_at_home:
+            if car is not None and not car.lease.is_leased:
                 out += self._circulate(car, now_ns)
         return out
 

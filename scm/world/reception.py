@@ -58,7 +58,7 @@ def _command(world: World, command: DriveCommand, now_ns: int) -> Sequence[Outgo
     car = world.cars.hosted.get(command.vehicle)
     if car is None:
         return ()  # for an agent
-    if car.lease.is_at_home or command.epoch != car.lease.epoch:
+    if not car.lease.is_leased or command.epoch != car.lease.epoch:
         world.ignored += 1
         return ()
     if car.guard is not None and car.guard.accept(command, now_ns):

@@ -145,7 +145,7 @@ def _remove(world: World, request: RemoveRequest, now_ns: int, out: list[Outgoin
 
 
 def _route(world: World, request: RouteRequest, now_ns: int, out: list[Outgoing]) -> RouteReply:
-    car = _at_home(world, request.vehicle)
+    car = _own(world, request.vehicle)
     if request.speed_mps is not None and not request.speed_mps > 0.0:
         raise _RefusedError("invalid", f"speed_mps: got {request.speed_mps}, expected above 0")
     del out
@@ -178,7 +178,7 @@ def _lease(world: World, request: LeaseRequest, now_ns: int, out: list[Outgoing]
 
 def _lights(world: World, request: LightRequest, now_ns: int, out: list[Outgoing]) -> LightReply:
     del now_ns, out
-    car = _at_home(world, request.vehicle)
+    car = _own(world, request.vehicle)
     car.switches = car.switches.updated(request.headlights, request.indicators)
     switches = car.switches
     return LightReply(
@@ -214,12 +214,12 @@ def _known(world: World, name: str) -> AnyCar:
     return car
 
 
-def _at_home(world: World, name: str) -> HostedCar:
+def _own(world: World, name: str) -> HostedCar:
     """Return a hosted car that nobody has leased."""
     car = _known(world, name)
     if isinstance(car, RemoteCar):  # of several answers the bus takes the one that is no refusal
         raise _RefusedError("not_found", f"{car.name} is not hosted: its own agent answers for it")
-    if not car.lease.is_at_home:
+    if car.lease.is_leased:
         detail = f"{car.name} is leased to {car.lease.owner!r}: release the lease, or steal it"
         raise _RefusedError("owned", detail)
     return car

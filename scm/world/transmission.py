@@ -319,7 +319,7 @@ def _received(world: World, receiver: str, frame: Frame, now_ns: int) -> Receive
             receiver=receiver, station=frame.station, t_ns=frame.t_ns, body=frame.body,
             signed=frame.signed, lost_ns=_lost_ns(world, frame.station),
             car="" if car is None else car.car_file,
-            by_hand=car is not None and not car.lease.is_at_home, stopped=world.stop.engaged,
+            by_hand=car is not None and car.lease.is_leased, stopped=world.stop.engaged,
             touches=now_ns - world.impulses.touched_ns.get(frame.station, -TOUCHES_NS) < TOUCHES_NS,
         )  # fmt: skip
     kind = RECEIVED[type(frame)]

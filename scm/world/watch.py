@@ -102,5 +102,5 @@ def _watch_lease(car: RemoteCar, now_ns: int) -> list[Outgoing]:
     if not rules.is_expired(car.lease, now_ns):
         return []
     text = f"{car.lease.owner} did not renew the lease of {car.name}: it is its agent's again"
-    car.lease = rules.sent_home(car.lease)
+    car.lease = rules.returned(car.lease)
     return [lease_record(car), city_event("warning", "lease_lost", text, now_ns, car.name)]

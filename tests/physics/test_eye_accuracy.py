@@ -210,7 +210,7 @@ ROLLING = replace(LOOK, rolling_s=0.010)
 class Film:
     """Shots of a studio, one after the other."""
 
-    trouble = None
+    problem = None
 
     def __init__(self, shots):
         self._left = list(shots)

@@ -36,9 +36,9 @@ class BusSource:
         self._closed = False
 
     @property
-    def trouble(self) -> str | None:
+    def problem(self) -> str | None:
         """What was wrong at the last `read`, in words; None if nothing was."""
-        text = self._monitor.trouble(self._now_ns)
+        text = self._monitor.problem(self._now_ns)
         return f"bus:{self.camera}: {text}" if text else None
 
     @property

@@ -59,7 +59,7 @@ class CameraClock:
         self._late_ns = arrival_ns - exposed_ns
         return exposed_ns
 
-    def trouble(self, now_ns: int) -> list[str]:
+    def problem(self, now_ns: int) -> list[str]:
         """Return what is wrong with the camera's time stamps, in words."""
         text = []
         if self._jump is not None and now_ns - self._jump[0] < REPORT_JUMP_NS:

@@ -137,13 +137,13 @@ class FrameMonitor:
         self._count(good=1)
         return Frame(t_ns, grabbed.image, stamped)
 
-    def trouble(self, now_ns: int) -> str | None:
+    def problem(self, now_ns: int) -> str | None:
         """Return what is wrong now, the worst first."""
         text = [self._gone, self._silence(now_ns), self._resized]
         if self._damaged is not None and now_ns - self._damaged[0] < HOLD_NS:
             text.append(f"{self._damaged[1]} ({self.tally.damaged} damaged so far)")
         if self._gone is None:
-            text += [self._empty, *self._clock.trouble(now_ns)]
+            text += [self._empty, *self._clock.problem(now_ns)]
         return "; ".join(text for text in text if text) or None
 
     def _silence(self, now_ns: int) -> str | None:

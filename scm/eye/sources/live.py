@@ -51,10 +51,10 @@ class LiveSource:
         self._given_ns: int | None = None
 
     @property
-    def trouble(self) -> str | None:
+    def problem(self) -> str | None:
         """What is wrong now, in words; None if nothing is."""
         with self._lock:
-            text = self._monitor.trouble(self._clock.now_ns()) if self._thread else None
+            text = self._monitor.problem(self._clock.now_ns()) if self._thread else None
         return f"{self.name}: {text}" if text else None
 
     @property

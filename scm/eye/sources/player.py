@@ -57,11 +57,11 @@ class Player:
         loop: Whether to restart at the end; time continues.
 
     Attributes:
-        trouble: What is wrong now, in words; None if nothing is.
+        problem: What is wrong now, in words; None if nothing is.
     """
 
     def __init__(self, name: str, reel: Reel, loop: bool) -> None:
-        self.trouble: str | None = None
+        self.problem: str | None = None
         self._name = name
         self._reel = reel
         self._loop = loop
@@ -100,11 +100,11 @@ class Player:
             started_ns += self._reel.rewind()
             next_ns = self._reel.next_ns()
         if next_ns is None:
-            self.trouble = f"{self._name}: over"
+            self.problem = f"{self._name}: over"
         return started_ns, next_ns
 
     def _report_fault(self, text: str, t_ns: int) -> None:
-        self.trouble, self._fault_ns = text, t_ns
+        self.problem, self._fault_ns = text, t_ns
 
     def _show(self, t_ns: int) -> Frame | None:
         try:
@@ -120,5 +120,5 @@ class Player:
             self._report_fault(text, t_ns)
             return None
         if self._fault_ns is None or t_ns - self._fault_ns >= HOLD_NS:
-            self.trouble = None
+            self.problem = None
         return Frame(t_ns, image)

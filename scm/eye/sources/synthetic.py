@@ -35,11 +35,11 @@ class SyntheticSource:
     """Frames of the world as `model`, the true camera, sees it.
 
     Attributes:
-        trouble: Always None: nothing can go wrong.
+        problem: Always None: nothing can go wrong.
         subscriptions: The poses of emulated cars.
     """
 
-    trouble: str | None = None
+    problem: str | None = None
     subscriptions = (Subscription(EmulatedPose),)
 
     def __init__(self, city_map: CityMap, model: CameraModel, rng: np.random.Generator) -> None:

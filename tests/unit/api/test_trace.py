@@ -6,8 +6,8 @@ import pytest
 from starlette.responses import PlainTextResponse
 
 from scm.api.app import create_app
+from scm.api.audit_text import AuditText
 from scm.api.audit_trail import newest_first
-from scm.api.deeds import Words
 from scm.api.trace import HEADER, Traced, trace_id, trace_id_of, traced
 from scm.clock import StepClock
 from scm.runtime.part import BasePart, Service
@@ -83,7 +83,7 @@ def test_a_station_says_in_log_and_audit_under_which_trace_it_did_something(capl
     with caplog.at_level(logging.INFO, "scm.runtime.station"):
         station.send(Answer(item, CityStop(t_ns=1, engaged=True)) for item in station.inbox())
     assert f"answered request=StopRequest reply=CityStop trace_id={GIVEN}" in caplog.text
-    assert [row.trace_id for row in newest_first(store, Words({}))] == [GIVEN]
+    assert [row.trace_id for row in newest_first(store, AuditText({}))] == [GIVEN]
 
 
 def test_the_gate_names_it_as_well(app, client_of):

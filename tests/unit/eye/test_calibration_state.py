@@ -47,7 +47,7 @@ LENS = MeasuredLens(
 class Still:
     """A camera that gives the same picture all the time, but for one pixel."""
 
-    trouble = None
+    problem = None
 
     def __init__(self, picture):
         self.shown = picture.copy()

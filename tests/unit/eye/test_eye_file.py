@@ -59,9 +59,9 @@ def test_a_file_that_is_no_picture_is_refused(tmp_path, capfd):
 
 def test_a_film_that_is_over_says_so(film):
     source = FileSource(film)
-    assert source.trouble is None
+    assert source.problem is None
     assert [bool(source.read(i * FRAME_NS, None)) for i in range(6)] == [True] * 5 + [False]
-    assert source.trouble == f"{film}: over"
+    assert source.problem == f"{film}: over"
 
 
 def test_a_film_in_a_loop_begins_again_and_time_goes_on(film):
@@ -70,7 +70,7 @@ def test_a_film_in_a_loop_begins_again_and_time_goes_on(film):
     assert [frame.t_ns for frame in frames] == [7 + i * FRAME_NS for i in range(13)]
     levels = [round(float(frame.image.mean()) / 40.0) for frame in frames]
     assert levels == [0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 0, 1, 2]
-    assert source.trouble is None
+    assert source.problem is None
 
 
 def test_a_film_whose_frames_come_unevenly_keeps_their_times(tmp_path, monkeypatch):
@@ -124,7 +124,7 @@ def test_a_film_cut_short_plays_what_there_is_and_says_it_is_over(tmp_path, capf
     source = FileSource(path)
     shown = sum(source.read(i * FRAME_NS, None) is not None for i in range(30))
     assert 5 <= shown <= 11
-    assert source.trouble == f"{path}: over"
+    assert source.problem == f"{path}: over"
 
 
 def test_nothing_comes_of_a_closed_film(film):

@@ -74,7 +74,7 @@ def test_the_same_snapshot_is_not_pictured_twice():
 class Given:
     """A camera that gives a frame when it is told to."""
 
-    trouble = None
+    problem = None
 
     def __init__(self):
         self.frame = None
@@ -139,7 +139,7 @@ def test_a_pose_comes_from_the_picture_and_not_from_the_snapshot(eye):
     class Elsewhere:
         """A source whose picture shows the car half a metre from where the snapshot says."""
 
-        trouble = None
+        problem = None
 
         def __init__(self, real):
             self.real = real
@@ -233,7 +233,7 @@ def test_a_mirrored_camera_says_so_within_three_seconds(eye):
 
 def test_a_tag_that_belongs_to_nobody_is_named_after_itself():
     class Stranger:
-        trouble = None
+        problem = None
 
         def __init__(self, real):
             self.real = real

@@ -79,7 +79,7 @@ def off_m(shots, camera, rolling_s):
     left = list(shots)
 
     class Film:
-        trouble = None
+        problem = None
 
         def read(self, now_ns, light):
             return Frame(left[0].t_ns, left.pop(0).image)

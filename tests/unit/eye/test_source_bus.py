@@ -74,8 +74,8 @@ def test_a_damaged_picture_is_counted_and_said_and_the_next_one_is_good(payload)
     source = BusSource("roof")
     arrive(source, NOW_NS, NOW_NS, payload)
     assert source.read(NOW_NS, None) is None
-    assert source.trouble.startswith("bus:roof: a frame: expected a ")
-    assert source.trouble.endswith("(1 damaged so far)")
+    assert source.problem.startswith("bus:roof: a frame: expected a ")
+    assert source.problem.endswith("(1 damaged so far)")
     arrive(source, NOW_NS + 1, NOW_NS + 1)
     assert source.read(NOW_NS + 1, None)
 
@@ -99,9 +99,9 @@ def test_a_clock_that_is_said_to_be_ours_and_is_ahead_is_not_believed():
 def test_silence_is_said_and_a_closed_source_gives_nothing():
     source = BusSource("roof")
     source.read(NOW_NS, None)
-    assert source.trouble is None
+    assert source.problem is None
     source.read(NOW_NS + 2 * NS_PER_S, None)
-    assert source.trouble == "bus:roof: no frame for 2.0 s"
+    assert source.problem == "bus:roof: no frame for 2.0 s"
     source.close()
     arrive(source, NOW_NS + 2 * NS_PER_S, NOW_NS)
     assert source.read(NOW_NS + 2 * NS_PER_S, None) is None

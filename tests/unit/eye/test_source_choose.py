@@ -26,7 +26,7 @@ from scm.eye.sources.live import LiveSource
 def test_a_live_camera_is_named_without_its_password_and_not_yet_opened(text, name):
     source = source_of(text)
     assert isinstance(source, LiveSource)
-    assert (source.name, source.trouble) == (name, None)
+    assert (source.name, source.problem) == (name, None)
 
 
 def test_files_folders_and_the_bus_are_told_apart(tmp_path):

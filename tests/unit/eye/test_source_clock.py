@@ -40,13 +40,13 @@ def test_a_drifting_clock_is_followed_and_its_drift_known():
     late_ms = (mapped - true)[30 * 120 :] / NS_PER_MS
     # not followed, 30 s at 80 ppm would leave 2.4 ms
     assert np.abs(late_ms - 5.0).max() < 0.8
-    assert clock.trouble(int(mapped[-1])) == []
+    assert clock.problem(int(mapped[-1])) == []
 
 
 def test_a_clock_that_runs_oddly_fast_is_said():
     clock = CameraClock()
     _, mapped = run(clock, 30 * 90, drift=-600e-6)
-    (said,) = clock.trouble(int(mapped[-1]))
+    (said,) = clock.problem(int(mapped[-1]))
     assert said.startswith("the camera's clock runs ")
     assert said.endswith(" ppm fast")
 
@@ -81,9 +81,9 @@ def test_a_clock_that_jumps_is_said_and_survived(jump_s, said):
     fresh = CameraClock()
     run(fresh, 90, stamps_from=base_ns)
     fresh.exposed(90 * FRAME_NS + jump_ns, int(true[0]))
-    (text,) = fresh.trouble(int(true[0]))
+    (text,) = fresh.problem(int(true[0]))
     assert said in text
-    assert fresh.trouble(int(true[0]) + 3 * NS_PER_S) == []
+    assert fresh.problem(int(true[0]) + 3 * NS_PER_S) == []
 
 
 def test_frames_from_a_queue_keep_their_old_times_and_are_said_to_be_late():
@@ -92,7 +92,7 @@ def test_frames_from_a_queue_keep_their_old_times_and_are_said_to_be_late():
     arrival_ns = int(true[-1]) + 2 * NS_PER_S
     mapped = clock.exposed(90 * FRAME_NS, arrival_ns)
     assert mapped == pytest.approx(int(true[-1]) + FRAME_NS, abs=10 * NS_PER_MS)
-    assert clock.trouble(arrival_ns) == ["frames come 2.0 s later than the quickest"]
+    assert clock.problem(arrival_ns) == ["frames come 2.0 s later than the quickest"]
 
 
 def noisy(seed=0, grey=100, shape=(480, 640, 3)):
@@ -131,9 +131,9 @@ def test_a_frame_of_another_size_is_left_out_and_said_until_the_first_size_is_ba
     monitor = FrameMonitor()
     assert monitor.accept(Grabbed(noisy()), 0).stamped == "arrived"
     assert monitor.accept(Grabbed(noisy(shape=(240, 320, 3))), 10) is None
-    assert monitor.trouble(10) == "size changed from 640 x 480 to 320 x 240 px: frames left out"
+    assert monitor.problem(10) == "size changed from 640 x 480 to 320 x 240 px: frames left out"
     assert monitor.accept(Grabbed(noisy(1)), 20).t_ns == 20
-    assert monitor.trouble(20) is None
+    assert monitor.problem(20) is None
     assert (monitor.tally.good, monitor.tally.resized) == (2, 1)
 
 
@@ -154,7 +154,7 @@ def test_the_least_delay_is_taken_off_where_stamps_cannot_tell_it():
 def test_silence_is_said_with_its_length():
     monitor = FrameMonitor()
     monitor.begin(0)
-    assert monitor.trouble(NS_PER_S) is None
-    assert monitor.trouble(12 * NS_PER_S // 10) == "no frame for 1.2 s"
+    assert monitor.problem(NS_PER_S) is None
+    assert monitor.problem(12 * NS_PER_S // 10) == "no frame for 1.2 s"
     monitor.accept(Grabbed(noisy()), 2 * NS_PER_S)
-    assert monitor.trouble(2 * NS_PER_S) is None
+    assert monitor.problem(2 * NS_PER_S) is None

@@ -38,7 +38,7 @@ def test_two_comes_before_ten_and_the_rate_is_kept(folder):
     (path / "notes.txt").write_text("no picture")
     source = FolderSource(path, rate_hz=20.0)
     assert play(source, 30) == [(0, 0), (50, 1), (100, 2), (150, 3)]
-    assert source.trouble == f"{path}: over"
+    assert source.problem == f"{path}: over"
 
 
 def test_a_table_of_times_chooses_the_pictures_and_says_when(folder):
@@ -65,7 +65,7 @@ def test_pictures_already_late_are_left_out_but_never_the_last(folder):
 def test_a_loop_goes_on_with_the_mean_pace(folder):
     source = FolderSource(folder("0.png", "1.png", "2.png"), rate_hz=10.0, loop=True)
     assert play(source, 61) == [(100 * i, i % 3) for i in range(7)]
-    assert source.trouble is None
+    assert source.problem is None
 
 
 def test_a_damaged_picture_is_said_and_the_next_one_is_shown(folder):
@@ -74,11 +74,11 @@ def test_a_damaged_picture_is_said_and_the_next_one_is_shown(folder):
     source = FolderSource(path, rate_hz=10.0)
     assert source.read(0, None)
     assert source.read(100 * NS_PER_MS, None) is None
-    assert source.trouble.startswith(f"{path / '1.jpg'}: expected a whole JPEG, got one truncated")
+    assert source.problem.startswith(f"{path / '1.jpg'}: expected a whole JPEG, got one truncated")
     assert source.read(200 * NS_PER_MS, None)
-    assert "truncated" in source.trouble  # long enough for a status that is told twice a second
+    assert "truncated" in source.problem  # long enough for a status that is told twice a second
     assert source.read(1_100 * NS_PER_MS, None)
-    assert source.trouble is None
+    assert source.problem is None
 
 
 def test_a_picture_that_vanished_is_said(folder):
@@ -86,7 +86,7 @@ def test_a_picture_that_vanished_is_said(folder):
     source = FolderSource(path)
     (path / "0.png").unlink()
     assert source.read(0, None) is None
-    assert "0.png: expected a picture, found no file" in source.trouble
+    assert "0.png: expected a picture, found no file" in source.problem
 
 
 def test_a_picture_of_another_size_is_left_out(folder):
@@ -97,7 +97,7 @@ def test_a_picture_of_another_size_is_left_out(folder):
     source = FolderSource(path)
     source.read(0, None)
     source.read(100 * NS_PER_MS, None)
-    assert source.trouble == f"{path}: size changed from 32 x 32 to 48 x 16 px: frames left out"
+    assert source.problem == f"{path}: size changed from 32 x 32 to 48 x 16 px: frames left out"
 
 
 @pytest.mark.parametrize(

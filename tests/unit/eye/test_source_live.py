@@ -136,7 +136,7 @@ def begin(source, camera, ahead_ns=0):
 def test_nothing_is_opened_before_the_first_take(live):
     camera = FakeCamera(["unstamped"])
     source = live(camera)
-    assert (camera.opened, source.trouble, left()) == (0, None, [])
+    assert (camera.opened, source.problem, left()) == (0, None, [])
 
 
 def test_take_never_waits_for_a_camera_that_stalls_and_close_ends_it(live):
@@ -169,13 +169,13 @@ def test_a_camera_that_disappears_comes_back_by_itself(live):
     frames = until(lambda: source.tally.good == 2 and source._newest is None, source)
     assert [frame.t_ns for frame in frames] == sorted(frame.t_ns for frame in frames)
     assert (camera.opened, source.tally.opened, camera.closed) == (5, 3, 2)
-    assert source.trouble is None
+    assert source.problem is None
 
 
 def test_why_there_is_no_camera_is_said_after_its_name(live):
     source = live(FakeCamera(["absent"]), pauses_s=(30.0, 30.0))
-    until(lambda: source.trouble is not None, source)
-    assert source.trouble == "fake: cannot open it: not there"
+    until(lambda: source.problem is not None, source)
+    assert source.problem == "fake: cannot open it: not there"
 
 
 def test_the_pause_doubles_until_its_longest_and_begins_anew_after_a_frame(live):
@@ -194,7 +194,7 @@ def test_the_pause_doubles_until_its_longest_and_begins_anew_after_a_frame(live)
 
 def test_closing_does_not_wait_for_a_pause(live):
     source = live(FakeCamera(["absent"]), pauses_s=(30.0, 30.0))
-    until(lambda: source.trouble is not None, source)
+    until(lambda: source.problem is not None, source)
     source.close()
     source.close()
     assert read(source) is None
@@ -206,9 +206,9 @@ def test_damaged_frames_are_counted_and_said_for_a_second(live):
     source = live(camera)
     until(lambda: source.tally.damaged == 2, source)
     camera.later(NS_PER_S - 3 * FRAME_NS)
-    assert source.trouble == "fake: a frame: JPEG cut short (2 damaged so far)"
+    assert source.problem == "fake: a frame: JPEG cut short (2 damaged so far)"
     camera.later(3 * FRAME_NS)
-    assert source.trouble == "fake: no frame for 1.1 s"
+    assert source.problem == "fake: no frame for 1.1 s"
 
 
 def test_a_stall_is_said_with_its_length(live):
@@ -216,9 +216,9 @@ def test_a_stall_is_said_with_its_length(live):
     source = live(camera)
     begin(source, camera)
     camera.later(NS_PER_S)
-    assert source.trouble is None
+    assert source.problem is None
     camera.later(NS_PER_S // 4)
-    assert source.trouble == "fake: no frame for 1.2 s"
+    assert source.problem == "fake: no frame for 1.2 s"
 
 
 def test_frames_are_on_the_callers_clock_whatever_ours_says(live):
@@ -254,7 +254,7 @@ def test_no_schedule_of_faults_stops_it_or_turns_time_back(scripts):
     try:
         frames = until(lambda: camera.opened > len(scripts) and camera.event == "stall", source)
         now_ns = camera.clock.now_ns()
-        said = source.trouble
+        said = source.problem
     finally:
         source.close()
     times = [frame.t_ns for frame in frames]

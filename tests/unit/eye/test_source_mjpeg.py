@@ -179,7 +179,7 @@ def test_nobody_at_the_address_is_said():
 def take_until(source, condition):
     ends, clock, times = time.monotonic() + DEADLINE_S, WallClock(), []
     while not condition():
-        assert time.monotonic() < ends, source.trouble
+        assert time.monotonic() < ends, source.problem
         frame = source.read(clock.now_ns(), None)
         times += [frame.t_ns] if frame else []
         time.sleep(0.005)
@@ -193,7 +193,7 @@ def test_a_camera_that_is_killed_and_started_again_comes_back_and_close_ends_its
     try:
         times = take_until(source, lambda: source.tally.good >= 1 and source._newest is None)
         camera.kill()
-        times += take_until(source, lambda: "cannot open it" in (source.trouble or ""))
+        times += take_until(source, lambda: "cannot open it" in (source.problem or ""))
         good = source.tally.good
         camera = Camera([*parts, None], port=camera.port)
         times += take_until(source, lambda: source.tally.good > good and source._newest is None)

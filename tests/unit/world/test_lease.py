@@ -81,7 +81,7 @@ def test_the_epoch_never_falls_and_changes_with_every_change_of_owner(steps):
             elif verb == "s":
                 lease = rules.steal(lease, who, 1000, "because", now)
             else:
-                lease = rules.sent_home(lease)
+                lease = rules.returned(lease)
         except LeaseError:
             assert lease is before
         assert lease.epoch >= before.epoch

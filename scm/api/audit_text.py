@@ -84,7 +84,7 @@ _REQUESTS: dict[str, Callable[[Facts], str]] = {
 }
 
 
-class Words:
+class AuditText:
     """Puts an entry of the audit log into words.
 
     Args:

@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from scm.api.app import create_app
-from scm.api.deeds import Words
+from scm.api.audit_text import AuditText
 from scm.api.keys import KeyRing
 from scm.clock import StepClock
 from scm.runtime.part import BasePart, Service
@@ -47,7 +47,7 @@ EXAMPLES = {
 def test_every_request_that_has_an_effect_is_said_in_words():
     kinds = [kind for kind in message_classes() if issubclass(kind, Request)]
     assert {kind.__name__ for kind in kinds if kind.HAS_EFFECT} == set(EXAMPLES)
-    words = Words({})
+    words = AuditText({})
     for kind, (request, said) in EXAMPLES.items():
         assert words.of(kind, request) == said
 
