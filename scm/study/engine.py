@@ -13,6 +13,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
 
+import dask
 from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 
 from scm.errors import RunError, StudyError
@@ -21,6 +22,13 @@ from scm.study.loaded_study import LoadedStudy, load
 from scm.study.row import Row
 
 CONNECT_S = 5
+QUIET = {  # nobody looks at what a cluster in this process measures of itself: 4 % of a core
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "10s",
+    "distributed.admin.system-monitor.interval": "60s",
+    "distributed.scheduler.active-memory-manager.start": False,
+    "distributed.scheduler.work-stealing-interval": "60s",
+}
 AHEAD = 4  # cases that a core has waiting: a worker never waits for the next one
 
 
@@ -136,6 +144,7 @@ def local_engine(study: LoadedStudy, folder: Path, workers: int) -> Iterator[Eng
     """
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # rows say what went wrong
     with (
+        dask.config.set(QUIET),
         LocalCluster(
             n_workers=1, threads_per_worker=workers, processes=False, dashboard_address=None,
             memory_limit=0,
