@@ -17,6 +17,7 @@ from scm.study.statistics import SUCCESS, by_level, estimate, grouped, level_tex
 from scm.study.targets import Axis
 
 MAX_LINES = 6
+MAX_DOTS = 2000  # a line; 100 000 would make a page of 16 MB
 INK, SOFT, GRID, PAPER = "#010203", "#020304", "#030405", "#040506"
 LINES = ("#0b0101", "#0b0202", "#0b0303", "#0b0404", "#0b0505", "#0b0606")
 MARKERS = ("o", "s", "^", "D", "v", "P")
@@ -53,7 +54,8 @@ def plots_of(rows: Sequence[Row], axes: Sequence[Axis], measure: str, unit: str)
         by = next((one for one in lines_of(axes) if one is not axis), None)
         title = f"{measure} by {axis.path}" + (f" and {by.path}" if by else "")
         about = "share of cases with Wilson's" if measure == SUCCESS else "mean with"
-        dots = "; dots are cases" if axis.factor.is_drawn and measure != SUCCESS else ""
+        has_dots = axis.factor.is_drawn and measure != SUCCESS
+        dots = f"; dots are cases, at most {MAX_DOTS} a line" if has_dots else ""
         found.append(
             Plot(title, f"{about} 95 % interval{dots}", _svg(rows, axis, by, measure, unit))
         )
@@ -110,7 +112,11 @@ def _draw(
     if axis.factor.is_drawn:
         at = [float(np.mean([float(r.values[axis.path]) for r in g])) for g in groups.values()]
         if measure != SUCCESS:
-            points = [(float(r.values[axis.path]), r.measures.get(measure, math.nan)) for r in rows]
+            chosen = sorted(rows, key=lambda row: row.seed)[:MAX_DOTS]  # a seed is a hash
+            points = [
+                (float(row.values[axis.path]), row.measures.get(measure, math.nan))
+                for row in chosen
+            ]
             axes.plot(*zip(*points, strict=True), ".", color=colour, alpha=0.25, markersize=3)
     elif _is_numeric(axis):
         at = [float(next(iter(group)).values[axis.path]) for group in groups.values()]

@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from scm.study import plots
 from scm.study.live_table import LiveTable
 from scm.study.loaded_study import load
 from scm.study.page import study_page
@@ -87,3 +88,14 @@ def test_the_line_says_how_far_it_is_and_names_each_case_that_did_not_end(result
 def test_the_text_of_a_study_that_has_not_begun(tmp_path):
     study = loaded(tmp_path)
     assert text_report(create_results(study, tmp_path / "out", []))[1] == "0 of 12 cases: none yet"
+
+
+def test_a_plot_of_many_cases_has_a_limited_number_of_dots(results, monkeypatch):
+    rows = [row for row in results.rows.values() if row.has_ended]
+    drawn = results.study.design.axes[1]
+    marks = []
+    for most in (len(rows), 3):
+        monkeypatch.setattr(plots, "MAX_DOTS", most)
+        (plot,) = plots.plots_of(rows, [drawn], "total", "1")
+        marks.append(plot.svg.count("<use"))
+    assert marks[0] - marks[1] > len(rows) / 2  # the rest are ticks and levels
