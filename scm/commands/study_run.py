@@ -32,8 +32,9 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.study.engine import engine_of
     from scm.study.live_table import LiveTable
     from scm.study.loaded_study import load
-    from scm.study.results import STUDIES, create_results
+    from scm.study.results import create_results
     from scm.study.run import run_study
+    from scm.study.stored import STUDIES
     from scm.study.text_report import text_report
 
     study = load(arguments.study)

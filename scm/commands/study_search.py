@@ -32,14 +32,16 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.study.engine import engine_of
     from scm.study.live_table import LiveTable
     from scm.study.loaded_study import load
-    from scm.study.results import STUDIES, create_results
+    from scm.study.results import create_results
     from scm.study.search import found_lines, run_search
+    from scm.study.stored import STUDIES
 
     study = load(arguments.study)
     folder = arguments.out or STUDIES / f"{study.file.name}-search"
     results = create_results(study, folder, sys.argv)
     goal = study.file.study.search
     cases = 0 if goal is None else goal.cases
+    results.note(cases=cases)
     with (
         engine_of(study, folder, arguments.workers, arguments.scheduler) as engine,
         closing(LiveTable(sys.stderr, results, cases)) as table,

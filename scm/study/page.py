@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 from scm.mismatch.report.page import around, document, section, table, tag
 from scm.study import tables
 from scm.study.plots import plots_of
-from scm.study.results import Results, read_manifest
 from scm.study.row import Row
-from scm.study.run import recording_of
 from scm.study.statistics import wilson
-from scm.study.tables import Table
+from scm.study.stored import read_manifest, recording_of
+from scm.study.tables import StudyResults, Table
 
 MAX_FAILURES, MAX_LEVELS = 50, 60
 EFFECTS = (
@@ -19,37 +18,37 @@ EFFECTS = (
 )
 
 
-def study_page(results: Results) -> str:
+def study_page(results: StudyResults) -> str:
     """Return the page."""
     rows = [results.rows[number] for number in sorted(results.rows)]
     body = _head(results, rows)
     if rows:
         body += "".join(_sections(results, rows))
-    return document(f"{results.study.file.name}: a study", body)
+    return document(f"{results.file.name}: a study", body)
 
 
-def _head(results: Results, rows: Sequence[Row]) -> str:
-    study, manifest = results.study, read_manifest(results.folder)
+def _head(results: StudyResults, rows: Sequence[Row]) -> str:
+    file, manifest = results.file, read_manifest(results.folder)
     counts = Counter(tables.outcome_text(results, row) for row in rows)
     words = [f"{count} {word}" for word, count in counts.most_common()]
-    text = f"{len(rows)} of {len(study.design)} cases: {', '.join(words) or 'none yet'}"
-    if tables.has_limits(study.file.measures) and rows:
+    text = f"{len(rows)} of {results.cases} cases: {', '.join(words) or 'none yet'}"
+    if tables.has_limits(file.measures) and rows:
         share = wilson(counts["success"], len(rows))
         text += f"; success {tables.interval_text(share, '%')} %"
     made = f"scm {manifest.get('scm', '')} {str(manifest.get('git', ''))[:12]}"
-    where = f"study {study.file.name}, scenario {study.file.study.scenario}, {made}"
+    where = f"study {file.name}, scenario {file.study.scenario}, {made}"
     inner = tag("p", where, "inputs")
-    inner += tag("h1", study.file.study.title or study.scenario.about) + tag("p", text)
+    inner += tag("h1", file.study.title or results.about) + tag("p", text)
     kind = "none" if all(row.has_ended for row in rows) else "unable"
     return around("header", around("div", inner, "words"), f"verdict {kind}")
 
 
-def _sections(results: Results, rows: Sequence[Row]) -> Iterator[str]:
+def _sections(results: StudyResults, rows: Sequence[Row]) -> Iterator[str]:
     names, axes = tables.measured(results), tables.varied(results)
     if tables.ordered_failures(results):
         yield section("failures", "Failures, the worst first", _failures(results))
     for name, unit in names.items():
-        measure = results.study.file.measures.get(name)
+        measure = results.file.measures.get(name)
         about = tag("p", measure.about) if measure and measure.about else ""
         figures = "".join(
             around(
@@ -66,11 +65,11 @@ def _sections(results: Results, rows: Sequence[Row]) -> Iterator[str]:
     yield section("factors", "By factor", *(_table(one) for one in levels if len(one.lines) > 1))
     effects = _table(tables.effects(rows, axes, names))
     yield section("effects", "Main effects", tag("p", EFFECTS), effects)
-    text = around("div", around("pre", tag("code", results.study.file.text)), "scroll")
+    text = around("div", around("pre", tag("code", results.file.text)), "scroll")
     yield section("file", "The study file", text)
 
 
-def _failures(results: Results) -> str:
+def _failures(results: StudyResults) -> str:
     failures = tables.ordered_failures(results)
     found = tables.failures(results, MAX_FAILURES)
     recordings = (recording_of(results.folder, int(line[0])) for line in found.lines)

@@ -1,15 +1,7 @@
-"""The folder of a study: its files, who ran it, and one row a case, safe against every crash.
+"""Writes the folder of a study: its files, who ran it, and one row a case, safe against crashes.
 
-    runs/studies/NAME/
-        study.toml, ...        the study file and all that it names, as they were
-        manifest.json          name, versions, machine, times
-        parts/*.parquet        rows as they came, until the study is complete
-        cases.parquet          all rows by case number, once it is
-        recordings/*.mcap      recorded cases
-        output.log             what scenarios printed
-
-Rows are written at least once a second, to a file that gets its name when it is whole. A case whose
-row is not there yet is run again.
+`stored.py` lists the files. Rows are written at least once a second, to a file that gets its name
+when it is whole. A case whose row is not there yet is run again.
 """
 
 import json
@@ -17,26 +9,32 @@ import os
 import platform
 import shutil
 import subprocess
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 import scm
 from scm.clock import WallClock, seconds
-from scm.errors import StudyError, reading
+from scm.errors import StudyError
 from scm.study.design import Design
 from scm.study.loaded_study import LoadedStudy, load
 from scm.study.row import Row
+from scm.study.stored import (
+    CASES,
+    MANIFEST,
+    PARTS,
+    STUDY,
+    check_folder,
+    parts_of,
+    read_manifest,
+    read_rows,
+)
 from scm.study.study_file import RESERVED, Measure, Value
 
-STUDIES = Path("runs/studies")
-STUDY, MANIFEST, CASES, PARTS = "study.toml", "manifest.json", "cases.parquet", "parts"
-RECORDINGS = "recordings"
 WRITE_EVERY_S = 1.0
 MAX_WAITING = 500
 PACKAGES = ("numpy", "numba", "scipy", "msgspec", "distributed", "optuna", "pyarrow", "pymunk")
@@ -47,16 +45,21 @@ class Results:
 
     Attributes:
         rows: All that are there, by case.
+        file, axes, cases, about: As `StoredResults` has them.
     """
 
     def __init__(self, folder: Path, study: LoadedStudy) -> None:
         self.folder, self.study = folder, study
         self._schema = schema_of(study.design, study.file.measures)
-        self.rows: dict[int, Row] = {row.case: row for row in self._read()}
+        self.file, self.axes = study.file, study.design.axes
+        self.cases, self.about = len(study.design), study.scenario.about
+        factors = [axis.path for axis in self.axes]
+        found = read_rows(folder, factors, study.file.measures)
+        self.rows: dict[int, Row] = {row.case: row for row in found}
         self._waiting: list[Row] = []
         self._clock = WallClock()
         self._written_ns = self._clock.now_ns()
-        self._next_part = 1 + max((int(p.stem) for p in self._parts()), default=0)
+        self._next_part = 1 + max((int(p.stem) for p in parts_of(folder)), default=0)
 
     def add(self, row: Row) -> None:
         """Add a row; it is on the disk within a second."""
@@ -91,15 +94,6 @@ class Results:
         manifest = {**read_manifest(self.folder), **facts}
         _write_text(json.dumps(manifest, indent=2) + "\n", self.folder / MANIFEST)
 
-    def _parts(self) -> list[Path]:
-        return sorted((self.folder / PARTS).glob("*.parquet"))
-
-    def _read(self) -> Iterator[Row]:
-        whole = self.folder / CASES
-        for path in [*([whole] if whole.is_file() else []), *self._parts()]:
-            with reading(path, "rows of a study", StudyError):
-                yield from rows_of(pq.read_table(path), self.study)
-
 
 def create_results(study: LoadedStudy, folder: Path, command: Sequence[str]) -> Results:
     """Return the folder of a study, a new one or one that is to be continued.
@@ -114,35 +108,28 @@ def create_results(study: LoadedStudy, folder: Path, command: Sequence[str]) -> 
         for name in study.file.files():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(study.file.folder / name, folder / name)
-        manifest = {"name": study.file.name, "cases": len(study.design), **facts_of_run(command)}
+        manifest = {"name": study.file.name, **facts_of_run(command)}
         _write_text(json.dumps(manifest, indent=2) + "\n", folder / MANIFEST)
         _write_text(study.file.text, folder / STUDY)  # last: with it, the folder is complete
-    return Results(folder, study)
+    results = Results(folder, study)
+    results.note(
+        cases=results.cases,
+        about=results.about,
+        factors={axis.path: axis.key for axis in results.axes},
+        host=platform.node(),
+        pid=os.getpid(),
+    )
+    return results
 
 
 def open_results(folder: Path) -> Results:
-    """Return the results of a folder.
+    """Return the results of a folder with all that running more of them needs.
 
     Raises:
         StudyError: when there are none, or they cannot be read.
     """
-    if not (folder / STUDY).is_file():
-        known = sorted(path.parent.name for path in STUDIES.glob(f"*/{STUDY}"))
-        there = f"; in {STUDIES} are {', '.join(known)}" if known else ""
-        raise StudyError(f"{folder}: expected the folder of a study, with {STUDY}{there}")
+    check_folder(folder)
     return Results(folder, load(folder / STUDY, read_manifest(folder)["name"]))
-
-
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return a study's manifest.
-
-    Raises:
-        StudyError: when it cannot be read.
-    """
-    path = folder / MANIFEST
-    with reading(path, "a study's manifest", StudyError):
-        manifest: dict[str, Any] = json.loads(path.read_text("utf-8"))
-        return {"name": manifest["name"], **manifest}
 
 
 def facts_of_run(command: Sequence[str]) -> dict[str, object]:
@@ -153,7 +140,6 @@ def facts_of_run(command: Sequence[str]) -> dict[str, object]:
         "python": platform.python_version(),
         "packages": {name: found for name in PACKAGES if (found := _version(name))},
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.platform()}",
-        "host": platform.node(),
         "command": " ".join(command),
         "began": _now(),
     }
@@ -177,18 +163,6 @@ def schema_of(design: Design, measures: Mapping[str, Measure]) -> pa.Schema:
 def table_of(rows: Iterable[Row], schema: pa.Schema) -> pa.Table:
     """Return rows as a table."""
     return pa.Table.from_pylist([_flat(row, schema) for row in rows], schema=schema)
-
-
-def rows_of(table: pa.Table, study: LoadedStudy) -> Iterator[Row]:
-    """Yield the rows of a table."""
-    factors = [axis.path for axis in study.design.axes]
-    for entry in table.to_pylist():
-        measures = {name: entry[name] for name in study.file.measures}
-        yield Row(
-            **{name: entry[name] for name in RESERVED},
-            values={name: entry[name] for name in factors},
-            measures={name: value for name, value in measures.items() if value is not None},
-        )
 
 
 def _flat(row: Row, schema: pa.Schema) -> dict[str, object]:

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 from scm.errors import RunError
 from scm.study.case_process import Task
 from scm.study.engine import Engine
-from scm.study.results import RECORDINGS, Results
+from scm.study.results import Results
 from scm.study.row import Row
 from scm.study.statistics import half_width, is_known
+from scm.study.stored import RECORDINGS, recording_name
 
 OnRow = Callable[[Row], None]
 
@@ -95,7 +95,7 @@ def _record(results: Results, engine: Engine) -> None:
         wanted = [number for number in study.recordings if number in results.rows]
     folder = (results.folder / RECORDINGS).resolve()
     folder.mkdir(exist_ok=True)
-    paths = {number: folder / f"case-{number}.mcap" for number in wanted}
+    paths = {number: folder / recording_name(number) for number in wanted}
     tasks = [
         Task(case=number, record_to=str(path))
         for number, path in paths.items()
@@ -103,12 +103,6 @@ def _record(results: Results, engine: Engine) -> None:
     ]
     for _ in engine.run(tasks):
         pass
-
-
-def recording_of(folder: Path, number: int) -> Path | None:
-    """Return the recording of a case; None: it was not recorded."""
-    path = folder / RECORDINGS / f"case-{number}.mcap"
-    return path if path.is_file() else None
 
 
 def _end(results: Results, is_complete: bool, why: str) -> RunEnd:

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from pathlib import Path
+from typing import NamedTuple, Protocol
 
-from scm.study.results import Results
 from scm.study.row import Row
 from scm.study.statistics import (
     SUCCESS,
@@ -14,10 +14,27 @@ from scm.study.statistics import (
     level_text,
     main_effects,
 )
-from scm.study.study_file import Measure
+from scm.study.study_file import Measure, StudyFile
 from scm.study.targets import Axis
 
 MAX_ACROSS = 6
+
+
+class StudyResults(Protocol):
+    """Results of a study, stored ones or those of a run; `StoredResults` says what is what."""
+
+    @property
+    def folder(self) -> Path: ...  # noqa: D102
+    @property
+    def file(self) -> StudyFile: ...  # noqa: D102
+    @property
+    def axes(self) -> Sequence[Axis]: ...  # noqa: D102
+    @property
+    def cases(self) -> int: ...  # noqa: D102
+    @property
+    def about(self) -> str: ...  # noqa: D102
+    @property
+    def rows(self) -> Mapping[int, Row]: ...  # noqa: D102
 
 
 class Table(NamedTuple):
@@ -28,9 +45,9 @@ class Table(NamedTuple):
     texts: int = 1
 
 
-def measured(results: Results) -> dict[str, str]:
+def measured(results: StudyResults) -> dict[str, str]:
     """Return what is reported by name, with its unit: success if there are limits, and measures."""
-    measures = results.study.file.measures
+    measures = results.file.measures
     names = {SUCCESS: "%"} if has_limits(measures) else {}
     return names | {name: measure.unit for name, measure in measures.items()}
 
@@ -40,15 +57,14 @@ def has_limits(measures: Mapping[str, Measure]) -> bool:
     return any(one.at_least is not None or one.at_most is not None for one in measures.values())
 
 
-def varied(results: Results) -> list[Axis]:
+def varied(results: StudyResults) -> list[Axis]:
     """Return the factors that have more than one value."""
-    axes = results.study.design.axes
-    return [axis for axis in axes if axis.factor.is_drawn or len(axis.factor.levels) > 1]
+    return [axis for axis in results.axes if axis.factor.is_drawn or len(axis.factor.levels) > 1]
 
 
-def outcome_text(results: Results, row: Row) -> str:
+def outcome_text(results: StudyResults, row: Row) -> str:
     """Return an outcome in words; without limits there is nothing to succeed in."""
-    is_judged = has_limits(results.study.file.measures) or not row.has_ended
+    is_judged = has_limits(results.file.measures) or not row.has_ended
     return row.outcome.replace("_", " ") if is_judged else "ended"
 
 
@@ -76,9 +92,9 @@ def _decimals_of(width: float) -> int:
     return max(0, min(6, 1 - math.floor(math.log10(width))))
 
 
-def failures(results: Results, most: int) -> Table:
+def failures(results: StudyResults, most: int) -> Table:
     """Return the cases that did not end, then failures, the worst first."""
-    measures, axes = results.study.file.measures, varied(results)
+    measures, axes = results.file.measures, varied(results)
     lines = []
     for row in ordered_failures(results)[:most]:
         what = row.detail or ", ".join(
@@ -88,9 +104,9 @@ def failures(results: Results, most: int) -> Table:
     return Table(["case", "outcome", "what", "factors"], lines, 4)
 
 
-def ordered_failures(results: Results) -> list[Row]:
+def ordered_failures(results: StudyResults) -> list[Row]:
     """Return the cases that did not end, then failures, the worst first."""
-    measures = results.study.file.measures
+    measures = results.file.measures
     rows = [results.rows[number] for number in sorted(results.rows)]
     failed = [row for row in rows if row.outcome == "failure"]
     failed.sort(key=lambda row: _excess(row, measures), reverse=True)

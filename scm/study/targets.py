@@ -84,11 +84,17 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One column of the results: a factor, or one match of a factor with `each`."""
+    """One column of the results: a factor, or one match of a factor with `each`.
+
+    Attributes:
+        key: Of the factor in the study file.
+        targets: What it sets; of stored results nothing.
+    """
 
     path: str
+    key: str
     factor: Factor
-    targets: tuple[Target, ...]
+    targets: tuple[Target, ...] = ()
 
     def put(self, setting: Setting, value: Value) -> Setting:
         """Return the setting with all targets set.
@@ -125,10 +131,10 @@ def axes_of(
         try:
             targets = targets_of(path, base, parameters)
             if factor.each:
-                axes += [Axis(one.path, factor, (one,)) for one in targets]
+                axes += [Axis(one.path, path, factor, (one,)) for one in targets]
             else:
                 complete = targets[0].path if len(targets) == 1 else _starred(path, targets)
-                axes.append(Axis(complete, factor, tuple(targets)))
+                axes.append(Axis(complete, path, factor, tuple(targets)))
             problems += _misfits(path, factor, targets, base)
         except StudyError as cause:
             problems.append(str(cause))

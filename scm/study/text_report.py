@@ -4,14 +4,13 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from scm.study import tables
-from scm.study.results import Results
 from scm.study.row import Row
-from scm.study.tables import Table
+from scm.study.tables import StudyResults, Table
 
 MAX_FAILURES, MAX_LEVELS = 10, 24
 
 
-def text_report(results: Results) -> list[str]:
+def text_report(results: StudyResults) -> list[str]:
     """Return the lines for a terminal."""
     rows = [results.rows[number] for number in sorted(results.rows)]
     lines = list(_head(results, rows))
@@ -31,15 +30,15 @@ def text_report(results: Results) -> list[str]:
     )]  # fmt: skip
 
 
-def _head(results: Results, rows: Sequence[Row]) -> Iterator[str]:
-    study = results.study
-    yield f"{study.file.name}: {study.file.study.title or study.scenario.about}"
+def _head(results: StudyResults, rows: Sequence[Row]) -> Iterator[str]:
+    file = results.file
+    yield f"{file.name}: {file.study.title or results.about}"
     counts = Counter(tables.outcome_text(results, row) for row in rows)
     words = ", ".join(f"{count} {word}" for word, count in counts.most_common())
-    yield f"{len(rows)} of {len(study.design)} cases: {words or 'none yet'}"
+    yield f"{len(rows)} of {results.cases} cases: {words or 'none yet'}"
 
 
-def _failures(results: Results) -> Iterator[str]:
+def _failures(results: StudyResults) -> Iterator[str]:
     failures = tables.ordered_failures(results)
     if not failures:
         yield "no failures"

@@ -7,8 +7,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from scm.errors import StudyError
-from scm.study.results import Results, create_results, open_results, read_manifest
+from scm.study.results import Results, create_results, open_results
 from scm.study.run import run_study
+from scm.study.stored import read_manifest
 from tests.unit.study.studying import Here, loaded
 
 

@@ -79,7 +79,7 @@ def test_failures_come_first_and_the_worst_of_them(tmp_path):
     class Results:
         rows = {row.case: row for row in Here(study).run([])} | dict(enumerate(rows_of(study)))
 
-    Results.study = study
+    Results.file = study.file
     failed = tables.ordered_failures(Results)
     assert {row.values["a"] for row in failed} == {3.0}
     assert all(row.outcome == "failure" for row in failed)
