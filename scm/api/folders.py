@@ -14,6 +14,7 @@ class Folders:
         scenarios: Fleet scenario scripts, `*.py`.
         calibrations: What the Eye's calibration found, a file a camera.
         plans: Signal plans that people edited, a file a junction and plan.
+        studies: A folder for each study.
     """
 
     recordings: Path | None = None
@@ -21,6 +22,7 @@ class Folders:
     scenarios: Path | None = None
     calibrations: Path | None = None
     plans: Path | None = None
+    studies: Path | None = None
 
 
 def folders_in(folder: Path) -> Folders:
@@ -31,4 +33,5 @@ def folders_in(folder: Path) -> Folders:
         scenarios=folder / "scenarios",
         calibrations=folder / "calibrations",
         plans=folder / "plans",
+        studies=folder / "studies",
     )

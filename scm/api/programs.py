@@ -23,13 +23,18 @@ OnLine = Callable[[str], None]
 
 
 def run_scm(
-    words: Sequence[str], progress: ProgressReporter, on_line: OnLine, *, kinder: bool = True
+    words: Sequence[str],
+    progress: ProgressReporter | None,
+    on_line: OnLine,
+    *,
+    kinder: bool = True,
 ) -> list[str]:
     """Run `scm WORDS` to its end and return its last lines.
 
     Args:
         words: Command and arguments.
-        progress: Of the operation; when it is cancelled, the program is requested to end.
+        progress: Of the operation; when it is cancelled, the program is requested to end. None:
+            it belongs to none.
         on_line: Receives every line, on this thread.
         kinder: Whether the city's parts go first.
 
@@ -67,12 +72,13 @@ def _read(process: "subprocess.Popen[str]", lines: "SimpleQueue[str | None]") ->
 
 
 def _follow(
-    lines: "SimpleQueue[str | None]", progress: ProgressReporter, on_line: OnLine
+    lines: "SimpleQueue[str | None]", progress: ProgressReporter | None, on_line: OnLine
 ) -> list[str]:
     """Pass lines on until there are no more; raise when the work was called off."""
     last: deque[str] = deque(maxlen=MAX_LINES)
     while True:
-        progress.check()
+        if progress is not None:
+            progress.check()
         try:
             line = lines.get(timeout=LOOK_S)
         except Empty:

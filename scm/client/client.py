@@ -32,6 +32,7 @@ from scm.client.nouns.signals import SignalsNoun
 from scm.client.nouns.stations import StationsNoun
 from scm.client.nouns.stop import StopNoun
 from scm.client.nouns.stream import StreamNoun
+from scm.client.nouns.studies import StudiesNoun
 from scm.client.nouns.traffic import TrafficNoun
 from scm.client.nouns.vehicles import VehiclesNoun
 from scm.client.teleop import Wheel, acquired
@@ -73,6 +74,7 @@ class Client:
         self.stations = StationsNoun(self.connection)
         self.stop = StopNoun(self.connection)
         self.stream = StreamNoun(self.connection)
+        self.studies = StudiesNoun(self.connection)
         self.traffic = TrafficNoun(self.connection)
         self.vehicles = VehiclesNoun(self.connection)
 
