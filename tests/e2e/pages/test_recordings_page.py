@@ -1,4 +1,4 @@
-"""The recordings page: a drive of the real city seen again, taken home, noted, deleted; scripts."""
+"""The recordings page: drives of the real city seen again, taken home, noted; scripts; studies."""
 
 import csv
 import os
@@ -12,9 +12,13 @@ from mcap.reader import make_reader
 
 from scm.recorder.recover import recover
 from scm.recorder.run_index import read_index
+from scm.study.page import study_page
+from scm.study.results import create_results
+from scm.study.run import run_study
 from tests.e2e.city_process import wait_for
-from tests.e2e.pages.visiting import LOOKS, SIZES, THEMES, in_each_look, judge, photograph
+from tests.e2e.pages.visiting import LOOKS, SIZES, THEMES, Visit, in_each_look, judge, photograph
 from tests.unit.recorder.short_run import STUCK_S, write_run
+from tests.unit.study.studying import Here, loaded
 
 NAME = "morning_drive"
 AT = f"/recordings/{NAME}"
@@ -457,3 +461,46 @@ def test_a_script_is_written_run_watched_and_stopped(visit, running):
         "it is offered this very city",
     )
     assert visited.complaints == []
+
+
+def test_studies_are_listed_as_they_run_and_open_their_pages(visit, running, tmp_path):
+    visited = visit("/recordings/studies")
+    page = visited.page
+    page.wait_for_selector(".studies .empty >> text=No study was run yet. scm study run FILE")
+    studies = running.folder / "studies"
+    study = loaded(tmp_path, factors="b = { uniform = [0.0, 3.0] }", more="samples = 20")
+    whole = create_results(study, studies / "adding", [])
+    run_study(whole, Here(study), lambda _: None)
+    (studies / "adding" / "study.html").write_text(study_page(whole))
+    half = create_results(study, studies / "adding-half", [])
+    with pytest.raises(KeyboardInterrupt):
+        run_study(half, Here(study, most=100), lambda _: None)
+    half.write()
+    (studies / "not_a_study").mkdir()
+    try:
+        page.wait_for_selector('tr[data-state="complete"] >> text=240 of 240')  # it is read again
+        page.wait_for_selector('tr[data-state="unreadable"] >> text=with study.toml')
+        running_row = page.locator('tr[data-study="adding-half"][data-state="running"]')
+        assert running_row.locator("progress").evaluate("bar => bar.position") == 100 / 240
+        judge_everywhere(visited, "studies")
+        with page.context.expect_page() as opened:
+            page.focus('tr[data-study="adding"] a')
+            page.keyboard.press("Enter")
+        shown = Visit(opened.value)
+        shown.page.reload()  # from now on it is seen what it complains of
+        shown.page.wait_for_selector("h1 >> text=Adding")
+        assert shown.page.locator("figure svg").first.is_visible()
+        for size, theme in LOOKS:
+            width, height = SIZES[size]
+            shown.page.set_viewport_size({"width": width, "height": height})
+            shown.page.emulate_media(color_scheme=theme)
+            assert shown.page.locator("main").bounding_box()["width"] <= width
+            photograph(shown, f"study_{size}_{theme}")
+        assert shown.complaints == []  # no script runs there: axe cannot look at it
+        opened.value.close()
+        half.add(study.run(0))
+        half.write()
+        running_row.locator("text=101 of 240").wait_for()
+    finally:
+        shutil.rmtree(studies)
+    page.wait_for_selector(".studies .empty")

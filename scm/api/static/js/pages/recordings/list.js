@@ -1,7 +1,7 @@
 /** The list: what was recorded, the newest first. */
 import { coded } from "scm/shared/coded.js";
 import { html } from "scm/shared/html.js";
-import { Halves } from "scm/pages/recordings/halves.js";
+import { Tabs } from "scm/pages/recordings/tabs.js";
 import { useReading } from "scm/pages/recordings/reading.js";
 import { minutes, moment, size } from "scm/pages/recordings/words.js";
 import { go, route } from "scm/shell/router.js";
@@ -14,7 +14,7 @@ export function RecordingsList() {
   const path = `/recordings?limit=${ROWS}${cursor && `&cursor=${encodeURIComponent(cursor)}`}`;
   const { body, error } = useReading(path, EVERY_MS);
   return html`
-    <${Halves} here="recordings" />
+    <${Tabs} here="recordings" />
     <section class="panel list" aria-label="Recordings">
       ${error && html`<p class="form-error" role="alert">The list could not be read: ${error}</p>`}
       ${!body && !error && html`<p class="empty">Reading the list…</p>`}

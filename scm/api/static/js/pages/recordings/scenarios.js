@@ -6,7 +6,7 @@ import { clock } from "scm/shared/format.js";
 import { Sure } from "scm/shared/sure.js";
 import { change } from "scm/shell/api.js";
 import { go, route } from "scm/shell/router.js";
-import { Halves } from "scm/pages/recordings/halves.js";
+import { Tabs } from "scm/pages/recordings/tabs.js";
 import { read, useReading } from "scm/pages/recordings/reading.js";
 import { BASE } from "scm/shared/base.js";
 
@@ -34,7 +34,7 @@ export function Scenarios() {
   const run = runs.find((row) => row.id === query.run) ?? null;
   const name = query.script ?? run?.what ?? list.body?.items[0]?.name ?? "";
   return html`
-    <${Halves} here="scenarios" />
+    <${Tabs} here="scenarios" />
     <div class="workshop">
       <${List} list=${list} here=${name} />
       <${Script} key=${name} name=${name} again=${list.again} seen=${work.again} />
