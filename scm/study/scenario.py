@@ -7,8 +7,8 @@
             ...
             return {"travel_time_s": 12.3}
 
-The other arguments of `run` are factors by their names. Shipped scenarios are in
-`scm/study/scenarios`.
+`MAP` may be a `CityMap`, too. The other arguments of `run` are factors by their names. Shipped
+scenarios are in `scm/study/scenarios`.
 """
 
 import importlib.util
@@ -22,6 +22,7 @@ from types import ModuleType
 
 from scm import registry
 from scm.errors import StudyError, nearest
+from scm.records.city_map import CityMap
 
 SHIPPED = "scm.study.scenarios"
 DEFAULT_MAP = "driving_school"
@@ -33,13 +34,13 @@ class Scenario:
 
     Attributes:
         run: Called with a `scm.study.case.Case` and the arguments; returns measures by name.
-        map: Where it plays unless the study says otherwise.
+        map: Where it plays unless the study says otherwise: a map, or the name of one.
         about: What it does, in one line.
         parameters: The arguments of `run` besides the case, by name.
     """
 
     run: Callable[..., Mapping[str, float]]
-    map: str
+    map: str | CityMap
     about: str
     parameters: Mapping[str, inspect.Parameter]
 

@@ -107,15 +107,21 @@ class Axis:
         return setting
 
 
-def base_setting(file: StudyFile, map_name: str) -> Setting:
+def base_setting(file: StudyFile, city_map: str | CityMap) -> Setting:
     """Return the setting that a study's files describe.
+
+    Args:
+        file: Of the study.
+        city_map: A map, or the name of one: shipped, or a file beside the study file.
 
     Raises:
         ScmError: when a map or a car file cannot be read.
     """
-    beside = file.folder / map_name
     cars = {Path(name).stem: load_car(file.folder / name) for name in file.study.cars}
-    return Setting(load_map(beside if beside.is_file() else map_name), cars)
+    if isinstance(city_map, CityMap):
+        return Setting(city_map, cars)
+    beside = file.folder / city_map
+    return Setting(load_map(beside if beside.is_file() else city_map), cars)
 
 
 def axes_of(

@@ -23,7 +23,8 @@ def example():
     ("loss", "seed", "over"), [(0.0, 0, 4), (0.6, 1, 4), (0.9, 3, None), (1.0, 0, 0)]
 )
 def test_nobody_touches_whatever_gets_lost_and_all_go_while_they_hear(example, loss, seed, over):
-    times, least_m = example.run(RadioChannel(loss=loss), seed, 30.0)
-    assert least_m > 0.05
-    went = sum(time < math.inf for time in times)
+    crossed = example.run(RadioChannel(loss=loss), seed, 30.0)
+    assert crossed.least_distance_m > 0.05
+    assert crossed.collisions == 0
+    went = sum(time < math.inf for time in crossed.across_s.values())
     assert went < 4 if over is None else went == over
