@@ -18,7 +18,14 @@ from bench.mismatch_free_run import gaussian_pushes, position_error, sindy_pushe
 from bench.mismatch_peers import Gaussian, Sindy, calibrated
 from bench.mismatch_residuals import residuals
 from scm.mismatch.trial import labels
-from scm.mismatch.trial.run import CaseRequest, answer_all, by_engine, make_cases, stored_answers
+from scm.mismatch.trial.run import (
+    CaseRequest,
+    answer_all,
+    by_engine,
+    make_cases,
+    processes,
+    stored_answers,
+)
 from scm.mismatch.trial.score import score
 from scm.recording.read import read_recordings
 from scm.vehicles.car import load_car
@@ -63,7 +70,9 @@ def compare(folder, healthy):
     cases, opened = labels.find_cases(folder), _labels(folder)
     answers = {a.case.name: a for a in stored_answers(cases, folder / "found")}
     wanted = [case for case in cases if case.name not in answers] if not answers else []
-    answers |= {a.case.name: a for a in answer_all(wanted, folder / "found", by_engine)}
+    with processes(2) as executor:
+        new = answer_all(wanted, folder / "found", by_engine, executor)
+        answers |= {a.case.name: a for a in new}
     table = defaultdict(lambda: defaultdict(list))
     for case in cases:
         if case.name in answers:

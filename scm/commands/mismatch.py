@@ -9,9 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scm.command import Command
+from scm.dask_cluster import SCHEDULER_HELP
 from scm.mismatch.budget import DEFAULT_S, Budget
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+    from contextlib import AbstractContextManager
+
     from scm.mismatch.progress import Progress
     from scm.mismatch.validate.conclude import Result
     from scm.recording.read import Recording
@@ -57,6 +61,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--strict",
         action="store_true",
         help="refuse a recording in which rows must be left out or repaired",
+    )
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help=f"several cars: one car, one task; {SCHEDULER_HELP}"
     )
 
 
@@ -148,9 +155,11 @@ def _of_cars(
         write(found, out, check)
         text = summary(found.diagnosis, out, found.evidence.retuned_m)
         return _with_account(found, text, check), failed
-    several = diagnose_several(
-        cars, budget_s=budget_s, strict=strict, notify=progress.notify, turn=progress.turn
-    )
+    with _executor(arguments.scheduler) as executor:
+        several = diagnose_several(
+            cars, budget_s=budget_s, strict=strict, notify=progress.notify, turn=progress.turn,
+            executor=executor,
+        )  # fmt: skip
     several = replace(several, failed=(*failed, *several.failed))
     progress.notify("writing the reports")
     write_all(several, out, lambda name: _check(arguments, out / name, name))
@@ -158,6 +167,14 @@ def _of_cars(
     read = [f"{name}: {line}" for name, found in several.cars.items() for line in found.account]
     text = several_summary(diagnoses, several.common, out)
     return "\n".join((*read, text)), several.failed
+
+
+def _executor(scheduler: str | None) -> "AbstractContextManager[Executor | None]":
+    from contextlib import nullcontext
+
+    from scm.dask_cluster import cluster_executor
+
+    return nullcontext() if scheduler is None else cluster_executor(scheduler)
 
 
 def _check(arguments: argparse.Namespace, out: Path, vehicle: str = "") -> str:

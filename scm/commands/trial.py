@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scm.command import Command
+from scm.dask_cluster import SCHEDULER_HELP
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from scm.progress import Progress
 
 
@@ -44,7 +47,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="score the stored diagnoses of --out again, without new ones",
     )
-    parser.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
+    where.add_argument(
+        "--scheduler", metavar="ADDRESS", help=f"one case, one task; {SCHEDULER_HELP}"
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -60,23 +67,36 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _table(arguments: argparse.Namespace, out: Path, progress: "Progress") -> list[str]:
+    from scm.dask_cluster import cluster_executor
+    from scm.mismatch.trial import run
+
+    if arguments.kept:
+        return run.judged_again(out, arguments.trials)
+    if arguments.scheduler is None:
+        with run.processes(arguments.workers) as executor:
+            return _diagnosed(arguments, out, executor, progress)
+    with cluster_executor(arguments.scheduler) as executor:  # its workers have other folders
+        return _diagnosed(arguments, out.resolve(), executor, progress)
+
+
+def _diagnosed(
+    arguments: argparse.Namespace, out: Path, executor: "Executor | None", progress: "Progress"
+) -> list[str]:
     from scm.mismatch.trial import run
     from scm.mismatch.trial.run import CaseRequest, by_engine
 
-    workers, report = arguments.workers, progress.step
-    if arguments.kept:
-        return run.judged_again(out, arguments.trials)
     if arguments.trials:
         only = [name for name in arguments.only.split(",") if name]
+        folder = arguments.trials if arguments.scheduler is None else arguments.trials.resolve()
         return run.on_shipped_cases(
-            arguments.trials, out, by_engine, only, workers=workers, notify=report
+            folder, out, by_engine, only, executor=executor, notify=progress.step
         )
     low, high = arguments.strength
     plan = CaseRequest(
         seed=arguments.seed, cases=arguments.cases, kind=arguments.kind,
         engine=arguments.engine, strength=(low, high),
     )  # fmt: skip
-    return run.on_own_cases(plan, out, by_engine, workers=workers, notify=report)
+    return run.on_own_cases(plan, out, by_engine, executor=executor, notify=progress.step)
 
 
 def _title(arguments: argparse.Namespace) -> str:

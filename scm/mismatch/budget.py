@@ -8,9 +8,9 @@ attempt.
 import math
 from collections.abc import Callable
 from enum import StrEnum
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from scm.clock import Clock, processor_s, seconds
+from scm.clock import Clock, nanoseconds, processor_s, seconds
 from scm.mismatch.findings import Unanswered
 
 DEFAULT_S = 1800.0  # enough for a whole diagnosis, on a slow and busy computer too
@@ -70,6 +70,14 @@ class Budget:
         self._began_ns = clock.now_ns() if clock else 0
         self._reserved_s, self._attempts = 0.0, False
         self._unanswered: dict[Question, Unanswered] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_began_ns": self.spent_s()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)  # other machines' clocks began at other times
+        now_ns = self._clock.now_ns() if self._clock else 0
+        self._began_ns = now_ns - nanoseconds(state["_began_ns"])
 
     @property
     def unanswered(self) -> tuple[Unanswered, ...]:

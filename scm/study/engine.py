@@ -16,12 +16,12 @@ from typing import Any, Protocol
 import dask
 from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 
+from scm.dask_cluster import connected
 from scm.errors import RunError, StudyError
 from scm.study.case_process import STUDY, CaseProcesses, Task
 from scm.study.loaded_study import LoadedStudy, load
 from scm.study.row import Row
 
-CONNECT_S = 5
 QUIET = {  # nobody looks at what a cluster in this process measures of itself: 4 % of a core
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "10s",
@@ -163,15 +163,9 @@ def dask_engine(study: LoadedStudy, folder: Path, address: str) -> Iterator[Engi
     """Use a Dask cluster that exists.
 
     Raises:
-        RunError: when there is no scheduler at the address.
+        RunError: when there is no scheduler at the address, or it has no workers.
     """
-    try:
-        client = Client(address, timeout=CONNECT_S)
-    except (OSError, TimeoutError, ValueError) as cause:
-        raise RunError(f"--scheduler {address}: no Dask scheduler there: {cause}") from cause
-    with client:
-        if not client.nthreads():
-            raise RunError(f"--scheduler {address}: it has no workers: dask worker {address}")
+    with connected(address) as client:
         engine = DaskEngine(client, study, folder, f"Dask at {address}, {client.dashboard_link}")
         try:
             yield engine

@@ -73,6 +73,9 @@ class Tiles:
         self.params = tuple(column.param for column in self.fleets[0].columns)
         self.columns = {param.key: i for i, param in enumerate(self.params)}
 
+    def __reduce__(self) -> tuple[type["Tiles"], tuple[Car, "Tiles | None"]]:
+        return type(self), (self.car, self.smaller)  # fleets hold memory that is not theirs alone
+
     def enough_for(self, sets: Sequence[Numbers]) -> "Tiles":
         """Return the tiles of the smallest car that has all the numbers named."""
         if self.smaller is None:

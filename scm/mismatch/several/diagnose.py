@@ -1,7 +1,9 @@
 """A diagnosis of several cars: each by itself, then what they have in common."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from msgspec import structs
@@ -127,11 +129,13 @@ def diagnose_several(
     notify: Notify = lambda _: None,
     turn: Turn = lambda *_: None,
     clock: Clock | None = None,
+    executor: Executor | None = None,
 ) -> Several:
     """Return what a simulator lacks to explain each of several cars, and what they share.
 
     Arguments are those of `diagnose`, with recordings by car as `cars_of` returns them, and a
-    budget for each. `turn` receives which car is next, its number, and of how many.
+    budget for each. `turn` receives which car is next, its number, and of how many. An `executor`
+    runs a task a car; its processes see the folders of recordings and car files.
 
     Raises:
         ScmError: when no car's recording or file can be used.
@@ -139,12 +143,17 @@ def diagnose_several(
     clock = clock or WallClock()
     began_ns, turns, found = clock.now_ns(), len(cars) + 1, dict[str, Result]()
     failed = list[str]()
-    for number, (name, recordings) in enumerate(cars.items()):
+    work = partial(diagnose_one, budget_s=budget_s, strict=strict)
+    if executor is None:
+        work = partial(work, notify=notify, clock=clock)
+        results = {name: partial(work, recordings) for name, recordings in cars.items()}
+    else:
+        futures = {name: executor.submit(work, recordings) for name, recordings in cars.items()}
+        results = {name: partial(_result_of, future) for name, future in futures.items()}
+    for number, (name, result) in enumerate(results.items()):
         turn(name, number, turns)
         try:
-            found[name] = diagnose_one(
-                recordings, budget_s=budget_s, strict=strict, notify=notify, clock=clock
-            )
+            found[name] = result()
         except ScmError as error:
             failed.append(f"{name}: {error}")
     if not found:
@@ -160,6 +169,16 @@ def diagnose_several(
             for name, one in anew.items():
                 found[name] = _sharing(name, found[name], one, common, anew)
     return Several(found, tuple(common), seconds(clock.now_ns() - began_ns), tuple(failed))
+
+
+def _result_of(future: Future[Result]) -> Result:
+    """Return a diagnosis that another process made, with the cars that it wrote."""
+    result = future.result()
+    if result.files is None:
+        return result
+    written = (result.files.reread(car) for car in (result.found_car, result.retuned_car))
+    found_car, retuned_car = written
+    return replace(result, found_car=found_car, retuned_car=retuned_car)
 
 
 def write_all(several: Several, out: Path, check: Callable[[str], str] = lambda _: "") -> None:

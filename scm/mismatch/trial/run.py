@@ -9,7 +9,8 @@ import subprocess
 import sys
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,10 +70,12 @@ def on_own_cases(
     out: Path,
     diagnose: Diagnose,
     *,
-    workers: int = 2,
+    executor: Executor | None = None,
     notify: Notify = silent,
 ) -> list[str]:
     """Have cases made in `out`, diagnose them blind, and return the table.
+
+    Arguments are those of `answer_all`.
 
     Raises:
         RecordingError: when a label is not what was sealed, or `out` holds cases already.
@@ -85,22 +88,24 @@ def on_own_cases(
     make_cases(request, out, lambda done: notify("making cases", done, request.cases))
     seals = labels.read_seals(out)
     cases = labels.find_cases(out)
-    answers = _answers(cases, out, diagnose, workers, notify)
+    answers = _answers(cases, out, diagnose, executor, notify)
     opened = {case: labels.open_label(out, case, digest) for case, digest in seals.items()}
     return _judged(answers, opened, out)
 
 
 def on_shipped_cases(
     folder: Path, out: Path, diagnose: Diagnose, only: Collection[str] = (), *,
-    workers: int = 2, notify: Notify = silent,
+    executor: Executor | None = None, notify: Notify = silent,
 ) -> list[str]:  # fmt: skip
     """Diagnose cases that lie in `folder`, then open its `labels.json`, and return the table.
+
+    Arguments are those of `answer_all`.
 
     Raises:
         RecordingError: when there are no such cases.
     """
     cases = labels.find_cases(folder, only)
-    answers = _answers(cases, out, diagnose, workers, notify)
+    answers = _answers(cases, out, diagnose, executor, notify)
     return _judged(answers, labels.shipped_labels(folder / "labels.json"), out)
 
 
@@ -124,11 +129,15 @@ def judged_again(out: Path, folder: Path | None = None) -> list[str]:
 
 
 def _answers(
-    cases: Sequence[labels.Case], out: Path, diagnose: Diagnose, workers: int, notify: Notify
+    cases: Sequence[labels.Case],
+    out: Path,
+    diagnose: Diagnose,
+    executor: Executor | None,
+    notify: Notify,
 ) -> list[Answer]:
     answers: list[Answer] = []
     notify("diagnosing", 0, len(cases))
-    for answer in answer_all(cases, out / FOUND, diagnose, workers):
+    for answer in answer_all(cases, out / FOUND, diagnose, executor):
         answers.append(answer)
         notify("diagnosing", len(answers), len(cases))
     return sorted(answers, key=lambda answer: answer.case.name)
@@ -197,7 +206,7 @@ def make_cases(request: CaseRequest, out: Path, notify: Callable[[int], None]) -
 
 
 def answer_all(
-    cases: Sequence[Case], out: Path, diagnose: Diagnose, workers: int = 2
+    cases: Sequence[Case], out: Path, diagnose: Diagnose, executor: Executor | None = None
 ) -> Iterator[Answer]:
     """Diagnose cases and give each answer as it comes; each is also written, `diagnosis.json`.
 
@@ -205,11 +214,23 @@ def answer_all(
         cases: To diagnose.
         out: Gets a folder a case.
         diagnose: A function of a module, so that other processes can load it.
-        workers: Processes; 0 diagnoses here, one after another.
+        executor: What runs a task a case, such as `processes`; None: here, one after another. Its
+            processes see the folders of cases and answers.
     """
-    if workers == 0:
+    if executor is None:
         for case in cases:
             yield _answer(case, out, diagnose)
+        return
+    waiting: list[Future[Answer]] = [executor.submit(_answer, c, out, diagnose) for c in cases]
+    for done in as_completed(waiting):
+        yield done.result()
+
+
+@contextmanager
+def processes(workers: int) -> Iterator[Executor | None]:
+    """Use so many processes of this machine; 0: none, see `answer_all`."""
+    if workers == 0:
+        yield None
         return
     context = multiprocessing.get_context("spawn")
     leashes, hand = context.Pipe(duplex=False)
@@ -218,9 +239,7 @@ def answer_all(
         ProcessPoolExecutor(workers, context, initializer=end_with, initargs=(leashes,)) as pool,
         hand,
     ):
-        waiting: list[Future[Answer]] = [pool.submit(_answer, c, out, diagnose) for c in cases]
-        for done in as_completed(waiting):
-            yield done.result()
+        yield pool
 
 
 def _answer(case: Case, out: Path, diagnose: Diagnose) -> Answer:

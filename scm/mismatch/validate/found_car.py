@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import mkdtemp
+from typing import Any
 
 import numpy as np
 from msgspec import structs
@@ -36,7 +37,8 @@ CLOCKS = "clock."  # numbers of a recording's stamps, not of the car
 class CarFiles:
     """Writes cars that a search finds into a folder of its own, and reads them back.
 
-    The folder lives as long as this object: effects outside the catalogue are files in it.
+    The folder lives as long as this object: effects outside the catalogue are files in it. Pickled,
+    it takes the files along, and has another folder.
     """
 
     def __init__(self, car: Car, recordings: tuple[str, ...]) -> None:
@@ -44,6 +46,18 @@ class CarFiles:
         self._folder = Path(mkdtemp(prefix="scm-found-"))
         weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         self._count = 0
+        self._sent_from = self._folder
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        files = (path for path in self._folder.rglob("*") if path.is_file())
+        content = {str(path.relative_to(self._folder)): path.read_bytes() for path in files}
+        return _received, (self._car, self._recordings, self._folder, content, self._count)
+
+    def reread(self, car: Car | None) -> Car | None:
+        """Return a car that was written before this object was pickled, from its present folder."""
+        if car is None or self._sent_from not in car.path.parents:
+            return car
+        return load_car(self._folder / car.path.relative_to(self._sent_from))
 
     def written(self, fitted: Hypothesis, effects: Sequence[Effect]) -> Car:
         """Return the car with what was found, as its written file says.
@@ -79,6 +93,23 @@ class CarFiles:
         )
         write_car(diagnosis, evidence, self._car, found, folder)
         return load_car(folder / FILE)
+
+
+def _received(
+    car: Car,
+    recordings: tuple[str, ...],
+    folder: Path,
+    content: Mapping[str, bytes],
+    count: int,
+) -> CarFiles:
+    """Return car files that another process wrote in a folder, in one of this process."""
+    files = CarFiles(car, recordings)
+    files._sent_from, files._count = folder, count  # noqa: SLF001
+    for name, data in content.items():
+        path = files._folder / name  # noqa: SLF001
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+    return files
 
 
 def as_written(found: Sequence[RefittedParameter], car: Car) -> tuple[RefittedParameter, ...]:

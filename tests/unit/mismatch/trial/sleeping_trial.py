@@ -11,7 +11,7 @@ import threading
 from pathlib import Path
 
 from scm.mismatch.trial.labels import Case
-from scm.mismatch.trial.run import answer_all
+from scm.mismatch.trial.run import answer_all, processes
 
 
 def sleep(_recording, out):
@@ -25,5 +25,7 @@ def sleep(_recording, out):
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     folder = Path(sys.argv[1])
-    for _ in answer_all([Case(n, folder, folder) for n in ("00", "01", "02")], folder, sleep, 2):
-        pass
+    cases = [Case(n, folder, folder) for n in ("00", "01", "02")]
+    with processes(2) as executor:
+        for _ in answer_all(cases, folder, sleep, executor):
+            pass

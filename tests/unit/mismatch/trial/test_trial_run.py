@@ -12,7 +12,13 @@ from scm.mismatch.findings import Diagnosis, Verdict
 from scm.mismatch.trial import run
 from scm.mismatch.trial.again import compare, error, true_cars
 from scm.mismatch.trial.labels import Case, find_cases, label_of, open_label, read_seals
-from scm.mismatch.trial.run import answer_all, judged_again, on_own_cases, on_shipped_cases
+from scm.mismatch.trial.run import (
+    answer_all,
+    judged_again,
+    on_own_cases,
+    on_shipped_cases,
+    processes,
+)
 from scm.recording.read import read_recordings
 from scm.vehicles.car import load_car
 
@@ -38,9 +44,7 @@ def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("trial")
     request = run.CaseRequest(seed=11, cases=2, kind="none")
     heard = []
-    lines = on_own_cases(
-        request, out, says_none, workers=0, notify=lambda *what: heard.append(what)
-    )
+    lines = on_own_cases(request, out, says_none, notify=lambda *what: heard.append(what))
     return out, lines, heard
 
 
@@ -61,7 +65,7 @@ def test_kept_diagnoses_are_judged_again_alike(made):
 
 def test_a_second_trial_in_the_same_place_is_refused(made):
     with pytest.raises(RecordingError, match="holds a trial already"):
-        on_own_cases(run.CaseRequest(cases=1), made[0], says_none, workers=0)
+        on_own_cases(run.CaseRequest(cases=1), made[0], says_none)
 
 
 def test_a_label_changed_after_it_was_sealed_is_told(made, tmp_path):
@@ -78,7 +82,8 @@ def test_a_label_changed_after_it_was_sealed_is_told(made, tmp_path):
 
 def test_cases_are_diagnosed_in_processes_of_their_own(made, tmp_path):
     cases = find_cases(made[0])
-    answers = list(answer_all(cases, tmp_path, os.path.relpath, workers=2))
+    with processes(2) as executor:
+        answers = list(answer_all(cases, tmp_path, os.path.relpath, executor))
     said = {answer.case.name: answer.diagnosis for answer in answers}
     assert said == {case.name: os.path.relpath(case.drive, tmp_path / case.name) for case in cases}
     assert (tmp_path / "case_001" / "diagnosis.json").is_file()
@@ -90,7 +95,7 @@ def test_a_diagnosis_that_breaks_is_counted_and_not_hidden(made, tmp_path):
     label = {"names": ["wind"], "car": "nigel", "equation": "body", "depends_on": ["heading"],
              "parameters": {"force_x_n": 1.0, "force_y_n": 0.0}, "listed": True}  # fmt: skip
     (tmp_path / "labels.json").write_text(json.dumps({"case_000": label}))
-    lines = on_shipped_cases(tmp_path, tmp_path / "out", breaks, ["000"], workers=0)
+    lines = on_shipped_cases(tmp_path, tmp_path / "out", breaks, ["000"])
     assert any("wind  ->  ValueError: no idea" in line for line in lines)
     assert "ValueError" in (tmp_path / "out" / "found" / "case_000" / "failed.txt").read_text()
 
