@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from scm.arrays import Floats
 from scm.scenery.canvas import Colour, colour_of
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
-from scm.vehicles.car_files import car_files
+from scm.vehicles.car_files import car_files, varied_values
 
 PAINT = {
     kind: colour_of(text)
@@ -59,24 +60,40 @@ KEYS = {
 }
 
 
-@lru_cache(maxsize=64)
 def car_body(car: str) -> CarBody:
     """Return the body of the car file of a name; a car whose file is not here is a Nigel to us.
 
     Every measure that a file leaves out is a Nigel's.
     """
+    varied = varied_values.get(car)
+    return _body_of_file(car) if varied is None else _body(varied)
+
+
+@lru_cache(maxsize=64)
+def _body_of_file(car: str) -> CarBody:
     path = car_files().get(car)
     if path is None:
         return NIGEL
-    values = tomllib.loads(path.read_text(encoding="utf-8"))
-    given = {field: _value(values, key) for field, key in KEYS.items()}
-    known = {field: value for field, value in given.items() if value is not None}
-    return replace(NIGEL, **known, has_tag="ips" in values)
+    sections = tomllib.loads(path.read_text(encoding="utf-8"))
+    tables = {name: table for name, table in sections.items() if isinstance(table, dict)}
+    return _body(
+        {
+            f"{section}.{key}": _plain(entry["value"])
+            for section, table in tables.items()
+            for key, entry in table.items()
+            if isinstance(entry, dict) and "value" in entry
+        }
+    )
 
 
-def _value(values: dict[str, Any], key: str) -> Any:
-    section, name = key.split(".")
-    value = values.get(section, {}).get(name, {}).get("value")
+def _body(values: Mapping[str, Any]) -> CarBody:
+    given = {field: values[key] for field, key in KEYS.items() if key in values}
+    if "tag_id" in given:
+        given["tag_id"] = int(given["tag_id"])
+    return replace(NIGEL, **given, has_tag=any(key.startswith("ips.") for key in values))
+
+
+def _plain(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 

@@ -17,7 +17,7 @@ from scm import registry
 from scm.errors import CarError, TermError, nearest, reading
 from scm.vehicles import body14
 from scm.vehicles.car_file_schema import FileKey, file_keys
-from scm.vehicles.car_files import OWN_CARS, TYPES_DIR, car_files
+from scm.vehicles.car_files import OWN_CARS, TYPES_DIR, car_files, varied_values
 from scm.vehicles.compiler.assemble import setters_of
 from scm.vehicles.correlated import Correlated, read_correlated
 from scm.vehicles.own_term import SUFFIX, load_own_term
@@ -209,14 +209,17 @@ def all_terms() -> Mapping[str, Term]:
 def varied_cars(cars: Mapping[str, Car]) -> Iterator[None]:
     """Let these cars be what `load_car` returns for their names, in this process, for a while.
 
-    A study's case runs alone in its process, with numbers of its own for a car of a known name.
+    They look so, too (`scm.scenery.bodies.car_body`). A study's case runs alone in its process,
+    with numbers of its own for a car of a known name.
     """
     _varied.update(cars)
+    for name, car in cars.items():
+        varied_values[name] = {key: quantity.value for key, quantity in car.values.items()}
     try:
         yield
     finally:
         for name in cars:
-            del _varied[name]
+            del _varied[name], varied_values[name]
 
 
 _varied: dict[str, Car] = {}

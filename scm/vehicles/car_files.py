@@ -5,6 +5,7 @@ Its default is `cars` beside the recordings of `scm up`, which are in `runs` by 
 """
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from scm.errors import CarError, reading
@@ -13,6 +14,9 @@ TYPES_DIR = Path(__file__).parent / "types"
 OWN_CARS = "SCM_CARS"
 USUAL_FOLDER = Path("runs/cars")
 """The user's folder, from the working directory, without `SCM_CARS`."""
+varied_values: dict[str, Mapping[str, float | tuple[float, ...] | str]] = {}
+"""Values by `section.key` of cars that are not as their files, see `scm.vehicles.car.varied_cars`.
+"""
 
 
 def name_own_folder(folder: Path) -> None:
