@@ -12,6 +12,10 @@ from scm.study.plots import plots_of
 from scm.study.stored import read_results
 
 PICTURES = Path(__file__).parents[1] / "pictures" / "studies"
+MORE = (  # of the page's colours; a picture's own are in it
+    ":root{--good:#1d7a3e;--question:#6b3fa0;--warn:#a35c00}"
+    "@media(prefers-color-scheme:dark){:root{--good:#63c98a;--question:#c3a1f0;--warn:#f0b14a}}"
+)
 
 
 def main(folders: list[str]) -> None:
@@ -24,7 +28,7 @@ def main(folders: list[str]) -> None:
             for number, plot in enumerate(plots_of(rows, tables.varied(results), name, unit)):
                 path = PICTURES / f"{results.file.name}_{name}_{number}.svg"
                 picture = Picture(name=path.stem, title="", caption="", svg=plot.svg)
-                path.write_text(picture.as_file(), "utf-8")
+                path.write_text(picture.as_file().replace("<style>", f"<style>{MORE}", 1), "utf-8")
 
 
 if __name__ == "__main__":

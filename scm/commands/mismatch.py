@@ -141,6 +141,7 @@ def _of_cars(
     Returns:
         What to print, and why other cars could not be diagnosed.
     """
+    from scm.errors import RunError
     from scm.mismatch.pipeline import write
     from scm.mismatch.report.cars_page import several_summary
     from scm.mismatch.report.write import summary
@@ -148,6 +149,9 @@ def _of_cars(
 
     budget_s, strict = arguments.budget_s, arguments.strict
     if len(cars) == 1:
+        if arguments.scheduler is not None:
+            msg = f"--scheduler {arguments.scheduler}: one car is one task: expected several cars"
+            raise RunError(msg)
         ((name, recordings),) = cars.items()
         found = diagnose_one(recordings, budget=budget, strict=strict, notify=progress.notify)
         progress.notify("writing the report")

@@ -146,7 +146,7 @@ def local_engine(study: LoadedStudy, folder: Path, workers: int) -> Iterator[Eng
     with (
         dask.config.set(QUIET),
         LocalCluster(
-            n_workers=1, threads_per_worker=workers, processes=False, dashboard_address=None,
+            n_workers=1, threads_per_worker=workers, processes=False, dashboard_address=":0",
             memory_limit=0,
         ) as cluster,
         Client(cluster) as client,

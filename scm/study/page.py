@@ -11,7 +11,7 @@ from scm.study.statistics import wilson
 from scm.study.stored import read_manifest, recording_of
 from scm.study.tables import StudyResults, Table
 
-MAX_FAILURES, MAX_LEVELS = 50, 60
+MAX_FAILURES, MAX_LEVELS = 10, 60
 EFFECTS = (
     "Means over all other factors. `explains` is the share of the measure's variance that the "
     "factor alone explains, `p` the probability of so large a share by chance."

@@ -17,6 +17,7 @@ from scm.study.statistics import SUCCESS, by_level, estimate, grouped, level_tex
 from scm.study.targets import Axis
 
 MAX_LINES = 6
+BESIDE = 0.006  # of the axis
 MAX_DOTS = 2000  # a line; 100 000 would make a page of 16 MB
 INK, SOFT, GRID, PAPER = "#010203", "#020304", "#030405", "#040506"
 LINES = ("#0b0101", "#0b0202", "#0b0303", "#0b0404", "#0b0505", "#0b0606")
@@ -123,6 +124,8 @@ def _draw(
     else:
         at = [float(n) for n in range(len(groups))]
         axes.set_xticks(at, list(groups))
+    if axis.factor.log_uniform is None:  # lines beside each other, so that no interval hides one
+        at = [x + number * BESIDE * (max(at) - min(at)) for x in at]
     values = scale * np.array([found.value for found in intervals])
     low = values - scale * np.array([found.low for found in intervals])
     high = scale * np.array([found.high for found in intervals]) - values

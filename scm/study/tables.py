@@ -18,6 +18,7 @@ from scm.study.study_file import Measure, StudyFile
 from scm.study.targets import Axis
 
 MAX_ACROSS = 6
+MAX_DECIMALS = 4  # a step of a simulation shows no finer
 
 
 class StudyResults(Protocol):
@@ -88,8 +89,8 @@ def interval_text(found: Interval, unit: str) -> str:
 def _decimals_of(width: float) -> int:
     """Return with how many decimals an interval of a width is written."""
     if width <= 0.0 or not math.isfinite(width):
-        return 3
-    return max(0, min(6, 1 - math.floor(math.log10(width))))
+        return MAX_DECIMALS
+    return max(0, min(MAX_DECIMALS, 1 - math.floor(math.log10(width))))
 
 
 def failures(results: StudyResults, most: int) -> Table:
