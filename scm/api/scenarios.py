@@ -15,7 +15,7 @@ import sys
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import IO
@@ -66,8 +66,9 @@ class ScenarioRepository:
                 continue
             for file in sorted(folder.glob("*.py")):
                 if re.fullmatch(NAME, file.stem) and file.stem not in found:
-                    row = self._read(file)
-                    found[file.stem] = msgspec.structs.replace(row, text="")
+                    with suppress(FileNotFoundError):  # somebody deletes it at this moment
+                        row = self._read(file)
+                        found[file.stem] = msgspec.structs.replace(row, text="")
         return tuple(found.values())
 
     def find(self, name: str) -> Scenario | None:

@@ -13,6 +13,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Literal
 
+from scm.errors import CarError
 from scm.vehicles.car import STANDARD_TERMS, Car, car_of_text, load_car
 from scm.vehicles.car_files import TYPES_DIR
 
@@ -33,6 +34,7 @@ HOLD = 0.03
 ROOF = 3.5
 """Height of the roof, over the radius of the wheels."""
 ROLLING = 0.015
+MAX_LOST = 0.999  # share of the thrust that rolling takes: beyond it no top speed follows
 DAMPING = 0.05
 """Bearing losses at the no-load speed, over the stall torque."""
 G = 9.80665
@@ -280,6 +282,12 @@ def _drive(figures: Figures, size: _Size) -> tuple[Entries, str]:
     thrust = spun * acceleration + ROLLING * weight
     stall = thrust * size.radius / wheels
     lost = ROLLING * weight / thrust
+    if lost > MAX_LOST:
+        msg = (
+            f"acceleration_mps2: {acceleration:g} is next to nothing beside the rolling resistance "
+            f"that it has to overcome, {ROLLING * G:.2g} m/s2"
+        )
+        raise CarError(f"{figures.name}.toml: {msg}")
     fast = (1.0 + DAMPING) * figures.top_speed_mps / size.radius / (1.0 - lost)
     hold = stall if figures.motor == "geared" else HOLD * weight * size.radius / wheels
     steady = (figures.top_speed_mps * (0.1 * k - lost) / (1.0 - lost) for k in range(1, 11))

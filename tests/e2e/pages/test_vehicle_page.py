@@ -83,6 +83,12 @@ def cars(running):
     return len(running.get("/vehicles")["vehicles"])
 
 
+def events_of(running, name):
+    """Return the events of the car; the world looks at all cars once a second."""
+    found = lambda: running.get(f"/events?vehicle={TIRED}&name={name}")["items"]  # noqa: E731
+    return wait_for(found, 60.0, f"{name} is among the events")
+
+
 @contextmanager
 def tired(running, throttle=0.0):
     """Have a car in the city whose battery is low, and that was reported once."""
@@ -152,7 +158,7 @@ def test_a_low_battery_is_told_by_sign_and_word_and_once_in_the_events(visit, ru
         page.wait_for_selector("text=not on the air, was reported")
         judge(visited)
         photograph(visited, "battery_narrow_dark")
-        events = running.get(f"/events?vehicle={TIRED}&name=battery_low")["items"]
+        events = events_of(running, "battery_low")
         assert [event["text"] for event in events] == [f"the battery of {TIRED} is low: 12 % left"]
 
 
@@ -169,7 +175,7 @@ def test_a_car_that_pushes_in_vain_is_stuck_in_table_page_and_events(visit, runn
         assert told.startswith(("commanded to drive but does not move", "pushes against"))
         judge(visited)
         photograph(visited, "stuck")
-        (event,) = running.get(f"/events?vehicle={TIRED}&name=stuck")["items"]
+        (event,) = events_of(running, "stuck")
         assert event["text"].startswith(f"{TIRED} is stuck: it ")
 
 

@@ -36,7 +36,7 @@ def run(case, a=1.0, how="well"):
 @pytest.fixture(scope="module")
 def process(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
-    more = "time_limit_s = 0.6\nmemory_limit_mb = 200"
+    more = "time_limit_s = 2.0\nmemory_limit_mb = 200"
     study = loaded(folder, scenario=SCENARIO, more=more, name="study", factors='how = "well"')
     running = CaseProcess(study, folder)
     yield running
@@ -52,7 +52,7 @@ def run(process, how, case=0):
     [
         ("raises", "error", "ValueError: no (adds.py:8)"),
         ("exits", "error", "SystemExit: 3 (adds.py:10)"),
-        ("hangs", "time_limit", "0.6 s"),
+        ("hangs", "time_limit", "2 s"),
         ("dies", "error", "its process ended: signal 9"),
         ("eats", "memory_limit", "MB more than before, 200 allowed"),
     ],

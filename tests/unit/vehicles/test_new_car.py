@@ -112,3 +112,9 @@ def test_sensors_are_those_it_has():
 def test_a_number_out_of_bounds_is_refused_by_its_key():
     with pytest.raises(CarError, match=r"mine\.toml: body\.wheelbase_m: expected 0\.05 to 5 m"):
         new_car_text(figures(wheelbase_m=9.0))
+
+
+@pytest.mark.parametrize("acceleration_mps2", [1e-300, 1e-5])
+def test_an_acceleration_that_rolling_swallows_is_refused(acceleration_mps2):
+    with pytest.raises(CarError, match=r"mine\.toml: acceleration_mps2: .* next to nothing"):
+        new_car_text(figures(acceleration_mps2=acceleration_mps2))
