@@ -1,4 +1,4 @@
-"""Turns parsed TOML into a record; what is wrong is said as `file: key: expected .., got ..`."""
+"""Turns parsed TOML into a record; errors read `file: key: expected .., got ..`."""
 
 import re
 from collections.abc import Sequence

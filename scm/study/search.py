@@ -1,6 +1,6 @@
 """Looks for the case that breaks it: Optuna chooses the factors of each next case.
 
-A search is told where the measure got worse and looks there more often. Its cases have rows like
+A search learns where the measure gets worse and looks there more often. Its cases have rows like
 those of a study. By default its memory is a journal in the results' folder, for one command at a
 time; several commands share a search through a PostgreSQL database, where trials of a killed one
 are noticed by their missing heartbeat and run again.
