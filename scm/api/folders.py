@@ -25,6 +25,14 @@ class Folders:
     studies: Path | None = None
 
 
+def written_ns(path: Path) -> int:
+    """Return when a file was last written [ns since 1970]; 0: it is not there."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
 def folders_in(folder: Path) -> Folders:
     """Return all folders inside one, recordings at its top; writers create theirs."""
     return Folders(

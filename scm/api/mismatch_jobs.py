@@ -16,7 +16,7 @@ from scm.api.city import City, not_found
 from scm.api.operations import Operations, ProgressReporter
 from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
-from scm.api.report_folders import ReportFolders
+from scm.api.report_folders import PARTIAL, ReportFolders
 from scm.api.trip_resume import RESUME_NS, RESUME_PAUSE_S, onward, trip_of
 from scm.clock import Clock
 from scm.errors import RecordingError, RunError
@@ -27,7 +27,6 @@ from scm.v2x.messages.route_request import RouteReply
 from scm.v2x.messages.trip import Trip
 
 KIND, DRIVE_KIND = "mismatch", "drive"
-_PARTIAL = ".partial"
 _RUN = ".mcap"
 _STEP = re.compile(r" *\d+ s +(?P<share>\d+) %  (?P<said>.+)")
 
@@ -46,7 +45,7 @@ class MismatchJobs:
     def __init__(self, city: City, work: Operations, clock: Clock, bus: Sequence[str]) -> None:
         self._city, self._work, self._clock, self._bus = city, work, clock, bus
         self.reports = ReportFolders(city.folders.reports)
-        for left in (city.folders.reports or Path("/nowhere")).glob(f".*{_PARTIAL}"):
+        for left in (city.folders.reports or Path("/nowhere")).glob(f".*{PARTIAL}"):
             shutil.rmtree(left, ignore_errors=True)  # of a server that was killed
 
     def folder(self) -> Path:
@@ -123,7 +122,7 @@ class MismatchJobs:
 
         def work(progress: ProgressReporter) -> str:
             partial, whole = (
-                folder / f".{base}-{job.asked_ns}{end}{_PARTIAL}" for end in ("", "-run")
+                folder / f".{base}-{job.asked_ns}{end}{PARTIAL}" for end in ("", "-run")
             )
             try:
                 runs = [_whole(Path(path), whole, progress) for path in job.recordings]

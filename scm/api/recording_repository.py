@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from scm.api.city import not_found
+from scm.api.folders import written_ns
 from scm.api.problem import RefusedError
 from scm.clock import NS_PER_S, Clock, WallClock
 from scm.errors import RecordingError
@@ -43,7 +44,7 @@ class RecordingRepository:
         if self._folder is None or not self._folder.is_dir():
             return []
         files = [
-            (_written_s(file), file.name.removesuffix(SUFFIX))
+            (written_ns(file), file.name.removesuffix(SUFFIX))
             for file in self._folder.glob(f"*{SUFFIX}")
             if re.fullmatch(NAME, file.name.removesuffix(SUFFIX))
         ]
@@ -178,7 +179,7 @@ class RecordingRepository:
 
     def _is_quiet(self, path: Path) -> bool:
         """Return whether a file has not been written for a while."""
-        return self._clock.now_ns() - _written_s(path) * NS_PER_S > QUIET_S * NS_PER_S
+        return self._clock.now_ns() - written_ns(path) > QUIET_S * NS_PER_S
 
 
 def cars_of(index: RunIndex) -> tuple[str, ...]:
@@ -207,13 +208,6 @@ def _trouble(state: State, index: RunIndex) -> str:
             f"shown; `scm recover {index.path.name}` repairs it."
         )
     return "" if index.chunks else "nothing was recorded yet"
-
-
-def _written_s(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except OSError:
-        return 0.0
 
 
 def _not_written(path: Path, cause: OSError) -> RefusedError:

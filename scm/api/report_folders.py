@@ -6,7 +6,9 @@ each of those is a report of its own here, `FOLDER.CAR`. `job.json` holds what i
 
 import re
 import shutil
+import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,8 @@ FILES = {
 }
 _FIELDS, _DRAWN, _JOB, _CARS = "report.json", "drawn.json", "job.json", "cars.json"
 _DRIVE, _RECORDED_DRIVE = re.compile(r"next_drive(_\d{1,2})?"), re.compile(r"told_\d{1,4}")
+PARTIAL = ".partial"
+"""Ends the name of a folder that is being written or removed; it begins with a dot."""
 MOST_SHOWN_BYTES = 16 * 2**20
 
 
@@ -70,7 +74,10 @@ class ReportFolders:
 
     def rows(self) -> list[ReportRow]:
         """Return all reports, newest first."""
-        found = [self._row(name, folder) for name, folder in self._folders()]
+        found = []
+        for name, folder in self._folders():
+            with suppress(FileNotFoundError):  # somebody removes it at this moment
+                found.append(self._row(name, folder))
         return sorted(found, key=lambda row: (-row.made_ns, row.name))
 
     def find(self, name: str) -> Path | None:
@@ -87,12 +94,18 @@ class ReportFolders:
     def remove(self, name: str) -> bool:
         """Remove a report; of several cars' the one car's. Return whether there was one."""
         folder = self.find(name)
-        if folder is None:
+        if folder is None or self.root is None:
             return False
-        shutil.rmtree(folder)
-        above = folder.parent
-        if above != self.root and not _cars_in(above):
-            shutil.rmtree(above)
+        # Renamed first: who reads reports at this moment finds a whole one or none.
+        removed = Path(tempfile.mkdtemp(prefix=".", suffix=PARTIAL, dir=self.root))
+        try:
+            folder.rename(removed)
+        except FileNotFoundError:  # somebody else removed it at this moment
+            return False
+        finally:
+            shutil.rmtree(removed)
+        if folder.parent != self.root and not _cars_in(folder.parent):
+            shutil.rmtree(folder.parent, ignore_errors=True)
         return True
 
     def job(self, folder: Path) -> Job | None:
@@ -173,7 +186,10 @@ class ReportFolders:
 
 
 def _cars_in(folder: Path) -> list[Path]:
-    return [car for car in folder.iterdir() if (car / _FIELDS).is_file()]
+    try:
+        return [car for car in folder.iterdir() if (car / _FIELDS).is_file()]
+    except FileNotFoundError:  # the last car's report is removed at this moment
+        return []
 
 
 def _read(path: Path, kind: Any) -> Any:

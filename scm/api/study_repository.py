@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from scm.api.city import not_found
+from scm.api.folders import written_ns
 from scm.api.operations import without_paths
 from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
@@ -59,16 +60,16 @@ class StudyRepository:
         from scm.study.record import study_row  # noqa: PLC0415  an extra, and half a second
 
         folder = self.folder(name)
-        written_ns = _written_ns(folder / CASES)
+        results_ns = written_ns(folder / CASES)
         known_ns, known = self._complete.get(name, (0, None))
-        if known is not None and known_ns == written_ns:
+        if known is not None and known_ns == results_ns:
             return known
         try:
             row = study_row(folder)
         except (ScmError, OSError) as cause:
             return StudyRow(name=name, state="unreadable", trouble=without_paths(str(cause)))
         if row.state == "complete":
-            self._complete[name] = written_ns, row
+            self._complete[name] = results_ns, row
         return row
 
     def study(self, name: str) -> Study:
@@ -86,7 +87,7 @@ class StudyRepository:
             RefusedError: when there is none of that name, or it cannot be read.
         """
         folder = self.folder(name)
-        if not 0 < _written_ns(folder / CASES) < _written_ns(folder / PAGE):
+        if not 0 < written_ns(folder / CASES) < written_ns(folder / PAGE):
             _shown(folder, "--html")
         return folder / PAGE
 
@@ -94,7 +95,7 @@ class StudyRepository:
         if self._root is not None and self._root.is_dir():
             for folder in self._root.iterdir():
                 if re.fullmatch(NAME, folder.name) and folder.is_dir():
-                    yield _written_ns(folder / "study.toml"), folder.name
+                    yield written_ns(folder / "study.toml"), folder.name
 
 
 def _shown(folder: Path, how: str) -> str:
@@ -111,11 +112,3 @@ def _check_installed() -> None:
     if missing:
         detail = f"studies need {', '.join(missing)}: `pip install 'scm[study]'`"
         raise RefusedError.of("not_installed", detail)
-
-
-def _written_ns(path: Path) -> int:
-    """Return when a file was written [ns]; 0: it is not there."""
-    try:
-        return path.stat().st_mtime_ns
-    except OSError:
-        return 0

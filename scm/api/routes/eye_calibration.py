@@ -12,6 +12,7 @@ from scm.api.calibration_repository import CalibrationRepository
 from scm.api.city import City, IdempotencyKey, Name, json_response, not_found
 from scm.api.etag import Matching, tagged
 from scm.api.eye_rows import frame_of
+from scm.api.folders import written_ns
 from scm.api.inputs import Json
 from scm.api.operations import Operations, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_response
@@ -262,7 +263,7 @@ def _views(jobs: CalibrationJobs, camera: str) -> Views:
 def _view(path: FilePath, found: dict[str, Any]) -> View:
     one = found.get(path.name)
     facts = None if one is None else {key: one[key] for key in one if key != "name"}
-    return View(name=path.name, made_ns=path.stat().st_mtime_ns, found=facts)
+    return View(name=path.name, made_ns=written_ns(path), found=facts)
 
 
 def _newest(city: City, camera: str) -> bytes:

@@ -12,6 +12,7 @@ from starlette.concurrency import run_in_threadpool
 
 from scm.api import uploads
 from scm.api.city import City, IdempotencyKey, json_response, not_found
+from scm.api.folders import written_ns
 from scm.api.inputs import Json
 from scm.api.mismatch_jobs import MismatchJobs
 from scm.api.operations import accepted
@@ -61,7 +62,7 @@ def _add_jobs(routes: APIRouter, city: City, jobs: MismatchJobs) -> None:
     def offers() -> Response:
         folder = city.folders.recordings
         runs = [path for path in folder.glob("*.mcap") if path.is_file()] if folder else []
-        runs.sort(key=lambda path: -path.stat().st_mtime_ns)
+        runs.sort(key=lambda path: -written_ns(path))
         answer_ = Offers(
             recordings=tuple(path.name for path in runs[:200]),
             cars=tuple(sorted(car_files())),
@@ -110,18 +111,10 @@ def _add_reports(routes: APIRouter, jobs: MismatchJobs) -> None:
     @routes.get("/reports/{name}", summary="One report", responses=answer(Report))
     def report(name: ReportName) -> Response:
         folder = _folder(jobs, name)
-        fields, drawn = jobs.reports.fields(folder)
-        answer_ = Report(
-            row=jobs.reports.row(name, folder),
-            report=fields,
-            drawn=drawn,
-            job=_shown(jobs.reports.job(folder)),
-            drives=tuple(jobs.reports.drives(folder)),
-            told=len(jobs.reports.recorded_drives(folder)),
-            files=tuple(file for file in FILES if (folder / file).is_file()),
-            together=jobs.reports.together(folder),
-        )
-        return json_response(answer_)
+        try:
+            return json_response(_report(jobs, name, folder))
+        except FileNotFoundError:  # somebody removes it at this moment
+            raise not_found("report", name) from None
 
     @routes.delete(
         "/reports/{name}",
@@ -209,6 +202,20 @@ def _folder(jobs: MismatchJobs, name: str) -> FilePath:
     if folder is None:
         raise not_found("report", name)
     return folder
+
+
+def _report(jobs: MismatchJobs, name: str, folder: FilePath) -> Report:
+    fields, drawn = jobs.reports.fields(folder)
+    return Report(
+        row=jobs.reports.row(name, folder),
+        report=fields,
+        drawn=drawn,
+        job=_shown(jobs.reports.job(folder)),
+        drives=tuple(jobs.reports.drives(folder)),
+        told=len(jobs.reports.recorded_drives(folder)),
+        files=tuple(file for file in FILES if (folder / file).is_file()),
+        together=jobs.reports.together(folder),
+    )
 
 
 def _shown(job: Job | None) -> Job | None:

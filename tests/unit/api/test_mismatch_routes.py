@@ -4,6 +4,7 @@ import io
 import json
 import os
 import shutil
+import threading
 import time
 import zipfile
 from pathlib import Path
@@ -198,6 +199,32 @@ def test_a_removed_report_is_gone(call, put):
     assert call("DELETE", f"{API}/reports/monday").status_code == 204
     assert not folder.exists()
     assert call("DELETE", f"{API}/reports/monday").status_code == 404
+
+
+def test_reports_are_read_while_one_is_removed(call, folders, put):
+    whole = put("whole")
+    answers, over = [], threading.Event()
+
+    def read():
+        while not over.is_set():
+            answers.append(call("GET", f"{API}/reports"))
+            answers.append(call("GET", f"{API}/reports/whole"))
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    try:
+        for number in range(40):
+            copied = shutil.copytree(whole, folders.reports / ".next")
+            assert call("DELETE", f"{API}/reports/whole").status_code == 204, number
+            copied.rename(whole)
+    finally:
+        over.set()
+        reader.join()
+    assert {answer.status_code for answer in answers} <= {200, 404}
+    rows = [row for answer in answers[::2] for row in answer.json()["items"]]
+    assert rows
+    assert {row["verdict"] for row in rows} == {"mismatch"}
+    assert not list(folders.reports.glob(".*"))
 
 
 def test_a_search_runs_the_program_and_puts_its_report_on_the_shelf(call, folders, ran):
