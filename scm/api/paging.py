@@ -9,7 +9,8 @@ import binascii
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
-from typing import Annotated
+from contextlib import suppress
+from typing import Annotated, TypeVar
 from urllib.parse import urlencode
 
 from fastapi import Query, Request, Response
@@ -18,6 +19,7 @@ from scm.api.city import json_response
 from scm.api.problem import RefusedError
 from scm.records.page import Page, T
 
+R = TypeVar("R")
 MOST = 500
 _CURSOR = re.compile(r"k([1-9][0-9]{0,5})?:(.*)", re.DOTALL)
 
@@ -74,6 +76,28 @@ def page_of(
     if wanted is not None:
         raise _bad(cursor, "its row is gone: begin again")
     return Page(items=tuple(found), next=None)
+
+
+def page_of_names(
+    names: Iterable[str], row: Callable[[str], R], *, limit: int, cursor: str
+) -> Page[R]:
+    """Cut a page from the names of files, and read the row of each.
+
+    Args:
+        names: All of them in order.
+        row: Reads one; what it refuses was deleted meanwhile, and is left out.
+        limit: Rows a page.
+        cursor: Of the page before.
+
+    Raises:
+        RefusedError: when the cursor is none of ours, or its file is gone.
+    """
+    page = page_of(names, str, limit=limit, cursor=cursor)
+    rows = []
+    for name in page.items:
+        with suppress(RefusedError):
+            rows.append(row(name))
+    return Page(items=tuple(rows), next=page.next)
 
 
 def cursor_at(key: str, number: int = 1) -> str:

@@ -4,15 +4,15 @@ import argparse
 import sys
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 from scm.command import Command
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
+def study_arguments(parser: argparse.ArgumentParser, out: str) -> Any:
+    """Add a study, where its results go and what runs it; return the group of what runs it."""
     parser.add_argument("study", type=Path, metavar="STUDY", help="the study file, a .toml")
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder of the results (runs/studies/NAME)"
-    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help=f"folder of the results ({out})")
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--workers", type=int, metavar="N", help="processes on this machine (one a core)"
@@ -20,6 +20,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument(
         "--scheduler", metavar="ADDRESS", help="a Dask cluster that exists: tcp://head:8786"
     )
+    return where
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    where = study_arguments(parser, "runs/studies/NAME")
     where.add_argument(
         "--slurm", metavar="OPTIONS", help='Slurm, with options of sbatch: "-p cpu -n 64"'
     )

@@ -3,25 +3,13 @@
 import argparse
 import sys
 from contextlib import closing
-from pathlib import Path
 
 from scm.command import Command
+from scm.commands.study_run import study_arguments
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "study", type=Path, metavar="STUDY", help="a study file with [search] in it"
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder of the results (runs/studies/NAME-search)"
-    )
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--workers", type=int, metavar="N", help="processes on this machine (one a core)"
-    )
-    where.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a Dask cluster that exists: tcp://head:8786"
-    )
+    study_arguments(parser, "runs/studies/NAME-search")
     parser.add_argument(
         "--storage", default="", metavar="URL",
         help="share the search with other commands: postgresql://user@host/database",

@@ -15,7 +15,7 @@ from scm.api.city import Name as BusName
 from scm.api.etag import Matching, tagged
 from scm.api.inputs import Json
 from scm.api.operations import Operations, ProgressReporter, accepted
-from scm.api.paging import Cursor, Limit, page_of, page_response
+from scm.api.paging import Cursor, Limit, page_of, page_of_names, page_response
 from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
@@ -30,7 +30,6 @@ from scm.maps.draw import draw_svg
 from scm.recorder.run_index import RunIndex
 from scm.records.disturbances import RecordedDisturbances
 from scm.records.operations import Operation
-from scm.records.page import Page
 from scm.records.recordings import (
     CarCamera,
     CarFacts,
@@ -94,9 +93,8 @@ def router(city: City, operations: Operations) -> APIRouter:
         responses=answer_page(RecordingRow),
     )
     def all_recordings(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
-        names = page_of(repository.names(), str, limit=limit, cursor=cursor)
-        rows = Page(items=_rows(repository, names.items), next=names.next)
-        return page_response(request, rows)
+        page = page_of_names(repository.names(), repository.row, limit=limit, cursor=cursor)
+        return page_response(request, page)
 
     @routes.get("/{name}", summary="One recording", responses=answer(RecordingRow))
     def one_recording(name: Name) -> Response:
@@ -334,17 +332,6 @@ def _add_parts(routes: APIRouter, repository: RecordingRepository, operations: O
         what = f"{body.from_s:g} to {to_s:g} s of {name}"
         owner = str(request.scope["scm_owner"])
         return accepted(operations.start("cut", what, do, owner=owner))
-
-
-def _rows(repository: RecordingRepository, names: tuple[str, ...]) -> tuple[RecordingRow, ...]:
-    """Return rows of recordings, without those that were deleted meanwhile."""
-    rows = []
-    for name in names:
-        try:
-            rows.append(repository.row(name))
-        except RefusedError:
-            continue
-    return tuple(rows)
 
 
 def _readable(repository: RecordingRepository, name: str) -> RunIndex:

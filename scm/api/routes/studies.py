@@ -7,12 +7,10 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.responses import FileResponse
 
 from scm.api.city import City, json_response
-from scm.api.paging import Cursor, Limit, page_of, page_response
-from scm.api.problem import RefusedError
+from scm.api.paging import Cursor, Limit, page_of_names, page_response
 from scm.api.roles import VIEWER
 from scm.api.schemas import answer, answer_file, answer_page
 from scm.api.study_repository import NAME, StudyRepository
-from scm.records.page import Page
 from scm.records.studies import Study, StudyRow
 
 PAGE_POLICY = (
@@ -42,9 +40,8 @@ def router(city: City) -> APIRouter:
         "", summary="All studies, the one begun last first", responses=answer_page(StudyRow)
     )
     def all_studies(request: Request, limit: Limit = 100, cursor: Cursor = "") -> Response:
-        names = page_of(repository.names(), str, limit=limit, cursor=cursor)
-        rows = Page(items=_rows(repository, names.items), next=names.next)
-        return page_response(request, rows)
+        page = page_of_names(repository.names(), repository.row, limit=limit, cursor=cursor)
+        return page_response(request, page)
 
     @routes.get("/{name}", summary="One study and what came of it", responses=answer(Study))
     async def one_study(name: Name) -> Response:
@@ -64,14 +61,3 @@ def router(city: City) -> APIRouter:
         return FileResponse(path, media_type="text/html", headers=headers)
 
     return routes
-
-
-def _rows(repository: StudyRepository, names: tuple[str, ...]) -> tuple[StudyRow, ...]:
-    """Return rows of studies, without those that were deleted meanwhile."""
-    rows = []
-    for name in names:
-        try:
-            rows.append(repository.row(name))
-        except RefusedError:
-            continue
-    return tuple(rows)
