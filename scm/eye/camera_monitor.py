@@ -21,7 +21,7 @@ from scm.arrays import Floats, Image
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.eye.camera import CameraModel
 from scm.eye.extrinsics import ExtrinsicsEstimator
-from scm.eye.sharpness import EdgeWidth, edge_width
+from scm.eye.sharpness import TAG_CELLS, EdgeWidth, corner_std_px, edge_width
 from scm.records.city_map import MapTag
 from scm.v2x.messages.eye_status import Complaint
 
@@ -39,7 +39,6 @@ MIN_BLUR_PX = 0.5  # and by how much it must be wider
 BLURRED_CELL = 0.9
 """An edge wider than this part of a tag's cell is out of focus in any case."""
 MIN_CONTRAST = 25.0  # grey levels; less and edges are not measured
-TAG_CELLS = 8  # across a tag36h11 inside its border
 MAX_UNSEEN_NS = 1_500 * NS_PER_MS  # without any tag the camera is reported
 FROZEN_NS = NS_PER_S
 MAX_FRAME_GAP_NS = NS_PER_S // 2  # without a frame the camera is reported
@@ -60,6 +59,14 @@ class MonitoredTag:
     sharp_px: float | None = None
     moved_m: float = 0.0
     turned_rad: float = 0.0
+
+    def edge_px(self) -> float:
+        """Return the usual width of its edges of late."""
+        return float(np.median([one.px for one in self.widths]))
+
+    def contrast(self) -> float:
+        """Return its usual step from black to white of late [grey levels]."""
+        return float(np.median([one.contrast for one in self.widths]))
 
 
 class CameraMonitor:
@@ -92,10 +99,17 @@ class CameraMonitor:
         moved = [tag_id for tag_id, found in ours.items() if self._moves(tag_id, found)]
         if moved:
             self._bumped(moved)
-        self.estimator.see(ours, t_ns)
+        for tag_id, found in ours.items():
+            self._tags[tag_id].widths.append(edge_width(grey, found))
+        stds = {
+            tag_id: corner_std_px(self._tags[tag_id].edge_px(), _side(found))
+            for tag_id, found in ours.items()
+            if self._tags[tag_id].contrast() >= MIN_CONTRAST
+        }
+        self.estimator.see(ours, t_ns, stds)
         for tag_id, found in ours.items():
             self._collect_reference(tag_id, found)
-            self._check_blur(tag_id, grey, found)
+            self._check_blur(tag_id, found)
         self._complaints.update(self.misplaced(ours))
         self._check_bump(t_ns)
         self._check_accuracy()
@@ -250,11 +264,10 @@ class CameraMonitor:
                 )
         return found_by_code
 
-    def _check_blur(self, tag_id: int, grey: Image, found: Floats) -> None:
+    def _check_blur(self, tag_id: int, found: Floats) -> None:
         tag_state = self._tags[tag_id]
-        tag_state.widths.append(edge_width(grey, found))
-        width = float(np.median([one.px for one in tag_state.widths]))
-        contrast = float(np.median([one.contrast for one in tag_state.widths]))
+        width = tag_state.edge_px()
+        contrast = tag_state.contrast()
         if contrast < MIN_CONTRAST:
             self._complaints["dim"] = (
                 f"map tag {tag_id} is dim: {contrast:.0f} grey levels between black and white"

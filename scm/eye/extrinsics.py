@@ -18,6 +18,7 @@ sees a tag far outside the tolerance: then the tolerance is widened and the tags
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import msgspec
 import numpy as np
@@ -98,6 +99,7 @@ class ExtrinsicsEstimator:
     _first_ns: int | None = field(init=False, default=None)
     _averages: dict[int, Average] = field(init=False, default_factory=dict)
     _solved: dict[int, Floats] = field(init=False, default_factory=dict)
+    _corner_stds_px: Mapping[int, float] = field(init=False, default_factory=dict)
     _knocked: bool = field(init=False, default=False)
     _base: tuple[Floats, Floats] = field(init=False)
 
@@ -136,11 +138,18 @@ class ExtrinsicsEstimator:
         """Whether the tags are further from the calibration than its tolerance explains."""
         return self._knocked
 
-    def see(self, seen: Mapping[int, Floats] | Floats | None, t_ns: int) -> None:
+    def see(
+        self,
+        seen: Mapping[int, Floats] | Floats | None,
+        t_ns: int,
+        corner_stds_px: Mapping[int, float] = MappingProxyType({}),
+    ) -> None:
         """Update with the corners of the map's tags in a frame, (4, 2) [px] by tag id.
 
-        An array without an id is the first tag's; without any corners the last estimate stays.
+        An array without an id is the first tag's; without any corners the last estimate stays. A
+        blurred tag's corners are further off than `corner_std_px`; how far, its own std says.
         """
+        self._corner_stds_px = corner_stds_px
         if self._first_ns is None:
             self._first_ns = t_ns
         if isinstance(seen, np.ndarray):
@@ -241,7 +250,8 @@ class ExtrinsicsEstimator:
 
     def _noise(self, tags: list[MapTag], points: Floats) -> Floats:
         """Return the covariance of all corner coordinates, (8 n, 8 n) [px^2]."""
-        noise = self.corner_std_px**2 * np.eye(8 * len(tags))
+        stds = [self._corner_stds_px.get(one.tag_id, self.corner_std_px) for one in tags]
+        noise = np.diag(np.repeat(np.square(stds), 8))
         for index, one in enumerate(tags):
             if one is not self.tag:
                 shift = by_place(self.model, points[index]).reshape(8, 2)

@@ -17,6 +17,7 @@ from scm.eye.sources.synthetic import SyntheticSource
 from scm.maps.load import load_map
 from scm.records.city_map import MapTag
 from scm.scenery.bodies import NIGEL
+from scm.scenery.tags import floor_corners
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 CITY = load_map("driving_school")
@@ -167,7 +168,7 @@ def worst_error_m(camera):
 def test_a_focus_that_drifts_is_said_with_both_widths(picture):
     camera = Camera(picture, sharpness=True)
     camera.see(20)
-    assert camera.see(15, grey=cv2.GaussianBlur(picture, (0, 0), 1.6)) == ["focus"]
+    assert camera.see(15, grey=cv2.GaussianBlur(picture, (0, 0), 1.6)) == ["focus", "unsure"]
     assert "at the start" in camera.said("focus")
     assert camera.see(15) == []
 
@@ -247,3 +248,16 @@ def test_a_camera_without_stated_doubt_is_sure_with_one_tag():
     watch = CameraMonitor(ExtrinsicsEstimator(TRUE, (CITY.tag,)))
     watch.see(0, np.full((720, 1280), 128, dtype=np.uint8), {0: watch.estimator.expected(CITY.tag)})
     assert "unsure" not in watch.flags(0)
+
+
+def test_a_blurred_tag_corrects_the_camera_less(picture):
+    turned_px = np.array([[0.2, 0.0], [0.0, 0.2], [-0.2, 0.0], [0.0, -0.2]])
+    corners = {0: TRUE.project(floor_corners(CITY.tag)) + turned_px}
+
+    def yaw_error(grey):
+        watch = CameraMonitor(ExtrinsicsEstimator(TRUE, (CITY.tag,)))
+        for frame in range(10):
+            watch.see(frame * PERIOD_NS, grey, corners)
+        return abs(watch.estimator.model.extrinsics[3] - TRUE.extrinsics[3])
+
+    assert yaw_error(cv2.GaussianBlur(picture, (0, 0), 1.2)) < yaw_error(picture) / 3.0
