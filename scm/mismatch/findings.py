@@ -125,13 +125,33 @@ class PartErrors(Struct, kw_only=True, frozen=True):
     noise_floor: Mapping[str, float]
 
 
+class Witness(Struct, kw_only=True, frozen=True):
+    """A kinematic bicycle fitted to `fit` and `choose`: its errors on `confirm`, as in `Fit`.
+
+    Attributes:
+        numbers: That were fitted, by name with unit.
+    """
+
+    position_m: float
+    yaw_rad: float
+    numbers: Mapping[str, float]
+
+
 class Fit(Struct, kw_only=True, frozen=True):
-    """How well free runs of `horizon_s` fit before and after, on three disjoint parts."""
+    """How well free runs of `horizon_s` fit before and after, on three disjoint parts.
+
+    Attributes:
+        retuned: Errors on `confirm` of the given car with its own numbers refitted and no effect;
+            None where no effect was found.
+        witness: What a plain model makes of `confirm`; None where windows are too few.
+    """
 
     horizon_s: float
     fit: PartErrors
     choose: PartErrors
     confirm: PartErrors
+    retuned: Mapping[str, float] | None = None
+    witness: Witness | None = None
 
 
 class Unanswered(Struct, kw_only=True, frozen=True):

@@ -6,7 +6,7 @@ Every text that goes in is escaped by `tag`.
 import math
 import platform
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
@@ -14,12 +14,13 @@ from pathlib import Path
 import scm
 from scm.data_quality.quality import MOST_NAMED, DataProblem
 from scm.mismatch.evidence import RefittedParameter
-from scm.mismatch.findings import Diagnosis, Fit
+from scm.mismatch.findings import Diagnosis, Fit, Witness
 from scm.mismatch.report.panels import Panel
 from scm.mismatch.report.plot import Picture, colours_css
 from scm.mismatch.report.record import Report
 from scm.mismatch.report.sentences import alike, sensors, spans
 from scm.mismatch.report.wording import (
+    bicycle_name,
     capital,
     interval,
     joined,
@@ -67,6 +68,16 @@ _PART_NAMES = {
     "confirm": "the part that only confirms",
     "choose": "the part that chooses the effect",
     "fit": "the part that fits the numbers",
+}
+_BICYCLE = {
+    "steering_gain_rad": ("wheel angle at full steering", "rad"),
+    "steering_offset_rad": ("wheel angle straight ahead", "rad"),
+    "steering_delay_s": ("delay of the steering", "s"),
+    "understeer_s2_per_m2": ("understeer", "s^2/m^2"),
+    "speed_gain_mps": ("speed per throttle beyond the dead-band", "m/s"),
+    "dead_band": ("dead-band of the throttle", ""),
+    "throttle_delay_s": ("delay of the throttle", "s"),
+    "time_constant_s": ("time constant of the speed", "s"),
 }
 _NEGLIGIBLE = 1e-4  # of a parameter's standard deviation; less is written as zero
 _ERROR_NAMES = {
@@ -208,19 +219,46 @@ def _fit_table(fit: Fit | None) -> str:
     if fit is None:
         return ""
     rows: list[tuple[str, ...]] = []
+    head = ["error", "before", "after", "noise alone"]
+    head += ["its own numbers refitted alone"] if fit.retuned else []
+    head += [bicycle_name(fit.witness)] if fit.witness else []
     for name, words in _PART_NAMES.items():
         part = getattr(fit, name)
         rows.append((f"{capital(words)}: {part.windows} windows",))
+        others = _others(fit) if name == "confirm" else ()
         for key in part.before:
             title, unit = _error_name(key)
-            sides = (part.before, part.after, part.noise_floor)
+            sides = (part.before, part.after, part.noise_floor, *others)
             known = [side.get(key, math.nan) for side in sides]
             shown = zip(quantities(known, unit), sides, strict=True)
             values = [value if key in side else "" for value, side in shown]
-            rows.append((title, *values))
-    head = ("error", "before", "after", "noise alone")
+            rows.append((title, *values, *[""] * (len(head) - 1 - len(values))))
     text = f"Root mean squares at the end of free runs of {quantity(fit.horizon_s, 's')}."
-    return tag("p", text) + table(head, rows, (1, 2, 3)) if rows else ""
+    numbers = tuple(range(1, len(head)))
+    return tag("p", text) + table(head, rows, numbers) + _bicycle(fit.witness) if rows else ""
+
+
+def _others(fit: Fit) -> tuple[Mapping[str, float], ...]:
+    """Return the errors on the part that only confirms of models beside the two cars."""
+    found = () if fit.retuned is None else (fit.retuned,)
+    plain = fit.witness
+    return found if plain is None else (
+        *found, {"position_m": plain.position_m, "yaw_rad": plain.yaw_rad})  # fmt: skip
+
+
+def _bicycle(witness: Witness | None) -> str:
+    """Return what the plain model is, and its numbers."""
+    if witness is None:
+        return ""
+    numbers = []
+    for name, value in witness.numbers.items():
+        words, unit = _BICYCLE[name]
+        numbers.append(f"{words} {quantity(value, unit) if unit else short(value)}")
+    text = (
+        f"The {bicycle_name(witness)} knows nothing of the simulator. It is fitted to the first "
+        "two parts of the recording, and shows what a plain model reaches on the third: "
+    )
+    return tag("p", text + joined(numbers) + ".")
 
 
 def _error_name(key: str) -> tuple[str, str]:

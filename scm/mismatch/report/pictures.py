@@ -24,7 +24,7 @@ from scm.mismatch.report.plot import (
     ticks_across,
     whiskers,
 )
-from scm.mismatch.report.wording import capital, quantities, title_of, unit_text
+from scm.mismatch.report.wording import bicycle_name, capital, quantities, title_of, unit_text
 
 _WIDTH, _HEIGHT = 440.0, 270.0  # of a picture beside another [px]
 _ROW, _BETTER_ROW = 25.0, 52.0
@@ -99,6 +99,8 @@ def _better(diagnosis: Diagnosis, retuned_m: float | None = None) -> Picture | N
     rows = [("before", "the simulator as it was", before), ("after", found, after)]
     if retuned_m is not None:
         rows.insert(1, ("retuned", "its own numbers refitted, no new physics", retuned_m))
+    if (witness := diagnosis.fit.witness) is not None:
+        rows.append(("witness", bicycle_name(witness), witness.position_m))
     values = [value for _, _, value in rows]
     if not all(map(math.isfinite, values)):
         return None

@@ -9,6 +9,7 @@ from scm.data_quality.quality import DataProblem, Span
 from scm.mismatch.effect_catalogue import identifications
 from scm.mismatch.findings import Diagnosis, Effect, Equation, Located, Place, Verdict
 from scm.mismatch.report.wording import (
+    bicycle_name,
     capital,
     joined,
     percent,
@@ -170,7 +171,9 @@ def better_sentence(diagnosis: Diagnosis, retuned_m: float | None = None) -> str
         return ""
     floor = fit.confirm.noise_floor.get("position_m", math.nan)
     own = math.nan if retuned_m is None else retuned_m
-    was, now, tuned, noise = quantities((before, after, own, floor), "m")
+    bicycle = math.nan if fit.witness is None else fit.witness.position_m
+    was, now, tuned, noise, other = quantities((before, after, own, floor, bicycle), "m")
+    plain = f" A {bicycle_name(fit.witness)} is {other} off." if fit.witness else ""
     text = (
         f"On parts of the recording that no fit has seen, after {quantity(fit.horizon_s, 's')} of "
         f"driving by the recorded commands alone, the simulator is {was} off"
@@ -179,12 +182,13 @@ def better_sentence(diagnosis: Diagnosis, retuned_m: float | None = None) -> str
         found = "the likeliest of them" if diagnosis.undecided else "what was found"
         alone = f"; with its own numbers refitted alone, {tuned}" if math.isfinite(own) else ""
         beside = f" as well, {now}" if alone else f" and its own numbers refitted, {now}"
-        return f"{text}{alone}; with {found}{beside}."
+        return f"{text}{alone}; with {found}{beside}.{plain}"
     if diagnosis.undecided and after < before:
         text += f"; with the best of these, {now}"
     elif diagnosis.verdict is Verdict.NONE:
         text += f"; with its own numbers refitted within their standard deviations, {now}"
-    return f"{text}. Measurement noise alone causes {noise}." if floor > 0 else f"{text}."
+    noise = f" Measurement noise alone causes {noise}." if floor > 0 else ""
+    return f"{text}.{plain}{noise}"
 
 
 def advice_of(effect: Effect) -> str:

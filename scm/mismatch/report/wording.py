@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from scm.mismatch.findings import Effect, Estimate
+from scm.mismatch.findings import Effect, Estimate, Witness
 from scm.vehicles.describe_effects import all_effects
 
 _SCALES = {  # smallest value of each unit, and how many of it one SI unit is
@@ -153,6 +153,11 @@ def name_of(name: str, unit: str) -> str:
 def amounts(parameters: Mapping[str, Estimate]) -> list[str]:
     """Return each parameter with its value and interval."""
     return [f"{name_of(name, e.unit)} {interval(e)}" for name, e in parameters.items()]
+
+
+def bicycle_name(witness: Witness) -> str:
+    """Return what the plain model is called that a car is held against."""
+    return f"kinematic bicycle with {len(witness.numbers)} numbers"
 
 
 def joined(names: Sequence[str], word: str = "and") -> str:

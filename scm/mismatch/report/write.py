@@ -16,7 +16,15 @@ from scm.mismatch.report.car_file import FILE, given_text, write_car, write_own_
 from scm.mismatch.report.page import page_html
 from scm.mismatch.report.record import drawn_text, json_text, make_report, on_clock
 from scm.mismatch.report.sentences import can_judge, processor_sentence, sensors, verdict_sentence
-from scm.mismatch.report.wording import amounts, percent, pretty, quantities, quantity, title_of
+from scm.mismatch.report.wording import (
+    amounts,
+    bicycle_name,
+    percent,
+    pretty,
+    quantities,
+    quantity,
+    title_of,
+)
 from scm.vehicles.car import Car
 
 PAGE, FIELDS, DRAWN, PICTURES = "report.html", "report.json", "drawn.json", "pictures"
@@ -145,7 +153,10 @@ def _better(diagnosis: Diagnosis, retuned_m: float | None) -> Iterator[str]:
         return
     sides = [fit.confirm.before["position_m"], fit.confirm.after.get("position_m", math.nan)]
     own = math.nan if retuned_m is None else retuned_m
-    before, after, tuned = quantities((*sides, own), "m")
+    bicycle = math.nan if fit.witness is None else fit.witness.position_m
+    before, after, tuned, plain = quantities((*sides, own, bicycle), "m")
     horizon = quantity(fit.horizon_s, "s")
-    alone = "" if math.isnan(own) else f" (with its own numbers refitted alone: {tuned})"
-    yield f"  position error after {horizon}, on unseen parts: {before} -> {after}{alone}"
+    beside = [] if math.isnan(own) else [f"with its own numbers refitted alone: {tuned}"]
+    beside += [] if fit.witness is None else [f"a {bicycle_name(fit.witness)}: {plain}"]
+    brackets = f" ({'; '.join(beside)})" if beside else ""
+    yield f"  position error after {horizon}, on unseen parts: {before} -> {after}{brackets}"

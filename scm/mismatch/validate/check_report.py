@@ -1,9 +1,9 @@
-"""A report's figures, worked out again from what it wrote: its car files in its own windows."""
+"""A report's figures, worked out again from what it wrote: its cars in its own windows."""
 
 import csv
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,10 +16,13 @@ from scm.mismatch.fit.data_split import NAMES
 from scm.mismatch.report.car_file import FILE
 from scm.mismatch.report.write import FIELDS, GIVEN, WINDOWS
 from scm.mismatch.usable_data import check
+from scm.mismatch.validate.witness import UNSEEN, errors_of
 from scm.recording.read import Recording
+from scm.replay.drive import Drive
 from scm.replay.free_run import free_run
 from scm.vehicles.car import Car, load_car
 
+Row = tuple[int, str, float]  # recording, part and start of a window
 AGREES = 0.005  # relative difference within which a figure is the report's
 
 
@@ -30,7 +33,7 @@ class Figure:
     Attributes:
         part: `fit`, `choose` or `confirm`.
         name: `position_m` or `yaw_rad`.
-        car: `given.toml` or `car.toml`.
+        car: `given.toml`, `car.toml` or `bicycle`, whose numbers `report.json` holds.
     """
 
     part: str
@@ -72,7 +75,22 @@ def check_report(folder: Path, recordings: Sequence[Recording]) -> list[Figure]:
                 if error in errors and mine.any():
                     again = float(np.sqrt(np.mean(errors[error][mine] ** 2)))
                     figures.append(Figure(part, int(mine.sum()), error, name, reported, again))
-    return figures
+    return [*figures, *_of_bicycle(fit, usable, given, rows)]
+
+
+def _of_bicycle(
+    fit: Mapping[str, Any], recordings: Sequence[Recording], given: Car, rows: Sequence[Row]
+) -> Iterator[Figure]:
+    """Yield the errors of the kinematic bicycle on the part that only confirms."""
+    reported = fit.get("witness")
+    unseen = [row for row in rows if row[1] == UNSEEN]
+    if reported is None or not unseen:
+        return
+    drives = [Drive(recording, given) for recording in recordings]
+    windows = np.array([row[0] for row in unseen]), np.array([row[2] for row in unseen])
+    again = errors_of(drives, given, windows, float(fit["horizon_s"]), reported["numbers"])
+    for name, now in again.items():
+        yield Figure(UNSEEN, len(unseen), name, "bicycle", reported[name], now)
 
 
 def _fields(folder: Path) -> dict[str, Any]:
@@ -84,7 +102,7 @@ def _fields(folder: Path) -> dict[str, Any]:
     return fields
 
 
-def _windows(folder: Path, recordings: int) -> list[tuple[int, str, float]]:
+def _windows(folder: Path, recordings: int) -> list[Row]:
     """Return recording, part and start of each of a report's windows."""
     path = folder / WINDOWS
     try:
@@ -109,7 +127,7 @@ def _windows(folder: Path, recordings: int) -> list[tuple[int, str, float]]:
 def _errors(
     recordings: Sequence[Recording],
     car: Car,
-    rows: Sequence[tuple[int, str, float]],
+    rows: Sequence[Row],
     horizon: float,
 ) -> tuple[np.ndarray[tuple[int], np.dtype[np.str_]], dict[str, Floats]]:
     """Return the part of each window, and the errors at its end."""

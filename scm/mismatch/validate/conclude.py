@@ -1,9 +1,10 @@
 """The validate step: what was selected, judged by free runs, located and put into words."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 
 from scm.errors import RecordingError, ScmError
 from scm.mismatch.discovery.decide import is_discovered
@@ -21,6 +22,7 @@ from scm.mismatch.validate.found_car import CarFiles, as_written, on
 from scm.mismatch.validate.free_runs import judge, nothing_got_worse
 from scm.mismatch.validate.locate import locate, strayed
 from scm.mismatch.validate.residuals import on_one_axis
+from scm.mismatch.validate.witness import witness_of
 from scm.vehicles.car import Car
 
 POSE = ("position_m", "yaw_rad")
@@ -74,7 +76,11 @@ def conclude(selected: Selected, notify: Notify) -> Result:
     _, retuned_car = _written(selected, files, retuned)
     valid = _validated(selected, files, retuned_car)
     best, effects, fit = valid.best, valid.effects, valid.fit
-    retuned_m = retuned_error(selected, retuned_car, valid.car) if best.effects else None
+    if fit is not None and valid.free_runs is not None:
+        notify("fitting a kinematic bicycle as witness")
+        own = retuned_errors(selected, retuned_car, valid.car) if best.effects else None
+        witness = witness_of(selected.drives, car, valid.free_runs)
+        fit = structs.replace(fit, retuned=own, witness=witness)
     located, residuals = locate(retuned, best)
     suggestions = () if selected.context.by_windows else undecided_of(selected, best, notify)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
@@ -87,7 +93,8 @@ def conclude(selected: Selected, notify: Notify) -> Result:
     evidence = Evidence(
         vehicle=car.name, recordings=titles, residuals=residuals, free_runs=valid.free_runs,
         refitted=as_written(refitted(best, car), valid.car or car), tried=selected.tried,
-        curves=_curves(selected, best), retuned_m=retuned_m, pauses=_pauses(selected),
+        curves=_curves(selected, best), pauses=_pauses(selected),
+        retuned_m=fit.retuned.get(POSE[0]) if fit and fit.retuned else None,
         widened=widened_of(best.model, car),
     )  # fmt: skip
     return Result(
@@ -141,13 +148,15 @@ def _judged(
         return None, None
 
 
-def retuned_error(selected: Selected, retuned: Car | None, found: Car | None) -> float | None:
-    """Return how far the re-tuned car strays [m] in the windows in which the one found is judged.
+def retuned_errors(
+    selected: Selected, retuned: Car | None, found: Car | None
+) -> Mapping[str, float] | None:
+    """Return how far the re-tuned car strays in the windows in which the one found is judged.
 
     None where no part has a whole window, or a car has no file.
     """
     fit, _ = _judged(selected, retuned, found)
-    return None if fit is None else fit.confirm.before.get(POSE[0])
+    return None if fit is None else fit.confirm.before
 
 
 def strays_more(selected: Selected, fit: Fit, retuned: Car | None, found: Car | None) -> bool:

@@ -168,8 +168,9 @@ def judge(
     if not judged:
         msg = f"{drives[0].recording.path}: no window of {horizon:g} s without a gap in the poses"
         raise RecordingError(msg)
-    every = {name: _part(judged, name) for name in NAMES}
-    return Fit(horizon_s=horizon, **every), _free_runs(judged, on_one_axis(drives), horizon)
+    fit, choose, confirm = (_part(judged, name) for name in NAMES)
+    errors = Fit(horizon_s=horizon, fit=fit, choose=choose, confirm=confirm)
+    return errors, _free_runs(judged, on_one_axis(drives), horizon)
 
 
 def nothing_got_worse(fit: Fit) -> tuple[str, ...]:

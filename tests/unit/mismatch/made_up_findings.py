@@ -22,7 +22,9 @@ from scm.mismatch.findings import (
     Unanswered,
     Undecided,
     Verdict,
+    Witness,
 )
+from scm.mismatch.validate.witness import NAMES
 from scm.vehicles.car import load_car
 from scm.vehicles.describe_effects import all_effects
 from scm.vehicles.own_term import load_own_term
@@ -147,12 +149,18 @@ def part(windows, before, after):
     )
 
 
-def fit(before=0.361, after=0.042):
+def bicycle(position_m=0.093):
+    numbers = dict(zip(NAMES, (0.52, -0.021, 0.18, 0.3, 1.1, 0.05, 0.08, 0.4), strict=True))
+    return Witness(position_m=position_m, yaw_rad=position_m / 2, numbers=numbers)
+
+
+def fit(before=0.361, after=0.042, **more):
     return Fit(
         horizon_s=3.0,
         fit=part(14, before * 1.05, after * 0.95),
         choose=part(8, before * 0.93, after * 1.02),
         confirm=part(8, before, after),
+        **{"witness": bicycle(), **more},
     )
 
 

@@ -17,7 +17,7 @@ from scm.mismatch.validate.conclude import (
     Result,
     as_given,
     gained_nothing,
-    retuned_error,
+    retuned_errors,
     strays_more,
     verdict_of,
 )
@@ -47,7 +47,7 @@ def test_the_re_tuned_car_strays_by_what_refitting_alone_could_not_take_off():
     selected = SimpleNamespace(best=SimpleNamespace(model=model), drives=[drive], parts=parts)
     found, tuned = (car_with({"steering.trim_rad": trim}) for trim in (true, half))
     fit, _ = judge([drive], big_nigel(), found, parts)
-    strays_m = retuned_error(selected, tuned, found)
+    strays_m = retuned_errors(selected, tuned, found)["position_m"]
     before, after = (side["position_m"] for side in (fit.confirm.before, fit.confirm.after))
     assert after < 0.9 * strays_m < 0.7 * before
 

@@ -37,7 +37,9 @@ def test_what_stands_inside_has_exactly_the_fixed_fields():
     assert set(report["effects"][0]["rivals"][0]) == {"name", "probability", "ruled_out_by"}
     estimate = report["effects"][0]["parameters"]["time_constant_s"]
     assert set(estimate) == {"value", "low", "high", "unit"}
-    assert set(report["fit"]) == {"horizon_s", "fit", "choose", "confirm"}
+    assert set(report["fit"]) == {"horizon_s", "fit", "choose", "confirm", "retuned", "witness"}
+    assert report["fit"]["retuned"] is None
+    assert set(report["fit"]["witness"]) == {"position_m", "yaw_rad", "numbers"}
     assert set(report["fit"]["confirm"]) == {"windows", "before", "after", "noise_floor"}
 
 

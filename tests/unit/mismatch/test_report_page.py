@@ -314,7 +314,8 @@ def test_sensors_of_one_table_are_named_as_a_person_names_them(tmp_path):
 def test_the_command_line_holds_what_was_found_against_refitted_numbers_too(tmp_path):
     found, *_ = made_up.one_effect()
     (line,) = [one for one in summary(found, tmp_path, 0.123).splitlines() if "unseen" in one]
-    assert line.endswith("(with its own numbers refitted alone: 12.3 cm)")
+    alone = "(with its own numbers refitted alone: 12.3 cm; "
+    assert line.endswith(f"{alone}a kinematic bicycle with 8 numbers: 9.3 cm)")
     assert "refitted" not in summary(found, tmp_path)
 
 
@@ -326,7 +327,7 @@ def test_a_bars_number_stands_clear_of_the_mark_of_noise(tmp_path):
         svg = (tmp_path / "pictures" / "better.svg").read_text()
         mark = float(re.search(r'd="M([\d.]+) ', svg).group(1))
         texts = re.findall(r'<text x="([\d.]+)"[^>]*class="strong"[^>]*>([^<]*)<', svg)
-        assert len(texts) == 2
+        assert len(texts) == 3
         for x, words in texts:
             assert not float(x) - 4.0 < mark < float(x) + 7.0 * len(words)
 
@@ -454,4 +455,25 @@ def test_what_was_found_is_held_against_the_car_with_its_own_numbers_refitted(tm
     said = "with its own numbers refitted alone, 21.3 cm; with what was found as well, 4.2 cm."
     assert said in first.replace("&nbsp;", " ")
     assert "its own numbers refitted, no new physics" in first
-    assert first.count('class="bar-') == 3
+    assert first.count('class="bar-') == 4
+
+
+def test_a_plain_model_stands_beside_the_car_found_in_words_bars_and_table(tmp_path):
+    found, *others = made_up.one_effect()
+    fit = made_up.fit(retuned=made_up.errors(0.213, 0.1065))
+    page = written(tmp_path, (replace(found, fit=fit), *others)).replace("&nbsp;", " ")
+    first, below = page[: page.index("<nav")], page[page.index("<nav") :]
+    assert "A kinematic bicycle with 8 numbers is 9.3 cm off." in first
+    assert first.count("kinematic bicycle with 8 numbers") == 2
+    table = below[below.index("noise alone") : below.index("</table>", below.index("noise alone"))]
+    rows = [re.sub(r"<[^>]*>", "|", row) for row in table.split("</tr>")]
+    confirmed = next(i for i, row in enumerate(rows) if "only confirms: 8 windows" in row)
+    columns = re.sub(r"\|+", "|", rows[confirmed + 1]).strip("|").split("|")
+    assert columns == ["position", "36.1 cm", "4.2 cm", "0.60 cm", "21.3 cm", "9.3 cm"]
+    assert "wheel angle at full steering 29.8°" in below
+
+
+def test_a_report_without_a_plain_model_says_nothing_of_one(tmp_path):
+    found, *others = made_up.one_effect()
+    page = written(tmp_path, (replace(found, fit=made_up.fit(witness=None)), *others))
+    assert "bicycle" not in page

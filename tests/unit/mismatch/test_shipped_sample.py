@@ -32,8 +32,11 @@ def test_the_sample_s_steering_trim_is_found_and_its_report_is_true(
     assert found.fit is not None
     confirm = found.fit.confirm
     assert confirm.after["position_m"] < 0.1 * confirm.before["position_m"]
+    assert found.fit.retuned is not None
+    assert found.fit.witness is not None
+    assert confirm.after["position_m"] < 0.5 * found.fit.witness.position_m
     write(searched, tmp_path)
     assert searched.selected is not None
     figures = check_report(tmp_path, searched.selected.recordings)
-    assert figures
+    assert {figure.car for figure in figures} == {"given.toml", "car.toml", "bicycle"}
     assert [figure for figure in figures if not figure.agrees] == []
