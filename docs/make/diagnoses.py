@@ -16,9 +16,9 @@ import numpy as np
 
 from scm.data_quality.prepare import prepare
 from scm.mismatch.evidence import FreeRuns
-from scm.mismatch.fit.data_split import split
 from scm.mismatch.pipeline import Result, diagnose, write
 from scm.mismatch.validate.free_runs import judge
+from scm.mismatch.validate.witness import UNSEEN, strayed_by
 from scm.recording.read import read_recordings
 from scm.replay.free_run import FreeRun, free_run
 from scm.vehicles.car import Car, load_car
@@ -120,13 +120,21 @@ def _figures(found: Result) -> None:
     for own in found.evidence.refitted:
         if abs(own.found.value - own.given) > 0.5 * (own.given_std or 1.0):
             _print(f"own: {own.key}: {own.given:.4g} -> {own.found.value:.4g}")
-    model, retuned, runs = found.model, found.retuned_car, found.evidence.free_runs
-    if model is None or retuned is None or runs is None or diagnosis.fit is None:
+    searched, retuned, runs = found.selected, found.retuned_car, found.evidence.free_runs
+    if searched is None or retuned is None or runs is None or diagnosis.fit is None:
         return
-    tuned = judge(model.drives, model.car, retuned, split(model), diagnosis.fit.horizon_s)[1]
+    horizon_s = diagnosis.fit.horizon_s
+    tuned = judge(searched.drives, found.car, retuned, searched.parts, horizon_s)[1]
     _print(f"free runs of {diagnosis.fit.horizon_s:g} s, position [cm], held out:")
     for title, side in (("nominal", runs), ("retuned", tuned), ("found", runs)):
         _print(f"  {title}: {_errors(side, 'before' if title == 'nominal' else 'after')}")
+    if (witness := diagnosis.fit.witness) is not None:
+        held = np.array(runs.part) == UNSEEN
+        windows = runs.recording[held], runs.stamp_s[held]
+        far = strayed_by(searched.drives, found.car, windows, horizon_s, witness.numbers)[
+            "position_m"
+        ]
+        _print(f"  bicycle: mean {100.0 * far.mean():.2f}, median {100.0 * np.median(far):.2f}")
     for name, before in diagnosis.fit.confirm.before.items():
         _print(f"  rms {name}: {before:.4g} -> {diagnosis.fit.confirm.after[name]:.4g}")
 

@@ -154,6 +154,29 @@ class Fit(Struct, kw_only=True, frozen=True):
     witness: Witness | None = None
 
 
+class Dropped(Struct, kw_only=True, frozen=True):
+    """An effect that was selected, and that the car handed out does not have.
+
+    Attributes:
+        text: One sentence: what does not hold on driving that no fit has seen.
+    """
+
+    name: str
+    text: str = field(name="said")
+
+
+class Failure(Struct, kw_only=True, frozen=True):
+    """A plain model follows the car better than what was fitted.
+
+    Attributes:
+        text: By how much, and which car is handed out.
+        reasons: Sentences on what can be read off the fit.
+    """
+
+    text: str = field(name="said")
+    reasons: tuple[str, ...] = ()
+
+
 class Unanswered(Struct, kw_only=True, frozen=True):
     """A question that the search had no time to answer.
 
@@ -171,6 +194,8 @@ class Diagnosis(Struct, kw_only=True, frozen=True):
     """Everything that was found, and the questions left open; the fields of `report.json`.
 
     Attributes:
+        dropped: Effects that do not hold on driving that no fit has seen.
+        failure: Why no effect is handed out; None where none has to be held back.
         processor_share: Share of one processor that the search got; None if it was not measured.
         compared_s: The longest recordings that the budget allows to compare as a whole; longer
             ones are sampled. None without a budget.
@@ -186,6 +211,8 @@ class Diagnosis(Struct, kw_only=True, frozen=True):
     unanswered: tuple[Unanswered, ...] = field(default=(), name="unasked")
     processor_share: float | None = None
     compared_s: float | None = None
+    dropped: tuple[Dropped, ...] = ()
+    failure: Failure | None = None
 
 
 def folders_of(undecided: Sequence[Undecided]) -> tuple[str, ...]:

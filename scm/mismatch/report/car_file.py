@@ -10,6 +10,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from textwrap import wrap
 
 from msgspec import structs
 
@@ -35,6 +36,7 @@ _SAME_SHARE = 0.01  # two numbers that differ by less than this share are one
 FILE = "car.toml"
 FOUND_DIGITS = 6  # of a number found: far more than any interval allows
 COMMENT = "found by scm mismatch"
+_COMMENT_WIDTH = 96
 _INTERVAL_STDS = 3.29  # of a normal distribution, from end to end of a 90 % interval
 _Entries = Mapping[str, Mapping[str, object]]
 
@@ -53,10 +55,10 @@ def write_car(
         msg = f"{FILE}: the file of an effect of its own is gone: {error}"
         raise CarError(msg) from error
     entries = dict(_entries(diagnosis, evidence, car, patched))
-    path = folder / FILE
-    path.write_text(_edited(car, patched, entries, evidence), encoding="utf-8")
+    path, note = folder / FILE, _note(diagnosis)
+    path.write_text(note + _edited(car, patched, entries, evidence), encoding="utf-8")
     if not _loads_as(path, patched):
-        path.write_text(_anew(patched, entries, evidence), encoding="utf-8")
+        path.write_text(note + _anew(patched, entries, evidence), encoding="utf-8")
         load_car(path)
     return [FILE, *own]
 
@@ -197,6 +199,13 @@ def _headline(evidence: Evidence) -> str:
         f"# With what `scm mismatch` found in {_plain(_recording(evidence))}: numbers that it "
         'moved have a\n# source that begins with "mismatch"; all else is the file that was given.\n'
     )
+
+
+def _note(diagnosis: Diagnosis) -> str:
+    """Return a comment that says why the file does not hold what was found; empty if it does."""
+    failure = diagnosis.failure
+    texts = () if failure is None else (failure.text, *failure.reasons)
+    return "".join(f"# {line}\n" for text in texts for line in wrap(_plain(text), _COMMENT_WIDTH))
 
 
 def _plain(text: str) -> str:

@@ -22,6 +22,7 @@ from scm.mismatch.report.sentences import alike, sensors, spans
 from scm.mismatch.report.wording import (
     bicycle_name,
     capital,
+    error_name,
     interval,
     joined,
     name_of,
@@ -80,14 +81,6 @@ _BICYCLE = {
     "time_constant_s": ("time constant of the speed", "s"),
 }
 _NEGLIGIBLE = 1e-4  # of a parameter's standard deviation; less is written as zero
-_ERROR_NAMES = {
-    "yaw": "heading",
-    "gyro": "yaw rate, gyro",
-    "wheel": "distance, wheels",
-    "accel_x": "forward acceleration, IMU",
-    "accel_y": "sideways acceleration, IMU",
-}
-_ERROR_UNITS = {"m": "m", "rad": "rad", "mps": "m/s", "s": "s"}
 _SIDES = (
     '<input type="radio" name="side" id="show-before" checked>'
     '<label for="show-before">Before</label>'
@@ -227,7 +220,7 @@ def _fit_table(fit: Fit | None) -> str:
         rows.append((f"{capital(words)}: {part.windows} windows",))
         others = _others(fit) if name == "confirm" else ()
         for key in part.before:
-            title, unit = _error_name(key)
+            title, unit = error_name(key)
             sides = (part.before, part.after, part.noise_floor, *others)
             known = [side.get(key, math.nan) for side in sides]
             shown = zip(quantities(known, unit), sides, strict=True)
@@ -259,14 +252,6 @@ def _bicycle(witness: Witness | None) -> str:
         "two parts of the recording, and shows what a plain model reaches on the third: "
     )
     return tag("p", text + joined(numbers) + ".")
-
-
-def _error_name(key: str) -> tuple[str, str]:
-    """Return the words and the unit of an error such as `position_m`."""
-    stem, _, unit = key.rpartition("_")
-    if unit not in _ERROR_UNITS:
-        return key, "1"
-    return _ERROR_NAMES.get(stem, stem.replace("_", " ")), _ERROR_UNITS[unit]
 
 
 def _parameter_table(diagnosis: Diagnosis) -> str:

@@ -50,16 +50,16 @@ class Panel(NamedTuple):
 
 def panels_of(diagnosis: Diagnosis, evidence: Evidence) -> list[Panel]:
     """Return what to know at first sight: effects, questions, problems of the recording."""
-    panels = [*_effects(diagnosis), *_questions(diagnosis)]
+    panels = [*_failed(diagnosis), *_effects(diagnosis), *_questions(diagnosis)]
     if diagnosis.located and not diagnosis.effects:
         where = ("Where", where_and_when(diagnosis.located))
         panels.append(Panel("effect", "Located", "Where the error is", [where]))
-    panels += _at_limit(evidence)
+    panels += [*_dropped(diagnosis), *_at_limit(evidence)]
     if diagnosis.unanswered:
         panels.append(_out_of_time(diagnosis))
     elif diagnosis.verdict is Verdict.NONE and can_judge(diagnosis):
         panels.append(_checked(evidence))
-    if diagnosis.verdict is Verdict.MISMATCH and not diagnosis.effects:
+    if diagnosis.verdict is Verdict.MISMATCH and not (diagnosis.effects or diagnosis.failure):
         panels.append(_unexplained(evidence))
     return [*panels, *_problems(diagnosis, evidence)]
 
@@ -117,6 +117,29 @@ def _separation(question: Undecided, folder: str) -> str:
         f"They differ by {stds:.1f} standard deviations; {_ENOUGH_STDS:g} are enough to be sure. "
         f"The drive's files are in `{folder}` beside this page, for `scm play`."
     )
+
+
+def _failed(diagnosis: Diagnosis) -> Iterator[Panel]:
+    """Yield that a plain model is better, by how much, and what can be read off."""
+    failure = diagnosis.failure
+    if failure is None:
+        return
+    rows = [
+        ("What", failure.text),
+        ("Likely reasons", "\n".join(failure.reasons)),
+        ("What to do", "Measure the numbers that are named, or give them an honest `std`; check "
+                       "the clocks and the units of commands. Then search again."),
+    ]  # fmt: skip
+    yield Panel("question", "Fit failed", "A plain model drives more like the car", rows)
+
+
+def _dropped(diagnosis: Diagnosis) -> Iterator[Panel]:
+    """Yield effects that were selected and did not hold."""
+    if not diagnosis.dropped:
+        return
+    titles = joined([title_of(one.name) for one in diagnosis.dropped])
+    text = "\n".join(one.text for one in diagnosis.dropped)
+    yield Panel("question", "Not confirmed", capital(titles), [("What", text)])
 
 
 def _at_limit(evidence: Evidence) -> Iterator[Panel]:

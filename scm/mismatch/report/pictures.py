@@ -91,11 +91,12 @@ def _better(diagnosis: Diagnosis, retuned_m: float | None = None) -> Picture | N
 
     `retuned_m` is that of the car with its own numbers refitted alone; None: not shown.
     """
-    if diagnosis.fit is None or not diagnosis.effects:
+    if diagnosis.fit is None or not (diagnosis.effects or diagnosis.failure):
         return None
     part = diagnosis.fit.confirm
     before, after = (side.get("position_m", math.nan) for side in (part.before, part.after))
     found = "with the likeliest of them" if diagnosis.undecided else "with what was found"
+    found = found if diagnosis.effects else "with its own numbers refitted, no new physics"
     rows = [("before", "the simulator as it was", before), ("after", found, after)]
     if retuned_m is not None:
         rows.insert(1, ("retuned", "its own numbers refitted, no new physics", retuned_m))

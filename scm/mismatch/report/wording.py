@@ -16,6 +16,14 @@ _SCALES = {  # smallest value of each unit, and how many of it one SI unit is
 _SURE = ((0.99, "Practically certain"), (0.9, "Very likely"), (0.7, "Likely"))
 _MOST_DIGITS = 6
 _INTEGERS, _FINEST, _TWO_DIGITS = 1000.0, 1e-4, 3.0
+_ERROR_NAMES = {
+    "yaw": "heading",
+    "gyro": "yaw rate, gyro",
+    "wheel": "distance, wheels",
+    "accel_x": "forward acceleration, IMU",
+    "accel_y": "sideways acceleration, IMU",
+}
+_ERROR_UNITS = {"m": "m", "rad": "rad", "mps": "m/s", "s": "s"}
 MINUS = "\N{MINUS SIGN}"
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _NEGATIVE = re.compile(r"(^|[\s(])-(?=[\d.])")
@@ -158,6 +166,14 @@ def amounts(parameters: Mapping[str, Estimate]) -> list[str]:
 def bicycle_name(witness: Witness) -> str:
     """Return what the plain model is called that a car is held against."""
     return f"kinematic bicycle with {len(witness.numbers)} numbers"
+
+
+def error_name(key: str) -> tuple[str, str]:
+    """Return the words and the unit of an error such as `position_m`."""
+    stem, _, unit = key.rpartition("_")
+    if unit not in _ERROR_UNITS:
+        return key, "1"
+    return _ERROR_NAMES.get(stem, stem.replace("_", " ")), _ERROR_UNITS[unit]
 
 
 def joined(names: Sequence[str], word: str = "and") -> str:

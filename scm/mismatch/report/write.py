@@ -116,6 +116,10 @@ def _lines(diagnosis: Diagnosis, out: Path, retuned_m: float | None) -> Iterator
     for question in diagnosis.undecided:
         yield f"  undecided: {' or '.join(map(title_of, question.between))}"
         yield f"    drive this: {question.drive_this}"
+    for gone in diagnosis.dropped:
+        yield f"  not confirmed: {gone.text}"
+    if diagnosis.failure:
+        yield from (f"  {text}" for text in (diagnosis.failure.text, *diagnosis.failure.reasons))
     for left in diagnosis.unanswered:
         yield f"  not answered: {left.text}"
     if busy := processor_sentence(diagnosis):

@@ -16,7 +16,7 @@ from scm.mismatch.fit.data_split import NAMES
 from scm.mismatch.report.car_file import FILE
 from scm.mismatch.report.write import FIELDS, GIVEN, WINDOWS
 from scm.mismatch.usable_data import check
-from scm.mismatch.validate.witness import UNSEEN, errors_of
+from scm.mismatch.validate.witness import UNSEEN, rms, strayed_by
 from scm.recording.read import Recording
 from scm.replay.drive import Drive
 from scm.replay.free_run import free_run
@@ -88,9 +88,9 @@ def _of_bicycle(
         return
     drives = [Drive(recording, given) for recording in recordings]
     windows = np.array([row[0] for row in unseen]), np.array([row[2] for row in unseen])
-    again = errors_of(drives, given, windows, float(fit["horizon_s"]), reported["numbers"])
-    for name, now in again.items():
-        yield Figure(UNSEEN, len(unseen), name, "bicycle", reported[name], now)
+    again = strayed_by(drives, given, windows, float(fit["horizon_s"]), reported["numbers"])
+    for name, errors in again.items():
+        yield Figure(UNSEEN, len(unseen), name, "bicycle", reported[name], rms(errors))
 
 
 def _fields(folder: Path) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The validate step: what was selected, judged by free runs, located and put into words."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,8 +10,17 @@ from scm.errors import RecordingError, ScmError
 from scm.mismatch.discovery.decide import is_discovered
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns
 from scm.mismatch.experiment.suggest import Suggestion
-from scm.mismatch.findings import Diagnosis, Effect, Fit, Undecided, Verdict
+from scm.mismatch.findings import (
+    Diagnosis,
+    Dropped,
+    Effect,
+    Failure,
+    Fit,
+    Undecided,
+    Verdict,
+)
 from scm.mismatch.fit.hypothesis import Hypothesis
+from scm.mismatch.report.wording import capital, title_of
 from scm.mismatch.select.confirm import without_one
 from scm.mismatch.select.round import Context, Notify
 from scm.mismatch.select.selected import Selected
@@ -19,14 +28,21 @@ from scm.mismatch.usable_data import titles_of
 from scm.mismatch.validate.curves import curve, discovered_curves
 from scm.mismatch.validate.explain import effect_of, refitted, undecided_of, widened_of
 from scm.mismatch.validate.found_car import CarFiles, as_written, on
-from scm.mismatch.validate.free_runs import judge, nothing_got_worse
+from scm.mismatch.validate.free_runs import MAX_NOISE_RATIO, judge
 from scm.mismatch.validate.locate import locate, strayed
+from scm.mismatch.validate.never_worse import (
+    GIVEN,
+    POSE,
+    RETUNED,
+    dropped,
+    failure_sentence,
+    loses,
+    reasons_of,
+    worse_than,
+)
 from scm.mismatch.validate.residuals import on_one_axis
 from scm.mismatch.validate.witness import witness_of
 from scm.vehicles.car import Car
-
-POSE = ("position_m", "yaw_rad")
-MAX_NOISE_RATIO = 3.0  # of a free run's error to what noise makes of it; healthy cars: 2.3 at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +82,8 @@ class _Validated:
     car: Car | None
     fit: Fit | None
     free_runs: FreeRuns | None
+    dropped: tuple[Dropped, ...] = ()
+    failure: Failure | None = None
 
 
 def conclude(selected: Selected, notify: Notify) -> Result:
@@ -74,21 +92,16 @@ def conclude(selected: Selected, notify: Notify) -> Result:
     titles = titles_of(selected.recordings)
     files = CarFiles(car, titles)
     _, retuned_car = _written(selected, files, retuned)
-    valid = _validated(selected, files, retuned_car)
+    valid = _handed_out(selected, files, _validated(selected, files, retuned_car))
     best, effects, fit = valid.best, valid.effects, valid.fit
-    if fit is not None and valid.free_runs is not None:
-        notify("fitting a kinematic bicycle as witness")
-        own = retuned_errors(selected, retuned_car, valid.car) if best.effects else None
-        witness = witness_of(selected.drives, car, valid.free_runs)
-        fit = structs.replace(fit, retuned=own, witness=witness)
     located, residuals = locate(retuned, best)
     suggestions = () if selected.context.by_windows else undecided_of(selected, best, notify)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
-    verdict = verdict_of(effects, undecided, fit)
+    verdict = Verdict.MISMATCH if valid.failure else verdict_of(effects, undecided, fit)
     if verdict is Verdict.MISMATCH and not effects and fit and valid.free_runs:
         located = strayed(valid.free_runs, fit)
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
-                          fit=fit, runtime_s=0.0,
+                          fit=fit, runtime_s=0.0, dropped=valid.dropped, failure=valid.failure,
                           unanswered=selected.context.budget.unanswered)  # fmt: skip
     evidence = Evidence(
         vehicle=car.name, recordings=titles, residuals=residuals, free_runs=valid.free_runs,
@@ -104,24 +117,65 @@ def conclude(selected: Selected, notify: Notify) -> Result:
 
 
 def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> _Validated:
-    """Return what stays of a hypothesis after free runs on unseen parts.
+    """Return what stays of a hypothesis after free runs on unseen parts, beside the witness.
 
-    By windows, effects go until the car strays no farther than those without; a car without
-    effects keeps the numbers of its file where refitted ones bring it no nearer.
+    Effects go until the car does nothing worse than those without.
     """
     best, context, given = selected.best, selected.context, selected.best.model.car
+    gone = list[Dropped]()
     while True:
         effects, car = _written(selected, files, best)
         fit, free_runs = _judged(selected, given, car)
-        if not context.by_windows or not best.effects or fit is None:
+        if fit is None or free_runs is None:
+            return _Validated(best, effects, car, fit, free_runs, tuple(gone))
+        beside = _judged(selected, retuned_car, car)[0] if effects else None
+        worse = worse_than(fit, beside) if effects else None
+        if worse is None:
             break
-        if not strays_more(selected, fit, retuned_car, car):
-            break
-        best = without_one(context, best, selected.retuned)
-    if not best.effects and fit is not None and gained_nothing(fit):
-        best, car = as_given(context, best), selected.car
-        fit, free_runs = _judged(selected, given, car)
-    return _Validated(best, effects, car, fit, free_runs)
+        fewer = without_one(context, best, selected.retuned)
+        lost = [name for name in best.names if name not in fewer.names]
+        gone += dropped(lost, worse, fit.horizon_s)
+        best = fewer if fewer.effects else selected.retuned
+    own = None if beside is None else beside.confirm.before
+    fit = structs.replace(
+        fit, retuned=own, witness=witness_of(selected.drives, selected.car, free_runs)
+    )
+    return _Validated(best, effects, car, fit, free_runs, tuple(gone))
+
+
+def _handed_out(selected: Selected, files: CarFiles, valid: _Validated) -> _Validated:
+    """Return the car that is handed out: not the one found where the witness follows better.
+
+    A car without effects keeps the numbers of its file where refitted ones bring it no nearer.
+    """
+    best, fit = valid.best, valid.fit
+    if fit is None:
+        return valid
+    now, failed = valid, bool(best.effects) and loses(fit)
+    if failed:
+        effects, car = _written(selected, files, selected.retuned)
+        now = _again(selected, replace(now, best=selected.retuned, effects=effects, car=car))
+    as_refitted = not (now.fit and gained_nothing(now.fit))
+    if not now.best.effects and not as_refitted:
+        given = as_given(selected.context, now.best)
+        now = _again(selected, replace(now, best=given, car=selected.car))
+    shown = valid if failed else now
+    if shown.fit is None or shown.free_runs is None or not loses(shown.fit):
+        return now
+    text = failure_sentence(shown.fit, best.names, RETUNED if as_refitted else GIVEN)
+    reasons = reasons_of(best, selected.car, shown.fit, shown.free_runs)
+    failure = Failure(text=text, reasons=reasons)
+    lost = [Dropped(name=name, text=f"{capital(title_of(name))} is part of a fit that failed.")
+            for name in best.names]  # fmt: skip
+    return replace(now, dropped=(*now.dropped, *lost), failure=failure)
+
+
+def _again(selected: Selected, valid: _Validated) -> _Validated:
+    """Return another car with its own free runs, beside the same witness."""
+    fit, free_runs = _judged(selected, selected.best.model.car, valid.car)
+    if fit is not None and valid.fit is not None:
+        fit = structs.replace(fit, witness=valid.fit.witness)
+    return replace(valid, fit=fit, free_runs=free_runs)
 
 
 def _written(
@@ -146,31 +200,6 @@ def _judged(
         return judge(selected.drives, on(base, before), on(base, after), selected.parts)
     except RecordingError:
         return None, None
-
-
-def retuned_errors(
-    selected: Selected, retuned: Car | None, found: Car | None
-) -> Mapping[str, float] | None:
-    """Return how far the re-tuned car strays in the windows in which the one found is judged.
-
-    None where no part has a whole window, or a car has no file.
-    """
-    fit, _ = _judged(selected, retuned, found)
-    return None if fit is None else fit.confirm.before
-
-
-def strays_more(selected: Selected, fit: Fit, retuned: Car | None, found: Car | None) -> bool:
-    """Return whether a car strays farther than the given one, or than the re-tuned one.
-
-    Args:
-        selected: Whose recordings they are driven by.
-        fit: Of the found car and the one given.
-        retuned: With the given car's own numbers refitted, and nothing else.
-        found: With effects.
-    """
-    beside, _ = _judged(selected, retuned, found)
-    fits = (fit,) if beside is None else (fit, beside)
-    return any(POSE[0] in nothing_got_worse(one) for one in fits)
 
 
 def gained_nothing(fit: Fit) -> bool:

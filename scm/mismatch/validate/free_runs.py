@@ -4,6 +4,7 @@ Windows are those of `scm.replay.free_run`, so `scm replay` of a car file finds 
 those at a window's end, root mean squares over windows of one part of the recordings.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -102,6 +103,7 @@ NEXT_S = 1.0  # between the starts of windows at most
 DRAWS = 2
 START_DIGITS = 6  # of a window's start in a report [s]: whoever replays it starts there too
 WORSE = 1.02
+MAX_NOISE_RATIO = 3.0  # of an error to what noise makes of it; healthy cars: 2.3 at most
 _BEFORE, _AFTER = 0, 1
 
 
@@ -179,13 +181,25 @@ def nothing_got_worse(fit: Fit) -> tuple[str, ...]:
     What noise of measuring alone changes between two equal cars does not count.
     """
     part = fit.confirm
-    chance = 2.0 * np.sqrt(2.0 / max(part.windows, 1))
-    return tuple(
-        name
-        for name, was in part.before.items()
-        if part.after[name] > WORSE * was
-        and part.after[name] ** 2 - was**2 > chance * part.noise_floor.get(name, 0.0) ** 2
-    )
+    return tuple(name for name, was in part.before.items() if got_worse(part, name, was))
+
+
+def got_worse(part: PartErrors, name: str, was: float, by: float = WORSE) -> bool:
+    """Return whether an error after is larger than another, beyond what noise may change.
+
+    Args:
+        part: With the error after.
+        name: Of the error.
+        was: The other error.
+        by: How many times larger it must be.
+    """
+    now, floor = part.after[name], part.noise_floor.get(name, 0.0)
+    return now > by * was and now**2 - was**2 > chance_of(part) * floor**2
+
+
+def chance_of(part: PartErrors) -> float:
+    """Return two standard deviations of a mean square over windows, as a share of it."""
+    return 2.0 * math.sqrt(2.0 / max(part.windows, 1))
 
 
 def _spans(parts: Parts, drive: int) -> list[tuple[str, Span]]:

@@ -89,21 +89,21 @@ def witness_of(drives: Sequence[Drive], car: Car, runs: FreeRuns) -> Witness | N
     if (~unseen).sum() < FEWEST_WINDOWS or not unseen.any():
         return None
     found = fit(course.of(~unseen))
-    apart = errors(course.of(unseen), found)
+    errors = {name: rms(far) for name, far in strayed(course.of(unseen), found).items()}
     return Witness(
-        position_m=apart["position_m"], yaw_rad=apart["yaw_rad"],
+        position_m=errors["position_m"], yaw_rad=errors["yaw_rad"],
         numbers={NAMES[j]: float(found[j]) for j in _free(course)},
     )  # fmt: skip
 
 
-def errors_of(
+def strayed_by(
     drives: Sequence[Drive],
     car: Car,
     windows: tuple[Ints, Floats],
     horizon_s: float,
     numbers: Mapping[str, float],
-) -> dict[str, float]:
-    """Return the errors of a bicycle with given numbers.
+) -> dict[str, Floats]:
+    """Return how far a bicycle with given numbers strays, as `strayed` does.
 
     Args:
         drives: The recordings.
@@ -115,7 +115,7 @@ def errors_of(
     course = course_of(drives, car, *windows, horizon_s)
     values = _starts(course)[0]
     values[[NAMES.index(name) for name in numbers]] = list(numbers.values())
-    return errors(course, values)
+    return strayed(course, values)
 
 
 def course_of(
@@ -161,13 +161,15 @@ def _area(command: Commanded, edges: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(means * STEP_S)))
 
 
-def errors(course: Course, values: Floats) -> dict[str, float]:
-    """Return root mean squares of position [m] and yaw [rad] at the windows' ends, by name."""
+def strayed(course: Course, values: Floats) -> dict[str, Floats]:
+    """Return `position_m` and `yaw_rad` at the windows' ends, each (windows,)."""
     x, y, yaw = apart_of(course, values[None])[0, :, 1]
-    return {
-        "position_m": float(np.sqrt(np.mean(x * x + y * y))),
-        "yaw_rad": float(np.sqrt(np.mean(yaw * yaw))),
-    }
+    return {"position_m": np.hypot(x, y), "yaw_rad": np.abs(yaw)}
+
+
+def rms(errors: Floats) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(errors * errors)))
 
 
 def apart_of(course: Course, sets: Floats) -> Floats:

@@ -4,13 +4,13 @@ import json
 
 import pytest
 
-from scm.mismatch.findings import Estimate
+from scm.mismatch.findings import Dropped, Estimate, Failure
 from scm.mismatch.report.record import json_text, on_clock, plain
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_up_findings import replace
 
 TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data", "unasked",
-       "processor_share", "compared_s"}  # fmt: skip
+       "processor_share", "compared_s", "dropped", "failure"}  # fmt: skip
 LOCATED = {"equation", "channels", "depends_on", "when_s", "where", "share_of_error"}
 EFFECT = {"name", "listed", "equation", "depends_on", "parameters", "probability", "said", "law",
           "rivals"}  # fmt: skip
@@ -52,6 +52,15 @@ def test_a_question_left_has_exactly_its_fields():
     first, second = read(made_up.cut_short()[0])["unasked"]
     assert first.keys() == second.keys() == {"name", "said"}
     assert (first["name"], second["name"]) == ("effects", "laws")
+
+
+def test_what_was_dropped_and_a_failure_have_exactly_their_fields():
+    gone = Dropped(name="stiction", text="It does not hold.")
+    failure = Failure(text="The fit failed.", reasons=("A clock is at its bound.",))
+    report = read(made_up.diagnosis(dropped=(gone,), failure=failure))
+    assert report["dropped"] == [{"name": "stiction", "said": "It does not hold."}]
+    assert report["failure"] == {"said": "The fit failed.", "reasons": ["A clock is at its bound."]}
+    assert read(made_up.diagnosis())["failure"] is None
 
 
 def test_words_of_the_verdict_are_text():

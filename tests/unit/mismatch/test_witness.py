@@ -11,7 +11,7 @@ import pytest
 from scm.mismatch.fit.data_split import split
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.validate.free_runs import judge
-from scm.mismatch.validate.witness import NAMES, OF_STEERING, errors_of, witness_of
+from scm.mismatch.validate.witness import NAMES, OF_STEERING, rms, strayed_by, witness_of
 from scm.recording.read import Channel, Recording
 from scm.replay.drive import Drive
 from scm.vehicles.car import load_car
@@ -102,10 +102,12 @@ def test_the_errors_follow_from_the_numbers():
     found = witness_of([drive], nigel(), runs)
     unseen = np.array(runs.part) == "confirm"
     windows = runs.recording[unseen], runs.stamp_s[unseen]
-    again = errors_of([drive], nigel(), windows, 1.0, found.numbers)
-    assert again == {"position_m": found.position_m, "yaw_rad": found.yaw_rad}
+    again = strayed_by([drive], nigel(), windows, 1.0, found.numbers)
+    assert rms(again["position_m"]) == found.position_m
+    assert rms(again["yaw_rad"]) == found.yaw_rad
     wrong = {**found.numbers, "steering_gain_rad": 0.2}
-    assert errors_of([drive], nigel(), windows, 1.0, wrong)["yaw_rad"] > 5.0 * found.yaw_rad
+    far = strayed_by([drive], nigel(), windows, 1.0, wrong)
+    assert rms(far["yaw_rad"]) > 5.0 * found.yaw_rad
 
 
 def test_where_the_measured_speed_drives_the_car_it_has_the_numbers_of_the_steering(

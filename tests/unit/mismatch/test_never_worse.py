@@ -1,0 +1,222 @@
+"""On unseen driving no car found is worse than the given one, the re-tuned one, the witness."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from scm.mismatch.findings import Verdict, Witness
+from scm.mismatch.fit.data_split import split
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.pipeline import write
+from scm.mismatch.report.wording import quantity
+from scm.mismatch.select.round import Context
+from scm.mismatch.select.search import Selection
+from scm.mismatch.select.selected import Selected
+from scm.mismatch.validate import conclude as module
+from scm.mismatch.validate.conclude import conclude
+from scm.mismatch.validate.free_runs import judge
+from scm.mismatch.validate.never_worse import GIVEN, RETUNED, loses, reasons_of, worse_than
+from scm.replay.numbers import POSE_CLOCK
+from scm.vehicles.car import load_car
+from tests.unit.mismatch import made_fit
+from tests.unit.mismatch import made_up_findings as made_up
+from tests.unit.mismatch.made_drive import big_nigel, car_with, driven, nigel
+
+TRIM = "steering.trim_rad"
+
+
+def selected(model, retuned, best):
+    """What a search would have ended with."""
+    catalogue = tuple(made_fit.candidate(name) for name in ("steer_trim", "drive_gain"))
+    context = Context(np.ones(len(model.t)), catalogue)
+    recordings = [drive.recording for drive in model.drives]
+    return Selected(
+        recordings, model.drives, nigel(), context, split(model), Selection(best, retuned), ()
+    )
+
+
+def concluded(model, retuned, best):
+    return conclude(selected(model, retuned, best), lambda _: None)
+
+
+@cache
+def trimmed():
+    return made_fit.trimmed()
+
+
+@pytest.fixture
+def plain_model(monkeypatch):
+    """The witness as somebody says it is."""
+
+    def errs_by(position_m):
+        found = Witness(position_m=position_m, yaw_rad=position_m, numbers={"dead_band": 0.1})
+        monkeypatch.setattr(module, "witness_of", lambda *_: found)
+
+    return errs_by
+
+
+def test_an_effect_that_holds_stays_beside_the_re_tuned_cars_errors():
+    found = concluded(*trimmed()).diagnosis
+    assert [effect.name for effect in found.effects] == ["steer_trim"]
+    assert (found.dropped, found.failure) == ((), None)
+    fit = found.fit
+    assert fit.confirm.after["position_m"] < 0.5 * fit.retuned["position_m"]
+    assert fit.confirm.after["position_m"] < 0.5 * fit.witness.position_m
+
+
+def test_an_effect_with_which_unseen_driving_is_worse_is_dropped_and_said(tmp_path):
+    model, retuned, _ = made_fit.healthy()
+    wrong = replace(
+        retuned, effects=(made_fit.candidate("steer_trim"),), values=np.array([0.05]),
+        jacobian=np.zeros((len(retuned.innovations), len(retuned.z) + 1)),
+        covariance=np.eye(len(retuned.z) + 1),
+    )  # fmt: skip
+    result = concluded(model, retuned, wrong)
+    found = result.diagnosis
+    assert (found.effects, found.verdict, found.failure) == ((), Verdict.NONE, None)
+    (gone,) = found.dropped
+    assert gone.name == "steer_trim"
+    assert "does not hold on parts that no fit has seen" in gone.text
+    assert GIVEN in gone.text
+    assert found.fit.confirm.after["position_m"] < 1.02 * found.fit.confirm.before["position_m"]
+    assert not result.found_car.has(TRIM)
+    write(result, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Not confirmed" in page
+    assert "Steering trim explains what was fitted, but does not hold" in page
+
+
+def test_of_two_effects_the_one_that_spoils_the_car_goes():
+    model, retuned, best = trimmed()
+    gain = made_fit.candidate("drive_gain")
+    spoilt = replace(
+        best, effects=(*best.effects, gain), values=np.array([*best.values, 0.7]),
+        jacobian=np.zeros((len(best.innovations), len(best.z) + 2)),
+        covariance=np.eye(len(best.z) + 2),
+    )  # fmt: skip
+    found = concluded(model, retuned, spoilt).diagnosis
+    assert [effect.name for effect in found.effects] == ["steer_trim"]
+    assert [gone.name for gone in found.dropped] == ["drive_gain"]
+
+
+@pytest.mark.parametrize(
+    ("tuned", "found", "other"),
+    [(0.05, 0.025, RETUNED), (0.025, 0.05, None), (0.0, -0.05, GIVEN)],
+)
+def test_a_car_is_worse_than_the_one_that_strays_less(tuned, found, other):
+    drive = driven(((TRIM, 0.05),))
+    parts = split(Likelihood.of([drive], big_nigel()), 5.0)
+    given, tuned, found = (car_with({TRIM: trim}) for trim in (0.0, tuned, found))
+    fits = [judge([drive], before, found, parts)[0] for before in (given, tuned)]
+    worse = worse_than(*fits)
+    assert (worse and worse.other) == other
+    assert worse is None or worse.now > 1.02 * worse.was
+
+
+def test_a_heading_that_got_worse_counts_too():
+    fit = made_up.fit(before=0.361, after=0.042)
+    turned = {**fit.confirm.after, "yaw_rad": 0.25}
+    fit = made_up.replace(fit, confirm=made_up.replace(fit.confirm, after=turned))
+    assert worse_than(fit, None).name == "yaw_rad"
+
+
+def with_windows(count, **errors):
+    """Errors of so many windows."""
+    fit = made_up.fit(**errors)
+    return made_up.replace(fit, confirm=made_up.replace(fit.confirm, windows=count))
+
+
+def test_few_windows_must_show_a_larger_difference():
+    errors = {"after": 0.083, "witness": made_up.bicycle(0.07)}
+    assert not loses(with_windows(6, **errors))
+    assert loses(with_windows(60, **errors))
+    assert loses(with_windows(6, **{**errors, "after": 0.11}))
+
+
+def test_the_witness_speaks_only_beyond_noise_and_five_per_cent():
+    assert loses(with_windows(4000, after=0.1, witness=made_up.bicycle(0.094)))
+    assert not loses(with_windows(4000, after=0.1, witness=made_up.bicycle(0.096)))
+    floor = made_up.fit().confirm.noise_floor["position_m"]
+    assert not loses(made_up.fit(after=2.9 * floor, witness=made_up.bicycle(floor)))
+    assert not loses(made_up.fit(after=0.1, witness=None))
+
+
+def test_a_healthy_car_stays_healthy_whatever_the_witness_says(plain_model):
+    plain_model(1e-6)
+    found = concluded(*made_fit.healthy()).diagnosis
+    assert (found.verdict, found.failure, found.dropped) == (Verdict.NONE, None, ())
+
+
+def missed():
+    """A trim that was not found, and a fault of the gyro that is not there."""
+    model, retuned, _ = trimmed()
+    bias = replace(
+        retuned, effects=(made_fit.candidate("gyro_bias"),), values=np.array([0.01]),
+        jacobian=np.zeros((len(retuned.innovations), len(retuned.z) + 1)),
+        covariance=np.eye(len(retuned.z) + 1),
+    )  # fmt: skip
+    return model, retuned, bias
+
+
+def test_a_car_that_loses_to_the_witness_is_not_handed_out(plain_model, tmp_path):
+    plain_model(0.005)
+    result = concluded(*missed())
+    found = result.diagnosis
+    assert (found.verdict, found.effects) == (Verdict.MISMATCH, ())
+    assert [gone.name for gone in found.dropped] == ["gyro_bias"]
+    assert "The fit failed: after" in found.failure.text
+    assert "10 times as far as a kinematic bicycle with 1 numbers (0.50 cm)" in found.failure.text
+    assert f"`car.toml` is the car {RETUNED}" in found.failure.text
+    assert any("lies across the way driven" in reason for reason in found.failure.reasons)
+    assert any(why.startswith("Far beyond measurement noise: ") for why in found.failure.reasons)
+    write(result, tmp_path)
+    written = (tmp_path / "car.toml").read_text(encoding="utf-8")
+    assert written.startswith("# The fit failed: after")
+    car, tuned = (load_car(tmp_path / name) for name in ("car.toml", "retuned.toml"))
+    assert car.values == tuned.values
+    assert not car.faults
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "A plain model drives more like the car" in page
+    assert "Cause unknown" not in page
+
+
+def test_a_failed_fit_without_effects_says_so_too(plain_model):
+    plain_model(0.005)
+    model, retuned, _ = trimmed()
+    found = concluded(model, retuned, retuned).diagnosis
+    assert (found.verdict, found.effects, found.dropped) == (Verdict.MISMATCH, (), ())
+    assert f"the car {RETUNED} is" in found.failure.text
+    assert "handed out" not in found.failure.text
+
+
+def test_a_failed_fit_that_gained_nothing_says_how_far_the_given_car_strays(
+    plain_model, monkeypatch
+):
+    plain_model(0.005)
+    model, retuned, _ = trimmed()
+    monkeypatch.setattr(module, "gained_nothing", lambda _: True)
+    found = concluded(model, retuned, retuned).diagnosis
+    assert found.fit.confirm.after == found.fit.confirm.before
+    far = quantity(found.fit.confirm.before["position_m"], "m")
+    assert f"the car {GIVEN} is {far} off" in found.failure.text
+
+
+def test_a_failed_fit_is_a_mismatch_however_near_the_car_handed_out_is(plain_model, monkeypatch):
+    plain_model(1e-3)
+    monkeypatch.setattr(module, "loses", lambda _: True)
+    assert concluded(*made_fit.healthy()).diagnosis.verdict is Verdict.MISMATCH
+
+
+def test_numbers_at_an_end_of_what_the_file_allows_and_clocks_at_their_bound_are_named():
+    _, retuned, _ = trimmed()
+    keys = [own.key for own in retuned.model.nominal]
+    z = np.zeros(len(keys))
+    z[keys.index("body.mass_kg")], z[keys.index(POSE_CLOCK)] = 2.0, -2.0
+    z[keys.index("steering.rate_rad_s")] = 1.5
+    fit, runs = made_up.fit(), made_up.free_runs()
+    reasons = reasons_of(replace(retuned, z=z), nigel(), fit, runs)
+    assert reasons[0].startswith("At an end of what the car file allows: `body.mass_kg` ")
+    assert "steering.rate" not in " ".join(reasons)
+    assert reasons[1].startswith("At its bound: the clock of poses 6 ms")
