@@ -61,6 +61,7 @@ class FreeRuns:
         start_s: The same on one axis for all recordings, (windows,).
         t_s: Since the window's start, (times,).
         measured, before, after: x, y [m] and yaw [rad] by name.
+        file: Of the car that each was driven with for `after`; empty: `car.toml`.
     """
 
     part: tuple[str, ...]
@@ -71,6 +72,7 @@ class FreeRuns:
     measured: Mapping[str, Floats]
     before: Mapping[str, Floats]
     after: Mapping[str, Floats]
+    file: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,6 +34,14 @@ class Equation(StrEnum):
     SENSOR = "sensor"
 
 
+class Course(StrEnum):
+    """How an effect goes over a recording: always the same, from a moment on, or growing evenly."""
+
+    CONSTANT = "constant"
+    STEP = "step"
+    RAMP = "ramp"
+
+
 class Estimate(Struct, kw_only=True, frozen=True):
     """A parameter's value with its 90 % interval, in `unit`."""
 
@@ -62,6 +70,9 @@ class Effect(Struct, kw_only=True, frozen=True):
         probability: Among all alternatives that were tried.
         text: One or two sentences that a mechanic understands.
         formula: Of an effect outside the catalogue.
+        course: How it goes over the recording. `parameters` are those in the end.
+        since_s: When it changed, on the recording's clock; None: it did not, or evenly all along.
+        before: Its parameters before the change; empty: it was not there, or did not change.
     """
 
     name: str
@@ -73,6 +84,9 @@ class Effect(Struct, kw_only=True, frozen=True):
     text: str = field(name="said")
     formula: str | None = field(default=None, name="law")
     alternatives: tuple[Alternative, ...] = field(default=(), name="rivals")
+    course: Course = Course.CONSTANT
+    since_s: Estimate | None = None
+    before: Mapping[str, Estimate] = {}
 
 
 class Place(Struct, kw_only=True, frozen=True):

@@ -1,8 +1,16 @@
 """The parameters of a car and of its sensor faults by key, with their neutral values."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scm.arrays import Floats
 
 Numbers = Mapping[str, float]
+"""A number that changes stands as what it is in the end, and with these after its key: what it was
+before, and when the change begins and ends on the drive's clock [s]."""
+BEFORE, SINCE, UNTIL = "@before", "@since_s", "@until_s"
 THROTTLE_DELAY, STEERING_DELAY = "drive.delay_s", "steering.delay_s"
 THROTTLE_CLOCK = "clock.throttle_s"  # the throttle acts so much later than the steering
 # Faults of measurement by the key that their library parameter has, and their neutral values.
@@ -22,3 +30,44 @@ MOTION_VARIABLES = (
     "wheel_angle.fl", "wheel_angle.fr", "wheel_angle.rl", "wheel_angle.rr",
 )  # fmt: skip
 TETHER_STEPS = 50  # between two moments at which a simulated pose is set to the measured one
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A number of one set that changes during a drive, from `before` to `after`.
+
+    Attributes:
+        column: Of the set.
+        since_s, until_s: When the change begins and ends; the same: a step.
+    """
+
+    column: int
+    key: str
+    before: float
+    after: float
+    since_s: float
+    until_s: float
+
+    def done(self, first_s: Floats | float, last_s: Floats | float) -> Floats:
+        """Return the share of the change that is done, its mean over each span of time."""
+        span = np.maximum(np.subtract(last_s, first_s), 1e-9)
+        return np.asarray((self._area(last_s) - self._area(first_s)) / span)
+
+    def _area(self, t: Floats | float) -> Floats:
+        """Return the integral of the share that is done, up to each time."""
+        length = max(self.until_s - self.since_s, 1e-9)
+        inside = np.clip(np.subtract(t, self.since_s), 0.0, length)
+        return np.asarray(
+            inside * inside / (2.0 * length) + np.maximum(np.subtract(t, self.until_s), 0.0)
+        )
+
+
+def changes_in(sets: Sequence[Numbers]) -> Iterator[Change]:
+    """Yield the numbers that change, set by set."""
+    for column, numbers in enumerate(sets):
+        for key in numbers:
+            if key.endswith(SINCE):
+                of = key.removesuffix(SINCE)
+                yield Change(
+                    column, of, numbers[of + BEFORE], numbers[of], numbers[key], numbers[of + UNTIL]
+                )

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from tests.reality.cases import CONTROLS, KINDS, draw_kinds, write_cases
+from tests.reality.cases import CONTROLS, COURSES, KINDS, draw_kinds, write_cases
 from tests.reality.motion import Moving
 
 
@@ -14,7 +14,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cases", type=int, default=40)
-    parser.add_argument("--kind", choices=("mixed", *KINDS, *CONTROLS), default="mixed")
+    parser.add_argument("--kind", choices=("mixed", *KINDS, *CONTROLS, *COURSES), default="mixed")
     parser.add_argument("--strength", type=float, nargs=2, default=(1.0, 4.0))
     parser.add_argument("--engine", choices=("own", "mujoco"), default="own")
     arguments = parser.parse_args()

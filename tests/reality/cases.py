@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.reality.changing import Changing
 from tests.reality.concealed import ALIKE, EFFECTS, HIDING, LISTED, UNLISTED, Drawn
 from tests.reality.driver import TEMPERS
 from tests.reality.motion import Moving
@@ -17,6 +18,9 @@ from tests.reality.sensing import FAULTS
 
 KINDS = ("single", "none", "pair", "unlisted")
 CONTROLS = ("shuffled", "other_car")
+COURSES = ("step", "ramp")
+"""Of one effect that changes during the drive."""
+STEADY = {"clock_drift", "unit_error", "surface_patch", "motor_fade", "battery_sag"}
 SHARES = (0.55, 0.15, 0.15, 0.15)
 DRIVES = (("drive", 90.0), ("again", 60.0))
 ENOUGH_ON_PATCH_S = 1.5
@@ -31,6 +35,8 @@ def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:
         return ()
     if kind == "single":
         return (str(rng.choice(listed)),)
+    if kind in COURSES:
+        return (str(rng.choice([name for name in listed if name not in STEADY])),)
     if kind == "unlisted":
         return (str(rng.choice([e.name for e in UNLISTED if car in e.smallest])),)
     hiding = [pair for pair in HIDING if set(pair) <= set(listed)]
@@ -74,7 +80,10 @@ def make_case(
     names: tuple[str, ...] | None = None,
     car: str | None = None,
 ) -> tuple[dict, dict[str, Drive], dict[str, float]]:
-    """Draw and drive one case; return its label, its drives by name and the car's numbers."""
+    """Draw and drive one case; return its label, its drives by name and the car's numbers.
+
+    What changes in the first drive stays as it became in the second.
+    """
     if car is None:
         cars = [c for c in TEMPERS if all(c in EFFECTS[n].smallest for n in names or ())]
         car = str(rng.choice(cars, p=[0.7, 0.3] if len(cars) == 2 else None))
@@ -84,15 +93,33 @@ def make_case(
     while True:
         effects = draw_effects(names, car, strengths, rng)
         numbers, faults = apply(ordinary, effects), apply(FAULTS, effects)
-        drives = {
-            name: record(car, numbers, faults, duration, rng, moving) for name, duration in DRIVES
-        }
+        change = _change(kind, rng)
+        drives = {}
+        for name, duration in DRIVES:
+            driven, sensed = numbers, faults
+            if change and name == DRIVES[0][0]:
+                driven, sensed = (
+                    Changing(ordinary, numbers, *change),
+                    Changing(FAULTS, faults, *change),
+                )
+            drives[name] = record(car, driven, sensed, duration, rng, moving)
         if all(_shows(drive, numbers) for drive in drives.values()) and (
             numbers["side_gain"] == 0.0 or _turns_both_ways(drives["drive"])
         ):
             break
     label = _label(kind, car, effects, ordinary, file_numbers, drives["drive"])
+    if change:
+        label |= {"course": kind, "since_s": change[0] if kind == "step" else None}
     return label, drives, numbers
+
+
+def _change(kind: str, rng: np.random.Generator) -> tuple[float, float] | None:
+    """Draw when a change begins and ends; None: nothing changes."""
+    length = DRIVES[0][1]
+    if kind == "step":
+        since = float(rng.uniform(0.25, 0.75)) * length
+        return since, since
+    return (0.0, length) if kind == "ramp" else None
 
 
 def _shows(drive: Drive, numbers: dict[str, float]) -> bool:

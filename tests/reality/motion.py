@@ -270,8 +270,7 @@ class Moving:
 
     def __init__(self, numbers, pose, commands, shake=None):
         self.numbers = np.zeros(1, NUMBERS)
-        for name in NUMBERS.names:
-            self.numbers[name] = numbers[name]
+        self.become(numbers)
         self.state = np.zeros(1, STATE)
         self.state["x"], self.state["y"], self.state["yaw"] = pose
         self.wheels = np.zeros((4, len(WHEEL)))
@@ -279,6 +278,11 @@ class Moving:
         self.throttle, self.steering = np.zeros(commands), np.zeros(commands)
         self.shake = np.zeros(commands) if shake is None else shake
         self.rows = np.empty((0, len(ROW)))
+
+    def become(self, numbers):
+        """Drive on with other numbers."""
+        for name in NUMBERS.names:
+            self.numbers[name] = numbers[name]
 
     def command(self, k, throttle, steering):
         """Give command `k`, drive until the next one is due, and return the new rows."""

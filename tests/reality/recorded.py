@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.reality.changing import Changing, at
 from tests.reality.driver import TEMPERS, Driver, draw_route, draw_speeds
 from tests.reality.motion import COMMAND_S, ROW_S, Moving
 from tests.reality.sensing import POSE_STD, YAW_STD, Camera, encoders, inertial
@@ -59,6 +60,7 @@ class Drive:
 
 def record(car, numbers, faults, duration, rng, moving=Moving):
     """Let a driver drive a car and return what the sensors saw of it."""
+    changing, numbers = numbers, at(numbers, 0.0)
     temper, commands = TEMPERS[car], round(duration / COMMAND_S)
     route = draw_route(temper, np.tan(numbers["limit"]) / numbers["base"], rng)
     wished, fastest = draw_speeds(temper, duration, rng)
@@ -76,6 +78,8 @@ def record(car, numbers, faults, duration, rng, moving=Moving):
             driver.look(stamp, pose)
         throttle, steering = np.round(driver.act(k), 5)
         given[k] = t, throttle, steering
+        if isinstance(changing, Changing):
+            body.become(changing.at(t))
         new = body.command(k, throttle, steering)
         rows[done : done + len(new)] = new
         done += len(new)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from tests.reality.changing import at, over
 from tests.reality.motion import ROW, ROW_S
 
 POSE_STD = {"nigel": 0.002, "f1tenth": 0.005}
@@ -41,8 +42,9 @@ class Camera:
 
     def look(self, rows, start, until):
         """Return (stamp, pose) of the frames before `until`, each frame once."""
-        f, found = self.faults, []
+        found = []
         while self.next < len(self.t) and self.t[self.next] <= until:
+            f = at(self.faults, self.t[self.next])
             t = max(self.t[self.next] - f["delay"], 0.0)
             x, y, yaw = (
                 start
@@ -62,8 +64,9 @@ class Camera:
 
     def table(self):
         """Return stamps and poses as recorded, heading in -pi..pi, columns t, x, y, yaw."""
-        f, t, poses = self.faults, self.t[: self.next], self.poses[: self.next]
-        stamps = t + f["clock_offset"] + f["clock_rate"] * (t - t[0])
+        t, poses = self.t[: self.next], self.poses[: self.next]
+        offset, rate = (over(self.faults, f"clock_{name}", t) for name in ("offset", "rate"))
+        stamps = t + offset + rate * (t - t[0])
         yaw = np.arctan2(np.sin(poses[:, 2]), np.cos(poses[:, 2]))
         return np.column_stack((stamps, poses[:, :2], yaw))
 
@@ -71,20 +74,27 @@ class Camera:
 def encoders(rows, faults, counts, duration):
     """Return cumulative counts of the rear wheels at 50 Hz, columns t, left, right."""
     t = np.arange(5, int(duration * 50)) / 50.0
-    per_rad = counts / (2.0 * math.pi) * (1.0 - faults["lost_counts"])
-    sides = [np.floor(per_rad * column(rows, side, t)) for side in ("left", "right")]
+    per_rad = counts / (2.0 * math.pi) * (1.0 - over(faults, "lost_counts", t))
+    sides = [np.floor(_counted(per_rad, column(rows, side, t))) for side in ("left", "right")]
     return np.column_stack((t, *(side - side[0] for side in sides)))
+
+
+def _counted(per_rad, turned):
+    if np.ptp(per_rad) == 0.0:
+        return per_rad * turned
+    return np.cumsum(per_rad * np.diff(turned, prepend=0.0))
 
 
 def inertial(rows, faults, noise, duration, rng):
     """Return accelerations of the centre of gravity and yaw rate at 100 Hz, t, ax, ay, gz."""
     t = np.arange(10, int(duration * 100)) / 100.0
     along, across, gyro = (column(rows, name, t) for name in ("push", "side", "yaw_rate"))
-    cos, sin = math.cos(faults["imu_angle"]), math.sin(faults["imu_angle"])
-    a_x = cos * along + sin * across + faults["accel_x"]
-    a_y = cos * across - sin * along + faults["accel_y"]
-    gyro = faults["gyro_scale"] * gyro + faults["gyro_bias"] + faults["gyro_per_accel"] * along
+    f = {name: over(faults, name, t) for name in FAULTS}
+    cos, sin = np.cos(f["imu_angle"]), np.sin(f["imu_angle"])
+    a_x = cos * along + sin * across + f["accel_x"]
+    a_y = cos * across - sin * along + f["accel_y"]
+    gyro = f["gyro_scale"] * gyro + f["gyro_bias"] + f["gyro_per_accel"] * along
     a_x, a_y = (a + noise[0] * rng.standard_normal(len(t)) for a in (a_x, a_y))
     gyro = gyro + noise[1] * rng.standard_normal(len(t))
-    unit = faults["accel_unit"]
-    return np.column_stack((t, a_x * unit, a_y * unit, gyro * faults["gyro_unit"]))
+    unit = f["accel_unit"]
+    return np.column_stack((t, a_x * unit, a_y * unit, gyro * f["gyro_unit"]))

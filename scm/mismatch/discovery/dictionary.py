@@ -109,7 +109,6 @@ def _angle(name: str) -> Parameter:
 
 _PERIOD = _parameter("period_s", "s", (0.5, 200.0), 0.05)
 _PHASE = _angle("phase_rad")
-_FROM = _parameter("from_s", "s", (-10.0, 1e4), 0.5)
 _LENGTH = _parameter("length_m", "m", (0.05, 100.0), 0.01)
 _AT = _parameter("beyond_m", "m", (-100.0, 100.0), 0.03)
 _ABOVE = _parameter("above_mps", "m/s", (0.0, 30.0), 0.02)
@@ -122,10 +121,6 @@ def _fixed(**numbers: float) -> ToNumbers:
 def _in_time(values: Values) -> dict[str, float]:
     period, phase = values
     return {"by_time": _TURN / period, "phase": phase, "sine": 1.0}
-
-
-def _since(values: Values) -> dict[str, float]:
-    return {"by_time": 1.0 / EDGE_S, "phase": -values[0] / EDGE_S, "step": 1.0}
 
 
 def _one_way(values: Values) -> dict[str, float]:
@@ -181,14 +176,6 @@ SWING = Shape(
     "swing", "time", (_PERIOD, _PHASE), _in_time, "swinging in time with a period of {period_s}",
     "sin(2 pi t / {period_s} + {phase_rad})", ("time",),
     "g = sine_of(2.0 * math.pi * time / period_s + phase_rad)",
-)  # fmt: skip
-SINCE = Shape(
-    "since", "time", (_FROM,), _since, "from {from_s} on", "(t > {from_s})", ("time",),
-    f"g = min(max((time - from_s) / {EDGE_S} + 0.5, 0.0), 1.0)",
-)  # fmt: skip
-DRIFT = Shape(
-    "drift", "time", (), _fixed(by_time=1.0 / 60.0, line=1.0), "more with every minute",
-    "t / 60 s", ("time",), "g = time / 60.0",
 )  # fmt: skip
 ONE_WAY = Shape(
     "one way", "heading", (_angle("against_rad"),), _one_way,
@@ -319,13 +306,13 @@ PHASE = Shape(
 
 _FLOOR = (TILES, WAVE, BEYOND, SLOPE)
 _HEADING = (ONE_WAY, ROUND, BOTH_WAYS)
-_TIME = (SWING, SINCE, DRIFT)
+_TIME = (SWING,)
 _SPEED = (SPEED, SPEED_SQUARED, SPEED_CUBED, FASTER)
 _TURNED = (TURNED, TURNED_SQUARED, TURNED_CUBED, LEFT, RIGHT)
 _ROWS = (
-    (FLOOR, (SWING, SINCE)),
+    (FLOOR, (SWING,)),
     (ALONG, (SWING,)),
-    (DRAG, (*_HEADING, *_FLOOR, SINCE, DRIFT, SPEED_CUBED, FASTER, *_TURNED,
+    (DRAG, (*_HEADING, *_FLOOR, SPEED_CUBED, FASTER, *_TURNED,
                TURNING)),
     (ANGLE, (*_TIME, ROUND, WAVE, BEYOND, SLOPE, SPEED, SPEED_SQUARED,
                 DRIVEN)),
@@ -333,7 +320,7 @@ _ROWS = (
     (STEER_GAIN, (*_TIME, ROUND, BEYOND, SPEED, LOAD)),
     (THROTTLE, (*_TIME, ROUND, BEYOND, SPEED, TURNED, LEFT, RIGHT,
                    REVERSED, LOAD, WORKED)),
-    (TWIST, (SWING, SINCE, *_SPEED[:2], DRIVEN)),
+    (TWIST, (SWING, *_SPEED[:2], DRIVEN)),
     (RIPPLE, (PHASE,)),
 )  # fmt: skip
 

@@ -104,7 +104,6 @@ def _grids(cells: Cells) -> Mapping[str, Floats]:
         "toward_rad": np.linspace(0.0, np.pi, 6, endpoint=False),
         "period_s": 1.0 / np.arange(slowest, fastest, 0.4 / span),
         "phase_rad": np.zeros(1),
-        "from_s": np.linspace(0.05, 0.95, 37) * span,
         "against_rad": np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False),
         "way_rad": np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False),
         "beyond_m": centre_at,

@@ -20,7 +20,9 @@ from scm.replay.numbers import (
     TETHER_STEPS,
     THROTTLE_CLOCK,
     THROTTLE_DELAY,
+    Change,
     Numbers,
+    changes_in,
 )
 from scm.vehicles.car import Car
 from scm.vehicles.compiler.vector_code import LANES, WIDTH
@@ -158,13 +160,21 @@ class Rollouts:
 
     def _moving(self, numbers: Numbers) -> tuple[tuple[str, float], ...]:
         """Return the numbers that a car's motion depends on."""
-        return tuple((k, v) for k, v in numbers.items() if k in self.tiles.columns or k in _LATE)
+        known = self.tiles.columns
+        return tuple(
+            (k, v)
+            for k, v in numbers.items()
+            for of in (k.partition("@")[0],)
+            if of in known or of in _LATE
+        )
 
     def _run(self, thread: int, sets: Sequence[Numbers]) -> Motions:
         tiles = self.tiles.enough_for(sets)
         fleet = tiles.fleets[thread]
         n, edges, tether = len(sets), self.drive.edges, _Tether(fleet)
         delays = self._set(fleet, tiles.columns, sets)
+        changing = _Changing(fleet, tiles.columns, delays, list(changes_in(sets)))
+        changing.set(edges[0], edges[0])
         parts = tether.parts
         self._begin(fleet, n, delays, parts)
         changes = np.linspace(edges[0], edges[-1], parts * (len(edges) - 1) + 1)
@@ -174,6 +184,7 @@ class Rollouts:
         tether.roll(n, out[:0], self._turned[0])
         for a in range(0, len(edges) - 1, TETHER_STEPS):
             b = min(a + TETHER_STEPS, len(edges) - 1)
+            changing.set(edges[a], edges[b])
             if self.drive.battery is not None:
                 fleet.battery[:n] = self.drive.battery[a]
             commands = self._commands(changes[parts * a : parts * b + 1], delays)
@@ -196,7 +207,7 @@ class Rollouts:
             for key, value in numbers.items():
                 if key in _LATE:
                     delays[int(key == STEERING_DELAY), row] += value
-                else:
+                elif "@" not in key:
                     fleet.parameters[row, columns[key]] = value
         return delays
 
@@ -218,6 +229,30 @@ class Rollouts:
         pose = Pose2(float(self._x[0]), float(self._y[0]), psi)
         for row in range(n):
             fleet.place(row, pose, c * vx + s * vy, 0.0, float(yaw.rate[0]), keep_actuators=True)
+
+
+class _Changing:
+    """Numbers of a fleet's rows that change while they drive."""
+
+    def __init__(
+        self, fleet: Fleet, columns: Mapping[str, int], delays: Floats, changes: Sequence[Change]
+    ) -> None:
+        self._changes = list[tuple[Change, Floats, tuple[int, int], float]]()
+        for change in changes:
+            late = change.key in _LATE
+            place = (
+                (int(change.key == STEERING_DELAY), change.column)
+                if late
+                else (change.column, columns[change.key])
+            )
+            array = delays if late else fleet.parameters
+            self._changes.append((change, array, place, float(array[place])))
+
+    def set(self, first_s: float, last_s: float) -> None:
+        """Set the numbers to their means over a stretch of time."""
+        for change, array, place, end in self._changes:
+            left = 1.0 - float(change.done(first_s, last_s))
+            array[place] = end + left * (change.before - change.after)
 
 
 class _Tether:

@@ -11,13 +11,14 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.mismatch.fit.rollouts import Motions
 from scm.replay.drive import STEP_S, WHEELS, Drive
-from scm.replay.numbers import COMMAND_CLOCK, NEUTRAL, POSE_CLOCK, Numbers
+from scm.replay.numbers import COMMAND_CLOCK, NEUTRAL, POSE_CLOCK, Numbers, changes_in
 from scm.vehicles.jit import array_kernel
 
 POSES = ("pose.x", "pose.y", "pose.yaw")
 _LATE = (COMMAND_CLOCK, POSE_CLOCK, "measure.pose_delay_s", "measure.clock_offset_s")
 _POSE = (*_LATE, "measure.clock_rate", "measure.pose_scale", "measure.camera_tilt_x_per_m",
          "measure.camera_tilt_y_per_m", "measure.pose_heading_rad")  # fmt: skip
+_POINT = ("measure.pose_point_x_m", "measure.pose_point_y_m")
 
 
 class Prediction:
@@ -35,18 +36,30 @@ class Prediction:
 
     def residuals(self, motions: Motions, faults: Sequence[Numbers]) -> list[Floats]:
         """Return measured minus predicted of every stream, each (samples, sets)."""
-        now = {key: np.array([n.get(key, value) for n in faults]) for key, value in NEUTRAL.items()}
+        now = self._faults(faults)
         path = self._path(motions, now)
         found = []
         for stream in self.drive.streams:
             predicted = path.get(stream.name)
             if predicted is None:
                 variable = self.sensor(stream.name, motions, now)
-                at, late = self._taps[stream.name], now[COMMAND_CLOCK]
+                at, late = self._taps[stream.name], now[COMMAND_CLOCK][0]
                 predicted = np.empty((len(at), len(late)))
                 _tapped(at, late / STEP_S, variable, predicted)
             found.append(stream.values[:, None] - predicted)
         return found
+
+    def _faults(self, sets: Sequence[Numbers]) -> dict[str, Floats]:
+        """Return each fault's number in each set, (1, sets); (edges, sets) where it changes."""
+        now = {key: np.array([[n.get(key, value) for n in sets]]) for key, value in NEUTRAL.items()}
+        edges = self.drive.edges
+        for change in changes_in(sets):
+            if change.key in now:
+                if len(now[change.key]) == 1:
+                    now[change.key] = np.repeat(now[change.key], len(edges), axis=0)
+                left = 1.0 - change.done(edges, edges + STEP_S)
+                now[change.key][:, change.column] += left * (change.before - change.after)
+        return now
 
     def _path(self, motions: Motions, now: Mapping[str, Floats]) -> dict[str, Floats]:
         """Return what the camera records of each set's way from its start, (samples, sets).
@@ -54,25 +67,24 @@ class Prediction:
         Each set is seen in its own camera's time, which may be late and run fast.
         """
         drive, edges = self.drive, self.drive.edges
+        rows = max(len(now[key]) for key in (*_POSE, *_POINT))
+        now = {key: _as_rows(now[key], rows) for key in (*_POSE, *_POINT)}
         late = np.sum([now[key] for key in _LATE], axis=0)
-        rate = now["measure.clock_rate"]
-        faulty = np.any([now[key] != NEUTRAL[key] for key in _POSE], axis=0)
+        rate, sets = now["measure.clock_rate"], late.shape[1]
+        faulty = np.any([(now[key] != NEUTRAL[key]).any(axis=0) for key in _POSE], axis=0)
         tilt = np.stack((now["measure.camera_tilt_x_per_m"], now["measure.camera_tilt_y_per_m"]))
-        arm = (
-            drive.point[0] + now["measure.pose_point_x_m"],
-            drive.point[1] + now["measure.pose_point_y_m"],
-        )
-        way = np.empty((3, len(edges), len(late)))
+        arm = (drive.point[0] + now[_POINT[0]], drive.point[1] + now[_POINT[1]])
+        way = np.empty((3, len(edges), sets))
         _drive_way(
             edges, late, rate, *self._seen, motions["speed"], motions["lateral_speed"],
             motions["yaw_rate"], *arm, now["measure.pose_heading_rad"], tilt,
-            now["measure.pose_scale"], STEP_S, np.zeros(len(late), np.int64), np.empty(3),
-            np.zeros((3, len(late))), way,
+            now["measure.pose_scale"], STEP_S, np.zeros(sets, np.int64), np.empty(3),
+            np.zeros((3, sets)), way,
         )  # fmt: skip
         found = {}
         for name, variable in zip(POSES, way, strict=True):
             t = drive.stream(name).t
-            found[name] = np.empty((len(t), len(late)))
+            found[name] = np.empty((len(t), sets))
             _seen_late(edges, t, late, rate, faulty, variable, found[name])
         return found
 
@@ -89,12 +101,27 @@ class Prediction:
             return c * ay - s * ax + now["measure.accel_bias_y_m_s2"]
         counted = 1.0 - now["measure.encoder_loss"]
         if name.startswith("encoder."):
-            return counted * self._counts * motions[f"wheel_angle.{WHEELS[name]}"]
+            return _counts(counted, self._counts * motions[f"wheel_angle.{WHEELS[name]}"])
         if name.startswith("wheel_speed."):
             return counted * np.gradient(motions[f"wheel_angle.{name[-2:]}"], STEP_S, axis=0)
         plain = {"speed": "speed", "velocity.x": "speed", "velocity.y": "lateral_speed"}
         variable = motions[plain.get(name, "yaw_rate")]
         return now["measure.speed_scale"] * variable if name == "speed" else variable
+
+
+def _counts(share: Floats, turned: Floats) -> Floats:
+    """Return what encoders count of wheels that turned, (edges, sets), if they count a share.
+
+    A share that changes, (edges, sets), counts from when it does.
+    """
+    if share.shape != turned.shape:
+        return np.asarray(share * turned)
+    return np.cumsum(share * np.diff(turned, axis=0, prepend=0.0), axis=0)
+
+
+def _as_rows(values: Floats, rows: int) -> Floats:
+    """Return numbers of sets, (1 or rows, sets), as (rows, sets)."""
+    return values if len(values) == rows else np.repeat(values, rows, axis=0)
 
 
 @array_kernel
@@ -121,43 +148,68 @@ def _drive_way(
     """Write each set's way in the measured frame, from its start, by trapezoids along its time.
 
     `t`, `values` and `rates`, (3, n), are the measured pose, smoothed; `way` is x, y and yaw, (3,
-    edges, sets). `row`, all 0, `seen` and `last` are room to work in.
+    edges, sets). Numbers of the sets are (1, sets), or (edges, sets) where any changes. `row`, all
+    0, `seen` and `last` are room to work in.
     """
     c, s = 1.0, 0.0
     for k in range(len(edges)):
-        for b in range(len(late)):
+        n = k if len(late) > 1 else 0
+        for b in range(late.shape[1]):
             if (
                 b == 0
-                or late[b] != late[b - 1]
-                or rate[b] != rate[b - 1]
-                or heading[b] != heading[b - 1]
+                or late[n, b] != late[n, b - 1]
+                or rate[n, b] != rate[n, b - 1]
+                or heading[n, b] != heading[n, b - 1]
             ):
-                stamp = edges[k] + late[b] + rate[b] * (edges[k] - edges[0])
+                stamp = edges[k] + late[n, b] + rate[n, b] * (edges[k] - edges[0])
                 stamp = min(max(stamp, t[0]), t[len(t) - 1])
                 i = row[b]
                 while i < len(t) - 2 and t[i + 1] <= stamp:
                     i += 1
+                while i > 0 and t[i] > stamp:  # the stamps have become later
+                    i -= 1
                 row[b] = i
                 _measured(stamp, i, t, values, rates, seen)
-                c, s = np.cos(seen[2] - heading[b]), np.sin(seen[2] - heading[b])
+                c, s = np.cos(seen[2] - heading[n, b]), np.sin(seen[2] - heading[n, b])
             turning = yaw_rate[k, b]
-            along = speed[k, b] - turning * arm_y[b]
-            across = lateral_speed[k, b] + turning * arm_x[b]
+            along = speed[k, b] - turning * arm_y[n, b]
+            across = lateral_speed[k, b] + turning * arm_x[n, b]
             vx, vy = c * along - s * across, s * along + c * across
-            if tilt[0, b] != 0.0 or tilt[1, b] != 0.0:
-                size = 1.0 / (1.0 - tilt[0, b] * seen[0] - tilt[1, b] * seen[1])
+            if tilt[0, n, b] != 0.0 or tilt[1, n, b] != 0.0:
+                size = 1.0 / (1.0 - tilt[0, n, b] * seen[0] - tilt[1, n, b] * seen[1])
                 x, y = seen[0] * size, seen[1] * size
-                depth = 1.0 + tilt[0, b] * x + tilt[1, b] * y
-                turn = (tilt[0, b] * vx + tilt[1, b] * vy) / (depth * depth)
+                depth = 1.0 + tilt[0, n, b] * x + tilt[1, n, b] * y
+                turn = (tilt[0, n, b] * vx + tilt[1, n, b] * vy) / (depth * depth)
                 vx, vy = vx / depth - x * turn, vy / depth - y * turn
-            vx, vy = scale[b] * vx, scale[b] * vy
+            vx, vy = scale[n, b] * vx, scale[n, b] * vy
             if k == 0:
                 way[0, k, b] = way[1, k, b] = way[2, k, b] = 0.0
             else:
                 way[0, k, b] = way[0, k - 1, b] + 0.5 * step * (vx + last[0, b])
                 way[1, k, b] = way[1, k - 1, b] + 0.5 * step * (vy + last[1, b])
                 way[2, k, b] = way[2, k - 1, b] + 0.5 * step * (turning + last[2, b])
+                if n > 0:
+                    _leap(n, b, seen, c, s, arm_x, arm_y, heading, tilt, scale, way[:, k, b])
             last[0, b], last[1, b], last[2, b] = vx, vy, turning
+
+
+@array_kernel
+def _leap(
+    n: int, b: int, seen: Floats, c: float, s: float, arm_x: Floats, arm_y: Floats,
+    heading: Floats, tilt: Floats, scale: Floats, way: Floats,
+) -> None:  # fmt: skip
+    """Add to a pose, (3,), what a fault that changes at row `n` moves in the picture at once."""
+    way[2] += heading[n, b] - heading[n - 1, b]
+    along, aside = arm_x[n, b] - arm_x[n - 1, b], arm_y[n, b] - arm_y[n - 1, b]
+    way[0] += scale[n, b] * (c * along - s * aside)
+    way[1] += scale[n, b] * (s * along + c * aside)
+    x, y = seen[0] / scale[n, b], seen[1] / scale[n, b]
+    size = 1.0 / (1.0 - tilt[0, n, b] * x - tilt[1, n, b] * y)
+    x, y = x * size, y * size
+    now = scale[n, b] / (1.0 + tilt[0, n, b] * x + tilt[1, n, b] * y)
+    before = scale[n - 1, b] / (1.0 + tilt[0, n - 1, b] * x + tilt[1, n - 1, b] * y)
+    way[0] += (now - before) * x
+    way[1] += (now - before) * y
 
 
 @array_kernel
@@ -181,8 +233,9 @@ def _seen_late(
     first, final = edges[0], edges[len(edges) - 1]
     step = edges[1] - edges[0]
     for k in range(len(t)):
-        for b in range(len(late)):
-            true = first + (t[k] - late[b] - first) / (1.0 + rate[b])
+        n = min(max(int((t[k] - first) / step), 0), len(late) - 1)
+        for b in range(late.shape[1]):
+            true = first + (t[k] - late[n, b] - first) / (1.0 + rate[n, b])
             if faulty[b]:
                 true = min(max(true, first), final)
             at = (true - first) / step

@@ -8,7 +8,7 @@ import inspect
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
 
@@ -16,7 +16,7 @@ from msgspec import structs
 
 from scm.errors import CarError
 from scm.mismatch.evidence import Evidence
-from scm.mismatch.findings import Diagnosis, Effect, Estimate
+from scm.mismatch.findings import Course, Diagnosis, Effect, Estimate
 from scm.vehicles.car import Car, Quantity, Value, all_terms, load_car
 from scm.vehicles.car_text import (
     number,
@@ -56,7 +56,9 @@ def write_car(
         raise CarError(msg) from error
     entries = dict(_entries(diagnosis, evidence, car, patched))
     path, note = folder / FILE, _note(diagnosis)
-    path.write_text(note + _edited(car, patched, entries, evidence), encoding="utf-8")
+    path.write_text(
+        note + _edited(car, patched, entries, evidence, diagnosis.effects), encoding="utf-8"
+    )
     if not _loads_as(path, patched):
         path.write_text(note + _anew(patched, entries, evidence), encoding="utf-8")
         load_car(path)
@@ -169,7 +171,10 @@ def _written(value: Value, digits: int) -> str:
     return quoted(value) if isinstance(value, str) else number(value, digits)
 
 
-def _edited(car: Car, patched: Car, entries: Mapping[str, str], evidence: Evidence) -> str:
+def _edited(
+    car: Car, patched: Car, entries: Mapping[str, str], evidence: Evidence,
+    effects: Sequence[Effect] = (),
+) -> str:  # fmt: skip
     """Return the given car's own text, changed where it has to be."""
     if not car.path.is_file():
         return _anew(patched, entries, evidence)
@@ -183,7 +188,23 @@ def _edited(car: Car, patched: Car, entries: Mapping[str, str], evidence: Eviden
     for key, entry in entries.items():
         section, _, name = key.partition(".")
         text = set_entry(text, section, name, entry)
-    return _headline(evidence) + _with_correlated(text, patched)
+    return _headline(evidence) + _changes(effects) + _with_correlated(text, patched)
+
+
+def _changes(effects: Sequence[Effect]) -> str:
+    """Return comments that say what changed during the recording, and when."""
+    lines = list[str]()
+    for effect in effects:
+        if effect.since_s is not None:
+            since = effect.since_s
+            when = f"since {since.value:.1f} s ({since.low:.1f} to {since.high:.1f} s)"
+            lines.append(f"# {effect.name} is so {when} of it; before.toml is the car before.\n")
+        elif effect.course is Course.RAMP:
+            lines.append(
+                f"# {effect.name} grew over it and is as it was at its end; before.toml is the "
+                "car as it was at its begin.\n"
+            )
+    return "".join(lines)
 
 
 def given_text(car: Car) -> str:

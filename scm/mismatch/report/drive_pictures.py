@@ -9,7 +9,7 @@ from scm.arrays import Bools, Floats, Ints
 from scm.data_quality.quality import Span
 from scm.maps.svg import element
 from scm.mismatch.evidence import FreeRuns, Residual
-from scm.mismatch.findings import Located, Place
+from scm.mismatch.findings import Estimate, Located, Place
 from scm.mismatch.report.plot import (
     BAND_STDS,
     TEXT_PX,
@@ -158,11 +158,12 @@ def time_line(
     runs: FreeRuns | None,
     after: str,
     clock: str,
+    changes: Sequence[Estimate] = (),
 ) -> Picture | None:
     """Return a panel for each of the first residuals; None where there is nothing to draw.
 
     Without free runs it is not shown which part of the recording was used for what. `after` stands
-    in the legend, `clock` below the axis.
+    in the legend, `clock` below the axis. `changes` are the moments at which effects changed.
     """
     shown = [r for r in residuals if len(r.t_s)][:_MAX_PANELS]
     if not shown:
@@ -171,11 +172,13 @@ def time_line(
     spans = [when for found in located for when in found.when_s or ()]
     entries = [("before thin", "the simulator as it was"), ("after thin", after)]
     entries += [("shade", "when the error was found to act")] if spans else []
+    entries += [("since", "when the car changed")] if changes else []
     parts = list(legend(66.0, 16.0, entries))
     y = _LEGEND_PX
     for residual in shown:
         room = frame(span, _heights(residual), (_LINE_PX, _PANEL_PX), (0.0, y), _LINE_MARGINS)
         parts += _panel(room, residual, spans)
+        parts += _moments(room, changes)
         y += _PANEL_PX
     parts += _strip(span, y, runs, clock)
     strip = " The strip below shows what each part of the recording was used for." if runs else ""
@@ -188,6 +191,19 @@ def time_line(
         svg=picture_svg(_LINE_PX, y + _STRIP_PX, parts, "Residuals over time", room),
         wide=True,
     )
+
+
+def _moments(room: Frame, changes: Sequence[Estimate]) -> Iterator[str]:
+    """Yield a line at each moment of a change, and an area over its interval."""
+    for change in changes:
+        low, at, high = (
+            float(np.clip(room.across.at(t), room.left, room.right))
+            for t in (change.low, change.value, change.high)
+        )
+        height = room.bottom - room.top
+        yield element("rect", x=low, y=room.top, width=max(high - low, 1.0), height=height,
+                      class_="since-area")  # fmt: skip
+        yield element("line", x1=at, y1=room.top, x2=at, y2=room.bottom, class_="since")
 
 
 def _heights(residual: Residual) -> tuple[float, float]:

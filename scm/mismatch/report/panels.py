@@ -21,6 +21,7 @@ from scm.mismatch.report.sentences import (
     pressing_problems,
     processor_sentence,
     sensors,
+    since_sentence,
     spans,
     where_and_when,
 )
@@ -71,6 +72,7 @@ def _effects(diagnosis: Diagnosis) -> Iterator[Panel]:
         rows = [
             ("What", pretty(effect.text)),
             ("How much", "\n".join(amounts(effect.parameters))),
+            ("Since", since_sentence(effect)),
             ("Formula", pretty(effect.formula or "").replace(" * ", " · ")),
             ("Where", where_and_when(_located_of(effect, diagnosis.located))),
             ("How sure", sureness(effect)),

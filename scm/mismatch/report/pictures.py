@@ -77,7 +77,14 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Pict
             floor_map(residual, diagnosis.located, i)
             for i, residual in enumerate(on_floor[:_MAX_MAPS], start=1)
         ],
-        time_line=time_line(residuals, diagnosis.located, evidence.free_runs, after, clock),
+        time_line=time_line(
+            residuals,
+            diagnosis.located,
+            evidence.free_runs,
+            after,
+            clock,
+            [effect.since_s for effect in diagnosis.effects if effect.since_s is not None],
+        ),
         curves=_curves(evidence.curves),
         windows=window_pictures(evidence.free_runs),
         errors=error_pictures(evidence.free_runs),

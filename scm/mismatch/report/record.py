@@ -148,7 +148,16 @@ def _since(start_s: float, diagnosis: Diagnosis, evidence: Evidence) -> tuple[Di
     if runs is not None:
         runs = replace(runs, start_s=runs.start_s - start_s)
     shown = replace(evidence, residuals=residuals, free_runs=runs)
-    return structs.replace(diagnosis, located=located, data=data), shown
+    effects = tuple(_effect_since(start_s, effect) for effect in diagnosis.effects)
+    return structs.replace(diagnosis, located=located, data=data, effects=effects), shown
+
+
+def _effect_since(start_s: float, effect: Effect) -> Effect:
+    since = effect.since_s
+    if since is None:
+        return effect
+    value, low, high = (t - start_s for t in (since.value, since.low, since.high))
+    return structs.replace(effect, since_s=structs.replace(since, value=value, low=low, high=high))
 
 
 def json_text(diagnosis: Diagnosis) -> str:

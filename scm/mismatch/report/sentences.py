@@ -7,8 +7,9 @@ from msgspec import structs
 
 from scm.data_quality.quality import DataProblem, Span
 from scm.mismatch.effect_catalogue import identifications
-from scm.mismatch.findings import Diagnosis, Effect, Equation, Located, Place, Verdict
+from scm.mismatch.findings import Course, Diagnosis, Effect, Equation, Located, Place, Verdict
 from scm.mismatch.report.wording import (
+    amounts,
     bicycle_name,
     capital,
     joined,
@@ -137,7 +138,24 @@ def all_named(effects: Sequence[Effect]) -> str:
 def effect_title(effect: Effect) -> str:
     """Return an effect as the verdict names it, with a note if the library does not have it."""
     name = title_of(effect.name)
+    if effect.since_s is not None:
+        return f"{name} since {effect.since_s.value:.0f} s"
+    if effect.course is Course.RAMP:
+        return f"{name}, growing over the recording"
     return name if effect.is_known else f"{name}, an effect outside its library"
+
+
+def since_sentence(effect: Effect) -> str:
+    """Return since when an effect is as it is; empty: all along."""
+    before = "; ".join(amounts(effect.before))
+    was = f" Before: {before}." if before else ""
+    if effect.since_s is not None:
+        at = effect.since_s
+        when = f"{at.value:.1f} s ({at.low:.1f} to {at.high:.1f} s)"
+        return f"{when}; the numbers are those after it.{was}"
+    if effect.course is Course.RAMP:
+        return f"It grows evenly over the recording; the numbers are those of its end.{was}"
+    return ""
 
 
 def _undecided_sentence(diagnosis: Diagnosis) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 from scm.data_quality.quality import DataProblem
 from scm.errors import CarError
 from scm.mismatch.evidence import Evidence
-from scm.mismatch.findings import Diagnosis, Effect
+from scm.mismatch.findings import Course, Diagnosis, Effect
 from scm.mismatch.report.car_file import FILE, given_text, write_car, write_own_terms
 from scm.mismatch.report.page import page_html
 from scm.mismatch.report.record import drawn_text, json_text, make_report, on_clock
@@ -72,6 +72,8 @@ def _write_car(diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car,
     if not _is_changed(car, patched):
         return f"`{FILE}` beside this page is the car as it was given.{beside}"
     what = "with what was found" if diagnosis.effects else "with its own numbers refitted"
+    if any(effect.course is not Course.CONSTANT for effect in diagnosis.effects):
+        what += ", as it was at the end of the recording; `before.toml` is the car as it was before"
     return (
         f"`{FILE}` beside this page is the given car {what}.{beside} The simulator loads it; see "
         f"how it does on another drive: `scm replay ANOTHER_DRIVE --car {FILE}`"
@@ -86,9 +88,11 @@ def _write_windows(evidence: Evidence, car: Car, out: Path) -> None:
     if runs is None:
         (out / WINDOWS).unlink(missing_ok=True)
         return
-    rows = zip(runs.recording.tolist(), runs.part, runs.stamp_s.tolist(), strict=True)
-    lines = [f"{number},{part},{start:.6f}" for number, part, start in rows]
-    (out / WINDOWS).write_text("\n".join(["recording,part,start_s", *lines, ""]), encoding="utf-8")
+    files = runs.file or (FILE,) * len(runs.part)
+    rows = zip(runs.recording.tolist(), runs.part, runs.stamp_s.tolist(), files, strict=True)
+    lines = [f"{number},{part},{start:.6f},{file}" for number, part, start, file in rows]
+    header = "recording,part,start_s,car"
+    (out / WINDOWS).write_text("\n".join([header, *lines, ""]), encoding="utf-8")
 
 
 def _is_changed(car: Car, patched: Car) -> bool:

@@ -20,6 +20,7 @@ from scm.mismatch.fit.fitter import FARTHEST, SPOTS, Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import fit_noise
+from scm.mismatch.select.changes import changes_to_try, with_best_moments
 
 MAX_REFITTED, MAX_REFITTED_FROM_NOMINAL, MAX_OTHER_STARTS = 16, 10, 6
 LAST_ROUNDS = 5, 8  # of fits that are compared: of all starts, then of the near ones
@@ -50,6 +51,7 @@ class Context:
         keeps_derivatives: Of the alternatives of a round; otherwise they would fill memory.
         share_confirmed: Share of an effect's gain that must hold where nothing was fitted.
         by_windows: Whether the likelihood is that of residual windows, which hold more than noise.
+        changes: Whether effects may change during a recording.
     """
 
     part: Floats
@@ -62,6 +64,7 @@ class Context:
     keeps_derivatives: bool = False
     share_confirmed: float = 0.4
     by_windows: bool = False
+    changes: bool = True
 
     @property
     def events(self) -> int:
@@ -134,6 +137,7 @@ def fit_with_noise(context: Context, fitted: Hypothesis) -> Hypothesis:
     """Return a hypothesis fitted together with its noise, one after the other, twice."""
     for _ in range(context.times_fitted):
         for _ in range(2):
+            (fitted,) = with_best_moments(context.fitter(fitted.model), [fitted])
             (fitted,) = context.fitter(fitted.model).refine([fitted], rounds=4, fresh=True)
             residuals, _ = fitted.model.residuals([fitted.numbers])
             fitted = replace(fitted, model=context.fit_noise(fitted.model, residuals, 1))
@@ -205,6 +209,9 @@ def _extended(context: Context, base: Hypothesis) -> Round:
         return context.criterion(fitted) - AT_LIMIT * bool(at_limit(fitted.effects[-1], base))
 
     near, far = (sorted(fits, key=cost)[:MAX_REFITTED] for fits in begun)
+    if context.changes:
+        changes = changes_to_try(context.penalty, fitter, base, every[0])
+        near += with_best_moments(fitter, _best_of_each(fitter.begin(base, changes), 1))
     near += [f for one in near[:MAX_OTHER_STARTS] for f in next_starts(one, every[0])]
     context.notify("refitting " + ", ".join(f.names[-1] for f in near[:4]) + " ...")
     del every, begun  # they hold innovations of every start

@@ -12,6 +12,7 @@ from scm.mismatch.effect_catalogue import params_of
 
 SEALED = "sealed.txt"
 CONTROLS = ("shuffled", "other_car")
+COURSES = ("step", "ramp")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,14 +20,15 @@ class Label:
     """What was concealed in one case.
 
     Attributes:
-        kind: `single`, `none`, `pair`, `unlisted`, or a control: `shuffled` commands of another
-            drive, or the file of an `other_car`.
+        kind: `single`, `none`, `pair`, `unlisted`; a single effect that changes: `step` or `ramp`;
+            or a control: `shuffled` commands of another drive, or the file of an `other_car`.
         names: Of the effects.
         parameters: Of each effect, by public name.
         equations: That are a right answer for a law outside the library.
         needs: Variables it depends on; `allows` are as good, or harmless beside them.
         strength: Of each effect, in multiples of what can be shown at all; empty: not known.
         nominal: Numbers in which this car differs from its file, by car file key.
+        since_s: When a step was, on the recording's clock.
     """
 
     case: str
@@ -39,6 +41,7 @@ class Label:
     allows: frozenset[str] = frozenset()
     strength: tuple[float, ...] = ()
     nominal: Mapping[str, float] = field(default_factory=dict)
+    since_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +104,7 @@ def label_of(case: str, fields: Mapping[str, Any]) -> Label:
     return Label(
         case=case,
         kind=fields["kind"]
-        if fields.get("kind") in CONTROLS
+        if fields.get("kind") in (*CONTROLS, *COURSES)
         else _kind(names, is_known=fields["listed"]),
         names=names,
         car=fields["car"],
@@ -111,6 +114,7 @@ def label_of(case: str, fields: Mapping[str, Any]) -> Label:
         allows=frozenset(fields.get("or_depends_on", ())),
         strength=tuple(fields.get("strength", ())),
         nominal=fields.get("ordinary", {}),
+        since_s=fields.get("since_s"),
     )
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.mismatch.effect_catalogue import identifications, params_of
-from scm.mismatch.findings import Diagnosis, Effect, Verdict
+from scm.mismatch.findings import Diagnosis, Effect, Estimate, Verdict
 from scm.mismatch.trial.again import Ratio
-from scm.mismatch.trial.labels import CONTROLS, Label
+from scm.mismatch.trial.labels import CONTROLS, COURSES, Label
 
 ALIKE = {
     "time": ("t", "phase in time", "period"),
@@ -35,8 +35,9 @@ ANGLES = {"uphill_rad", "toward_rad"}
 NORMAL_95 = 1.959964
 BARS = {
     "single": "exact 90, among 97", "pair": "among 75", "unlisted": "exact 80", "none": "exact 98",
-    "shuffled": "exact 100", "other_car": "exact 100",
+    "step": "exact 85", "ramp": "exact 80", "shuffled": "exact 100", "other_car": "exact 100",
 }  # fmt: skip
+MOMENT_S = 3.0  # by which a moment may be off
 CLEAR = 2.0
 NEAR = 1.15
 
@@ -67,6 +68,8 @@ class Outcome:
         false_names: Reported, but not concealed.
         errors: Of every parameter found, relative to the size of its effect.
         covered: Whether each parameter's interval holds the true value.
+        late_s: By how much the moment of a step is off; None: there is none, or none was found.
+        moment_covered: Whether its interval holds the true one.
     """
 
     label: Label
@@ -79,6 +82,8 @@ class Outcome:
     covered: tuple[bool, ...]
     runtime_s: float
     failed: str = ""
+    late_s: float | None = None
+    moment_covered: bool = False
 
 
 def score(label: Label, diagnosis: Diagnosis) -> Outcome:
@@ -96,6 +101,12 @@ def score(label: Label, diagnosis: Diagnosis) -> Outcome:
     nothing = diagnosis.verdict == Verdict.NONE and not names and not right
     pairs = [pair for effect in diagnosis.effects for pair in _compared(effect, label)]
     everything = len(right) == len(label.names) or _rightly_undecided(label, names, undecided)
+    since = _moment(label, diagnosis)
+    late_s = None if since is None or label.since_s is None else since.value - label.since_s
+    if label.kind in COURSES:
+        everything &= _has_course(label, diagnosis)
+    if label.since_s is not None:
+        everything &= late_s is not None and abs(late_s) <= MOMENT_S
     return Outcome(
         label=label,
         reported=names,
@@ -106,6 +117,21 @@ def score(label: Label, diagnosis: Diagnosis) -> Outcome:
         errors=tuple(error for error, _ in pairs if error is not None),
         covered=tuple(inside for _, inside in pairs),
         runtime_s=diagnosis.runtime_s,
+        late_s=late_s,
+        moment_covered=since is not None and since.low <= (label.since_s or 0.0) <= since.high,
+    )
+
+
+def _moment(label: Label, diagnosis: Diagnosis) -> Estimate | None:
+    """Return when a concealed effect is said to have changed; None where that is not said."""
+    named = (effect.since_s for effect in diagnosis.effects if effect.name in label.names)
+    return next((since for since in named if since is not None), None)
+
+
+def _has_course(label: Label, diagnosis: Diagnosis) -> bool:
+    """Return whether the concealed effect was reported to change as it did."""
+    return any(
+        effect.name in label.names and effect.course == label.kind for effect in diagnosis.effects
     )
 
 
@@ -231,7 +257,7 @@ def lines(outcomes: Sequence[Outcome], ratios: Sequence[Ratio]) -> list[str]:
         clear = [o for o in some if o.label.strength and min(o.label.strength) >= CLEAR]
         if clear and len(clear) < len(some):
             found += _row(f"  of these, {CLEAR:g} x floor up", clear)
-    found += ["", *_parameters(outcomes), *_again(ratios), *_times(outcomes)]
+    found += ["", *_parameters(outcomes), *_moments(outcomes), *_again(ratios), *_times(outcomes)]
     found += ["", *_confusions(outcomes)]
     return found
 
@@ -263,6 +289,19 @@ def _parameters(outcomes: Iterable[Outcome]) -> list[str]:
         middle, far = np.percentile(errors, (50, 90))
         text += f", error median {100 * middle:.1f} %, 90th percentile {100 * far:.0f} %"
     return [f"{text}; 90 % intervals hold the truth in {_share(sum(covered), len(covered))}"]
+
+
+def _moments(outcomes: Iterable[Outcome]) -> list[str]:
+    found = [(o.late_s, o.moment_covered) for o in outcomes if o.late_s is not None]
+    if not found:
+        return []
+    late = np.abs([late_s for late_s, _ in found])
+    near = _share(int((late <= MOMENT_S).sum()), len(found))
+    inside = _share(sum(held for _, held in found), len(found))
+    return [
+        f"moments of steps: {len(found)} found, off by {np.median(late):.1f} s (median), within "
+        f"{MOMENT_S:g} s in {near}; 90 % intervals hold the true one in {inside}"
+    ]
 
 
 def _again(ratios: Sequence[Ratio]) -> list[str]:

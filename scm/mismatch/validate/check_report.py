@@ -22,7 +22,8 @@ from scm.replay.drive import Drive
 from scm.replay.free_run import free_run
 from scm.vehicles.car import Car, load_car
 
-Row = tuple[int, str, float]  # recording, part and start of a window
+Row = tuple[int, str, float, str]
+"""Recording, part, start [s], and the file of the car found that it was driven with."""
 AGREES = 0.005  # relative difference within which a figure is the report's
 
 
@@ -66,9 +67,11 @@ def check_report(folder: Path, recordings: Sequence[Recording]) -> list[Figure]:
     given, found = (load_car(folder / name) for name in (GIVEN, FILE))
     usable = check(recordings, given, math.inf if compared_s is None else compared_s).recordings
     rows = _windows(folder, len(usable))
-    figures = list[Figure]()
-    for car, name, side in ((given, GIVEN, "before"), (found, FILE, "after")):
-        parts, errors = _errors(usable, car, rows, float(fit["horizon_s"]))
+    figures, horizon = list[Figure](), float(fit["horizon_s"])
+    stages = {name: found if name == FILE else load_car(folder / name) for *_, name in rows}
+    for name, side in ((GIVEN, "before"), (FILE, "after")):
+        driven = dict.fromkeys(stages, given) if side == "before" else stages
+        parts, errors = _errors(usable, driven, rows, horizon)
         for part in NAMES:
             mine = parts == part
             for error, reported in fit[part][side].items():
@@ -103,18 +106,18 @@ def _fields(folder: Path) -> dict[str, Any]:
 
 
 def _windows(folder: Path, recordings: int) -> list[Row]:
-    """Return recording, part and start of each of a report's windows."""
+    """Return a report's windows; those of an older report were all driven with the car found."""
     path = folder / WINDOWS
     try:
         with path.open(newline="", encoding="utf-8") as stream:
             rows = [
-                (int(row["recording"]), row["part"], float(row["start_s"]))
+                (int(row["recording"]), row["part"], float(row["start_s"]), row.get("car", FILE))
                 for row in csv.DictReader(stream)
             ]
     except (OSError, KeyError, TypeError, ValueError) as cause:
         msg = f"{path}: expected the windows of a report: {type(cause).__name__}: {cause}"
         raise RecordingError(msg) from cause
-    most = max((number for number, _, _ in rows), default=-1)
+    most = max((number for number, *_ in rows), default=-1)
     if most >= recordings:
         msg = (
             f"{path}: the report is of {most + 1} or more stretches of recordings; "
@@ -126,21 +129,24 @@ def _windows(folder: Path, recordings: int) -> list[Row]:
 
 def _errors(
     recordings: Sequence[Recording],
-    car: Car,
+    cars: Mapping[str, Car],
     rows: Sequence[Row],
     horizon: float,
 ) -> tuple[np.ndarray[tuple[int], np.dtype[np.str_]], dict[str, Floats]]:
     """Return the part of each window, and the errors at its end."""
     parts, position, yaw = list[str](), list[Floats](), list[Floats]()
     for number, recording in enumerate(recordings):
-        mine = sorted((start, part) for at, part, start in rows if at == number)
-        if not mine:
-            continue
-        run = free_run(recording, car, horizon, starts_s=np.array([start for start, _ in mine]))
-        known = dict(mine)
-        parts += [known[float(start)] for start in run.start_s]
-        position.append(run.position_error()[:, -1])
-        yaw.append(run.yaw_error()[:, -1])
+        for name, car in cars.items():
+            mine = sorted(
+                (start, part) for at, part, start, by in rows if (at, by) == (number, name)
+            )
+            if not mine:
+                continue
+            run = free_run(recording, car, horizon, starts_s=np.array([start for start, _ in mine]))
+            known = dict(mine)
+            parts += [known[float(start)] for start in run.start_s]
+            position.append(run.position_error()[:, -1])
+            yaw.append(run.yaw_error()[:, -1])
     return np.array(parts), {
         "position_m": np.concatenate(position),
         "yaw_rad": np.concatenate(yaw),

@@ -41,6 +41,7 @@ from scm.mismatch.validate.never_worse import (
     worse_than,
 )
 from scm.mismatch.validate.residuals import on_one_axis
+from scm.mismatch.validate.stages import Stage
 from scm.mismatch.validate.witness import witness_of
 from scm.vehicles.car import Car
 
@@ -58,6 +59,7 @@ class Result:
         found_car, retuned_car: As their written files say; None where none could be written.
         files: Keeps the folder of those files.
         account: Which rows were read, a line a recording.
+        stages: The car as it was in each part of a recording, the one found last.
     """
 
     diagnosis: Diagnosis
@@ -71,6 +73,7 @@ class Result:
     retuned_car: Car | None = None
     files: CarFiles | None = None
     account: tuple[str, ...] = ()
+    stages: tuple[Stage, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +85,7 @@ class _Validated:
     car: Car | None
     fit: Fit | None
     free_runs: FreeRuns | None
+    stages: tuple[Stage, ...]
     dropped: tuple[Dropped, ...] = ()
     failure: Failure | None = None
 
@@ -112,7 +116,7 @@ def conclude(selected: Selected, notify: Notify) -> Result:
     )  # fmt: skip
     return Result(
         diagnosis, car, evidence, best, retuned, suggestions, selected, valid.car, retuned_car,
-        files,
+        files, stages=valid.stages,
     )  # fmt: skip
 
 
@@ -125,10 +129,11 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
     gone = list[Dropped]()
     while True:
         effects, car = _written(selected, files, best)
-        fit, free_runs = _judged(selected, given, car)
+        stages = () if car is None else files.stages(best, effects, car)
+        fit, free_runs = _judged(selected, given, stages)
         if fit is None or free_runs is None:
-            return _Validated(best, effects, car, fit, free_runs, tuple(gone))
-        beside = _judged(selected, retuned_car, car)[0] if effects else None
+            return _Validated(best, effects, car, fit, free_runs, stages, tuple(gone))
+        beside = _judged(selected, retuned_car, stages)[0] if effects else None
         worse = worse_than(fit, beside) if effects else None
         if worse is None:
             break
@@ -140,7 +145,7 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
     fit = structs.replace(
         fit, retuned=own, witness=witness_of(selected.drives, selected.car, free_runs)
     )
-    return _Validated(best, effects, car, fit, free_runs, tuple(gone))
+    return _Validated(best, effects, car, fit, free_runs, stages, tuple(gone))
 
 
 def _handed_out(selected: Selected, files: CarFiles, valid: _Validated) -> _Validated:
@@ -172,10 +177,11 @@ def _handed_out(selected: Selected, files: CarFiles, valid: _Validated) -> _Vali
 
 def _again(selected: Selected, valid: _Validated) -> _Validated:
     """Return another car with its own free runs, beside the same witness."""
-    fit, free_runs = _judged(selected, selected.best.model.car, valid.car)
+    stages = () if valid.car is None else (Stage(valid.car),)
+    fit, free_runs = _judged(selected, selected.best.model.car, stages)
     if fit is not None and valid.fit is not None:
         fit = structs.replace(fit, witness=valid.fit.witness)
-    return replace(valid, fit=fit, free_runs=free_runs)
+    return replace(valid, fit=fit, free_runs=free_runs, stages=stages)
 
 
 def _written(
@@ -190,14 +196,16 @@ def _written(
 
 
 def _judged(
-    selected: Selected, before: Car | None, after: Car | None
+    selected: Selected, before: Car | None, after: Car | Sequence[Stage] | None
 ) -> tuple[Fit | None, FreeRuns | None]:
     """Return free runs of two cars; nothing where no part has a whole window, or a car no file."""
-    if before is None or after is None:
+    if before is None or not after:
         return None, None
     base = selected.best.model.car
+    stages = (Stage(after),) if isinstance(after, Car) else after
+    stages = [replace(stage, car=on(base, stage.car)) for stage in stages]
     try:
-        return judge(selected.drives, on(base, before), on(base, after), selected.parts)
+        return judge(selected.drives, on(base, before), stages, selected.parts)
     except RecordingError:
         return None, None
 

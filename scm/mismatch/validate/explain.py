@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from scm.arrays import Floats
+from scm.mismatch.changing_effect import BEFORE_NAME, SINCE_NAME, ChangingEffect
 from scm.mismatch.discovery.decide import TIE, against, alternatives_to, is_discovered
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect
 from scm.mismatch.discovery.sensor_effects import SensorEffect
@@ -13,10 +14,11 @@ from scm.mismatch.effect_catalogue import Candidate, Parameter
 from scm.mismatch.evidence import RefittedParameter
 from scm.mismatch.experiment.plan import Explanation
 from scm.mismatch.experiment.suggest import Suggestion, suggest
-from scm.mismatch.findings import Alternative, Effect, Equation, Estimate
+from scm.mismatch.findings import Alternative, Course, Effect, Equation, Estimate
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import LOCK, MIN_RELATIVE_STD, TIMING_S, UNKNOWN, Likelihood
 from scm.mismatch.report.wording import joined, percent, quantity, short
+from scm.mismatch.select.changes import moments_scored
 from scm.mismatch.select.round import Notify
 from scm.mismatch.select.search import Selection
 from scm.mismatch.select.selected import Selected
@@ -31,6 +33,7 @@ WHY = {
 WIDER = 1.3  # intervals from curvature alone are too narrow for what any model leaves out
 EQUATION_ERROR = 0.03  # of an effect's size: no equation of an effect is exactly the car's
 MAX_ALTERNATIVES = 5
+AROUND_S, EVERY_S = 12.0, 0.5  # of a moment, and between those compared with it
 SHARES = {
     "slope", "difference", "fraction", "fraction_per_min", "gain", "scale", "left", "right",
     "threshold",
@@ -141,6 +144,8 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
             value=value, low=max(value - spread, low), high=min(value + spread, high),
             unit=parameter.unit,
         )  # fmt: skip
+    if isinstance(candidate, ChangingEffect) and candidate.course is Course.STEP:
+        estimates[SINCE_NAME] = _moment(selected, best, place.stop - 1)
     probability, alternatives = _alternatives(selected.selection, candidate)
     discovered, offered, discovery = is_discovered(candidate), selected.offered, selected.discovery
     if discovered and offered is not None and discovery is not None:
@@ -152,14 +157,35 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
         is_known=not discovered,
         equation=candidate.equation,
         depends_on=candidate.depends_on,
-        parameters=estimates,
+        parameters={
+            name: one for name, one in estimates.items()
+            if name != SINCE_NAME and not name.endswith(BEFORE_NAME)
+        },
         probability=probability,
         text=sentence_of(candidate, estimates),
+        course=candidate.course if isinstance(candidate, ChangingEffect) else Course.CONSTANT,
+        since_s=estimates.get(SINCE_NAME),
+        before={
+            name.removesuffix(BEFORE_NAME): one
+            for name, one in estimates.items()
+            if name.endswith(BEFORE_NAME)
+        },
         formula=candidate.formula(mine)
         if isinstance(candidate, DictionaryEffect | SensorEffect)
         else None,
         alternatives=alternatives,
-    )
+    )  # fmt: skip
+
+
+def _moment(selected: Selected, best: Hypothesis, index: int) -> Estimate:
+    """Return when a step was, with the moments that explain the recording about as well."""
+    fitter = selected.context.fitter(best.model)
+    at, scores = moments_scored(fitter, best, index, AROUND_S, EVERY_S)
+    near = at[scores < scores.min() + (NINETY * WIDER) ** 2]
+    return Estimate(
+        value=float(best.values[index]), low=float(near.min()) - EVERY_S,
+        high=float(near.max()) + EVERY_S, unit="s",
+    )  # fmt: skip
 
 
 def upright(candidate: Candidate, values: Sequence[float]) -> tuple[float, ...]:

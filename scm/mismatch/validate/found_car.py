@@ -17,6 +17,7 @@ from msgspec import structs
 
 from scm.arrays import Bools
 from scm.errors import ScmError
+from scm.mismatch.changing_effect import ChangingEffect
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, as_term, number_keys
 from scm.mismatch.discovery.sensor_effects import LENS, PREFIX, SensorEffect
 from scm.mismatch.evidence import Evidence, RefittedParameter
@@ -24,6 +25,7 @@ from scm.mismatch.findings import Diagnosis, Effect, Verdict
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.report.car_file import FILE, write_car
 from scm.mismatch.validate.explain import NINETY, refitted
+from scm.mismatch.validate.stages import BEFORE, Stage, as_it_was, at_share, shares_of
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.correlated import Correlated
 from scm.vehicles.term import Term
@@ -77,11 +79,34 @@ class CarFiles:
                 continue
         return self._written(fitted, effects, np.zeros(len(fitted.z), dtype=np.bool_))
 
+    def stages(
+        self, fitted: Hypothesis, effects: Sequence[Effect], found: Car
+    ) -> tuple[Stage, ...]:
+        """Return the car as it was in each part of the recording; `found` is how it is in the end.
+
+        Raises:
+            ScmError: as `written`.
+        """
+        changes = [one for one in fitted.each() if isinstance(one[0], ChangingEffect)]
+        if not changes:
+            return (Stage(found),)
+        shares, times = shares_of(fitted)
+        ends = (*times, math.inf)
+        stages, from_s = list[Stage](), -math.inf
+        for number, (share, until_s) in enumerate(zip(shares, ends, strict=True)):
+            last = number == len(shares) - 1
+            was = [as_it_was(effect, share) for effect in effects]
+            mine = found if last else self.written(at_share(fitted, share), [*filter(None, was)])
+            name = FILE if last else f"before_{number + 1}.toml" if number else BEFORE
+            stages.append(Stage(mine, name, from_s, until_s))
+            from_s = until_s
+        return tuple(stages)
+
     def _written(self, fitted: Hypothesis, effects: Sequence[Effect], own: Bools) -> Car:
         self._count += 1
         folder = self._folder / f"{self._count}"
         folder.mkdir()
-        found = patched(self._car, fitted, folder, own)
+        found = patched(self._car, at_share(fitted, 1.0), folder, own)
         diagnosis = Diagnosis(
             verdict=Verdict.NONE, located=(), effects=tuple(effects), undecided=(), fit=None,
             runtime_s=0.0,
@@ -181,7 +206,7 @@ def patched(car: Car, fitted: Hypothesis, folder: Path, own: Bools | None = None
                 numbers[effect.fault] = values[0]
                 faults.append(LENS)
             continue
-        numbers |= effect.numbers(values)
+        numbers |= {k: v for k, v in effect.numbers(values).items() if "@" not in k}
         if effect.equation == "sensor" and effect.name != "wheel_radius":
             faults.append(effect.name)
         elif effect.name not in known and effect.name != "wheel_radius":

@@ -19,6 +19,7 @@ from scm.mismatch.fit.data_split import NAMES, Parts
 from scm.mismatch.fit.rollouts import Motions
 from scm.mismatch.fit.sensor_prediction import Prediction
 from scm.mismatch.validate.residuals import on_one_axis
+from scm.mismatch.validate.stages import Stage
 from scm.recording.motion import Poses
 from scm.replay.camera import Camera
 from scm.replay.drive import STEP_S, Drive, Stream
@@ -112,13 +113,14 @@ class _Judged:
     """One drive's windows: errors by channel, each (sides, windows, values), and what is drawn.
 
     Attributes:
-        number: Of the drive.
+        number: Of the drive; `file`: of the car found.
         start_s: (windows,), by the poses' stamps; `part`: of each.
         floor: What noise alone makes of each error, (draws, windows, values).
         shown: Poses recorded, before and after, (3, windows, times).
     """
 
     number: int
+    file: str
     start_s: Floats
     part: tuple[str, ...]
     errors: Mapping[str, Floats]
@@ -144,7 +146,7 @@ def _usual(blocks: Sequence[float]) -> float:
 def judge(
     drives: Sequence[Drive],
     before: Car,
-    after: Car,
+    after: Car | Sequence[Stage],
     parts: Parts,
     horizon_s: float | None = None,
 ) -> tuple[Fit, FreeRuns]:
@@ -153,7 +155,7 @@ def judge(
     Args:
         drives: The recordings.
         before: The car as given.
-        after: The car as found.
+        after: The car as found, or as it was in each part of a recording.
         parts: Of the recordings.
         horizon_s: Length of a window; None chooses it.
 
@@ -162,10 +164,12 @@ def judge(
     """
     horizon = horizon_of(drives, parts) if horizon_s is None else horizon_s
     horizon = max(round(horizon / STEP_S) * STEP_S, SHORTEST_S)
+    stages = (Stage(after),) if isinstance(after, Car) else after
     judged = [
         one
         for number, drive in enumerate(drives)
-        if (one := _judged(drive, (before, after), _spans(parts, number), number, horizon))
+        for stage in stages
+        if (one := _judged(drive, before, stage, _spans(parts, number), number, horizon))
     ]
     if not judged:
         msg = f"{drives[0].recording.path}: no window of {horizon:g} s without a gap in the poses"
@@ -209,11 +213,14 @@ def _spans(parts: Parts, drive: int) -> list[tuple[str, Span]]:
 
 
 def _judged(
-    drive: Drive, cars: tuple[Car, Car], spans: Sequence[tuple[str, Span]], number: int,
+    drive: Drive, before: Car, stage: Stage, spans: Sequence[tuple[str, Span]], number: int,
     horizon: float,
 ) -> _Judged | None:  # fmt: skip
-    replays = [Replay(drive.recording, car) for car in cars]
+    replays = [Replay(drive.recording, car) for car in (before, stage.car)]
     starts, part = _starts(drive, replays, spans, horizon)
+    middle = starts + 0.5 * horizon
+    mine = np.flatnonzero((middle >= stage.from_s) & (middle < stage.until_s))
+    starts, part = starts[mine], tuple(part[i] for i in mine)
     if not len(starts):
         return None
     noisy = [Camera(replays[_AFTER].drive, {}, poses) for poses in _draws(replays[_AFTER].drive)]
@@ -247,6 +254,7 @@ def _judged(
     }
     return _Judged(
         number,
+        stage.file,
         starts[fine],
         tuple(name for name, ok in zip(part, fine, strict=True) if ok),
         {name: error[:, fine] for name, error in errors.items()},
@@ -374,4 +382,5 @@ def _free_runs(judged: Sequence[_Judged], moves: Sequence[float], horizon: float
         stamp_s=np.concatenate([one.start_s for one in judged]),
         start_s=np.concatenate([one.start_s + moves[one.number] for one in judged]),
         t_s=t_s, measured=sides[0], before=sides[1], after=sides[2],
+        file=tuple(one.file for one in judged for _ in one.part),
     )  # fmt: skip

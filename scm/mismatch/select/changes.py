@@ -1,0 +1,188 @@
+"""Which effects seem to change during a recording: a screen without any further rollout.
+
+What an effect changes in the innovations at a time depends on its numbers shortly before. So an
+effect that begins at a moment changes them as a constant one does after it, and not before. All
+moments of an effect are compared by its one rollout.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.changing_effect import (
+    LEAST_S,
+    ChangingEffect,
+    changing,
+    may_change,
+    moments_in,
+)
+from scm.mismatch.effect_catalogue import Candidate
+from scm.mismatch.findings import Course
+from scm.mismatch.fit.fitter import Fitter, Trial
+from scm.mismatch.fit.hypothesis import Hypothesis
+
+Penalty = Callable[[Sequence[Candidate]], float]
+MAX_TRIALS = 12
+SEARCHED = ((9.0, 1.5), (1.5, 0.25))  # about a moment, and between those tried [s]
+AMPLITUDES = 0.02, 8.0  # of the strength that was simulated: farther, no line holds
+
+
+def span_of(base: Hypothesis) -> tuple[float, float] | None:
+    """Return the span of the recording in which changes may be searched for, on its clock.
+
+    None where there are several recordings: a moment of one means nothing in another.
+    """
+    if len(base.model.drives) != 1:
+        return None
+    edges = base.model.drives[0].edges
+    span = float(edges[0]), float(edges[-1])
+    return span if span[1] - span[0] >= LEAST_S else None
+
+
+def changes_to_try(
+    penalty: Penalty, fitter: Fitter, base: Hypothesis, begun: Sequence[Hypothesis]
+) -> list[Trial]:
+    """Return the effects that gain most as changes, with values to begin from.
+
+    Args:
+        penalty: Returns what effects must gain to be accepted.
+        fitter: Under the noise of `base`.
+        base: Without them, with derivatives.
+        begun: Constant effects beside it, each once or more, as `Fitter.begin` returns them.
+    """
+    span = span_of(base)
+    if span is None:
+        return []
+    screen = _Screen(fitter, base, span)
+    found = list[tuple[float, Trial]]()
+    for fitted in begun:
+        effect = fitted.effects[-1]
+        if may_change(effect) and np.isfinite(fitted.score):
+            found += [(gain - penalty((one[0][-1],)), one) for gain, one in screen.of(fitted)]
+    best = dict[int, Trial]()
+    for _, trial in sorted(found, key=lambda one: -one[0]):
+        best.setdefault(id(trial[0][-1]), trial)
+    return list(best.values())[:MAX_TRIALS]
+
+
+def with_best_moments(fitter: Fitter, fits: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Return fits, each step moved to the moment that suits the other numbers best, not refitted.
+
+    A score has a flat or a valley between any two events that show an effect: no derivative leads
+    from one to the next.
+    """
+    return [_at_best_moment(fitter, fitted) for fitted in fits]
+
+
+def _at_best_moment(fitter: Fitter, fitted: Hypothesis) -> Hypothesis:
+    for effect, place in fitted.each():
+        if isinstance(effect, ChangingEffect) and effect.course is Course.STEP:
+            for around_s, every_s in SEARCHED:
+                at, scores = moments_scored(fitter, fitted, place.stop - 1, around_s, every_s)
+                values = fitted.values.copy()
+                values[place.stop - 1] = at[int(np.argmin(scores))]
+                fitted = replace(fitted, values=values)
+    return fitted
+
+
+def moments_scored(
+    fitter: Fitter, fitted: Hypothesis, index: int, around_s: float, every_s: float
+) -> tuple[Floats, Floats]:
+    """Return moments about that of a step, and the score of the hypothesis with each.
+
+    Args:
+        fitter: Under the noise of `fitted`.
+        fitted: With a step.
+        index: Of the moment among its values.
+        around_s: How far to either side.
+        every_s: Between moments.
+    """
+    low, high = fitted.parameters[index].bounds
+    count = round(around_s / every_s)
+    at = np.clip(fitted.values[index] + every_s * np.arange(-count, count + 1), low, high)
+    values = np.repeat(fitted.values[None], len(at), axis=0)
+    values[:, index] = at
+    e, ok = fitter.model([replace(fitted, values=one).numbers for one in values])
+    scores = fitter.score(np.nan_to_num(e), np.repeat(fitted.z[None], len(at), axis=0))
+    return at, np.where(ok, scores, np.inf)
+
+
+class _Screen:
+    """Compares all moments of one effect after the other, and its ramp.
+
+    Sums over the spans between two moments, added up from the end, are those after each moment.
+    """
+
+    def __init__(self, fitter: Fitter, base: Hypothesis, span: tuple[float, float]) -> None:
+        self._base, self._span = base, span
+        self._prior = fitter.model.simulator.prior
+        self._weights = fitter.weights(base.innovations)
+        self._moments = moments_in(span)
+        t = base.model.t
+        order = np.argsort(t, kind="stable")
+        self._order = order[np.searchsorted(t[order], self._moments[0]) :]
+        self._cuts = np.searchsorted(t[self._order], self._moments)
+        self._ramp = np.clip((t - span[0]) / (span[1] - span[0]), 0.0, 1.0)
+        self._changing = dict[tuple[int, Course], ChangingEffect]()
+        self._normals = dict[int, tuple[Floats, Floats, Floats]]()
+
+    def of(self, fitted: Hypothesis) -> Iterator[tuple[float, Trial]]:
+        """Yield the best moment of an effect that begins, and its ramp: gain, and what to try."""
+        base, effect = self._base, fitted.effects[-1]
+        own = fitted.jacobian[:, : len(base.z)]
+        change = fitted.innovations - own @ (fitted.z - base.z) - base.innovations
+        ordered, normal, back = self._normal(own)
+        weighted = self._weights * change
+        ramped = self._ramp * weighted
+        slopes = np.append(self._after(weighted * base.innovations), ramped @ base.innovations)
+        sizes = np.append(self._after(weighted * change), ramped @ (self._ramp * change))
+        moves = np.vstack((self._moves_after(ordered, weighted[self._order]), own.T @ ramped))
+        moved = np.linalg.lstsq(normal, moves.T, rcond=1e-12)[0]
+        slopes -= moved.T @ (back + self._prior @ base.z)
+        sizes = np.maximum(sizes - (moves.T * moved).sum(axis=0), 1e-9)
+        gains, by = slopes * slopes / sizes, -slopes / sizes
+        gains[(np.abs(by) < AMPLITUDES[0]) | (np.abs(by) > AMPLITUDES[1])] = -np.inf
+        best = int(np.argmax(gains[:-1]))
+        for at, course in ((best, Course.STEP), (len(gains) - 1, Course.RAMP)):
+            if np.isfinite(gains[at]):
+                yield float(gains[at]), self._trial(fitted, effect, course, at, float(by[at]))
+
+    def _normal(self, own: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return J in time's order, J' W J with the prior, and J' W e.
+
+        Trials that set the same numbers share them.
+        """
+        key = id(own.base)
+        if key not in self._normals:
+            weighted = own * self._weights[:, None]
+            normal, back = own.T @ weighted + self._prior, weighted.T @ self._base.innovations
+            self._normals[key] = own[self._order], normal, back
+        return self._normals[key]
+
+    def _moves_after(self, own: Floats, values: Floats) -> Floats:
+        """Return J' v of what comes after each moment, both in time's order."""
+        ends = [*self._cuts[1:], len(values)]
+        parts = [own[a:b].T @ values[a:b] for a, b in zip(self._cuts, ends, strict=True)]
+        return np.asarray(np.cumsum(np.stack(parts)[::-1], axis=0)[::-1])
+
+    def _after(self, values: Floats) -> Floats:
+        """Return sums of what comes after each moment."""
+        sums = np.add.reduceat(values[self._order], self._cuts, axis=0)
+        return np.asarray(np.cumsum(sums[::-1], axis=0)[::-1])
+
+    def _trial(
+        self, fitted: Hypothesis, effect: Candidate, course: Course, at: int, by: float
+    ) -> Trial:
+        known = len(self._base.values)
+        values = fitted.values[known:]
+        neutral = np.array([parameter.neutral for parameter in effect.parameters])
+        low, high = np.array([parameter.bounds for parameter in effect.parameters]).T
+        strong = np.where(effect.amounts, neutral + by * (values - neutral), values)
+        moment = [float(self._moments[at])] if course is Course.STEP else []
+        key = id(effect), course
+        if key not in self._changing:
+            self._changing[key] = changing(effect, course, self._span)
+        start = np.concatenate((self._base.values, np.clip(strong, low, high), moment))
+        return (*self._base.effects, self._changing[key]), start

@@ -1,0 +1,81 @@
+"""The car as it was in each part of a recording during which something changed."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from msgspec import structs
+
+from scm.mismatch.changing_effect import ChangingEffect
+from scm.mismatch.effect_catalogue import Candidate
+from scm.mismatch.findings import Course, Effect
+from scm.mismatch.fit.hypothesis import Hypothesis
+from scm.mismatch.report.car_file import FILE
+from scm.vehicles.car import Car
+
+BEFORE = "before.toml"  # the car as it was before something changed
+RAMP_STAGES = 5  # cars that stand for a change over a whole recording
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """The car as it was in a part of a recording, from one time on to another on its clock [s].
+
+    Attributes:
+        file: Its name in a report; the last stage is the car found.
+    """
+
+    car: Car
+    file: str = FILE
+    from_s: float = -math.inf
+    until_s: float = math.inf
+
+
+def at_share(fitted: Hypothesis, share: float) -> Hypothesis:
+    """Return a hypothesis without changes: each effect as it is when a share of them is done."""
+    if not any(isinstance(effect, ChangingEffect) for effect in fitted.effects):
+        return fitted
+    effects, values, rows = list[Candidate](), list[float](), list(range(len(fitted.z)))
+    for effect, place in fitted.each():
+        mine = fitted.values[place].tolist()
+        if not isinstance(effect, ChangingEffect):
+            effects.append(effect)
+            values += mine
+            rows += range(len(fitted.z) + place.start, len(fitted.z) + place.stop)
+        elif share > 0.0 or effect.was_there:
+            effects.append(effect.of)
+            values += effect.at(mine, share)
+            first = len(fitted.z) + place.start
+            rows += range(first, first + len(effect.of.parameters))
+    covariance = fitted.covariance
+    if covariance.size:
+        covariance = covariance[np.ix_(rows, rows)]
+    return replace(
+        fitted, effects=tuple(effects), values=np.array(values), covariance=covariance,
+        jacobian=np.zeros((0, 0)),
+    )  # fmt: skip
+
+
+def as_it_was(effect: Effect, share: float) -> Effect | None:
+    """Return what is stated of an effect when a share of its change is done; None: nothing.
+
+    Between, its numbers follow from both ends and have no interval of their own.
+    """
+    if effect.course is Course.CONSTANT or share == 1.0:
+        return effect
+    if share == 0.0 and effect.before:
+        return structs.replace(effect, parameters=effect.before)
+    return None
+
+
+def shares_of(fitted: Hypothesis) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return how far changes are done in each stage, and when one stage follows another."""
+    for effect, place in fitted.each():
+        if isinstance(effect, ChangingEffect):
+            since, until = effect.change_s(fitted.values[place].tolist())
+            if effect.course is Course.STEP:
+                return (0.0, 1.0), (since,)
+            shares = np.linspace(0.0, 1.0, RAMP_STAGES)
+            times = since + (until - since) * 0.5 * (shares[1:] + shares[:-1])
+            return tuple(shares.tolist()), tuple(times.tolist())
+    return (1.0,), ()

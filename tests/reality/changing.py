@@ -1,0 +1,39 @@
+"""Numbers of a car and of its sensors that change while it drives: at a moment, or evenly."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Changing:
+    """Two sets of numbers, and when the one turns into the other [s]; both the same: a step."""
+
+    before: dict[str, float]
+    after: dict[str, float]
+    since: float
+    until: float
+
+    def share(self, t):
+        """Return how far the change is at times, 0 to 1."""
+        return np.clip((t - self.since) / max(self.until - self.since, 1e-9), 0.0, 1.0)
+
+    def at(self, t):
+        """Return all numbers at a time."""
+        share = float(self.share(t))
+        return {
+            name: before + share * (self.after[name] - before)
+            for name, before in self.before.items()
+        }
+
+
+def at(numbers, t):
+    """Return numbers at a time, of those that change and of those that do not."""
+    return numbers.at(t) if isinstance(numbers, Changing) else numbers
+
+
+def over(numbers, name, t):
+    """Return one number at each of some times."""
+    if not isinstance(numbers, Changing):
+        return np.full(len(t), numbers[name])
+    return numbers.before[name] + numbers.share(t) * (numbers.after[name] - numbers.before[name])

@@ -1,0 +1,142 @@
+"""Effects that change during a recording: what is tried, found, written and said of them."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+from scm.mismatch.changing_effect import EDGE_S, LEAST_S, changing, may_change, moments_in
+from scm.mismatch.findings import Course, Estimate
+from scm.mismatch.fit.fitter import Fitter
+from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.report.sentences import effect_title, since_sentence
+from scm.mismatch.select.changes import changes_to_try, moments_scored, with_best_moments
+from scm.mismatch.select.round import Context, extend, penalty
+from scm.mismatch.validate.stages import as_it_was, at_share
+from tests.unit.mismatch import made_up_findings as made_up
+from tests.unit.mismatch.made_drive import big_nigel, driven
+from tests.unit.mismatch.made_fit import candidate
+
+SINCE_S, SPAN = 15.0, (0.0, 30.0)
+BIAS = 0.05
+
+
+def _late(name, t, values):
+    return values + BIAS * (t > SINCE_S) if name == "imu.gyro_z" else values
+
+
+def _growing(name, t, values):
+    return values + BIAS * t / SPAN[1] if name == "imu.gyro_z" else values
+
+
+def context_of(model, *names, **more):
+    return Context(np.ones(len(model.t)), tuple(map(candidate, names)), **more)
+
+
+@cache
+def tried(sense):
+    """One round on a drive whose gyro has a bias later, or more and more."""
+    model = Likelihood.of([driven(seconds=30.0, sense=sense)], big_nigel())
+    context = context_of(model, "gyro_bias", "gyro_scale", "steer_trim")
+    fitter = context.fitter(model)
+    (base,) = fitter.refine([fitter.unfitted()], rounds=2, fresh=True)
+    return extend(context, base)
+
+
+def test_a_bias_that_came_later_is_found_with_its_moment():
+    best = tried(_late).alternatives[0]
+    (effect,) = best.effects
+    assert (effect.name, effect.course) == ("gyro_bias", Course.STEP)
+    assert best.values == pytest.approx([BIAS, SINCE_S], abs=0.5)
+    assert best.values[0] == pytest.approx(BIAS, abs=0.006)
+
+
+def test_a_bias_that_grew_is_found_as_a_ramp():
+    best = tried(_growing).alternatives[0]
+    (effect,) = best.effects
+    assert (effect.name, effect.course) == ("gyro_bias", Course.RAMP)
+    assert best.values == pytest.approx([BIAS], abs=0.006)
+
+
+@pytest.mark.parametrize("sense", [_late, _growing])
+def test_a_change_is_better_by_far_than_the_same_effect_all_along(sense):
+    found = tried(sense)
+    costs = zip(found.alternatives, found.criteria, strict=True)
+    constant = min(cost for one, cost in costs if may_change(one.effects[0]))
+    assert found.criteria[0] < constant - 50.0
+
+
+def test_a_bias_that_was_always_there_is_constant():
+    sense = lambda name, _, v: v + BIAS if name == "imu.gyro_z" else v  # noqa: E731
+    model = Likelihood.of([driven(seconds=30.0, sense=sense)], big_nigel())
+    context = context_of(model, "gyro_bias", "gyro_scale")
+    fitter = context.fitter(model)
+    (base,) = fitter.refine([fitter.unfitted()], rounds=2, fresh=True)
+    best = extend(context, base).alternatives[0]
+    assert may_change(best.effects[0])
+    assert best.names == ("gyro_bias",)
+
+
+def test_a_moment_is_moved_to_where_the_score_is_lowest():
+    best = tried(_late).alternatives[0]
+    fitter = Fitter(best.model, np.ones(len(best.model.t)))
+    off = replace(best, values=best.values + np.array([0.0, 6.0]))
+    (moved,) = with_best_moments(fitter, [off])
+    assert moved.values[-1] == pytest.approx(SINCE_S, abs=0.5)
+    at, scores = moments_scored(fitter, best, 1, 3.0, 0.5)
+    assert at[np.argmin(scores)] == pytest.approx(SINCE_S, abs=0.6)
+
+
+def test_no_change_is_searched_for_in_a_short_drive_or_in_several():
+    short = Likelihood.of([driven(seconds=LEAST_S - 5.0)], big_nigel())
+    several = Likelihood.of([driven(seconds=22.0), driven(seconds=22.0)], big_nigel())
+    for model in (short, several):
+        context = context_of(model, "gyro_bias")
+        fitter = context.fitter(model)
+        base = fitter.at(fitter.unfitted())
+        begun = fitter.begin(base, [((candidate("gyro_bias"),), np.array([0.05]))])
+        assert changes_to_try(context.penalty, fitter, base, begun) == []
+
+
+def test_every_moment_that_is_tried_counts_in_the_penalty():
+    bias = candidate("gyro_bias")
+    short, long = (changing(bias, Course.STEP, (0.0, end)) for end in (30.0, 120.0))
+    assert penalty((bias,), 40) < penalty((short,), 40) < penalty((long,), 40)
+    first, *_, last = moments_in(SPAN)
+    assert (first, last) == (EDGE_S, SPAN[1] - EDGE_S)
+
+
+def test_a_change_says_its_numbers_before_and_when():
+    step = changing(candidate("steer_trim"), Course.STEP, SPAN)
+    assert step.numbers((0.05, 12.0)) == {
+        "steering.trim_rad": 0.05, "steering.trim_rad@before": 0.0,
+        "steering.trim_rad@since_s": 12.0, "steering.trim_rad@until_s": 12.0,
+    }  # fmt: skip
+    ramp = changing(candidate("steer_trim"), Course.RAMP, SPAN, was_there=True)
+    numbers = ramp.numbers((0.05, -0.01))
+    assert numbers["steering.trim_rad@before"] == -0.01
+    assert (numbers["steering.trim_rad@since_s"], numbers["steering.trim_rad@until_s"]) == SPAN
+
+
+def test_the_car_at_the_end_has_the_effect_and_the_car_before_has_not():
+    best = tried(_late).alternatives[0]
+    assert at_share(best, 0.0).effects == ()
+    (effect,) = at_share(best, 1.0).effects
+    assert effect == candidate("gyro_bias")
+    assert at_share(best, 1.0).values.tolist() == [best.values[0]]
+    assert at_share(best, 0.5).values.tolist() == pytest.approx([0.5 * best.values[0]])
+
+
+def test_what_is_said_of_a_change_is_since_when():
+    effect = made_up.CASES["one_effect"]()[0].effects[0]
+    since = Estimate(value=42.0, low=41.2, high=43.1, unit="s")
+    late = structs.replace(effect, course=Course.STEP, since_s=since)
+    assert effect_title(late).endswith("since 42 s")
+    assert since_sentence(late).startswith("42.0 s (41.2 to 43.1 s)")
+    assert since_sentence(effect) == ""
+    assert as_it_was(late, 0.0) is None
+    assert as_it_was(effect, 0.0) is effect
+    was = structs.replace(late, before=effect.parameters)
+    assert as_it_was(was, 0.0).parameters == effect.parameters
