@@ -55,10 +55,8 @@ def write_car(
         msg = f"{FILE}: the file of an effect of its own is gone: {error}"
         raise CarError(msg) from error
     entries = dict(_entries(diagnosis, evidence, car, patched))
-    path, note = folder / FILE, _note(diagnosis)
-    path.write_text(
-        note + _edited(car, patched, entries, evidence, diagnosis.effects), encoding="utf-8"
-    )
+    path, note = folder / FILE, _note(diagnosis) + _changes(diagnosis.effects)
+    path.write_text(note + _edited(car, patched, entries, evidence), encoding="utf-8")
     if not _loads_as(path, patched):
         path.write_text(note + _anew(patched, entries, evidence), encoding="utf-8")
         load_car(path)
@@ -171,10 +169,7 @@ def _written(value: Value, digits: int) -> str:
     return quoted(value) if isinstance(value, str) else number(value, digits)
 
 
-def _edited(
-    car: Car, patched: Car, entries: Mapping[str, str], evidence: Evidence,
-    effects: Sequence[Effect] = (),
-) -> str:  # fmt: skip
+def _edited(car: Car, patched: Car, entries: Mapping[str, str], evidence: Evidence) -> str:
     """Return the given car's own text, changed where it has to be."""
     if not car.path.is_file():
         return _anew(patched, entries, evidence)
@@ -188,7 +183,7 @@ def _edited(
     for key, entry in entries.items():
         section, _, name = key.partition(".")
         text = set_entry(text, section, name, entry)
-    return _headline(evidence) + _changes(effects) + _with_correlated(text, patched)
+    return _headline(evidence) + _with_correlated(text, patched)
 
 
 def _changes(effects: Sequence[Effect]) -> str:

@@ -30,7 +30,7 @@ FOUND = "found"
 Notify = Callable[[str, int, int], None]
 """Receives what is being done, how many of it are done, and of how many."""
 PLACE = "tests/reality"
-KINDS = ("mixed", "single", "none", "pair", "unlisted", "shuffled", "other_car")
+KINDS = ("mixed", "single", "none", "pair", "unlisted", "step", "ramp", "shuffled", "other_car")
 ENGINES = ("own", "mujoco")
 DIAGNOSIS, BROKEN = "diagnosis.json", "failed.txt"
 Diagnose = Callable[[Path, Path], Diagnosis]
