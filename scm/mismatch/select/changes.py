@@ -67,6 +67,14 @@ def changes_to_try(
     return list(best.values())[:MAX_TRIALS]
 
 
+def has_step(fitted: Hypothesis) -> bool:
+    """Return whether an effect of a hypothesis began at a moment."""
+    return any(
+        isinstance(effect, ChangingEffect) and effect.course is Course.STEP
+        for effect in fitted.effects
+    )
+
+
 def with_best_moments(fitter: Fitter, fits: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Return fits, each step moved to the moment that suits the other numbers best, not refitted.
 

@@ -20,7 +20,7 @@ from scm.mismatch.fit.fitter import FARTHEST, SPOTS, Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import fit_noise
-from scm.mismatch.select.changes import changes_to_try, with_best_moments
+from scm.mismatch.select.changes import changes_to_try, has_step, with_best_moments
 
 MAX_REFITTED, MAX_REFITTED_FROM_NOMINAL, MAX_OTHER_STARTS = 16, 10, 6
 LAST_ROUNDS = 5, 8  # of fits that are compared: of all starts, then of the near ones
@@ -142,7 +142,11 @@ def fit_with_noise(context: Context, fitted: Hypothesis) -> Hypothesis:
             residuals, _ = fitted.model.residuals([fitted.numbers])
             fitted = replace(fitted, model=context.fit_noise(fitted.model, residuals, 1))
         fitted = fit_to_the_end(context, fitted, [fitted.z, np.zeros_like(fitted.z)])
-    return fitted
+    if not has_step(fitted):
+        return fitted
+    fitter = context.fitter(fitted.model)
+    (moved,) = fitter.refine(with_best_moments(fitter, [fitted]), rounds=2, fresh=True)
+    return min((moved, fitted), key=lambda f: f.score)
 
 
 def fit_to_the_end(context: Context, fitted: Hypothesis, starts: Sequence[Floats]) -> Hypothesis:
