@@ -29,7 +29,7 @@ from scm.mismatch.validate.curves import curve, discovered_curves
 from scm.mismatch.validate.explain import effect_of, refitted, undecided_of, widened_of
 from scm.mismatch.validate.found_car import CarFiles, as_written, on
 from scm.mismatch.validate.free_runs import MAX_NOISE_RATIO, judge
-from scm.mismatch.validate.locate import locate, strayed
+from scm.mismatch.validate.locate import locate, since_changes, strayed
 from scm.mismatch.validate.never_worse import (
     GIVEN,
     POSE,
@@ -99,6 +99,7 @@ def conclude(selected: Selected, notify: Notify) -> Result:
     valid = _handed_out(selected, files, _validated(selected, files, retuned_car))
     best, effects, fit = valid.best, valid.effects, valid.fit
     located, residuals = locate(retuned, best)
+    located = since_changes(located, effects, float(selected.drives[0].edges[-1]))
     suggestions = () if selected.context.by_windows else undecided_of(selected, best, notify)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = Verdict.MISMATCH if valid.failure else verdict_of(effects, undecided, fit)

@@ -5,16 +5,17 @@ where its gain is beyond what chance gives the best of all places looked at.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 
 from scm.arrays import Bools, Floats, Ints
 from scm.data_quality.quality import Span
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.evidence import FreeRuns, Residual
-from scm.mismatch.findings import Equation, Fit, Located, Place
+from scm.mismatch.findings import Effect, Equation, Fit, Located, Place
 from scm.mismatch.fit.fitter import TAIL, Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
@@ -223,6 +224,31 @@ def _named(effect: Candidate, values: Floats) -> Place | None:
         return None
     x, y, radius = known["x_m"], known["y_m"], known["radius_m"]
     return Place(x_m=(x - radius, x + radius), y_m=(y - radius, y + radius))
+
+
+def since_changes(
+    located: Sequence[Located], effects: Sequence[Effect], end_s: float
+) -> tuple[Located, ...]:
+    """Return what was located with its time, where effects began at a moment.
+
+    Args:
+        located: Of a part of the car each; its error is not always there if no effect of that part
+            was there before.
+        effects: That were found.
+        end_s: Of the recording, on its clock.
+    """
+    found = list[Located]()
+    for one in located:
+        began = [
+            effect.since_s.value if effect.since_s and not effect.before else None
+            for effect in effects
+            if effect.equation is one.equation
+        ]
+        moments = [since for since in began if since is not None]
+        is_late = one.when_s is None and bool(moments) and len(moments) == len(began)
+        when_s = ((min(moments), end_s),) if is_late else one.when_s
+        found.append(structs.replace(one, when_s=when_s))
+    return tuple(found)
 
 
 def strayed(runs: FreeRuns, fit: Fit) -> tuple[Located, ...]:

@@ -14,6 +14,7 @@ from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.report.sentences import effect_title, since_sentence
 from scm.mismatch.select.changes import changes_to_try, moments_scored, with_best_moments
 from scm.mismatch.select.round import Context, extend, penalty
+from scm.mismatch.validate.locate import since_changes
 from scm.mismatch.validate.stages import as_it_was, at_share
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_drive import big_nigel, driven
@@ -140,3 +141,17 @@ def test_what_is_said_of_a_change_is_since_when():
     assert as_it_was(effect, 0.0) is effect
     was = structs.replace(late, before=effect.parameters)
     assert as_it_was(was, 0.0).parameters == effect.parameters
+
+
+def test_the_error_of_an_effect_that_began_is_located_in_time():
+    found = made_up.CASES["one_effect"]()[0]
+    (effect,) = found.effects
+    located = tuple(structs.replace(one, when_s=None) for one in found.located)
+    since = Estimate(value=42.0, low=41.2, high=43.1, unit="s")
+    late = structs.replace(effect, course=Course.STEP, since_s=since)
+    for one, now in zip(located, since_changes(located, [late], 90.0), strict=True):
+        mine = one.equation is effect.equation
+        assert now.when_s == (((42.0, 90.0),) if mine else None)
+    changed = structs.replace(late, before=effect.parameters)
+    assert since_changes(located, [changed], 90.0) == located
+    assert since_changes(located, [late, effect], 90.0) == located
