@@ -95,7 +95,10 @@ class CarFiles:
         stages, from_s = list[Stage](), -math.inf
         for number, (share, until_s) in enumerate(zip(shares, ends, strict=True)):
             last = number == len(shares) - 1
-            was = [as_it_was(effect, share) for effect in effects]
+            was = [
+                as_it_was(effect, candidate, fitted.values[place].tolist(), share)
+                for effect, (candidate, place) in zip(effects, fitted.each(), strict=True)
+            ]
             mine = found if last else self.written(at_share(fitted, share), [*filter(None, was)])
             name = FILE if last else f"before_{number + 1}.toml" if number else BEFORE
             stages.append(Stage(mine, name, from_s, until_s))

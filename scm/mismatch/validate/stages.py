@@ -1,6 +1,7 @@
 """The car as it was in each part of a recording during which something changed."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from msgspec import structs
 
 from scm.mismatch.changing_effect import ChangingEffect
 from scm.mismatch.effect_catalogue import Candidate
-from scm.mismatch.findings import Course, Effect
+from scm.mismatch.findings import Course, Effect, Estimate
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.report.car_file import FILE
 from scm.vehicles.car import Car
@@ -56,16 +57,31 @@ def at_share(fitted: Hypothesis, share: float) -> Hypothesis:
     )  # fmt: skip
 
 
-def as_it_was(effect: Effect, share: float) -> Effect | None:
+def as_it_was(
+    effect: Effect, candidate: Candidate, values: Sequence[float], share: float
+) -> Effect | None:
     """Return what is stated of an effect when a share of its change is done; None: nothing.
 
-    Between, its numbers follow from both ends and have no interval of their own.
+    Args:
+        effect: As it is stated in the end.
+        candidate: What it was fitted as, with the `values` of its parameters.
+        values: In the order of its parameters.
+        share: 0 to 1. Between, intervals go from the one end's to the other's.
     """
-    if effect.course is Course.CONSTANT or share == 1.0:
+    if not isinstance(candidate, ChangingEffect) or share == 1.0:
         return effect
-    if share == 0.0 and effect.before:
-        return structs.replace(effect, parameters=effect.before)
-    return None
+    if share == 0.0 and not candidate.was_there:
+        return None
+    parameters = dict[str, Estimate]()
+    for parameter, value in zip(candidate.of.parameters, candidate.at(values, share), strict=True):
+        end = effect.parameters[parameter.name]
+        begin = effect.before.get(parameter.name)
+        half = share * (end.high - end.low) / 2.0
+        half += 0.0 if begin is None else (1.0 - share) * (begin.high - begin.low) / 2.0
+        parameters[parameter.name] = structs.replace(
+            end, value=value, low=value - half, high=value + half
+        )
+    return structs.replace(effect, parameters=parameters)
 
 
 def shares_of(fitted: Hypothesis) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -137,10 +137,24 @@ def test_what_is_said_of_a_change_is_since_when():
     assert effect_title(late).endswith("since 42 s")
     assert since_sentence(late).startswith("42.0 s (41.2 to 43.1 s)")
     assert since_sentence(effect) == ""
-    assert as_it_was(late, 0.0) is None
-    assert as_it_was(effect, 0.0) is effect
-    was = structs.replace(late, before=effect.parameters)
-    assert as_it_was(was, 0.0).parameters == effect.parameters
+
+
+def test_an_effect_on_its_way_has_numbers_and_intervals_between_its_ends():
+    trim = candidate("steer_trim")
+    end = Estimate(value=0.04, low=0.03, high=0.05, unit="rad")
+    effect = structs.replace(
+        made_up.CASES["one_effect"]()[0].effects[0], parameters={"offset_rad": end}
+    )
+    ramp = changing(trim, Course.RAMP, SPAN)
+    assert as_it_was(effect, trim, [0.04], 0.0) is effect
+    assert as_it_was(effect, ramp, [0.04], 0.0) is None
+    assert as_it_was(effect, ramp, [0.04], 1.0) is effect
+    half = as_it_was(effect, ramp, [0.04], 0.5).parameters["offset_rad"]
+    assert (half.value, half.low, half.high) == pytest.approx((0.02, 0.015, 0.025))
+    was = structs.replace(effect, before={"offset_rad": structs.replace(end, value=0.02)})
+    there = changing(trim, Course.RAMP, SPAN, was_there=True)
+    first = as_it_was(was, there, [0.04, 0.02], 0.0).parameters["offset_rad"]
+    assert (first.value, first.low) == pytest.approx((0.02, 0.01))
 
 
 def test_the_error_of_an_effect_that_began_is_located_in_time():
