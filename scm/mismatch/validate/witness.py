@@ -45,7 +45,7 @@ UNSEEN = "confirm"
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class Windows:
     """Windows of all recordings as the bicycle sees them.
 
     Attributes:
@@ -67,7 +67,7 @@ class Course:
     top_mps: float
     led_mps: float | None
 
-    def of(self, which: Bools) -> "Course":
+    def of(self, which: Bools) -> "Windows":
         """Return some of the windows."""
         return replace(self, edge=self.edge[which], start=self.start[:, which],
                        real=self.real[:, :, which])  # fmt: skip
@@ -84,22 +84,22 @@ def witness_of(drives: Sequence[Drive], car: Car, runs: FreeRuns) -> Witness | N
     Returns:
         None where there are too few windows.
     """
-    course = course_of(drives, car, runs.recording, runs.stamp_s, float(runs.t_s[-1]))
+    windows = windows_of(drives, car, runs.recording, runs.stamp_s, float(runs.t_s[-1]))
     unseen = np.array(runs.part) == UNSEEN
     if (~unseen).sum() < FEWEST_WINDOWS or not unseen.any():
         return None
-    found = fit(course.of(~unseen))
-    errors = {name: rms(far) for name, far in strayed(course.of(unseen), found).items()}
+    found = fit(windows.of(~unseen))
+    errors = {name: rms(far) for name, far in strayed(windows.of(unseen), found).items()}
     return Witness(
         position_m=errors["position_m"], yaw_rad=errors["yaw_rad"],
-        numbers={NAMES[j]: float(found[j]) for j in _free(course)},
+        numbers={NAMES[j]: float(found[j]) for j in _free(windows)},
     )  # fmt: skip
 
 
 def strayed_by(
     drives: Sequence[Drive],
     car: Car,
-    windows: tuple[Ints, Floats],
+    starts: tuple[Ints, Floats],
     horizon_s: float,
     numbers: Mapping[str, float],
 ) -> dict[str, Floats]:
@@ -108,19 +108,19 @@ def strayed_by(
     Args:
         drives: The recordings.
         car: As given.
-        windows: The recording and the stamp at which each starts, both (windows,).
+        starts: The recording and the stamp of each window, both (windows,).
         horizon_s: Their length.
         numbers: Of the bicycle, by name.
     """
-    course = course_of(drives, car, *windows, horizon_s)
-    values = _starts(course)[0]
+    windows = windows_of(drives, car, *starts, horizon_s)
+    values = _starts(windows)[0]
     values[[NAMES.index(name) for name in numbers]] = list(numbers.values())
-    return strayed(course, values)
+    return strayed(windows, values)
 
 
-def course_of(
+def windows_of(
     drives: Sequence[Drive], car: Car, recording: Ints, stamp_s: Floats, horizon_s: float
-) -> Course:
+) -> Windows:
     """Return windows with the commands around them.
 
     Args:
@@ -149,7 +149,7 @@ def course_of(
     top = float(np.percentile(np.concatenate([drive.pose_speed for drive in drives]), 90))
     led = car.value(FULL_SPEED) if any(map(is_led, drives)) else None
     limit = car.value("steering.limit_rad") if car.has("steering.limit_rad") else USUAL_LIMIT_RAD
-    return Course(
+    return Windows(
         np.concatenate(areas, axis=1), edge, seen[0], seen[1:, :3], horizon_s,
         car.value("body.wheelbase_m"), limit, max(top, SLOWEST_MPS), led,
     )  # fmt: skip
@@ -161,9 +161,9 @@ def _area(command: Commanded, edges: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(means * STEP_S)))
 
 
-def strayed(course: Course, values: Floats) -> dict[str, Floats]:
+def strayed(windows: Windows, values: Floats) -> dict[str, Floats]:
     """Return `position_m` and `yaw_rad` at the windows' ends, each (windows,)."""
-    x, y, yaw = apart_of(course, values[None])[0, :, 1]
+    x, y, yaw = apart_of(windows, values[None])[0, :, 1]
     return {"position_m": np.hypot(x, y), "yaw_rad": np.abs(yaw)}
 
 
@@ -172,34 +172,34 @@ def rms(errors: Floats) -> float:
     return float(np.sqrt(np.mean(errors * errors)))
 
 
-def apart_of(course: Course, sets: Floats) -> Floats:
+def apart_of(windows: Windows, sets: Floats) -> Floats:
     """Return how far bicycles are from what was measured: x, y, yaw half-way and at the end.
 
     Args:
-        course: The windows.
+        windows: The windows.
         sets: Numbers in the order of `NAMES`, (sets, 8).
 
     Returns:
         (sets, 3, 2, windows).
     """
-    apart = driven(course, sets) - course.real.swapaxes(0, 1)
+    apart = driven(windows, sets) - windows.real.swapaxes(0, 1)
     apart[:, 2] = np.arctan2(np.sin(apart[:, 2]), np.cos(apart[:, 2]))
     return apart
 
 
-def driven(course: Course, sets: Floats) -> Floats:
+def driven(windows: Windows, sets: Floats) -> Floats:
     """Return x, y and yaw of bicycles half-way and at the end, (sets, 3, 2, windows)."""
-    half = max(1, math.ceil(0.5 * course.horizon_s / LONGEST_STEP_S - 1e-9))
-    step_s = 0.5 * course.horizon_s / half
+    half = max(1, math.ceil(0.5 * windows.horizon_s / LONGEST_STEP_S - 1e-9))
+    step_s = 0.5 * windows.horizon_s / half
     times: Floats = np.asarray(step_s * np.arange(2 * half + 1), dtype=np.float64)
     number = sets.T[:, :, None, None]  # (8, sets, 1, 1)
-    throttle = _means(course, 0, times, number[THROTTLE_LATE])
-    speed = _speeds(course, _target(throttle, number), step_s, sets[:, TIME])
-    steering = _means(course, 1, times, number[LATE])
+    throttle = _means(windows, 0, times, number[THROTTLE_LATE])
+    speed = _speeds(windows, _target(throttle, number), step_s, sets[:, TIME])
+    steering = _means(windows, 1, times, number[LATE])
     angle = np.clip(number[GAIN] * steering + number[OFFSET], -MAX_ANGLE_RAD, MAX_ANGLE_RAD)
     turned = step_s * speed * np.tan(angle)
-    turned /= course.wheelbase_m * (1.0 + number[UNDERSTEER] * speed * speed)
-    x0, y0, yaw0, _ = course.start[:, None, :, None]
+    turned /= windows.wheelbase_m * (1.0 + number[UNDERSTEER] * speed * speed)
+    x0, y0, yaw0, _ = windows.start[:, None, :, None]
     yaw = yaw0 + np.cumsum(turned, axis=2)
     way, middle = step_s * speed, yaw - 0.5 * turned
     x = x0 + np.cumsum(way * np.cos(middle), axis=2)
@@ -207,10 +207,10 @@ def driven(course: Course, sets: Floats) -> Floats:
     return np.stack((x, y, yaw), axis=1)[..., (half - 1, -1)].swapaxes(2, 3)
 
 
-def _means(course: Course, which: int, times: Floats, late: Floats) -> Floats:
+def _means(windows: Windows, which: int, times: Floats, late: Floats) -> Floats:
     """Return a command's means over the steps between times, (sets, windows, steps)."""
-    area = course.areas[which]
-    at = course.edge[:, None] + (times - late) / STEP_S
+    area = windows.areas[which]
+    at = windows.edge[:, None] + (times - late) / STEP_S
     row = np.clip(at.astype(np.int64), 0, len(area) - 2)
     low = area[row]
     whole = low + (at - row) * (area[row + 1] - low)
@@ -224,12 +224,12 @@ def _target(throttle: Floats, number: Floats) -> Floats:
     return np.asarray(number[SPEED] * np.sign(throttle) * past)
 
 
-def _speeds(course: Course, target: Floats, step_s: float, constants: Floats) -> Floats:
+def _speeds(windows: Windows, target: Floats, step_s: float, constants: Floats) -> Floats:
     """Return mean speeds over the steps, (sets, windows, steps)."""
     left = np.exp(-step_s / constants)[:, None]
     mean = (1.0 - left) * constants[:, None] / step_s
     out = np.empty_like(target)
-    now = np.broadcast_to(course.start[3], target.shape[:2])
+    now = np.broadcast_to(windows.start[3], target.shape[:2])
     for k in range(target.shape[2]):
         beyond = now - target[:, :, k]
         out[:, :, k] = target[:, :, k] + beyond * mean
@@ -237,34 +237,34 @@ def _speeds(course: Course, target: Floats, step_s: float, constants: Floats) ->
     return out
 
 
-def fit(course: Course) -> Floats:
+def fit(windows: Windows) -> Floats:
     """Return the numbers of the bicycle that follows the windows best, from several starts."""
-    whole = _thinned(course, MAX_WINDOWS)
-    costs, sets = _refined(_thinned(whole, MAX_COARSE_WINDOWS), _starts(course), COARSE_ROUNDS)
+    whole = _thinned(windows, MAX_WINDOWS)
+    costs, sets = _refined(_thinned(whole, MAX_COARSE_WINDOWS), _starts(windows), COARSE_ROUNDS)
     costs, sets = _refined(whole, sets[np.argsort(costs)[:POLISHED]], FINE_ROUNDS)
     return np.asarray(sets[np.argmin(costs)])
 
 
-def _free(course: Course) -> Ints:
+def _free(windows: Windows) -> Ints:
     """Return the places of the numbers that are fitted."""
     every = np.arange(len(NAMES))
-    return every if course.led_mps is None else every[OF_STEERING]
+    return every if windows.led_mps is None else every[OF_STEERING]
 
 
-def _thinned(course: Course, most: int) -> Course:
-    count = len(course.edge)
+def _thinned(windows: Windows, most: int) -> Windows:
+    count = len(windows.edge)
     which = np.zeros(count, dtype=np.bool_)
     which[np.unique(np.linspace(0, count - 1, min(most, count)).astype(np.int64))] = True
-    return course.of(which)
+    return windows.of(which)
 
 
-def _starts(course: Course) -> Floats:
+def _starts(windows: Windows) -> Floats:
     """Return numbers to begin from, (starts, 8)."""
-    throttle = _means(course, 0, np.array((0.0, course.horizon_s)), np.zeros((1, 1, 1)))[0, :, 0]
-    full = course.top_mps / max(float(np.percentile(np.abs(throttle), 90)), 0.05)
-    limit, bent = course.limit_rad, 0.5 / course.top_mps**2
-    if course.led_mps is not None:
-        led = (course.led_mps, 0.0, 0.0, UNDELAYED_S)
+    throttle = _means(windows, 0, np.array((0.0, windows.horizon_s)), np.zeros((1, 1, 1)))[0, :, 0]
+    full = windows.top_mps / max(float(np.percentile(np.abs(throttle), 90)), 0.05)
+    limit, bent = windows.limit_rad, 0.5 / windows.top_mps**2
+    if windows.led_mps is not None:
+        led = (windows.led_mps, 0.0, 0.0, UNDELAYED_S)
         return np.array([
             (limit, 0.0, 0.05, 0.0, *led),
             (limit, 0.0, 0.3, 0.0, *led),
@@ -280,21 +280,21 @@ def _starts(course: Course) -> Floats:
     ])  # fmt: skip
 
 
-def _refined(course: Course, sets: Floats, rounds: int) -> tuple[Floats, Floats]:
+def _refined(windows: Windows, sets: Floats, rounds: int) -> tuple[Floats, Floats]:
     """Return costs and numbers after damped Gauss-Newton steps under a robust loss.
 
     Args:
-        course: The windows to follow.
+        windows: The windows to follow.
         sets: To begin from, (sets, 8); all are refined at once.
         rounds: How many steps are tried.
     """
-    free, (low, high) = _free(course), _bounds(course)
+    free, (low, high) = _free(windows), _bounds(windows)
     sets = np.clip(sets, low, high)
-    costs, damping = _costs(_residuals(course, sets)), np.full(len(sets), FIRST_DAMPING)
+    costs, damping = _costs(_residuals(windows, sets)), np.full(len(sets), FIRST_DAMPING)
     for _ in range(rounds):
         moved = np.repeat(sets[:, None], len(free) + 1, axis=1)
         moved[:, 1 + np.arange(len(free)), free] += STEPS[free]
-        left = _residuals(course, moved.reshape(-1, len(NAMES))).reshape(*moved.shape[:2], -1)
+        left = _residuals(windows, moved.reshape(-1, len(NAMES))).reshape(*moved.shape[:2], -1)
         trials = sets.copy()
         for i, (e, more) in enumerate(zip(left[:, 0], left[:, 1:], strict=True)):
             trials[i, free] += STEPS[free] * _step(
@@ -302,7 +302,7 @@ def _refined(course: Course, sets: Floats, rounds: int) -> tuple[Floats, Floats]
                 (high - sets[i])[free] / STEPS[free],
             )  # fmt: skip
         trials = np.clip(trials, low, high)
-        now = _costs(_residuals(course, trials))
+        now = _costs(_residuals(windows, trials))
         better = now < costs
         sets, costs = np.where(better[:, None], trials, sets), np.where(better, now, costs)
         damping *= np.where(better, LESS, MORE)
@@ -319,21 +319,21 @@ def _step(e: Floats, slopes: Floats, damping: float, low: Floats, high: Floats) 
     return np.clip(np.linalg.solve(normal, down * moves), low, high)
 
 
-def _residuals(course: Course, sets: Floats) -> Floats:
+def _residuals(windows: Windows, sets: Floats) -> Floats:
     """Return how far bicycles stray half-way and at the end, over usual errors, (sets, n)."""
-    ways = np.hypot(*(course.real[1, :2] - course.start[:2]))
+    ways = np.hypot(*(windows.real[1, :2] - windows.start[:2]))
     metres = SHARE * max(float(np.sqrt(np.mean(ways * ways))), SHORTEST_WAY_M)
     usual = np.array((metres, metres, YAW_RAD))[:, None, None]
-    return np.asarray((apart_of(course, sets) / usual).reshape(len(sets), -1))
+    return np.asarray((apart_of(windows, sets) / usual).reshape(len(sets), -1))
 
 
 def _costs(residuals: Floats) -> Floats:
     return np.asarray((np.sqrt(1.0 + residuals * residuals) - 1.0).sum(axis=1))
 
 
-def _bounds(course: Course) -> tuple[Floats, Floats]:
+def _bounds(windows: Windows) -> tuple[Floats, Floats]:
     """Return the least and the largest numbers, in the order of `NAMES`."""
-    squared, fast = course.top_mps**2, 60.0 * course.top_mps
+    squared, fast = windows.top_mps**2, 60.0 * windows.top_mps
     low = (-1.5, -0.6, 0.0, -0.3 / squared, 0.0, -1.0, 0.0, UNDELAYED_S)
     high = (1.5, 0.6, MAX_DELAY_S, 20.0 / squared, fast, 0.9, MAX_DELAY_S, 30.0)
     return np.array(low), np.array(high)
