@@ -4,8 +4,9 @@ An effect is tried as constant first. Beside that it may begin or change at a mo
 too. What a change gains must exceed what the best of all moments gains by chance.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -58,13 +59,29 @@ class ChangingEffect(Candidate):
             return tuple(values[count : 2 * count])
         return tuple(parameter.neutral for parameter in self.of.parameters)
 
-    def at(self, values: Sequence[float], share: float) -> tuple[float, ...]:
-        """Return the effect's parameters when a share of the change is done."""
+    @property
+    def keys(self) -> set[str]:
+        """The keys of a car file that it moves."""
+        return {parameter.key for parameter in self.of.parameters}
+
+    def at(
+        self, values: Sequence[float], share: float, own: Mapping[str, float] = MappingProxyType({})
+    ) -> tuple[float, ...]:
+        """Return the effect's parameters when a share of the change is done.
+
+        Args:
+            values: Of its parameters.
+            share: 0 to 1.
+            own: The car's own numbers by key, which are its own before the change.
+        """
+        before = [
+            (own[one.key] - one.given) / one.per_unit
+            if one.key in own and not self.was_there
+            else was
+            for one, was in zip(self.of.parameters, self.before(values), strict=True)
+        ]
         end = values[: len(self.of.parameters)]
-        return tuple(
-            before + share * (after - before)
-            for before, after in zip(self.before(values), end, strict=True)
-        )
+        return tuple(was + share * (now - was) for was, now in zip(before, end, strict=True))
 
     def change_s(self, values: Sequence[float]) -> tuple[float, float]:
         """Return when the change begins and ends, on the drive's clock [s]."""

@@ -10,8 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from scm.arrays import Bools, Floats
+from scm.mismatch.changing_effect import ChangingEffect
 from scm.mismatch.effect_catalogue import Candidate
-from scm.mismatch.fit.hypothesis import Hypothesis, numbers_of
+from scm.mismatch.fit.hypothesis import Hypothesis, together
 from scm.mismatch.fit.likelihood import Likelihood
 
 ROUNDS = 5
@@ -138,13 +139,21 @@ class Fitter:
         return (slope * slope / size, -slope / size) if size > 1e-9 else (0.0, 1.0)
 
     def _free(self, effects: Sequence[Candidate]) -> Bools:
-        """Return which of the car's own numbers no effect sets, or means the same by."""
-        parameters = [parameter for effect in effects for parameter in effect.parameters]
+        """Return which of the car's own numbers no effect sets, or means the same by.
+
+        What an effect moves only later is the car's own before.
+        """
+        parameters = [
+            parameter
+            for effect in effects
+            if not isinstance(effect, ChangingEffect) or effect.was_there
+            for parameter in effect.parameters
+        ]
         set_by_effects = {key for one in parameters for key in (one.key, one.own)}
         return np.array([own.key not in set_by_effects for own in self.model.nominal])
 
     def _numbers(self, effects: Sequence[Candidate], z: Floats, values: Floats) -> dict[str, float]:
-        return self.model.simulator.numbers(z) | numbers_of(effects, values)
+        return together(self.model.simulator.numbers(z), effects, values)
 
     def refine(
         self, fits: Sequence[Hypothesis], rounds: int = ROUNDS, *, fresh: bool = False

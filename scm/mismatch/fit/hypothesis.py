@@ -3,15 +3,17 @@
 It is a value. A fit returns a new one; going back is keeping the older one.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from scm.arrays import Floats
+from scm.mismatch.changing_effect import ChangingEffect
 from scm.mismatch.effect_catalogue import Candidate, Parameter
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import Noise
+from scm.replay.numbers import BEFORE
 
 
 def numbers_of(effects: Sequence[Candidate], values: Floats) -> dict[str, float]:
@@ -21,6 +23,20 @@ def numbers_of(effects: Sequence[Candidate], values: Floats) -> dict[str, float]
         end = at + len(effect.parameters)
         found |= effect.numbers(tuple(values[at:end]))
         at = end
+    return found
+
+
+def together(
+    own: Mapping[str, float], effects: Sequence[Candidate], values: Floats
+) -> dict[str, float]:
+    """Return a car's own numbers and those of effects, by key.
+
+    What an effect moves later was before as the car's own number is.
+    """
+    found = {**own, **numbers_of(effects, values)}
+    for effect in effects:
+        if isinstance(effect, ChangingEffect) and not effect.was_there:
+            found |= {key + BEFORE: own[key] for key in effect.keys & own.keys()}
     return found
 
 
@@ -66,8 +82,7 @@ class Hypothesis:
     @property
     def numbers(self) -> dict[str, float]:
         """All numbers by key, the car's own first."""
-        own = self.model.simulator.numbers(self.z)
-        return own | numbers_of(self.effects, self.values)
+        return together(self.model.simulator.numbers(self.z), self.effects, self.values)
 
     def each(self) -> Iterator[tuple[Candidate, slice]]:
         """Yield each effect and where its numbers stand in `values`."""

@@ -22,6 +22,7 @@ from scm.mismatch.select.changes import moments_scored
 from scm.mismatch.select.round import Notify
 from scm.mismatch.select.search import Selection
 from scm.mismatch.select.selected import Selected
+from scm.mismatch.validate.stages import at_share
 from scm.vehicles.car import Car
 
 NINETY = 1.645
@@ -275,6 +276,12 @@ def _alternatives(found: Selection, candidate: Candidate) -> tuple[float, tuple[
     )  # fmt: skip
 
 
+def _at_the_end(fitted: Hypothesis) -> Explanation:
+    """Return what a hypothesis says of the car that would drive next."""
+    now = at_share(fitted, 1.0)
+    return Explanation(now.effects, now.values)
+
+
 def undecided_of(selected: Selected, best: Hypothesis, notify: Notify) -> tuple[Suggestion, ...]:
     """Return which effects found could as well be others, and the drives that would decide."""
     found = list[Suggestion]()
@@ -285,12 +292,12 @@ def undecided_of(selected: Selected, best: Hypothesis, notify: Notify) -> tuple[
         tried = list(zip(its_round.alternatives, its_round.criteria, strict=True))
         mine, lowest = next((f, c) for f, c in tried if f.names[-1] == effect.name)
         near = [
-            Explanation(f.effects, f.values)
+            _at_the_end(f)
             for f, c in tried
             if c - f.effects[-1].rare < lowest + TIE and f.names[-1] not in best.names
         ]
         if near:
             notify("designing the drive that would decide")
-            explanations = [Explanation(mine.effects, mine.values), *near]
+            explanations = [_at_the_end(mine), *near]
             found.append(suggest(best.model, explanations, notify=notify))
     return tuple(found)

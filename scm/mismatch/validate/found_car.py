@@ -91,12 +91,13 @@ class CarFiles:
         if not changes:
             return (Stage(found),)
         shares, times = shares_of(fitted)
+        own = fitted.model.simulator.numbers(fitted.z)
         ends = (*times, math.inf)
         stages, from_s = list[Stage](), -math.inf
         for number, (share, until_s) in enumerate(zip(shares, ends, strict=True)):
             last = number == len(shares) - 1
             was = [
-                as_it_was(effect, candidate, fitted.values[place].tolist(), share)
+                as_it_was(effect, candidate, fitted.values[place].tolist(), share, own)
                 for effect, (candidate, place) in zip(effects, fitted.each(), strict=True)
             ]
             mine = found if last else self.written(at_share(fitted, share), [*filter(None, was)])

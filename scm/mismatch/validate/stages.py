@@ -1,7 +1,7 @@
 """The car as it was in each part of a recording during which something changed."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +36,7 @@ def at_share(fitted: Hypothesis, share: float) -> Hypothesis:
     """Return a hypothesis without changes: each effect as it is when a share of them is done."""
     if not any(isinstance(effect, ChangingEffect) for effect in fitted.effects):
         return fitted
+    own = fitted.model.simulator.numbers(fitted.z)
     effects, values, rows = list[Candidate](), list[float](), list(range(len(fitted.z)))
     for effect, place in fitted.each():
         mine = fitted.values[place].tolist()
@@ -45,7 +46,7 @@ def at_share(fitted: Hypothesis, share: float) -> Hypothesis:
             rows += range(len(fitted.z) + place.start, len(fitted.z) + place.stop)
         elif share > 0.0 or effect.was_there:
             effects.append(effect.of)
-            values += effect.at(mine, share)
+            values += effect.at(mine, share, own)
             first = len(fitted.z) + place.start
             rows += range(first, first + len(effect.of.parameters))
     covariance = fitted.covariance
@@ -58,7 +59,11 @@ def at_share(fitted: Hypothesis, share: float) -> Hypothesis:
 
 
 def as_it_was(
-    effect: Effect, candidate: Candidate, values: Sequence[float], share: float
+    effect: Effect,
+    candidate: Candidate,
+    values: Sequence[float],
+    share: float,
+    own: Mapping[str, float],
 ) -> Effect | None:
     """Return what is stated of an effect when a share of its change is done; None: nothing.
 
@@ -67,13 +72,16 @@ def as_it_was(
         candidate: What it was fitted as, with the `values` of its parameters.
         values: In the order of its parameters.
         share: 0 to 1. Between, intervals go from the one end's to the other's.
+        own: The car's own numbers by key.
     """
     if not isinstance(candidate, ChangingEffect) or share == 1.0:
         return effect
     if share == 0.0 and not candidate.was_there:
         return None
     parameters = dict[str, Estimate]()
-    for parameter, value in zip(candidate.of.parameters, candidate.at(values, share), strict=True):
+    for parameter, value in zip(
+        candidate.of.parameters, candidate.at(values, share, own), strict=True
+    ):
         end = effect.parameters[parameter.name]
         begin = effect.before.get(parameter.name)
         half = share * (end.high - end.low) / 2.0

@@ -10,6 +10,7 @@ from msgspec import structs
 from scm.mismatch.changing_effect import EDGE_S, LEAST_S, changing, may_change, moments_in
 from scm.mismatch.findings import Course, Estimate
 from scm.mismatch.fit.fitter import Fitter
+from scm.mismatch.fit.hypothesis import together
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.report.sentences import effect_title, since_sentence
 from scm.mismatch.select.changes import changes_to_try, moments_scored, with_best_moments
@@ -146,14 +147,14 @@ def test_an_effect_on_its_way_has_numbers_and_intervals_between_its_ends():
         made_up.CASES["one_effect"]()[0].effects[0], parameters={"offset_rad": end}
     )
     ramp = changing(trim, Course.RAMP, SPAN)
-    assert as_it_was(effect, trim, [0.04], 0.0) is effect
-    assert as_it_was(effect, ramp, [0.04], 0.0) is None
-    assert as_it_was(effect, ramp, [0.04], 1.0) is effect
-    half = as_it_was(effect, ramp, [0.04], 0.5).parameters["offset_rad"]
+    assert as_it_was(effect, trim, [0.04], 0.0, {}) is effect
+    assert as_it_was(effect, ramp, [0.04], 0.0, {}) is None
+    assert as_it_was(effect, ramp, [0.04], 1.0, {}) is effect
+    half = as_it_was(effect, ramp, [0.04], 0.5, {}).parameters["offset_rad"]
     assert (half.value, half.low, half.high) == pytest.approx((0.02, 0.015, 0.025))
     was = structs.replace(effect, before={"offset_rad": structs.replace(end, value=0.02)})
     there = changing(trim, Course.RAMP, SPAN, was_there=True)
-    first = as_it_was(was, there, [0.04, 0.02], 0.0).parameters["offset_rad"]
+    first = as_it_was(was, there, [0.04, 0.02], 0.0, {}).parameters["offset_rad"]
     assert (first.value, first.low) == pytest.approx((0.02, 0.01))
 
 
@@ -169,3 +170,26 @@ def test_the_error_of_an_effect_that_began_is_located_in_time():
     changed = structs.replace(late, before=effect.parameters)
     assert since_changes(located, [changed], 90.0) == located
     assert since_changes(located, [late, effect], 90.0) == located
+
+
+def test_before_a_change_the_car_s_own_number_counts():
+    radius, trim = candidate("wheel_radius"), candidate("steer_trim")
+    key, given = radius.parameters[0].key, big_nigel().value("wheel.radius_m")
+    step = changing(radius, Course.STEP, SPAN)
+    numbers = together({key: 0.033}, (step, trim), np.array([0.95, 12.0, 0.05]))
+    assert (key, numbers[key + "@before"]) == ("wheel.radius_m", 0.033)
+    assert numbers[key] == pytest.approx(0.95 * given)
+    assert step.at([0.95, 12.0], 0.0, {key: 0.033}) == pytest.approx((0.033 / given,))
+
+
+def test_a_change_leaves_the_car_s_own_number_free():
+    model = Likelihood.of([driven(seconds=6.0)], big_nigel())
+    fitter = Fitter(model, np.ones(len(model.t)))
+    effect = candidate("payload")
+    own = [one.key for one in model.nominal].index(effect.parameters[0].own)
+    base = fitter.at(fitter.unfitted(np.full(len(model.nominal), 0.1)))
+    ramp = changing(effect, Course.RAMP, (0.0, 6.0))
+    trials = [((one,), np.array([0.3])) for one in (effect, ramp)]
+    constant, changed = fitter.begin(base, trials)
+    assert constant.z[own] == 0.0
+    assert changed.z[own] != 0.0
