@@ -25,7 +25,8 @@ def test_the_page_lists_car_files_and_draws_the_new_one(look, size, theme):
 
 
 def test_a_car_from_a_few_figures_drives_on_the_map_at_its_size(visit, running):
-    page = visit("/cars").page
+    visited = visit("/cars")
+    page = visited.page
     page.wait_for_selector(MADE)
     for field, value in {
         "car": "page_buggy", "mass_kg": "1.8", "wheelbase_m": "21", "top_speed_mps": "2",
@@ -45,11 +46,12 @@ def test_a_car_from_a_few_figures_drives_on_the_map_at_its_size(visit, running):
     page.click("dialog button.primary")
     page.wait_for_selector("tr[data-car=pb1], tr:has-text('pb1')", timeout=COMPILING_MS)
     try:
-        drawn = page.evaluate(
-            "async () => (await import('scm/shared/car_shape.js')).footprint('page_buggy')"
+        visited.wait(  # its shape is fetched once the car is there
+            """async () => {
+                const of = (await import('scm/shared/car_shape.js')).footprint('page_buggy');
+                return Math.abs(of.front - of.rear - 0.37) < 1e-3 && of.wheelbase === 0.21;
+            }"""
         )
-        assert drawn["front"] - drawn["rear"] == pytest.approx(0.37, abs=1e-3)
-        assert drawn["wheelbase"] == 0.21
     finally:
         running.web.delete("/vehicles/pb1").raise_for_status()
 
