@@ -57,14 +57,14 @@ class Cells:
 class Response:
     """What pushes in one channel would explain.
 
-    A course of pushes f, (cells,), changes the objective by 2 f @ slope + f @ bend @ f.
+    A series of pushes f, (cells,), changes the objective by 2 f @ slope + f @ bend @ f.
     """
 
     slope: Floats
     bend: Floats
 
     def gains(self, pushes: Floats) -> tuple[Floats, Floats]:
-        """Return the best factor of each course, and what it then explains: (cells, n) -> (n,)."""
+        """Return the best factor of each series, and what it then explains: (cells, n) -> (n,)."""
         top = -(self.slope @ pushes)
         bottom = np.einsum("ij,ij->j", pushes, self.bend @ pushes)
         bottom = np.maximum(bottom, 1e-9 * max(float(bottom.max(initial=0.0)), 1e-12))

@@ -167,12 +167,12 @@ def screen(
 def _best(
     effect: DictionaryEffect, grid: Sequence[Values], cells: Cells, response: Response
 ) -> list[Start]:
-    courses = np.stack([pushes(effect, cells, (1.0, *values[1:])) for values in grid], axis=1)
-    amounts, gains = response.gains(courses)
+    every_series = np.stack([pushes(effect, cells, (1.0, *values[1:])) for values in grid], axis=1)
+    amounts, gains = response.gains(every_series)
     order, chosen = np.argsort(-gains), list[int]()
     for i in order[:200]:
         if len(chosen) < MAX_STARTS and all(
-            _alike(courses[:, i], courses[:, j]) < SAME_ABOVE for j in chosen
+            _alike(every_series[:, i], every_series[:, j]) < SAME_ABOVE for j in chosen
         ):
             chosen.append(int(i))
     return [Start(effect, (float(amounts[i]), *grid[i][1:]), float(gains[i])) for i in chosen]
@@ -202,9 +202,9 @@ def _waves(
     most = MAX_WAVES if effect.shape is WAVE else MAX_STARTS
     found, chosen = list[Start](), list[Floats]()
     for i in np.argsort(-gains)[:400]:
-        course = a[i] * halves[0][:, i] + b[i] * halves[1][:, i]
-        if len(found) < most and all(_alike(course, k) < SAME_ABOVE for k in chosen):
-            chosen.append(course)
+        series = a[i] * halves[0][:, i] + b[i] * halves[1][:, i]
+        if len(found) < most and all(_alike(series, k) < SAME_ABOVE for k in chosen):
+            chosen.append(series)
             values = (float(np.hypot(a[i], b[i])), *grid[i][1:-1], float(np.arctan2(b[i], a[i])))
             found.append(Start(effect, values, float(gains[i])))
     return found
@@ -220,8 +220,8 @@ def polished(start: Start, cells: Cells, response: Response) -> Start:
     while left > 0 and len(parameters):
         steps = np.concatenate((np.diag(steps_now), -np.diag(steps_now)))
         moves = np.clip(values + steps, low, high)
-        courses = np.stack([pushes(start.effect, cells, (1.0, *m)) for m in moves], axis=1)
-        amounts, gains = response.gains(courses)
+        every_series = np.stack([pushes(start.effect, cells, (1.0, *m)) for m in moves], axis=1)
+        amounts, gains = response.gains(every_series)
         best = int(np.argmax(gains))
         if gains[best] > gain + 0.1:
             values, gain, amount = moves[best], float(gains[best]), float(amounts[best])

@@ -255,13 +255,13 @@ def _in_bins(
     edges = np.linspace(float(x.min()), float(x.max()), DISCOVERED_BINS + 1)
     place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, DISCOVERED_BINS - 1)
     used = [b for b in range(DISCOVERED_BINS) if np.count_nonzero(place == b) >= LEAST_CELLS]
-    courses = np.stack([np.where(place == b, unit, 0.0) for b in used], axis=1)
+    every_series = np.stack([np.where(place == b, unit, 0.0) for b in used], axis=1)
     fitter = Fitter(fitted.model, tried.part)
     response = respond(fitter, _without(fitted, mine), cells, effect.channel.response)
-    covariance = _inverse(courses.T @ response.bend @ courses)
+    covariance = _inverse(every_series.T @ response.bend @ every_series)
     fit = values[0] * shape(effect.shape.numbers(values[n:]), cells)
     y = np.array([fit[place == b].mean() for b in used])
-    y = y - covariance @ (courses.T @ response.slope)
+    y = y - covariance @ (every_series.T @ response.slope)
     band = NINETY * np.sqrt(np.maximum(covariance.diagonal(), 0.0))
     middle, order = np.array([x[place == b].mean() for b in used]), np.argsort(x)
     draw = partial(
@@ -301,7 +301,7 @@ def _without(fitted: Hypothesis, mine: slice) -> Hypothesis:
 
 
 def _inverse(bend: Floats) -> Floats:
-    """Return the covariance of amounts; finite where a course shows nothing."""
+    """Return the covariance of amounts; finite where a series shows nothing."""
     return np.asarray(np.linalg.inv(bend + 1e-9 * np.trace(bend) * np.eye(len(bend))))
 
 
