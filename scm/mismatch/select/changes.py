@@ -176,9 +176,9 @@ class _Screen:
         return np.asarray(np.cumsum(np.stack(parts)[::-1], axis=0)[::-1])
 
     def _after(self, values: Floats) -> Floats:
-        """Return sums of what comes after each moment."""
-        sums = np.add.reduceat(values[self._order], self._cuts, axis=0)
-        return np.asarray(np.cumsum(sums[::-1], axis=0)[::-1])
+        """Return sums of what comes after each moment, of values (events,)."""
+        until = np.concatenate(([0.0], np.cumsum(values[self._order])))
+        return np.asarray(until[-1] - until[self._cuts])
 
     def _trial(
         self, fitted: Hypothesis, effect: Candidate, course: Course, at: int, by: float
