@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Floats, Ints
 from scm.mismatch.changing_effect import (
     LEAST_S,
     ChangingEffect,
@@ -130,23 +130,25 @@ class _Screen:
         self._moments = moments_in(span)
         t = base.model.t
         order = np.argsort(t, kind="stable")
-        self._order = order[np.searchsorted(t[order], self._moments[0]) :]
-        self._cuts = np.searchsorted(t[self._order], self._moments)
+        first = int(np.searchsorted(t[order], self._moments[0]))
+        in_order = bool((order == np.arange(len(t))).all())
+        self._later: slice | Ints = slice(first, None) if in_order else order[first:]
+        self._cuts = np.searchsorted(t[self._later], self._moments)
         self._ramp = np.clip((t - span[0]) / (span[1] - span[0]), 0.0, 1.0)
         self._changing = dict[tuple[int, Course], ChangingEffect]()
-        self._normals = dict[int, tuple[Floats, Floats, Floats]]()
+        self._normals = dict[int, tuple[Floats, Floats]]()
 
     def of(self, fitted: Hypothesis) -> Iterator[tuple[float, Trial]]:
         """Yield the best moment of an effect that begins, and its ramp: gain, and what to try."""
         base, effect = self._base, fitted.effects[-1]
         own = fitted.jacobian[:, : len(base.z)]
         change = fitted.innovations - own @ (fitted.z - base.z) - base.innovations
-        ordered, normal, back = self._normal(own)
+        normal, back = self._normal(own)
         weighted = self._weights * change
         ramped = self._ramp * weighted
         slopes = np.append(self._after(weighted * base.innovations), ramped @ base.innovations)
         sizes = np.append(self._after(weighted * change), ramped @ (self._ramp * change))
-        moves = np.vstack((self._moves_after(ordered, weighted[self._order]), own.T @ ramped))
+        moves = np.vstack((self._moves_after(own, weighted), own.T @ ramped))
         moved = np.linalg.lstsq(normal, moves.T, rcond=1e-12)[0]
         slopes -= moved.T @ (back + self._prior @ base.z)
         sizes = np.maximum(sizes - (moves.T * moved).sum(axis=0), 1e-9)
@@ -157,27 +159,25 @@ class _Screen:
             if np.isfinite(gains[at]):
                 yield float(gains[at]), self._trial(fitted, effect, course, at, float(by[at]))
 
-    def _normal(self, own: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return J in time's order, J' W J with the prior, and J' W e.
-
-        Trials that set the same numbers share them.
-        """
+    def _normal(self, own: Floats) -> tuple[Floats, Floats]:
+        """Return J' W J with the prior, and J' W e; trials that set the same numbers share them."""
         key = id(own.base)
         if key not in self._normals:
             weighted = own * self._weights[:, None]
             normal, back = own.T @ weighted + self._prior, weighted.T @ self._base.innovations
-            self._normals[key] = own[self._order], normal, back
+            self._normals[key] = normal, back
         return self._normals[key]
 
     def _moves_after(self, own: Floats, values: Floats) -> Floats:
-        """Return J' v of what comes after each moment, both in time's order."""
+        """Return J' v of what comes after each moment."""
+        own, values = own[self._later], values[self._later]
         ends = [*self._cuts[1:], len(values)]
         parts = [own[a:b].T @ values[a:b] for a, b in zip(self._cuts, ends, strict=True)]
         return np.asarray(np.cumsum(np.stack(parts)[::-1], axis=0)[::-1])
 
     def _after(self, values: Floats) -> Floats:
         """Return sums of what comes after each moment, of values (events,)."""
-        until = np.concatenate(([0.0], np.cumsum(values[self._order])))
+        until = np.concatenate(([0.0], np.cumsum(values[self._later])))
         return np.asarray(until[-1] - until[self._cuts])
 
     def _trial(
