@@ -79,6 +79,8 @@ _FACTORS: Mapping[str, Callable[[Mapping[str, Floats]], Floats]] = {
 
 
 FASTEST_HZ = 1.0
+WAVES_AT_ONCE = 2000  # tens of thousands of waves fill memory
+_HALVES = (0.0, 0.5 * np.pi)  # phases
 SHORTEST = 2.2  # cells in a wave
 
 
@@ -186,28 +188,37 @@ def _waves(
     effect: DictionaryEffect, grid: Sequence[Values], cells: Cells, response: Response
 ) -> list[Start]:
     """Return the best waves; amount and phase come from a wave's two halves together."""
-    halves = [np.empty((len(cells), len(grid))) for _ in range(2)]  # thousands of waves fill memory
-    for half, phase in zip(halves, (0.0, 0.5 * np.pi), strict=True):
-        for i, v in enumerate(grid):
-            half[:, i] = pushes(effect, cells, (*v[:-1], phase))
-    top = np.stack([-(response.slope @ half) for half in halves])
-    ss = np.einsum("ij,ij->j", halves[0], response.bend @ halves[0])
-    bent = response.bend @ halves[1]
-    cc, sc = (np.einsum("ij,ij->j", half, bent) for half in halves[::-1])
-    del bent
-    size = ss * cc - sc * sc
-    size = np.maximum(size, 1e-6 * ss * cc + 1e-30)
-    a, b = (cc * top[0] - sc * top[1]) / size, (ss * top[1] - sc * top[0]) / size
-    gains = a * top[0] + b * top[1]
+    some = (grid[k : k + WAVES_AT_ONCE] for k in range(0, len(grid), WAVES_AT_ONCE))
+    parts = [_amounts(effect, one, cells, response) for one in some]
+    a, b, gains = np.concatenate(parts, axis=1)
     most = MAX_WAVES if effect.shape is WAVE else MAX_STARTS
     found, chosen = list[Start](), list[Floats]()
     for i in np.argsort(-gains)[:400]:
-        series = a[i] * halves[0][:, i] + b[i] * halves[1][:, i]
+        halves = [pushes(effect, cells, (*grid[i][:-1], phase)) for phase in _HALVES]
+        series = a[i] * halves[0] + b[i] * halves[1]
         if len(found) < most and all(_alike(series, k) < SAME_ABOVE for k in chosen):
             chosen.append(series)
             values = (float(np.hypot(a[i], b[i])), *grid[i][1:-1], float(np.arctan2(b[i], a[i])))
             found.append(Start(effect, values, float(gains[i])))
     return found
+
+
+def _amounts(
+    effect: DictionaryEffect, grid: Sequence[Values], cells: Cells, response: Response
+) -> Floats:
+    """Return the amounts of the two halves of waves, and what they gain, (3, waves)."""
+    halves = [
+        np.stack([pushes(effect, cells, (*v[:-1], phase)) for v in grid], axis=1)
+        for phase in _HALVES
+    ]
+    top = np.stack([-(response.slope @ half) for half in halves])
+    ss = np.einsum("ij,ij->j", halves[0], response.bend @ halves[0])
+    bent = response.bend @ halves[1]
+    cc, sc = (np.einsum("ij,ij->j", half, bent) for half in halves[::-1])
+    size = ss * cc - sc * sc
+    size = np.maximum(size, 1e-6 * ss * cc + 1e-30)
+    a, b = (cc * top[0] - sc * top[1]) / size, (ss * top[1] - sc * top[0]) / size
+    return np.stack((a, b, a * top[0] + b * top[1]))
 
 
 def polished(start: Start, cells: Cells, response: Response) -> Start:
