@@ -29,6 +29,7 @@ class Question(StrEnum):
     DISCOVERY = "laws"
     BESIDE = "beside_law"
     WINDOWS = "strides"
+    WITNESS = "from_witness"
 
 
 WORDS = {
@@ -38,6 +39,7 @@ WORDS = {
     Question.DISCOVERY: "Effects outside the catalogue were not searched for",
     Question.BESIDE: "Effects beside the one discovered were not searched for",
     Question.WINDOWS: "The car differs in many ways, which were not searched for",
+    Question.WITNESS: "The search was not started again from what a bicycle shows",
 }
 
 

@@ -196,7 +196,7 @@ class Unanswered(Struct, kw_only=True, frozen=True):
 
     Attributes:
         name: Short and fixed: `effects`, `further_effects`, `calm`, `laws`, `beside_law`,
-            `strides`.
+            `strides`, `from_witness`.
         text: One sentence: what was not searched for, and why.
     """
 

@@ -221,9 +221,17 @@ def by_windows(context: Context, drives: Sequence[Drive], car: Car) -> ByWindows
     return ByWindows(mine, parts, retune(mine, model))
 
 
-def select_many(context: Context, retuned: Hypothesis) -> Selection:
-    """Return the hypothesis that explains the recordings best, with several effects a round."""
-    found = Selection(retuned, retuned)
+def select_many(
+    context: Context, retuned: Hypothesis, start: Hypothesis | None = None
+) -> Selection:
+    """Return the hypothesis that explains the recordings best, with several effects a round.
+
+    Args:
+        context: What to work with.
+        retuned: The car with its own numbers refitted alone.
+        start: To begin from; None: the re-tuned car.
+    """
+    found = Selection(start or retuned, retuned)
     while len(found.best.effects) < MAX_EFFECTS_BY_WINDOWS:
         question = question_beside(found.best)
         more = context.budget.attempt(question, partial(_round_of_many, context, found))

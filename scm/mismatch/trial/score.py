@@ -123,7 +123,7 @@ def score(label: Label, diagnosis: Diagnosis) -> Outcome:
 
 
 def _moment(label: Label, diagnosis: Diagnosis) -> Estimate | None:
-    """Return when a concealed effect is said to have changed; None where that is not said."""
+    """Return when a report has a concealed effect change; None where it gives no moment."""
     named = (effect.since_s for effect in diagnosis.effects if effect.name in label.names)
     return next((since for since in named if since is not None), None)
 

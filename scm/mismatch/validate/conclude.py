@@ -1,5 +1,6 @@
 """The validate step: what was selected, judged by free runs, located and put into words."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -22,6 +23,7 @@ from scm.mismatch.findings import (
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.report.wording import capital, title_of
 from scm.mismatch.select.confirm import without_one
+from scm.mismatch.select.from_witness import from_witness
 from scm.mismatch.select.round import Context, Notify
 from scm.mismatch.select.selected import Selected
 from scm.mismatch.usable_data import titles_of
@@ -92,12 +94,11 @@ class _Validated:
 
 def conclude(selected: Selected, notify: Notify) -> Result:
     """Return the diagnosis of what was selected, validated, located and put into words."""
-    car, retuned = selected.car, selected.retuned
-    titles = titles_of(selected.recordings)
+    car, titles = selected.car, titles_of(selected.recordings)
     files = CarFiles(car, titles)
-    _, retuned_car = _written(selected, files, retuned)
-    valid = _handed_out(selected, files, _validated(selected, files, retuned_car))
-    best, effects, fit = valid.best, valid.effects, valid.fit
+    selected, retuned_car, valid = _nearest(selected, files, notify)
+    valid = _handed_out(selected, files, valid)
+    retuned, best, effects, fit = selected.retuned, valid.best, valid.effects, valid.fit
     located, residuals = locate(retuned, best)
     located = since_changes(located, effects, float(selected.drives[0].edges[-1]))
     suggestions = () if selected.context.by_windows else undecided_of(selected, best, notify)
@@ -119,6 +120,36 @@ def conclude(selected: Selected, notify: Notify) -> Result:
         diagnosis, car, evidence, best, retuned, suggestions, selected, valid.car, retuned_car,
         files, stages=valid.stages,
     )  # fmt: skip
+
+
+def _nearest(
+    selected: Selected, files: CarFiles, notify: Notify
+) -> tuple[Selected, Car | None, _Validated]:
+    """Return a selection with its re-tuned car and what stays of it.
+
+    Where the witness follows better, the search begins again from it, and what is nearer on the
+    part that chooses is taken.
+    """
+    first = _with_its_cars(selected, files)
+    fit = first[2].fit
+    if fit is None or fit.witness is None or not loses(fit):
+        return first
+    again = from_witness(selected, fit.witness.numbers)
+    if again is None:
+        return first
+    notify("judging what began from the bicycle")
+    other = _with_its_cars(again, files)
+    return min((first, other), key=lambda one: _chosen_m(one[2].fit))
+
+
+def _with_its_cars(selected: Selected, files: CarFiles) -> tuple[Selected, Car | None, _Validated]:
+    _, retuned_car = _written(selected, files, selected.retuned)
+    return selected, retuned_car, _validated(selected, files, retuned_car)
+
+
+def _chosen_m(fit: Fit | None) -> float:
+    """Return the position error on the part that chooses."""
+    return math.inf if fit is None else fit.choose.after.get(POSE[0], math.inf)
 
 
 def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> _Validated:

@@ -1,4 +1,4 @@
-"""Effects that change during a recording: what is tried, found, written and said of them."""
+"""Effects that change during a recording: what is tried, found, written and reported."""
 
 from dataclasses import replace
 from functools import cache
@@ -131,7 +131,7 @@ def test_the_car_at_the_end_has_the_effect_and_the_car_before_has_not():
     assert at_share(best, 0.5).values.tolist() == pytest.approx([0.5 * best.values[0]])
 
 
-def test_what_is_said_of_a_change_is_since_when():
+def test_a_report_names_the_moment_of_a_change():
     effect = made_up.CASES["one_effect"]()[0].effects[0]
     since = Estimate(value=42.0, low=41.2, high=43.1, unit="s")
     late = structs.replace(effect, course=Course.STEP, since_s=since)

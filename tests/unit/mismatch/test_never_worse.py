@@ -6,11 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from scm.clock import WallClock
+from scm.mismatch.budget import Budget
 from scm.mismatch.findings import Verdict, Witness
 from scm.mismatch.fit.data_split import split
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.pipeline import write
 from scm.mismatch.report.wording import quantity
+from scm.mismatch.select.from_witness import from_witness
 from scm.mismatch.select.round import Context
 from scm.mismatch.select.search import Selection
 from scm.mismatch.select.selected import Selected
@@ -50,8 +53,9 @@ def trimmed():
 def plain_model(monkeypatch):
     """The witness as somebody says it is."""
 
-    def errs_by(position_m):
-        found = Witness(position_m=position_m, yaw_rad=position_m, numbers={"dead_band": 0.1})
+    def errs_by(position_m, **numbers):
+        numbers = numbers or {"dead_band": 0.1}  # of no effect in the catalogue
+        found = Witness(position_m=position_m, yaw_rad=position_m, numbers=numbers)
         monkeypatch.setattr(module, "witness_of", lambda *_: found)
 
     return errs_by
@@ -66,7 +70,7 @@ def test_an_effect_that_holds_stays_beside_the_re_tuned_cars_errors():
     assert fit.confirm.after["position_m"] < 0.5 * fit.witness.position_m
 
 
-def test_an_effect_with_which_unseen_driving_is_worse_is_dropped_and_said(tmp_path):
+def test_an_effect_with_which_unseen_driving_is_worse_is_dropped_and_listed(tmp_path):
     model, retuned, _ = made_fit.healthy()
     wrong = replace(
         retuned, effects=(made_fit.candidate("steer_trim"),), values=np.array([0.05]),
@@ -88,15 +92,15 @@ def test_an_effect_with_which_unseen_driving_is_worse_is_dropped_and_said(tmp_pa
     assert "Steering trim explains what was fitted, but does not hold" in page
 
 
-def test_of_two_effects_the_one_that_spoils_the_car_goes():
+def test_of_two_effects_the_one_that_worsens_the_car_goes():
     model, retuned, best = trimmed()
     gain = made_fit.candidate("drive_gain")
-    spoilt = replace(
+    worsened = replace(
         best, effects=(*best.effects, gain), values=np.array([*best.values, 0.7]),
         jacobian=np.zeros((len(best.innovations), len(best.z) + 2)),
         covariance=np.eye(len(best.z) + 2),
     )  # fmt: skip
-    found = concluded(model, retuned, spoilt).diagnosis
+    found = concluded(model, retuned, worsened).diagnosis
     assert [effect.name for effect in found.effects] == ["steer_trim"]
     assert [gone.name for gone in found.dropped] == ["drive_gain"]
 
@@ -180,6 +184,40 @@ def test_a_car_that_loses_to_the_witness_is_not_handed_out(plain_model, tmp_path
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "A plain model drives more like the car" in page
     assert "Cause unknown" not in page
+
+
+def test_a_search_that_lost_begins_again_where_the_witness_points(plain_model):
+    plain_model(0.005, steering_offset_rad=0.03)
+    found = concluded(*missed()).diagnosis
+    assert [effect.name for effect in found.effects] == ["steer_trim"]
+    assert found.effects[0].parameters["offset_rad"].value == pytest.approx(0.05, abs=0.01)
+    assert (found.failure, found.dropped) == (None, ())
+
+
+def test_what_began_from_the_witness_counts_only_where_it_is_nearer(plain_model, monkeypatch):
+    plain_model(0.005)
+    model, retuned, best = trimmed()
+    worse = selected(model, retuned, missed()[2])
+    monkeypatch.setattr(module, "from_witness", lambda *_: worse)
+    monkeypatch.setattr(module, "loses", lambda _: True)
+    found = concluded(model, retuned, best).diagnosis
+    assert [gone.name for gone in found.dropped] == ["steer_trim"]
+
+
+def test_a_search_begins_again_from_a_bicycle_of_steering_alone():
+    model, retuned, gyro = missed()
+    found = from_witness(selected(model, retuned, gyro), {"steering_offset_rad": 0.08})
+    assert found.best.names == ("steer_trim",)
+    assert found.context.by_windows
+
+
+def test_nothing_begins_again_where_no_effect_stands_for_the_bicycle_or_time_is_up():
+    lost = selected(*missed())
+    assert from_witness(lost, {"understeer_s2_per_m2": 0.1}) is None
+    over = replace(lost, context=replace(lost.context, budget=Budget(0.0, WallClock())))
+    assert from_witness(over, {"steering_offset_rad": 0.05}) is None
+    (question,) = over.context.budget.unanswered
+    assert question.name == "from_witness"
 
 
 def test_a_failed_fit_without_effects_says_so_too(plain_model):

@@ -104,7 +104,7 @@ def diagnosis(*names, between=()):
 
 
 @pytest.mark.parametrize(
-    ("said", "concealed", "found", "false_effects"),
+    ("reported", "concealed", "found", "false_effects"),
     [
         (diagnosis("steer_trim"), "steer_trim", 1.0, 0),
         (diagnosis("steer_trim", "wind"), "steer_trim", 1.0, 1),
@@ -115,8 +115,8 @@ def diagnosis(*names, between=()):
         (diagnosis("wind"), "none", 0.0, 1),
     ],
 )
-def test_an_effect_is_found_if_the_diagnosis_names_it(said, concealed, found, false_effects):
-    measured = mismatch_power.judged(said, concealed)
+def test_an_effect_is_found_if_the_diagnosis_names_it(reported, concealed, found, false_effects):
+    measured = mismatch_power.judged(reported, concealed)
     assert (measured["found"], measured["false_effects"]) == (found, false_effects)
 
 
