@@ -71,13 +71,16 @@ class _Own:
 def curve(best: Hypothesis, effect: Candidate) -> Curve | None:
     """Return an effect of the model found as a curve, or None where a curve would say nothing.
 
-    Several drives count as one; their times follow the recordings' clocks.
+    A delay or a lag acts by what was commanded before: it is no curve over anything. Several drives
+    count as one; their times follow the recordings' clocks.
     """
     model = best.model
     known = identifications()[effect.name]
     if known.line:
         return _sensor_curve(model, effect, _own(best, effect), known.line)
     if effect.equation is Equation.SENSOR or not effect.depends_on:
+        return None
+    if all(parameter.unit == "s" for parameter in effect.parameters):
         return None
     own = _own(best, effect)
     turning = effect.equation in (Equation.STEERING, Equation.TYRE) or known.turns

@@ -1,5 +1,7 @@
 """Where an error lies: by sensor, in time, on the floor; what is left over; effects as curves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -158,6 +160,8 @@ def test_a_gyro_s_bias_is_a_curve_over_the_turning_seen():
     assert np.all(found.high > 0.05 - 0.01)
 
 
-def test_an_effect_that_no_curve_would_tell_has_none():
+@pytest.mark.parametrize("name", ["pose_latency", "steer_delay", "drive_lag"])
+def test_an_effect_that_no_curve_would_tell_has_none(name):
     _, _, best = made_fit.biased()
-    assert curve(best, made_fit.candidate("pose_latency")) is None
+    with_it = replace(best, effects=(made_fit.candidate(name),))
+    assert curve(with_it, with_it.effects[0]) is None
