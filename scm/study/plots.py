@@ -97,7 +97,10 @@ def _svg(rows: Sequence[Row], axis: Axis, by: Axis | None, measure: str, unit: s
         axes.set_xlabel(axis.path)
         axes.set_ylabel(f"{measure} [{unit}]")
         if by is not None:
-            axes.legend(title=by.path, fontsize=10, title_fontsize=10)
+            axes.legend(
+                title=by.path, fontsize=10, title_fontsize=10,
+                loc="center left", bbox_to_anchor=(1.0, 0.5),  # beside the lines, never over them
+            )  # fmt: skip
         written = io.StringIO()
         figure.savefig(written, format="svg", metadata={"Date": None, "Creator": None})
     return _themed(written.getvalue())

@@ -57,7 +57,7 @@ def from_witness(selected: Selected, bicycle: Mapping[str, float]) -> Selected |
     """Return what a search by residual windows selects that begins where a bicycle points.
 
     Args:
-        selected: What was found, and lost to the bicycle.
+        selected: What was found, and strays farther than the bicycle.
         bicycle: Its numbers by name, as `Witness.numbers`.
 
     Returns:

@@ -38,6 +38,7 @@ from scm.mismatch.validate.never_worse import (
     RETUNED,
     dropped,
     failure_sentence,
+    is_behind,
     loses,
     reasons_of,
     worse_than,
@@ -132,7 +133,7 @@ def _nearest(
     """
     first = _with_its_cars(selected, files)
     fit = first[2].fit
-    if fit is None or fit.witness is None or not loses(fit):
+    if fit is None or fit.witness is None or not is_behind(fit):
         return first
     again = from_witness(selected, fit.witness.numbers)
     if again is None:

@@ -77,19 +77,26 @@ def dropped(names: Sequence[str], worse: Worse, horizon_s: float) -> list[Droppe
     ]
 
 
+def is_behind(fit: Fit) -> bool:
+    """Return whether the bicycle follows the car better, where noise is not all that is left."""
+    part, name = fit.confirm, POSE[0]
+    if fit.witness is None or name not in part.after:
+        return False
+    now = part.after[name]
+    return now > MAX_NOISE_RATIO * part.noise_floor[name] and now > fit.witness.position_m
+
+
 def loses(fit: Fit) -> bool:
-    """Return whether the bicycle follows the car better, where noise is not all that is left.
+    """Return whether the bicycle follows the car so much better that the car was not found.
 
     Beyond what noise may change, and what the choice of windows may: they overlap by half, and the
     square of an error scatters by as much as its mean.
     """
-    part, name = fit.confirm, POSE[0]
-    if fit.witness is None or name not in part.after:
+    if fit.witness is None or not is_behind(fit):
         return False
-    now, plain = part.after[name], fit.witness.position_m
-    by_choice = 1.0 + chance_of(part)
-    far = now > MAX_NOISE_RATIO * part.noise_floor[name] and now**2 > by_choice * plain**2
-    return far and got_worse(part, name, plain, WORSE_THAN_WITNESS)
+    part, plain = fit.confirm, fit.witness.position_m
+    by_choice = part.after[POSE[0]] ** 2 > (1.0 + chance_of(part)) * plain**2
+    return by_choice and got_worse(part, POSE[0], plain, WORSE_THAN_WITNESS)
 
 
 def failure_sentence(fit: Fit, effects: Sequence[str], handed_out: str) -> str:
