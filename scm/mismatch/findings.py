@@ -73,6 +73,7 @@ class Effect(Struct, kw_only=True, frozen=True):
         course: How it goes over the recording. `parameters` are those in the end.
         since_s: When it changed, on the recording's clock; None: it did not, or evenly all along.
         before: Its parameters before the change; empty: it was not there, or did not change.
+        stated: Its parameters as the given car file has them; empty: the file lacks the effect.
     """
 
     name: str
@@ -87,6 +88,7 @@ class Effect(Struct, kw_only=True, frozen=True):
     course: Course = Course.CONSTANT
     since_s: Estimate | None = None
     before: Mapping[str, Estimate] = {}
+    stated: Mapping[str, float] = {}
 
 
 class Place(Struct, kw_only=True, frozen=True):

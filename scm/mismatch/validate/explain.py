@@ -153,6 +153,7 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
         probability, alternatives = alternatives_to(
             selected.context, best, candidate, offered, discovery
         )
+    stated = stated_of(selected.car, candidate)
     return Effect(
         name=candidate.name,
         is_known=not discovered,
@@ -163,7 +164,8 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
             if name != SINCE_NAME and not name.endswith(BEFORE_NAME)
         },
         probability=probability,
-        text=sentence_of(candidate, estimates),
+        text=sentence_of(candidate, estimates) + _stated_sentence(stated, estimates),
+        stated=stated,
         course=candidate.course if isinstance(candidate, ChangingEffect) else Course.CONSTANT,
         since_s=estimates.get(SINCE_NAME),
         before={
@@ -241,6 +243,30 @@ def sentence_of(candidate: Candidate, estimates: dict[str, Estimate]) -> str:
         if turned:
             sentence, words[name] = turned, _number(name, -estimate.value, estimate.unit)
     return sentence.format(**words)
+
+
+def stated_of(car: Car, candidate: Candidate) -> dict[str, float]:
+    """Return an effect's parameters as a car file states them; empty where it lacks the effect.
+
+    So it is in a car that was found before: what is found now is what changed since.
+    """
+    have = {term.name for term in car.terms} | {fault.kind.name for fault in car.measures}
+    if candidate.name not in have or isinstance(candidate, ChangingEffect):
+        return {}
+    stated = {
+        one.name: car.value(one.key) / one.per_unit
+        for one in candidate.parameters
+        if car.has(one.key) and not one.given  # what is added to a number is no number of its own
+    }
+    at_rest = {one.name: one.neutral for one in candidate.parameters}
+    acts = any(not math.isclose(value, at_rest[name]) for name, value in stated.items())
+    return stated if acts else {}
+
+
+def _stated_sentence(stated: Mapping[str, float], estimates: Mapping[str, Estimate]) -> str:
+    """Return a sentence with what the car file states, empty where it states nothing."""
+    words = [_number(name, value, estimates[name].unit) for name, value in stated.items()]
+    return f" The car file states {joined(words)}." if words else ""
 
 
 def _turned(sentence: str, name: str) -> str:

@@ -96,6 +96,21 @@ def test_a_sentence_holds_numbers_as_a_mechanic_says_them(name, numbers, sentenc
     assert sentence_of(by_name(candidates(big_nigel()), name), estimates) == sentence
 
 
+def test_an_effect_that_the_car_file_has_is_reported_with_what_the_file_states():
+    model, retuned, best = made_fit.trimmed()
+    context = Context(np.ones(len(model.t)), best.effects)
+    before = big_nigel().with_terms(["steer_trim"], {"steering.trim_rad": 0.02})
+    for car, stated, ending in (
+        (before, {"offset_rad": 0.02}, "The car file states 1.15°."),
+        (before.with_terms([], {"steering.trim_rad": 0.0}), {}, "straight ahead."),
+        (big_nigel(), {}, "straight ahead."),
+    ):
+        selected = Selected((), (), car, context, None, Selection(best, retuned), (), None, None)
+        found = effect_of(selected, best, best.effects[0])
+        assert found.stated == pytest.approx(stated)
+        assert found.text.endswith(ending)
+
+
 def weighed_to(std_kg):
     car = big_nigel()
     mass = replace(car.quantity("body.mass_kg"), std=std_kg)
