@@ -5,6 +5,7 @@ A process stays for the next case: map, cars and compiled physics are loaded onc
 """
 
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -178,7 +179,12 @@ class CaseProcesses:
 
 
 def main(arguments: list[str]) -> None:
-    """Run cases until the owner is gone."""
+    """Run cases until the owner is gone.
+
+    A scheduler that ends a job sends SIGTERM to all its processes. It is no case's fault: the owner
+    decides, and the case ends with it.
+    """
+    signal.signal(signal.SIGTERM, lambda *_: None)  # not SIG_IGN: a case's children inherit that
     down, up, folder, name = arguments
     to_owner = Connection(int(up), readable=False)
     tasks: SimpleQueue[Task] = SimpleQueue()

@@ -7,7 +7,7 @@ import os
 import tarfile
 import tempfile
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -30,6 +30,8 @@ QUIET = {  # nobody looks at what a cluster in this process measures of itself: 
     "distributed.scheduler.work-stealing-interval": "60s",
 }
 AHEAD = 4  # cases that a core has waiting: a worker never waits for the next one
+TRIES = 3  # of cases whose Slurm job was lost
+SHARES_PER_JOB, MOST_SHARES = 8, 1000  # Slurm takes arrays of 1001 as it is installed
 
 
 class Engine(Protocol):
@@ -176,6 +178,9 @@ def dask_engine(study: LoadedStudy, folder: Path, address: str) -> Iterator[Engi
 class SlurmEngine:
     """Cases in jobs of a Slurm array, by submitit; each job takes one share of them.
 
+    There are several shares for each job that runs at a time: rows come while others still run, and
+    a job that is cancelled costs little.
+
     Args:
         executor: Of submitit; its jobs see the folder, as a cluster's shared file system offers.
         jobs: How many.
@@ -187,15 +192,27 @@ class SlurmEngine:
         self.about = f"{jobs} Slurm jobs"
 
     def run(self, tasks: Iterable[Task]) -> Iterator[Row]:
-        """Yield the row of each task, job by job as they end."""
-        all_tasks = list(tasks)
-        shares = [share for n in range(self.cores) if (share := all_tasks[n :: self.cores])]
-        folder, name = str(self._folder.resolve()), self._study.file.name
-        jobs = self._executor.map_array(
-            run_share, [folder] * len(shares), [name] * len(shares), shares
-        )
+        """Yield the row of each task, job by job as they end; cases of lost jobs run again.
+
+        Raises:
+            RunError: when jobs were lost again and again.
+        """
+        left, why = list(tasks), ""
+        for _ in range(TRIES):
+            left, why = yield from self._run_once(left)
+            if not left:
+                return
+        raise RunError(f"{why}; {len(left)} cases are left, the same command goes on with them")
+
+    def _run_once(self, tasks: list[Task]) -> Generator[Row, None, tuple[list[Task], str]]:
+        """Yield rows; return the tasks of jobs that were lost, and how the last one was."""
         import submitit  # noqa: PLC0415
 
+        count = min(len(tasks), max(self.cores, min(SHARES_PER_JOB * self.cores, MOST_SHARES)))
+        shares = [tasks[n::count] for n in range(count)]
+        folder, name = str(self._folder.resolve()), self._study.file.name
+        jobs = self._executor.map_array(run_share, [folder] * count, [name] * count, shares)
+        lost, why = list[Task](), ""
         for job, share in zip(jobs, shares, strict=True):
             try:
                 yield from job.result()
@@ -203,9 +220,9 @@ class SlurmEngine:
                 submitit.core.utils.UncompletedJobError,
                 submitit.core.utils.FailedJobError,
             ) as cause:
-                text = f"Slurm job {job.job_id}: {str(cause).partition(chr(10))[0]}"
-                for task in share:
-                    yield self._study.row(task.case, task.values, "error", 0.0, text)
+                why = f"Slurm job {job.job_id}: {str(cause).partition(chr(10))[0]}"
+                lost += share
+        return lost, why
 
 
 def slurm_engine(study: LoadedStudy, folder: Path, options: str) -> SlurmEngine:

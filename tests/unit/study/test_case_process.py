@@ -25,6 +25,8 @@ def run(case, a=1.0, how="well"):
             pass
     if how == "dies":
         os.kill(os.getpid(), 9)
+    if how == "gets_sigterm":
+        os.kill(os.getpid(), 15)
     if how == "eats":
         eaten = []
         while True:
@@ -63,6 +65,10 @@ def test_a_bad_case_says_so_and_the_next_one_runs(process, how, outcome, words):
     assert words in bad.detail
     good = run(process, "well", 5)
     assert (good.outcome, good.measures, good.case) == ("success", {"total": 2.0}, 5)
+
+
+def test_a_case_outlives_a_scheduler_s_sigterm(process):
+    assert run(process, "gets_sigterm").outcome == "success"
 
 
 def test_one_process_serves_many_cases_and_its_memory_stays(process):

@@ -29,6 +29,49 @@ def test_slurm_s_jobs_share_the_cases_and_a_bad_one_costs_only_its_own(tmp_path)
     assert rows[2].detail == "its process ended: exit status 4"
 
 
+class Cancelling:
+    """Submitit's interface where Slurm cancels the job of case 0 so often."""
+
+    def __init__(self, times):
+        self.times = times
+
+    def map_array(self, call, folders, names, shares):
+        return [Job(self, lambda args=args: call(*args))
+                for args in zip(folders, names, shares, strict=True)]  # fmt: skip
+
+
+class Job:
+    job_id = "7_0"
+
+    def __init__(self, executor, call):
+        self.executor, self.call = executor, call
+
+    def result(self):
+        rows = self.call()
+        if rows[0].case == 0 and self.executor.times:
+            self.executor.times -= 1
+            raise submitit.core.utils.UncompletedJobError("cancelled")
+        return rows
+
+
+def on_slurm(tmp_path, times):
+    study = loaded(tmp_path)
+    folder = create_results(study, tmp_path / "out", []).folder
+    return SlurmEngine(Cancelling(times), study, folder, 1)
+
+
+def test_cases_of_a_cancelled_job_run_again(tmp_path):
+    rows = list(on_slurm(tmp_path, 1).run([Task(case=n) for n in range(2)]))
+    assert [(row.case, row.outcome) for row in rows] == [(1, "success"), (0, "success")]
+
+
+def test_jobs_that_are_always_cancelled_leave_their_cases_without_a_row(tmp_path):
+    rows = on_slurm(tmp_path, 99).run([Task(case=n) for n in range(2)])
+    assert next(rows).case == 1
+    with pytest.raises(RunError, match="Slurm job 7_0: cancelled; 1 cases are left"):
+        next(rows)
+
+
 def test_options_of_sbatch_are_those_of_the_jobs():
     given, jobs = slurm_options("-p cpu -n 64 -t 30 --mem 4G --account=lab")
     assert jobs == 64
