@@ -19,7 +19,7 @@ from scm.mismatch.fit.rollouts import Motions, Rollouts, Tiles
 from scm.mismatch.fit.sensor_prediction import Prediction
 from scm.mismatch.fit.whitening import Whitener
 from scm.replay.drive import Drive
-from scm.replay.numbers import COMMAND_CLOCK, POSE_CLOCK, THROTTLE_CLOCK, Numbers
+from scm.replay.numbers import COMMAND_CLOCK, NEUTRAL, POSE_CLOCK, THROTTLE_CLOCK, Numbers
 from scm.vehicles.car import Car
 from scm.vehicles.param import Param
 
@@ -49,9 +49,9 @@ _CLOCKS = tuple(
 
 
 def nominal_parameters(car: Car, params: Sequence[Param]) -> tuple[NominalParameter, ...]:
-    """Return every number of a car's equations that its file says is uncertain."""
+    """Return every number of a car and of its sensors' faults that its file says is uncertain."""
     found = dict[str, NominalParameter]()
-    for param in params:
+    for param in (*params, *fault_params(car)):
         std = car.quantity(param.key).std
         if param.key in UNKNOWN and not std:
             mean, std = UNKNOWN[param.key]
@@ -61,6 +61,13 @@ def nominal_parameters(car: Car, params: Sequence[Param]) -> tuple[NominalParame
             std = max(std, MIN_RELATIVE_STD.get(param.key, 0.0) * abs(mean))
             found[param.key] = NominalParameter(param.key, mean, std, param.bounds)
     return (*found.values(), *_CLOCKS)
+
+
+def fault_params(car: Car) -> tuple[Param, ...]:
+    """Return the parameters of the sensor faults that a car file states."""
+    return tuple(
+        param for fault in car.measures for param in fault.kind.params if param.key in NEUTRAL
+    )
 
 
 def prior_precision(car: Car, keys: Sequence[str]) -> Floats:
@@ -139,6 +146,7 @@ class Simulator:
         self._recent = [RecentSets(sum(len(s.t) for s in drive.streams)) for drive in drives]
         self.nominal = nominal_parameters(car, self.rollouts[0].params)
         self._predictions = [Prediction(drive) for drive in drives]
+        self._stated = {param.key: car.value(param.key) for param in fault_params(car)}
         self.runs = 0
 
     @cached_property
@@ -148,7 +156,8 @@ class Simulator:
 
     def unit(self, key: str) -> str:
         """Return the unit of one of the car's numbers."""
-        return next((p.unit for p in self.rollouts[0].params if p.key == key), "s")
+        params = (*self.rollouts[0].params, *fault_params(self.car))
+        return next((p.unit for p in params if p.key == key), "s")
 
     def residuals(self, sets: Sequence[Numbers]) -> tuple[list[list[Floats]], Bools]:
         """Return residuals of every drive's streams, and which sets stayed physical."""
@@ -186,8 +195,12 @@ class Simulator:
         return streams, ok
 
     def numbers(self, z: Floats) -> dict[str, float]:
-        """Return the car's own numbers at `z` standard deviations from the file's."""
-        return {o.key: clipped(o, v) for o, v in zip(self.nominal, z, strict=True)}
+        """Return the car's own numbers at `z` standard deviations from the file's.
+
+        Faults of sensors that the file states are among them.
+        """
+        own = {o.key: clipped(o, v) for o, v in zip(self.nominal, z, strict=True)}
+        return self._stated | own
 
     def unfitted(self) -> Floats:
         """Return `z` of the car as it is driven where nothing is fitted.

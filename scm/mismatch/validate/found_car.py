@@ -220,7 +220,7 @@ def patched(car: Car, fitted: Hypothesis, folder: Path, own: Bools | None = None
     sensed = {key: value for key, value in numbers.items() if key.startswith("measure.")}
     driven = {key: value for key, value in numbers.items() if key not in sensed}
     found = car.with_terms(terms, driven)
-    found = found.with_measures(list(dict.fromkeys(faults)), sensed) if faults else found
+    found = found.with_measures(list(dict.fromkeys(faults)), sensed) if sensed else found
     return replace(found, correlated=correlated(fitted, which))
 
 
