@@ -9,12 +9,14 @@ import pytest
 
 from scm.mismatch.budget import Budget, OutOfTimeError
 from scm.mismatch.fit import likelihood
+from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import usual_noise
 from scm.mismatch.fit.rollouts import ROWS, Rollouts, Tiles
 from scm.mismatch.fit.whitening import Whitener
+from scm.mismatch.validate.found_car import patched
 from scm.replay.drive import Drive
-from tests.unit.mismatch.made_drive import big_nigel, made_drive
+from tests.unit.mismatch.made_drive import big_nigel, car_with, driven, made_drive
 
 CACHED = 3
 
@@ -133,3 +135,32 @@ def test_what_one_thread_raises_waits_until_the_others_are_done(drive, tiles):
         Rollouts(drive, big_nigel(), tiles).each(trims(*range(2 * ROWS)), use)
     assert len(done) == 1
     returned.set()
+
+
+BIAS = "measure.gyro_bias_rad_s"
+
+
+def biased_score(car):
+    sense = lambda name, _, v: v + 0.05 if name == "imu.gyro_z" else v  # noqa: E731
+    model = Likelihood.of([driven(seconds=4.0, sense=sense)], car)
+    return model, Fitter(model, np.ones(len(model.t))).unfitted().score
+
+
+def test_a_fault_of_a_sensor_that_the_car_file_states_is_driven():
+    _, without = biased_score(big_nigel())
+    model, known = biased_score(car_with({BIAS: 0.05}))
+    assert known < 0.5 * without
+    assert BIAS not in [number.key for number in model.nominal]
+
+
+def test_a_stated_fault_with_a_std_is_one_of_the_cars_own_numbers_and_is_written(tmp_path):
+    car = car_with({BIAS: 0.05})
+    unsure = replace(car.quantity(BIAS), std=0.01)
+    car = replace(car, values={**car.values, BIAS: unsure})
+    model, _ = biased_score(car)
+    (at,) = (i for i, number in enumerate(model.nominal) if number.key == BIAS)
+    assert model.simulator.unit(BIAS) == "rad/s"
+    z = np.zeros(len(model.nominal))
+    z[at] = 1.0
+    found = patched(car, Fitter(model, np.ones(len(model.t))).unfitted(z), tmp_path)
+    assert found.value(BIAS) == pytest.approx(0.06)
