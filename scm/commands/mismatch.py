@@ -114,6 +114,7 @@ def _cars(arguments: argparse.Namespace) -> "tuple[dict[str, list[Recording]], t
 def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> str:
     """Diagnose one car, write its report, and return what to print."""
     from scm.mismatch.pipeline import diagnose, write
+    from scm.mismatch.report.record import since_start
     from scm.mismatch.report.write import summary
 
     found = diagnose(
@@ -124,7 +125,7 @@ def _of_one(arguments: argparse.Namespace, out: Path, progress: "Progress") -> s
     progress.notify("writing the report")
     check = _check(arguments, out)
     write(found, out, check)
-    text = summary(found.diagnosis, out, found.evidence.retuned_m)
+    text = summary(since_start(found.diagnosis, found.evidence), out, found.evidence.retuned_m)
     return _with_account(found, text, check)
 
 
@@ -144,6 +145,7 @@ def _of_cars(
     from scm.errors import RunError
     from scm.mismatch.pipeline import write
     from scm.mismatch.report.cars_page import several_summary
+    from scm.mismatch.report.record import since_start
     from scm.mismatch.report.write import summary
     from scm.mismatch.several.diagnose import diagnose_one, diagnose_several, write_all
 
@@ -157,7 +159,7 @@ def _of_cars(
         progress.notify("writing the report")
         check = _check(arguments, out, name if failed else "")
         write(found, out, check)
-        text = summary(found.diagnosis, out, found.evidence.retuned_m)
+        text = summary(since_start(found.diagnosis, found.evidence), out, found.evidence.retuned_m)
         return _with_account(found, text, check), failed
     with _executor(arguments.scheduler) as executor:
         several = diagnose_several(

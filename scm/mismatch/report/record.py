@@ -93,6 +93,12 @@ def make_report(diagnosis: Diagnosis, evidence: Evidence, given: Car, patched: C
     )
 
 
+def since_start(diagnosis: Diagnosis, evidence: Evidence) -> Diagnosis:
+    """Return a diagnosis with times since its recording began, where its clock counts from 1970."""
+    start_s = _start_s(evidence)
+    return _since(start_s, diagnosis, evidence)[0] if start_s else diagnosis
+
+
 def on_clock(diagnosis: Diagnosis, evidence: Evidence) -> Diagnosis:
     """Return a diagnosis whose times are on the recording's clock, with its pauses."""
     if not evidence.pauses:

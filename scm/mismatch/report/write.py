@@ -14,7 +14,7 @@ from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Course, Diagnosis, Effect
 from scm.mismatch.report.car_file import FILE, given_text, write_car, write_own_terms
 from scm.mismatch.report.page import page_html
-from scm.mismatch.report.record import drawn_text, json_text, make_report, on_clock
+from scm.mismatch.report.record import drawn_text, json_text, make_report, on_clock, since_start
 from scm.mismatch.report.sentences import can_judge, processor_sentence, sensors, verdict_sentence
 from scm.mismatch.report.wording import (
     amounts,
@@ -49,7 +49,7 @@ def write_report(
     pictures.mkdir(parents=True, exist_ok=True)
     for old in pictures.glob("*.svg"):
         old.unlink()
-    use = _write_car(diagnosis, evidence, car, patched, out)
+    use = _write_car(since_start(diagnosis, evidence), evidence, car, patched, out)
     _write_windows(evidence, car, out)
     if check and diagnosis.fit is not None:
         use += f". These figures are of that file; to compute them again: `{check}`"

@@ -5,10 +5,12 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from scm.data_quality.quality import DataProblem
 from scm.mismatch.evidence import Evidence, RefittedParameter, Residual
-from scm.mismatch.findings import Effect, Equation, Estimate, Located, Verdict
+from scm.mismatch.findings import Course, Effect, Equation, Estimate, Located, Verdict
+from scm.mismatch.report.record import since_start
 from scm.mismatch.report.sentences import verdict_sentence
 from scm.mismatch.report.write import summary, write_report
 from scm.vehicles.car import load_car
@@ -372,6 +374,24 @@ def test_a_clock_that_counts_from_1970_is_shown_from_the_start(tmp_path):
     assert "at 31.0 to 34.0&nbsp;s" in page
     assert re.findall(r"\d{9,}", page) == ["1700000000"]
     assert "time since 1700000000 s of the recording" in page
+
+
+def test_a_change_on_a_clock_from_1970_is_since_the_recordings_start(tmp_path):
+    found, evidence, *cars = made_up.CASES["one_effect"]()
+    start_s = 1_700_000_000.0
+    since = Estimate(value=start_s + 42.0, low=start_s + 41.0, high=start_s + 43.0, unit="s")
+    late = structs.replace(found.effects[0], course=Course.STEP, since_s=since)
+    found = structs.replace(found, effects=(late, *found.effects[1:]))
+    dated = replace(
+        evidence,
+        residuals=tuple(replace(r, t_s=r.t_s + start_s) for r in evidence.residuals),
+        free_runs=replace(evidence.free_runs, start_s=evidence.free_runs.start_s + start_s),
+    )
+    first = since_start(found, dated).effects[0].since_s
+    assert (first.low, first.high) == (41.0, 43.0)
+    assert since_start(found, evidence) is found
+    write_report(found, dated, *cars, tmp_path)
+    assert "since 42.0 s (41.0 to 43.0 s)" in (tmp_path / "car.toml").read_text(encoding="utf-8")
 
 
 def test_the_strip_says_what_served_what_on_the_axis_of_one_recording_or_several(tmp_path):
