@@ -199,10 +199,11 @@ class SlurmEngine:
         """
         left, why = list(tasks), ""
         for _ in range(TRIES):
-            left, why = yield from self._run_once(left)
-            if not left:
+            if not left:  # submitit takes no empty array
                 return
-        raise RunError(f"{why}; {len(left)} cases are left, the same command goes on with them")
+            left, why = yield from self._run_once(left)
+        if left:
+            raise RunError(f"{why}; {len(left)} cases are left, the same command goes on with them")
 
     def _run_once(self, tasks: list[Task]) -> Generator[Row, None, tuple[list[Task], str]]:
         """Yield rows; return the tasks of jobs that were lost, and how the last one was."""

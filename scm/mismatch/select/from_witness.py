@@ -1,4 +1,4 @@
-"""A selection begun again where a plain bicycle points that follows the car better.
+"""Begins a selection again from what a plain bicycle shows that follows the car better.
 
 Adding one effect at a time, a search may go down a valley that it cannot leave. The bicycle was
 fitted from many starts, and each of its numbers stands for an effect: a delay, a trim, a gain.

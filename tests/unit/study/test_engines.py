@@ -36,6 +36,7 @@ class Cancelling:
         self.times = times
 
     def map_array(self, call, folders, names, shares):
+        assert shares
         return [Job(self, lambda args=args: call(*args))
                 for args in zip(folders, names, shares, strict=True)]  # fmt: skip
 
@@ -63,6 +64,10 @@ def on_slurm(tmp_path, times):
 def test_cases_of_a_cancelled_job_run_again(tmp_path):
     rows = list(on_slurm(tmp_path, 1).run([Task(case=n) for n in range(2)]))
     assert [(row.case, row.outcome) for row in rows] == [(1, "success"), (0, "success")]
+
+
+def test_nothing_is_submitted_where_no_case_is_left(tmp_path):
+    assert list(on_slurm(tmp_path, 0).run([])) == []
 
 
 def test_jobs_that_are_always_cancelled_leave_their_cases_without_a_row(tmp_path):
