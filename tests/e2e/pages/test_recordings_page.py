@@ -369,15 +369,15 @@ def test_a_mismatch_job_is_asked_for_the_car_and_the_span_that_are_shown(
 def test_a_refusal_is_said_within_the_dialog_that_asked(visit, drive):
     visited = visit(AT)
     page = visited.page
+    stale = {"recordings": [], "cars": ["no_such_car"], "most_upload_bytes": 1}  # removed since
+    page.route("**/mismatch/offers", lambda route: route.fulfill(json=stale))
     page.click("text=Mismatch job")
-    visited.wait("() => document.querySelectorAll('dialog select[name=car] option').length > 1")
-    gone = "car => { car.options[1].value = 'no_such_car'; car.selectedIndex = 1 }"  # as removed
-    page.locator("dialog select[name=car]").evaluate(gone)
-    page.locator("dialog select[name=car]").dispatch_event("input")
+    page.select_option("dialog select[name=car]", "no_such_car")
     page.click("dialog .primary")
     visited.wait(IN_REACH, "there is no car file named 'no_such_car'")
     assert len(visited.complaints) == 1  # the browser's own, of the answer 404
     assert page.locator("dialog[open]").count() == 1
+    page.unroute("**/mismatch/offers")
 
 
 def test_a_name_and_notes_stay_and_a_deleted_recording_goes(visit, running, drive):
