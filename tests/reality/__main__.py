@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from tests.reality.cases import CONTROLS, COURSES, KINDS, draw_kinds, write_cases
+from tests.reality.family import HALVES
 from tests.reality.motion import Moving
 
 
@@ -17,7 +18,13 @@ def main() -> int:
     parser.add_argument("--kind", choices=("mixed", *KINDS, *CONTROLS, *COURSES), default="mixed")
     parser.add_argument("--strength", type=float, nargs=2, default=(1.0, 4.0))
     parser.add_argument("--engine", choices=("own", "mujoco"), default="own")
+    parser.add_argument(
+        "--family", choices=("own", "drawn"), default="own", help="equations and sensors"
+    )
+    parser.add_argument("--half", choices=tuple(HALVES), help="of the families, with drawn ones")
     arguments = parser.parse_args()
+    if arguments.half and arguments.family == "own":
+        parser.error("--half needs --family drawn")
     moving = Moving
     if arguments.engine == "mujoco":
         try:
@@ -28,7 +35,7 @@ def main() -> int:
     low, high = arguments.strength
     write_cases(
         arguments.out, arguments.seed, kinds, (low, high), moving,
-        lambda line: print(line, flush=True),
+        lambda line: print(line, flush=True), arguments.half or arguments.family,
     )  # fmt: skip
     return 0
 

@@ -3,17 +3,18 @@
 import hashlib
 import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 
 from tests.reality.changing import Changing
 from tests.reality.concealed import ALIKE, EFFECTS, HIDING, LISTED, UNLISTED, Drawn
-from tests.reality.driver import TEMPERS
+from tests.reality.family import USUAL, draw_family, equations
 from tests.reality.motion import Moving
 from tests.reality.numbers import KEYS, SCATTER, TOGETHER, nominal, scattered
 from tests.reality.recorded import Drive, record, write
+from tests.reality.routes import TEMPERS
 from tests.reality.sensing import FAULTS
 
 KINDS = ("single", "none", "pair", "unlisted")
@@ -48,14 +49,20 @@ def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:
 
 
 def draw_effects(
-    names: tuple[str, ...], car: str, strengths: tuple[float, float], rng: np.random.Generator
+    names: tuple[str, ...],
+    car: str,
+    strengths: tuple[float, float],
+    rng: np.random.Generator,
+    floor: float = 1.0,
 ) -> list[tuple[str, float, Drawn]]:
     """Return (name, strength, what it does) for each; sizes spread evenly over their logarithm."""
     found = []
     for name in names:
         strength = math.exp(rng.uniform(*np.log(strengths)))
         effect = EFFECTS[name]
-        found.append((name, strength, effect.draw(strength * effect.smallest[car], rng, car)))
+        found.append(
+            (name, strength, effect.draw(strength * effect.smallest[car], rng, car, floor))
+        )
     return found
 
 
@@ -79,10 +86,14 @@ def make_case(
     moving: type = Moving,
     names: tuple[str, ...] | None = None,
     car: str | None = None,
+    families: str = "own",
 ) -> tuple[dict, dict[str, Drive], dict[str, float]]:
     """Draw and drive one case; return its label, its drives by name and the car's numbers.
 
     What changes in the first drive stays as it became in the second.
+
+    Args:
+        families: `own`: the usual equations and sensors; or what `draw_family` draws from.
     """
     if car is None:
         cars = [c for c in TEMPERS if all(c in EFFECTS[n].smallest for n in names or ())]
@@ -90,19 +101,25 @@ def make_case(
     names = names_for(kind, car, rng) if names is None else names
     file_numbers = nominal(car)
     ordinary = scattered(file_numbers, rng) if rng.random() < 0.5 else dict(file_numbers)
+    family, usual = USUAL, ordinary
+    if families != "own":
+        family = draw_family(families, names, rng)
+        if moving is not Moving:  # MuJoCo moves the bodies in its own way
+            family = replace(family, suspension="sprung", body="semi_implicit")
+        usual = ordinary | equations(family, car, ordinary, rng)
     while True:
-        effects = draw_effects(names, car, strengths, rng)
-        numbers, faults = apply(ordinary, effects), apply(FAULTS, effects)
+        effects = draw_effects(names, car, strengths, rng, family.floor)
+        numbers, faults = apply(usual, effects), apply(FAULTS, effects)
         change = _change(kind, rng)
         drives = {}
         for name, duration in DRIVES:
             driven, sensed = numbers, faults
             if change and name == DRIVES[0][0]:
                 driven, sensed = (
-                    Changing(ordinary, numbers, *change),
+                    Changing(usual, numbers, *change),
                     Changing(FAULTS, faults, *change),
                 )
-            drives[name] = record(car, driven, sensed, duration, rng, moving)
+            drives[name] = record(car, driven, sensed, duration, rng, moving, family)
         if all(_shows(drive, numbers) for drive in drives.values()) and (
             numbers["side_gain"] == 0.0 or _turns_both_ways(drives["drive"])
         ):
@@ -110,6 +127,8 @@ def make_case(
     label = _label(kind, car, effects, ordinary, file_numbers, drives["drive"])
     if change:
         label |= {"course": kind, "since_s": change[0] if kind == "step" else None}
+    if families != "own":
+        label["family"] = asdict(family)
     return label, drives, numbers
 
 
@@ -179,6 +198,7 @@ def write_cases(
     strengths: tuple[float, float] = (1.0, 4.0),
     moving: type = Moving,
     say=lambda _line: None,
+    families: str = "own",
 ) -> None:
     """Write every case's recordings, its label, and `sealed.txt` with one hash a case.
 
@@ -188,8 +208,8 @@ def write_cases(
     sealed = []
     for k, kind in enumerate(kinds):
         rng = np.random.default_rng([seed, k])
-        label, drives, numbers = make_case(kind, rng, strengths, moving)
-        drives, said_car = _controlled(kind, label["car"], drives, rng, moving)
+        label, drives, numbers = make_case(kind, rng, strengths, moving, families=families)
+        drives, said_car = _controlled(kind, label["car"], drives, rng, moving, families)
         name = f"case_{k:03d}"
         for drive_name, drive in drives.items():
             write(drive, said_car, numbers, out / name / drive_name)
@@ -203,10 +223,10 @@ def write_cases(
     (out / "sealed.txt").write_text("\n".join(sealed) + "\n", encoding="utf-8")
 
 
-def _controlled(kind, car, drives, rng, moving):
+def _controlled(kind, car, drives, rng, moving, families):
     """Return drives, and the car that the recording names, of cases that fit no car at all."""
     if kind == "shuffled":
-        _, others, _ = make_case("none", rng, moving=moving, car=car)
+        _, others, _ = make_case("none", rng, moving=moving, car=car, families=families)
         drives = {
             name: replace(drive, commands=others[name].commands) for name, drive in drives.items()
         }

@@ -7,8 +7,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import numpy as np
-
 FLOOR = {"nigel": (1.2, 0.72), "f1tenth": (4.6, 2.8)}
 
 
@@ -28,7 +26,8 @@ class Drawn:
     law: str = ""
 
 
-Draw = Callable[[float, np.random.Generator, str], Drawn]
+Draw = Callable[..., Drawn]
+"""Of a size, a generator, the car, and the floor's size relative to the usual one."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ def _sign(rng):
 def _adds(parameter, number, *, signed=False, both=1.0):
     """Return a draw whose one parameter is added to one number."""
 
-    def draw(size, rng, _car):
+    def draw(size, rng, _car, _floor=1.0):
         value = size * (_sign(rng) if signed else 1.0)
         return Drawn({parameter: value}, {number: value * both})
 
@@ -68,7 +67,7 @@ def _adds(parameter, number, *, signed=False, both=1.0):
 def _times(parameter, *numbers, power=1.0, up=None):
     """Return a draw whose parameter multiplies numbers; `up` says which side of 1, None either."""
 
-    def draw(size, rng, _car):
+    def draw(size, rng, _car, _floor=1.0):
         sign = _sign(rng) if up is None else (1.0 if up else -1.0)
         factor = math.exp(sign * size)
         return Drawn({parameter: factor}, {}, dict.fromkeys(numbers, factor**power))
@@ -76,30 +75,31 @@ def _times(parameter, *numbers, power=1.0, up=None):
     return draw
 
 
-def _grade(size, rng, _car):
+def _grade(size, rng, _car, _floor=1.0):
     uphill = rng.uniform(-math.pi, math.pi)
     return Drawn({"slope": size, "uphill_rad": uphill}, {"slope": size, "uphill": uphill})
 
 
-def _wind(size, rng, _car):
+def _wind(size, rng, _car, _floor=1.0):
     way = rng.uniform(-math.pi, math.pi)
     x, y = size * math.cos(way), size * math.sin(way)
     return Drawn({"force_x_n": x, "force_y_n": y}, {"wind_x": x, "wind_y": y})
 
 
-def _saturation(size, rng, _car):
+def _saturation(size, rng, _car, _floor=1.0):
     cut = 1.0 - 0.6 / math.sqrt(size)
     left, right = (1.0 - cut, 1.0) if rng.random() < 0.5 else (1.0, 1.0 - cut)
     values = {"left": left, "right": right}
     return Drawn(values, {"stop_left": left - 1.0, "stop_right": right - 1.0})
 
 
-def _patch(size, rng, car):
+def _patch(size, rng, car, floor=1.0):
     grip = rng.uniform(0.35, 0.7) if car == "f1tenth" else 1.0
-    radius = FLOOR[car][1] * rng.uniform(0.3, 0.5)
+    radius = floor * FLOOR[car][1] * rng.uniform(0.3, 0.5)
     spot = {
-        "x": rng.uniform(-0.8, 0.8) * FLOOR[car][0], "y": rng.uniform(-0.8, 0.8) * FLOOR[car][1]
-    }  # fmt: skip
+        axis: rng.uniform(-0.8, 0.8) * floor * half
+        for axis, half in zip("xy", FLOOR[car], strict=True)
+    }
     adds = {"patch_x": spot["x"], "patch_y": spot["y"], "patch_rolling": size}
     adds |= {"patch_radius": radius - 0.01, "patch_grip": grip - 1.0}
     known = {"x_m": spot["x"], "y_m": spot["y"], "radius_m": radius}
@@ -107,7 +107,7 @@ def _patch(size, rng, car):
 
 
 def _two(first, second, number_1, number_2):
-    def draw(size, rng, _car):
+    def draw(size, rng, _car, _floor=1.0):
         way = rng.uniform(-math.pi, math.pi)
         x, y = size * math.cos(way), size * math.sin(way)
         return Drawn({first: x, second: y}, {number_1: x, number_2: y})
@@ -115,7 +115,7 @@ def _two(first, second, number_1, number_2):
     return draw
 
 
-def _unit(_size, rng, _car):
+def _unit(_size, rng, _car, _floor=1.0):
     if rng.random() < 0.5:
         return Drawn({"factor": 180.0 / math.pi}, {}, {"gyro_unit": 180.0 / math.pi})
     return Drawn({"factor": 1.0 / 9.80665}, {}, {"accel_unit": 1.0 / 9.80665})
@@ -201,29 +201,29 @@ LISTED = (
 )  # fmt: skip
 
 
-def _gust(size, rng, _car):
+def _gust(size, rng, _car, _floor=1.0):
     period, way, phase = rng.uniform(3.0, 12.0), rng.uniform(-3.1, 3.1), rng.uniform(0.0, 6.28)
     found = {"force_n": size, "period_s": period, "toward_rad": way}
     adds = {"gust": size, "gust_period": period - 5.0, "gust_way": way, "gust_phase": phase}
     return Drawn(found, adds, law="force_n * sin(2 pi t / period_s + phase) along toward_rad")
 
 
-def _tiles(size, rng, car):
-    length, way = rng.uniform(0.2, 0.5) * FLOOR[car][1], rng.uniform(-1.5, 1.5)
+def _tiles(size, rng, car, floor=1.0):
+    length, way = rng.uniform(0.2, 0.5) * FLOOR[car][1] * floor, rng.uniform(-1.5, 1.5)
     adds = {"tiles": size, "tile_length": length - 0.5, "tile_way": way}
     adds["tile_phase"] = rng.uniform(0.0, 6.28)
     found = {"force_n": size, "length_m": length, "toward_rad": way}
     return Drawn(found, adds, law="-force_n / 2 * (1 + sin(2 pi s / length_m)), s = place")
 
 
-def _cliff(size, rng, car):
-    way, at = rng.uniform(-3.1, 3.1), rng.uniform(-0.3, 0.3) * FLOOR[car][1]
+def _cliff(size, rng, car, floor=1.0):
+    way, at = rng.uniform(-3.1, 3.1), rng.uniform(-0.3, 0.3) * FLOOR[car][1] * floor
     adds = {"cliff_drag": size, "cliff_way": way, "cliff_at": at}
     found = {"force_n": size, "beyond_m": at, "toward_rad": way}
     return Drawn(found, adds, law="-force_n where x cos(toward) + y sin(toward) > beyond_m")
 
 
-def _nap(size, rng, _car):
+def _nap(size, rng, _car, _floor=1.0):
     way = rng.uniform(-3.1, 3.1)
     return Drawn(
         {"force_n": size, "against_rad": way}, {"nap": size, "nap_way": way},
@@ -231,7 +231,7 @@ def _nap(size, rng, _car):
     )  # fmt: skip
 
 
-def _bend_drag(size, rng, _car):
+def _bend_drag(size, rng, _car, _floor=1.0):
     power = float(rng.choice([1.0, 2.0, 3.0]))
     return Drawn(
         {"force_n": size, "power": power}, {"bend_drag": size, "bend_power": power - 2.0},
@@ -239,7 +239,7 @@ def _bend_drag(size, rng, _car):
     )  # fmt: skip
 
 
-def _ripple(size, rng, _car):
+def _ripple(size, rng, _car, _floor=1.0):
     turns = float(rng.choice([1.0, 2.0, 3.0]))
     adds = {"ripple": size, "ripple_turns": turns - 2.0, "ripple_phase": rng.uniform(0.0, 6.28)}
     return Drawn(
@@ -248,7 +248,7 @@ def _ripple(size, rng, _car):
 
 
 def _swinging(number, period_number, usual, low, high):
-    def draw(size, rng, _car):
+    def draw(size, rng, _car, _floor=1.0):
         period = rng.uniform(low, high)
         return Drawn(
             {"amplitude": size, "period_s": period},
@@ -260,7 +260,7 @@ def _swinging(number, period_number, usual, low, high):
 
 
 def _law(number, text):
-    def draw(size, rng, _car):
+    def draw(size, rng, _car, _floor=1.0):
         value = size * _sign(rng)
         return Drawn({"size": value}, {number: value}, law=text)
 

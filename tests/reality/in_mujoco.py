@@ -16,8 +16,6 @@ from tests.reality.motion import (
     NUMBERS,
     ROW_S,
     STATE,
-    STEP,
-    STEPS_PER_ROW,
     TYRE_DAMPING,
     TYRE_STIFFNESS,
     WHEEL,
@@ -62,7 +60,7 @@ def _model(numbers, places):
         for x, y, z, load in places
     )  # fmt: skip
     text = MODEL.format(
-        step=STEP, gravity=GRAVITY, height=numbers["height"], at=" ".join(map(str, at)),
+        step=numbers["step"], gravity=GRAVITY, height=numbers["height"], at=" ".join(map(str, at)),
         mass=chassis, roll=numbers["roll_inertia"], pitch=numbers["pitch_inertia"],
         yaw=numbers["inertia"] - squares[0] - squares[1], hubs=hubs,
     )  # fmt: skip
@@ -159,7 +157,7 @@ class Moving:
     def command(self, k, throttle, steering):
         """Give command `k`, drive until the next one is due, and return the new rows."""
         self.throttle[k], self.steering[k] = throttle, steering
-        count = motion.STEPS_PER_COMMAND // STEPS_PER_ROW
+        count = motion.ROWS_PER_COMMAND
         out = np.empty((count, len(motion.ROW)))
         for row in range(count):
             self._row(k * count + row, out[row])
@@ -167,17 +165,19 @@ class Moving:
 
     def _row(self, row, out):
         qpos, qvel, forces = self.data.qpos, self.data.qvel, self.data.qfrc_applied
-        for step in range(STEPS_PER_ROW):
+        step = self.model.opt.timestep
+        steps = round(ROW_S / step)
+        for k in range(steps):
             before = qvel[:2].copy()
-            t = (row * STEPS_PER_ROW + step) * STEP
+            t = (row * steps + k) * step
             push(
                 self.numbers, self.state, self.wheels, self.places, qpos, qvel, forces, t,
                 self.throttle, self.steering, self.shake,
             )  # fmt: skip
             mujoco.mj_step(self.model, self.data)
-        s, gain = self.state[0], (qvel[:2] - before) / STEP
+        s, gain = self.state[0], (qvel[:2] - before) / step
         _see(self.numbers[0], s, qpos, qvel)
-        middle = s["yaw"] - 0.5 * STEP * s["yaw_rate"]
+        middle = s["yaw"] - 0.5 * step * s["yaw_rate"]
         cos, sin = math.cos(middle), math.sin(middle)
         out[:4] = (row + 1) * ROW_S, *motion.under_axle(self.numbers[0], s), s["yaw"]
         out[4:7] = s["vx"], s["vy"], s["yaw_rate"]

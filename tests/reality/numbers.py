@@ -71,6 +71,14 @@ NEUTRAL = {
     "cliff_way": 0.0, "cliff_at": 0.0, "shake": 0.0,
 }  # fmt: skip
 
+# Which equations a car has, as places in `family.ASPECTS`, and their own numbers; here the usual.
+EQUATIONS = {
+    "tyre": 0.0, "combined_slip": 0.0, "suspension": 0.0, "motor": 0.0, "servo": 0.0,
+    "friction": 0.0, "body": 0.0, "step": 0.00025, "tyre_shape": 1.5, "tyre_bend": 0.0,
+    "side_tyre_shape": 1.5, "side_tyre_bend": 0.0, "winding_lag": 0.002, "current_limit": 1.0,
+    "servo_lag": 0.01, "servo_load": 0.0, "stribeck": 0.0,
+}  # fmt: skip
+
 # How far ordinary cars of one type differ, relative standard deviations.
 SCATTER = {
     "mass": 0.05, "no_load": 0.004, "cog": 0.02, "slip_peak": 0.08, "slip_slide": 0.08,
@@ -86,7 +94,7 @@ def nominal(car: str) -> dict[str, float]:
     for name, key in {**KEYS, **SENSED}.items():
         section, _, entry = key.partition(".")
         values[name] = float(data[section][entry]["value"])
-    return {**values, **NEUTRAL}
+    return {**values, **NEUTRAL, **EQUATIONS}
 
 
 def scattered(numbers: dict[str, float], rng: np.random.Generator) -> dict[str, float]:

@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from tests.reality.changing import Changing, at
-from tests.reality.driver import TEMPERS, Driver, draw_route, draw_speeds
+from tests.reality.driver import DRIVERS
+from tests.reality.family import USUAL
 from tests.reality.motion import COMMAND_S, ROW_S, Moving
-from tests.reality.sensing import POSE_STD, YAW_STD, Camera, encoders, inertial
+from tests.reality.routes import TEMPERS, draw_route, draw_speeds
+from tests.reality.sensing import POSE_STD, YAW_STD, Camera, encoders, inertial, stated_std
 
-DESCRIPTION = """recording: 1
+HEAD = """recording: 1
 vehicle: {car}
 frame: world            # x right, y up on the floor, yaw counter-clockwise from x; pose of the rear-axle centre
 tables:
@@ -25,18 +27,21 @@ tables:
       pose.x:   {{column: x, unit: m, std: {pose:g}}}
       pose.y:   {{column: y, unit: m, std: {pose:g}}}
       pose.yaw: {{column: yaw, unit: rad, std: {yaw:g}}}
-  - file: encoders.csv
+"""  # noqa: E501
+ENCODERS = """  - file: encoders.csv
     time: {{column: t, unit: s}}
     channels:
       encoder.left:  {{column: left, unit: count}}
       encoder.right: {{column: right, unit: count}}
-  - file: imu.csv
+"""
+IMU = """  - file: imu.csv
     time: {{column: t, unit: s}}
     channels:
       imu.accel_x: {{column: ax, unit: m/s^2, std: {accel:g}}}
       imu.accel_y: {{column: ay, unit: m/s^2, std: {accel:g}}}
       imu.gyro_z:  {{column: gz, unit: rad/s, std: {gyro:g}}}
-"""  # noqa: E501
+"""
+DESCRIPTION = HEAD + ENCODERS + IMU
 
 
 @dataclass(frozen=True)
@@ -44,30 +49,36 @@ class Drive:
     """What was recorded, as tables with a column of time each, and the truth behind it.
 
     Attributes:
+        encoders, imu: None where the car has none.
         rows: What really happened, every 2.5 ms; see `motion.ROW`.
         fastest: Speed that the driver allowed himself [m/s].
+        noise: Of the poses, standard deviation relative to the usual one.
     """
 
     commands: np.ndarray
     poses: np.ndarray
-    encoders: np.ndarray
-    imu: np.ndarray
+    encoders: np.ndarray | None
+    imu: np.ndarray | None
     rows: np.ndarray
     fastest: float
     span: tuple[float, float]
     shape: str
+    noise: float = 1.0
 
 
-def record(car, numbers, faults, duration, rng, moving=Moving):
+def record(car, numbers, faults, duration, rng, moving=Moving, family=USUAL):
     """Let a driver drive a car and return what the sensors saw of it."""
     changing, numbers = numbers, at(numbers, 0.0)
-    temper, commands = TEMPERS[car], round(duration / COMMAND_S)
-    route = draw_route(temper, np.tan(numbers["limit"]) / numbers["base"], rng)
+    temper, commands = TEMPERS[car].on_floor(family.floor), round(duration / COMMAND_S)
+    sharpest = np.tan(numbers["limit"]) / numbers["base"]
+    route = draw_route(temper, sharpest, rng, family.routes)
     wished, fastest = draw_speeds(temper, duration, rng)
-    driver = Driver(temper, route, wished, numbers["base"], numbers["limit"], rng)
+    driver = DRIVERS[family.driver](
+        temper, route, wished, numbers["base"], numbers["limit"], rng, family.pose_hz
+    )
     first, second = route.points[0], route.points[3]
     start = (*first, np.arctan2(*(second - first)[::-1]))
-    camera = Camera(faults, car, duration, rng)
+    camera = Camera(faults, car, duration, rng, family)
     shake = _bursts(commands, rng)
     body = moving(numbers, start, commands, shake)
     rows = np.empty((round(duration / ROW_S), 11))
@@ -85,10 +96,17 @@ def record(car, numbers, faults, duration, rng, moving=Moving):
         done += len(new)
     camera.look(rows, start, duration)
     noise = numbers["accel_noise"], numbers["gyro_noise"]
+    wheels = imu = None
+    if family.encoder_hz:
+        wheels = encoders(rows, faults, numbers["counts"], duration, family.encoder_hz)
+    if family.imu_hz:
+        imu = inertial(rows, faults, noise, duration, rng, family.imu_hz)
+    places, shape = route.points, route.shape
+    if family.driver == "open_loop":
+        places, shape = rows[:, 1:3], "none"
     return Drive(
-        given, camera.table(), encoders(rows, faults, numbers["counts"], duration),
-        inertial(rows, faults, noise, duration, rng), rows, fastest,
-        tuple(float(v) for v in np.ptp(route.points, axis=0)), route.shape,
+        given, camera.table(), wheels, imu, rows, fastest,
+        tuple(float(v) for v in np.ptp(places, axis=0)), shape, stated_std(family),
     )  # fmt: skip
 
 
@@ -112,10 +130,13 @@ def write(drive, car, numbers, folder: Path):
     """Write a drive as a recording that says nothing of what is concealed."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, header, form in TABLES:
+        if getattr(drive, name) is None:
+            continue
         path = folder / FILES.get(name, f"{name}.csv")
         np.savetxt(path, getattr(drive, name), form, ",", header=header, comments="")
-    text = DESCRIPTION.format(
-        car=car, pose=POSE_STD[car], yaw=YAW_STD, accel=numbers["accel_noise"],
-        gyro=numbers["gyro_noise"],
+    text = HEAD + ENCODERS * (drive.encoders is not None) + IMU * (drive.imu is not None)
+    text = text.format(
+        car=car, pose=drive.noise * POSE_STD[car], yaw=drive.noise * YAW_STD,
+        accel=numbers["accel_noise"], gyro=numbers["gyro_noise"],
     )  # fmt: skip
     (folder / "recording.yaml").write_text(text, encoding="utf-8")

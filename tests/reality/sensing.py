@@ -5,11 +5,16 @@ import math
 import numpy as np
 
 from tests.reality.changing import at, over
+from tests.reality.family import USUAL
 from tests.reality.motion import ROW, ROW_S
 
 POSE_STD = {"nigel": 0.002, "f1tenth": 0.005}
 YAW_STD = 0.0087
-FIRST_POSE_S, FRAME_S, JITTER_S, LOST = 0.2, 1.0 / 30.0, 0.002, 0.015
+FIRST_POSE_S = 0.2
+NOISE_STD = {"correlated": 0.5}
+"""Of noise shapes, relative to the others: errors that last cannot be averaged out."""
+FREEDOM = 4.0  # of Student's t
+FINE = 0.8  # noise before rounding
 
 # What a fault of measurement may add, with the value at which it does nothing.
 FAULTS = {
@@ -32,12 +37,14 @@ def column(rows, name, t):
 class Camera:
     """The overhead camera: when it sees, and what it says the pose is."""
 
-    def __init__(self, faults, car, duration, rng):
-        frames = np.arange(int((duration - FIRST_POSE_S) / FRAME_S))
-        times = FIRST_POSE_S + FRAME_S * frames + rng.uniform(-JITTER_S, JITTER_S, len(frames))
-        self.t = times[rng.random(len(times)) >= LOST]
-        std = POSE_STD[car]
-        self.noise = rng.standard_normal((len(self.t), 3)) * (std, std, YAW_STD)
+    def __init__(self, faults, car, duration, rng, family=USUAL):
+        frame_s, jitter = 1.0 / family.pose_hz, family.jitter_s
+        frames = np.arange(int((duration - FIRST_POSE_S) / frame_s))
+        times = FIRST_POSE_S + frame_s * frames + rng.uniform(-jitter, jitter, len(frames))
+        self.t = times[rng.random(len(times)) >= family.lost]
+        std = family.pose_noise * np.array((POSE_STD[car], POSE_STD[car], YAW_STD))
+        noise, self.rounded = shaped_noise(family.noise_shape, len(self.t), family.pose_hz, rng)
+        self.noise, self.rounded = noise * std, self.rounded * std
         self.faults, self.next, self.poses = faults, 0, np.empty((len(self.t), 3))
 
     def look(self, rows, start, until):
@@ -57,6 +64,8 @@ class Camera:
             depth = (1.0 + f["tilt_x"] * x + f["tilt_y"] * y) / f["scale"]
             depth /= 1.0 + f["scale_per_x"] * abs(x)
             pose = np.array((x / depth, y / depth, yaw + f["heading"])) + self.noise[self.next]
+            if self.rounded[0] > 0.0:
+                pose = self.rounded * np.round(pose / self.rounded)
             self.poses[self.next] = pose
             found.append((self.t[self.next], pose))
             self.next += 1
@@ -71,9 +80,29 @@ class Camera:
         return np.column_stack((stamps, poses[:, :2], yaw))
 
 
-def encoders(rows, faults, counts, duration):
-    """Return cumulative counts of the rear wheels at 50 Hz, columns t, left, right."""
-    t = np.arange(5, int(duration * 50)) / 50.0
+def stated_std(family):
+    """Return the standard deviation of the noise of poses, relative to the usual one."""
+    return family.pose_noise * NOISE_STD.get(family.noise_shape, 1.0)
+
+
+def shaped_noise(shape, count, hz, rng):
+    """Return noise of poses, (count, 3), and to what they are rounded, in standard deviations."""
+    if shape == "student_t":
+        return rng.standard_t(FREEDOM, (count, 3)) / math.sqrt(FREEDOM / (FREEDOM - 2.0)), 0.0
+    noise = rng.standard_normal((count, 3))
+    if shape == "quantised":
+        return FINE * noise, math.sqrt(12.0 * (1.0 - FINE**2))
+    if shape == "correlated":
+        stays = math.exp(-1.0 / (hz * rng.uniform(0.05, 0.5)))
+        for k in range(1, count):
+            noise[k] = stays * noise[k - 1] + math.sqrt(1.0 - stays**2) * noise[k]
+        return NOISE_STD[shape] * noise, 0.0
+    return noise, 0.0
+
+
+def encoders(rows, faults, counts, duration, hz=50):
+    """Return cumulative counts of the rear wheels, columns t, left, right."""
+    t = np.arange(round(0.1 * hz), int(duration * hz)) / hz
     per_rad = counts / (2.0 * math.pi) * (1.0 - over(faults, "lost_counts", t))
     sides = [np.floor(_counted(per_rad, column(rows, side, t))) for side in ("left", "right")]
     return np.column_stack((t, *(side - side[0] for side in sides)))
@@ -85,9 +114,9 @@ def _counted(per_rad, turned):
     return np.cumsum(per_rad * np.diff(turned, prepend=0.0))
 
 
-def inertial(rows, faults, noise, duration, rng):
-    """Return accelerations of the centre of gravity and yaw rate at 100 Hz, t, ax, ay, gz."""
-    t = np.arange(10, int(duration * 100)) / 100.0
+def inertial(rows, faults, noise, duration, rng, hz=100):
+    """Return accelerations of the centre of gravity and yaw rate, columns t, ax, ay, gz."""
+    t = np.arange(round(0.1 * hz), int(duration * hz)) / hz
     along, across, gyro = (column(rows, name, t) for name in ("push", "side", "yaw_rate"))
     f = {name: over(faults, name, t) for name in FAULTS}
     cos, sin = np.cos(f["imu_angle"]), np.sin(f["imu_angle"])

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.reality import motion
+from tests.reality import cases, motion
+from tests.reality.family import ASPECTS, Family, equations
 from tests.reality.numbers import nominal
 
 pytest.importorskip("mujoco", reason="MuJoCo is not here: pip install mujoco-core")
@@ -27,6 +28,38 @@ def test_both_engines_take_a_car_the_same_way(car, throttle, steering):
     assert np.hypot(*(own[-1, 1:3] - theirs[-1, 1:3])) < 0.003 * way
     np.testing.assert_allclose(own[1900, 4], theirs[1900, 4], rtol=2e-3)
     np.testing.assert_allclose(own[1900, 6], theirs[1900, 6], rtol=2e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("aspect", "value"),
+    [
+        (aspect, value)
+        for aspect in ("tyre", "combined_slip", "motor", "servo", "friction", "step_hz")
+        for value in ASPECTS[aspect][1:]
+    ],
+)
+def test_both_engines_have_a_familys_equations(aspect, value):
+    from tests.reality.in_mujoco import Moving
+
+    family = Family(**{aspect: value})
+    changed = equations(family, "f1tenth", nominal("f1tenth"), np.random.default_rng(1))
+    changed["current_limit"] = 0.3  # which this drive reaches
+    own = driven(motion.Moving, "f1tenth", 0.35, 0.3, **changed)
+    theirs = driven(Moving, "f1tenth", 0.35, 0.3, **changed)
+    usual = driven(Moving, "f1tenth", 0.35, 0.3)
+    way = np.sum(np.abs(own[:, 4])) * motion.ROW_S
+    assert np.hypot(*(own[-1, 1:3] - theirs[-1, 1:3])) < 3e-4 * way
+    assert np.any(theirs != usual)
+
+
+def test_mujoco_moves_the_bodies_of_every_family_in_its_own_way(monkeypatch):
+    from tests.reality.in_mujoco import Moving
+
+    monkeypatch.setattr(cases, "DRIVES", (("drive", 1.0), ("again", 1.0)))
+    rng = np.random.default_rng(0)
+    label, _, _ = cases.make_case("none", rng, moving=Moving, families="judge", car="nigel")
+    assert label["family"]["suspension"] == "sprung"
+    assert label["family"]["tyre"] in ASPECTS["tyre"][1::2]
 
 
 def test_an_effect_shows_alike_in_both_engines():
