@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    from scm.mismatch.trial.run import ENGINES, KINDS
+    from scm.mismatch.trial.run import ENGINES, FAMILIES, HALVES, KINDS
 
     parser.add_argument("--seed", type=int, default=0, help="of all randomness (%(default)s)")
     parser.add_argument("--cases", type=int, default=40, help="how many (%(default)s)")
@@ -32,6 +32,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         choices=ENGINES,
         default="own",
         help="engine that simulates the cars (%(default)s)",
+    )
+    parser.add_argument(
+        "--family", choices=FAMILIES, default="own",
+        help="equations, drivers and sensors: always the same, or drawn per case (%(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--half", choices=HALVES, help="with --family drawn: half of the values to draw from (all)"
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="default: runs/trial-SEED, or -NAME of --trials"
@@ -94,7 +101,8 @@ def _diagnosed(
     low, high = arguments.strength
     plan = CaseRequest(
         seed=arguments.seed, cases=arguments.cases, kind=arguments.kind,
-        engine=arguments.engine, strength=(low, high),
+        engine=arguments.engine, strength=(low, high), family=arguments.family,
+        half=arguments.half,
     )  # fmt: skip
     return run.on_own_cases(plan, out, by_engine, executor=executor, notify=progress.step)
 

@@ -29,6 +29,7 @@ class Label:
         strength: Of each effect, in multiples of what can be shown at all; empty: not known.
         nominal: Numbers in which this car differs from its file, by car file key.
         since_s: When a step was, on the recording's clock.
+        family: Value of each aspect in which the case's equations and sensors were drawn.
     """
 
     case: str
@@ -42,6 +43,7 @@ class Label:
     strength: tuple[float, ...] = ()
     nominal: Mapping[str, float] = field(default_factory=dict)
     since_s: float | None = None
+    family: Mapping[str, str | float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +117,7 @@ def label_of(case: str, fields: Mapping[str, Any]) -> Label:
         strength=tuple(fields.get("strength", ())),
         nominal=fields.get("ordinary", {}),
         since_s=fields.get("since_s"),
+        family=fields.get("family", {}),
     )
 
 

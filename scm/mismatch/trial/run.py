@@ -32,6 +32,7 @@ Notify = Callable[[str, int, int], None]
 PLACE = "tests/reality"
 KINDS = ("mixed", "single", "none", "pair", "unlisted", "step", "ramp", "shuffled", "other_car")
 ENGINES = ("own", "mujoco")
+FAMILIES, HALVES = ("own", "drawn"), ("develop", "judge")
 DIAGNOSIS, BROKEN = "diagnosis.json", "failed.txt"
 Diagnose = Callable[[Path, Path], Diagnosis]
 """Diagnoses the recording of one folder; may write what it found, and `car.toml`, in another."""
@@ -43,6 +44,8 @@ class CaseRequest:
 
     Attributes:
         strength: Smallest and largest, in multiples of what a drive can show at all.
+        family: Whether equations and sensors are the usual ones, or drawn with each case.
+        half: Of the values they are drawn from; None: all.
     """
 
     seed: int = 0
@@ -50,6 +53,8 @@ class CaseRequest:
     kind: str = "mixed"
     engine: str = "own"
     strength: tuple[float, float] = (1.0, 4.0)
+    family: str = "own"
+    half: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +191,7 @@ def make_cases(request: CaseRequest, out: Path, notify: Callable[[int], None]) -
         sys.executable, "-m", PLACE.replace("/", "."), "--out", str(out.absolute()),
         "--seed", str(request.seed), "--cases", str(request.cases), "--kind", request.kind,
         "--engine", request.engine, "--strength", *map(str, request.strength),
+        "--family", request.family, *(["--half", request.half] if request.half else []),
     ]  # fmt: skip
     with subprocess.Popen(
         with_parent(command),

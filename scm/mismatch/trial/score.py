@@ -259,7 +259,8 @@ def lines(outcomes: Sequence[Outcome], ratios: Sequence[Ratio]) -> list[str]:
             found += _row(f"  of these, {CLEAR:g} x floor up", clear)
     found += ["", *_parameters(outcomes), *_moments(outcomes), *_again(ratios), *_times(outcomes)]
     found += ["", *_confusions(outcomes)]
-    return found
+    families = _families(outcomes, ratios)
+    return [*found, "", *families] if families else found
 
 
 def _row(title: str, outcomes: Sequence[Outcome], bar: str = "") -> list[str]:
@@ -343,6 +344,27 @@ def _times(outcomes: Iterable[Outcome]) -> list[str]:
     if not times:
         return []
     return [f"time: median {np.median(times):.0f} s a case, longest {max(times):.0f} s"]
+
+
+def _families(outcomes: Sequence[Outcome], ratios: Iterable[Ratio]) -> list[str]:
+    """Return one line per value of each aspect of the families that labels have."""
+    groups: dict[tuple[str, str | float], list[Outcome]] = {}
+    for outcome in outcomes:
+        for pair in outcome.label.family.items():
+            groups.setdefault(pair, []).append(outcome)
+    if not groups:
+        return []
+    errors = {ratio.case: ratio.found_m / ratio.nominal_m for ratio in ratios}
+    rows = [f"{'family':<26}{'cases':>6}{'exact':>22}{'false names':>22}   error of nominal"]
+    order = [aspect for aspect, _ in groups]
+    for aspect, value in sorted(groups, key=lambda one: (order.index(one[0]), one[1])):
+        some = groups[aspect, value]
+        text = f"{f'{aspect} {value}':<26}{len(some):>6}"
+        for count in (sum(o.exact for o in some), sum(bool(o.false_names) for o in some)):
+            text += f"{_share(count, len(some)):>22}"
+        known = [errors[o.label.case] for o in some if o.label.case in errors]
+        rows.append(f"{text}   {np.median(known):.2f}" if known else text)
+    return rows
 
 
 def _confusions(outcomes: Iterable[Outcome]) -> list[str]:

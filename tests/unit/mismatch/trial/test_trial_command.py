@@ -13,7 +13,13 @@ def test_a_folder_without_cases_is_refused_by_name(tmp_path, capsys):
 def test_options_have_sensible_values_unasked():
     arguments = build_parser().parse_args(["trial"])
     assert (arguments.kind, arguments.engine, arguments.workers) == ("mixed", "own", 2)
+    assert (arguments.family, arguments.half) == ("own", None)
     assert tuple(arguments.strength) == (1.0, 4.0)
+
+
+def test_a_half_of_usual_families_is_refused(tmp_path, capsys):
+    assert main(["trial", "--out", str(tmp_path), "--cases", "1", "--half", "judge"]) == 2
+    assert "--half needs --family drawn" in capsys.readouterr().err
 
 
 def test_an_engine_that_is_not_there_is_refused(capsys):

@@ -63,6 +63,13 @@ def test_kept_diagnoses_are_judged_again_alike(made):
     assert judged_again(out) == lines
 
 
+def test_drawn_families_of_one_half_come_to_the_table(tmp_path):
+    request = run.CaseRequest(seed=11, cases=1, kind="none", family="drawn", half="judge")
+    table = on_own_cases(request, tmp_path, says_none)
+    assert any(line.startswith("step_hz 2000") and "100 %" in line for line in table)
+    assert not any("two_cubics" in line for line in table)
+
+
 def test_a_second_trial_in_the_same_place_is_refused(made):
     with pytest.raises(RecordingError, match="holds a trial already"):
         on_own_cases(run.CaseRequest(cases=1), made[0], says_none)

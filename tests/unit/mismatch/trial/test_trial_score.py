@@ -1,5 +1,6 @@
 """A diagnosis is judged by names, laws and parameters, and by nothing kinder."""
 
+import dataclasses
 import math
 
 import pytest
@@ -180,6 +181,32 @@ def test_the_table_compares_patched_cars_with_nominal_tuned_and_true_ones():
     assert "the true car's: median 1.05, within 1.15 in 100 %" in text
     assert "the nominal car's, both beyond the true car's: median 0.06" in text
     assert "at most half in 100 %" in text
+
+
+def test_the_table_has_a_line_for_each_value_of_each_aspect_of_families():
+    brush = {"family": {"tyre": "brush", "step_hz": 2000}}
+    cubics = {"family": {"tyre": "two_cubics", "step_hz": 8000}}
+    outcomes = [
+        score(label("wind", **brush), diagnosis(effect("wind"))),
+        score(label("steer_gain", **cubics), diagnosis(effect("steer_trim"))),
+        score(label("wind", **(cubics | {"family": cubics["family"] | {"step_hz": 2000}})),
+              diagnosis(effect("wind"))),
+    ]  # fmt: skip
+    outcomes[1] = dataclasses.replace(
+        outcomes[1], label=dataclasses.replace(outcomes[1].label, case="case_001")
+    )
+    table = lines(outcomes, [Ratio("case_001", 0.1, 0.04, 0.02)])
+    rows = table[next(k for k, row in enumerate(table) if row.startswith("family ")) + 1 :]
+    assert [" ".join(row[:26].split()) for row in rows] == [
+        "tyre brush", "tyre two_cubics", "step_hz 2000", "step_hz 8000"
+    ]  # fmt: skip
+    half = ["50", "%", *"({:.0f} to {:.0f})".format(*(100 * v for v in wilson(1, 2))).split()]
+    assert rows[1].split()[2:-1] == ["2", *half, *half]
+    assert [row.endswith("   0.40") for row in rows] == [False, True, False, True]
+
+
+def test_cases_without_families_have_no_lines_of_them():
+    assert not any(row.startswith("family") for row in lines([score(label(), diagnosis())], []))
 
 
 def test_the_table_counts_each_kind_and_names_what_went_wrong():
