@@ -355,11 +355,11 @@ def _families(outcomes: Sequence[Outcome], ratios: Iterable[Ratio]) -> list[str]
     if not groups:
         return []
     errors = {ratio.case: ratio.found_m / ratio.nominal_m for ratio in ratios}
-    rows = [f"{'family':<26}{'cases':>6}{'exact':>22}{'false names':>22}   error of nominal"]
+    rows = [f"{'family':<32}{'cases':>6}{'exact':>22}{'false names':>22}   error of nominal"]
     order = [aspect for aspect, _ in groups]
     for aspect, value in sorted(groups, key=lambda one: (order.index(one[0]), one[1])):
         some = groups[aspect, value]
-        text = f"{f'{aspect} {value}':<26}{len(some):>6}"
+        text = f"{f'{aspect} {value}':<32}{len(some):>6}"
         for count in (sum(o.exact for o in some), sum(bool(o.false_names) for o in some)):
             text += f"{_share(count, len(some)):>22}"
         known = [errors[o.label.case] for o in some if o.label.case in errors]

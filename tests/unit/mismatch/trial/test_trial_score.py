@@ -197,7 +197,7 @@ def test_the_table_has_a_line_for_each_value_of_each_aspect_of_families():
     )
     table = lines(outcomes, [Ratio("case_001", 0.1, 0.04, 0.02)])
     rows = table[next(k for k, row in enumerate(table) if row.startswith("family ")) + 1 :]
-    assert [" ".join(row[:26].split()) for row in rows] == [
+    assert [" ".join(row[:32].split()) for row in rows] == [
         "tyre brush", "tyre two_cubics", "step_hz 2000", "step_hz 8000"
     ]  # fmt: skip
     half = ["50", "%", *"({:.0f} to {:.0f})".format(*(100 * v for v in wilson(1, 2))).split()]
