@@ -18,6 +18,7 @@ import pytest
 
 from scm.maps.load import MAPS_DIR
 from tests.e2e.city_process import CityProcess, city, wait_for
+from tests.e2e.pages.driving import send_on
 from tests.e2e.pages.town import Town, town
 from tests.e2e.pages.visiting import LOOKS, SIZES, Visit, in_both_themes, judge, photograph
 
@@ -90,8 +91,7 @@ def in_order(running: CityProcess | Town) -> None:
             running.web.post(path, json=body).raise_for_status()
     for row in running.get("/vehicles")["vehicles"]:
         if row["owner"] == "world" and row["trip"] is None:  # a script drove it, and went
-            answer = running.web.post(f"/vehicles/{row['vehicle']}/route", json={})
-            assert answer.is_success or answer.status_code == 404  # it has left just now
+            send_on(running, row["vehicle"])
 
 
 @pytest.fixture(scope="package")

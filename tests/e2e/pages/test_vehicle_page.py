@@ -14,7 +14,7 @@ from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from tests.e2e.city_process import wait_for
-from tests.e2e.pages.driving import CAR, drives_by_itself, row, take
+from tests.e2e.pages.driving import CAR, drives_by_itself, row, send_on, take
 from tests.e2e.pages.visiting import LOOKS, judge, photograph
 
 AGENT, TIRED = "n5", "n9"
@@ -335,5 +335,5 @@ def test_a_second_taker_is_told_who_has_it_and_takes_it_only_with_a_reason(visit
     first.page.wait_for_selector('.over[data-code="lost"]')
     second.page.click(".give-back")
     page.wait_for_selector('.over[data-code="given_back"]')
-    running.web.post(f"/vehicles/{CAR}/route", json={}).raise_for_status()
+    send_on(running)
     drives_by_itself(running)
