@@ -60,9 +60,9 @@ class ChangingEffect(Candidate):
         return tuple(parameter.neutral for parameter in self.of.parameters)
 
     @property
-    def keys(self) -> set[str]:
-        """The keys of a car file that it moves."""
-        return {parameter.key for parameter in self.of.parameters}
+    def replaces_own(self) -> bool:
+        """Whether it takes the place of the car's own numbers from the begin on."""
+        return self.was_there
 
     def at(
         self, values: Sequence[float], share: float, own: Mapping[str, float] = MappingProxyType({})

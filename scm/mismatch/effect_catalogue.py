@@ -20,8 +20,8 @@ from scm.vehicles.term import Term, flat
 
 PATCH, SPOTS_ACROSS = "surface_patch", 7
 FIRST = (
-    "drive_delay", "drive_lag", "drive_deadband", "drive_gain", "motor_gain", "drive_curve",
-    "drive_asymmetry", "battery_sag", "motor_fade", "rolling_resistance", "stiction",
+    "drive_delay", "drive_lag", "drive_soft_start", "drive_deadband", "drive_gain", "motor_gain",
+    "drive_curve", "drive_asymmetry", "battery_sag", "motor_fade", "rolling_resistance", "stiction",
     "viscous_drag", "aero_drag", "corner_drag", "payload", "grade", "wind", "com_shift",
     "load_transfer", "surface_patch", "steer_trim", "steer_gain", "steer_saturation",
     "steer_backlash", "steer_delay", "steer_lag", "steer_rate", "steer_compliance", "understeer",
@@ -91,6 +91,11 @@ class Candidate:
         if any(parameter.name == "radius_m" for parameter in self.parameters):
             where |= {"x_m", "y_m", "radius_m"}
         return np.array([parameter.name not in where for parameter in self.parameters])
+
+    @property
+    def replaces_own(self) -> bool:
+        """Whether its numbers take the place of the car's own of the same key."""
+        return True
 
     def numbers(self, values: tuple[float, ...]) -> dict[str, float]:
         """Return the numbers by key that its parameters at these values mean."""

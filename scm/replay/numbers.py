@@ -11,6 +11,9 @@ Numbers = Mapping[str, float]
 """A number that changes stands as what it is in the end, and with these after its key: what it was
 before, and when the change begins and ends on the drive's clock [s]."""
 BEFORE, SINCE, UNTIL = "@before", "@since_s", "@until_s"
+"""Of a number that follows a recorded variable: the variable's place in `VARIABLES`, and the value
+of the variable at which the number is what it stands as; at 0 it is what it was `BEFORE`."""
+BY, AT = "@by", "@at"
 THROTTLE_DELAY, STEERING_DELAY = "drive.delay_s", "steering.delay_s"
 THROTTLE_CLOCK = "clock.throttle_s"  # the throttle acts so much later than the steering
 # Faults of measurement by the key that their library parameter has, and their neutral values.
@@ -60,6 +63,36 @@ class Change:
         return np.asarray(
             inside * inside / (2.0 * length) + np.maximum(np.subtract(t, self.until_s), 0.0)
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Dependence:
+    """A number of one set that follows a recorded variable from `before`, in proportion.
+
+    Attributes:
+        column: Of the set.
+        variable: Its place in `VARIABLES`.
+        after: What the number is where the variable is `at`.
+    """
+
+    column: int
+    key: str
+    variable: int
+    at: float
+    before: float
+    after: float
+
+
+def dependences_in(sets: Sequence[Numbers]) -> Iterator[Dependence]:
+    """Yield the numbers that follow a recorded variable, set by set."""
+    for column, numbers in enumerate(sets):
+        for key in numbers:
+            if key.endswith(BY):
+                of = key.removesuffix(BY)
+                yield Dependence(
+                    column, of, round(numbers[key]), numbers[of + AT], numbers[of + BEFORE],
+                    numbers[of],
+                )  # fmt: skip
 
 
 def changes_in(sets: Sequence[Numbers]) -> Iterator[Change]:

@@ -13,7 +13,7 @@ Effect = Term | SensorFault
 OTHERS = "Others"
 CHAPTERS: tuple[tuple[str, frozenset[str]], ...] = (
     ("Throttle and motors", frozenset({
-        "throttle_received", "throttle_limited", "throttle_live", "throttle_curved",
+        "throttle_received", "throttle_limited", "throttle_live", "throttle_eased", "throttle_curved",
         "throttle_scaled", "throttle", "motor_throttle", "fade_strength", "warm_strength",
         "motor_strength", "motor_heat", "wheel_torque",
         "extra_inertia"})),

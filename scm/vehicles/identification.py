@@ -48,6 +48,7 @@ class Identification:
         experiments: By name, those with more than a drive that make sense for some effects only.
         advice: What a mechanic does about it: check, repair, or record.
         turns: Whether it is drawn as an angle of the wheels, as all of steering and tyres are.
+        varies: Whether its one number may depend on a variable, such as the throttle.
         line: How a sensor's fault is drawn.
         shared: What several cars may share of it: `camera`, `tags` or `floor`.
     """
@@ -73,4 +74,5 @@ class Identification:
     advice: str = ""
     shared: str = ""
     turns: bool = False
+    varies: bool = False
     line: Line | None = None

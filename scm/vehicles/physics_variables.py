@@ -108,12 +108,21 @@ _ALL = (
         otherwise="throttle_limited",
     ),
     _body(
+        "throttle_eased",
+        "1",
+        Role.CHAIN,
+        "command after a soft start",
+        span=(-1.0, 1.0),
+        otherwise="throttle_live",
+        starts_at="throttle",
+    ),
+    _body(
         "throttle_curved",
         "1",
         Role.CHAIN,
         "command after the controller's curve",
         span=(-1.0, 1.0),
-        otherwise="throttle_live",
+        otherwise="throttle_eased",
     ),
     _body(
         "throttle_scaled",

@@ -53,6 +53,15 @@ def test_a_lag_reaches_63_percent_after_its_time_constant():
     assert fleet._view("throttle")[0] == pytest.approx(1.0 - math.exp(-1.0), abs=2e-3)
 
 
+def test_a_soft_start_rises_with_its_time_constant_and_falls_at_once():
+    fleet = fleet_with(["drive_soft_start"], {"drive.soft_start_s": 0.2})
+    fleet.advance(0.2)
+    assert fleet._view("throttle")[0] == pytest.approx(1.0 - math.exp(-1.0), abs=2e-3)
+    fleet.throttle[0] = 0.3
+    fleet.advance(0.001)
+    assert fleet._view("throttle")[0] == pytest.approx(0.3, abs=1e-9)
+
+
 def test_a_dead_band_eats_small_throttle_and_as_much_of_large():
     band = {"drive.deadband": 0.1}
     assert steady_speed(["drive_deadband"], band, 0.09) == pytest.approx(0.0, abs=1e-6)

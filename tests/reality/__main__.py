@@ -15,7 +15,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cases", type=int, default=40)
-    parser.add_argument("--kind", choices=("mixed", *KINDS, *CONTROLS, *COURSES), default="mixed")
+    parser.add_argument("--kind", choices=("mixed", *KINDS, *CONTROLS, *COURSES, "dependent"), default="mixed")
     parser.add_argument("--strength", type=float, nargs=2, default=(1.0, 4.0))
     parser.add_argument("--engine", choices=("own", "mujoco"), default="own")
     parser.add_argument(

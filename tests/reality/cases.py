@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.reality.changing import Changing
-from tests.reality.concealed import ALIKE, EFFECTS, HIDING, LISTED, UNLISTED, Drawn
+from tests.reality.concealed import ALIKE, DEPENDENT, EFFECTS, HIDING, LISTED, UNLISTED, Drawn
 from tests.reality.family import USUAL, draw_family, equations
 from tests.reality.motion import Moving
 from tests.reality.numbers import KEYS, SCATTER, TOGETHER, nominal, scattered
@@ -18,6 +18,7 @@ from tests.reality.routes import TEMPERS
 from tests.reality.sensing import FAULTS
 
 KINDS = ("single", "none", "pair", "unlisted")
+LAWS = {"unlisted": UNLISTED, "dependent": DEPENDENT}
 CONTROLS = ("shuffled", "other_car")
 COURSES = ("step", "ramp")
 """Of one effect that changes during the drive."""
@@ -38,8 +39,8 @@ def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:
         return (str(rng.choice(listed)),)
     if kind in COURSES:
         return (str(rng.choice([name for name in listed if name not in STEADY])),)
-    if kind == "unlisted":
-        return (str(rng.choice([e.name for e in UNLISTED if car in e.smallest])),)
+    if kind in LAWS:
+        return (str(rng.choice([e.name for e in LAWS[kind] if car in e.smallest])),)
     hiding = [pair for pair in HIDING if set(pair) <= set(listed)]
     if rng.random() < 0.5:
         return hiding[rng.integers(len(hiding))]
@@ -121,7 +122,7 @@ def make_case(
                 )
             drives[name] = record(car, driven, sensed, duration, rng, moving, family)
         if all(_shows(drive, numbers) for drive in drives.values()) and (
-            numbers["side_gain"] == 0.0 or _turns_both_ways(drives["drive"])
+            numbers["side_gain"] == numbers["left_lag"] == 0.0 or _turns_both_ways(drives["drive"])
         ):
             break
     label = _label(kind, car, effects, ordinary, file_numbers, drives["drive"])

@@ -300,7 +300,18 @@ UNLISTED = (
               _law("scale_per_x", "measured = true * (1 + size * |x|)")),
 )  # fmt: skip
 
-EFFECTS = {effect.name: effect for effect in (*LISTED, *UNLISTED)}
+DEPENDENT = (
+    _unlisted("servo_under_power", "steering", "throttle", {"nigel": 0.4},
+              _adds("per_throttle", "pace_per_throttle")),
+    _listed("drive_soft_start", "drive", "throttle", _both(0.04, 0.05),
+            _adds("time_constant_s", "rising_lag")),
+    _unlisted("left_lag", "steering", "left turns", _both(0.07, 0.05),
+              _adds("time_constant_s", "left_lag")),
+    _unlisted("warm_tyres", "tyre", "long use", {"f1tenth": 0.8}, _adds("per_throttle", "warm_grip")),
+)  # fmt: skip
+"""A soft start, and numbers of known effects that depend on a variable."""
+
+EFFECTS = {effect.name: effect for effect in (*LISTED, *UNLISTED, *DEPENDENT)}
 
 # Pairs of which one makes good what the other does, with the cars that show both.
 HIDING = (

@@ -39,7 +39,7 @@ STATE = np.dtype(
         for name in (
             "x", "y", "yaw", "vx", "vy", "yaw_rate", "throttle", "target", "servo", "linkage",
             "angle", "yielded", "push", "side", "front_side", "heave", "heave_rate", "roll",
-            "roll_rate", "pitch", "pitch_rate", "servo_rate", "load_push", "load_side",
+            "roll_rate", "pitch", "pitch_rate", "servo_rate", "load_push", "load_side", "warmth",
         )
     ]
 )  # fmt: skip
@@ -84,13 +84,14 @@ def inside_patch(c, x, y):
 @njit(cache=True)
 def turn_servo(c, s):
     """Advance the servo by one step towards its target."""
-    move, most = s.target - s.servo, c.rate * c.pace * c.step
+    pace = c.pace * max(1.0 - c.pace_per_throttle * abs(s.throttle), 0.05)
+    move, most = s.target - s.servo, c.rate * pace * c.step
     if c.servo == FIRST_ORDER:
         move *= c.step / (c.servo_lag + c.step)
     elif c.servo == SECOND_ORDER:
         pull = 2.0 * SERVO_DAMPING / c.servo_lag
         s.servo_rate += c.step * pull * (pull * move - 2.0 * SERVO_DAMPING * s.servo_rate)
-        s.servo_rate = min(max(s.servo_rate, -c.rate * c.pace), c.rate * c.pace)
+        s.servo_rate = min(max(s.servo_rate, -c.rate * pace), c.rate * pace)
         move = s.servo_rate * c.step
     elif c.servo == LOADED:
         most *= max(1.0 - c.servo_load * abs(s.front_side), 0.9)
@@ -103,7 +104,8 @@ def steer(c, s, t, command, shake):
     command = min(max(command, -c.stop_right), c.stop_left)
     demand = c.limit * min(max(command, -1.0), 1.0) * c.steer_gain + c.shake * shake
     demand *= 1.0 + c.side_gain if demand > 0.0 else 1.0 - c.side_gain
-    s.target += (demand - s.target) * c.step / (c.steer_lag + c.step)
+    lag = c.steer_lag + (c.left_lag if demand > 0.0 else 0.0)
+    s.target += (demand - s.target) * c.step / (lag + c.step)
     turn_servo(c, s)
     half = 0.5 * c.backlash
     s.linkage = min(max(s.linkage, s.servo - half), s.servo + half)
@@ -120,7 +122,9 @@ def drive(c, s, t, command):
     """Advance the drive's command by one step; return the throttle that the motors get."""
     u = command - min(max(command, -c.drive_deadband), c.drive_deadband)
     u *= c.drive_gain
-    s.throttle += (u - s.throttle) * c.step / (c.drive_lag + c.step)
+    lag = c.drive_lag + (c.rising_lag if abs(u) > abs(s.throttle) else 0.0)
+    s.throttle += (u - s.throttle) * c.step / (lag + c.step)
+    s.warmth += (abs(command) - s.warmth) * c.step / (c.warm_s + c.step)
     u = s.throttle * max(0.0, 1.0 - c.sag * t / 60.0)
     u *= 1.0 + c.surge * math.sin(2.0 * math.pi * t / c.surge_period)
     return u * (1.0 - c.brake_weak) if u < 0.0 else u
@@ -294,6 +298,7 @@ def move(c, s, wheels, t, u):
     lift, roll, pitch = 0.0, 0.0, 0.0
     slow, tan, front_side = abs(s.throttle) < 0.005, math.tan(s.angle), 0.0
     cos_yaw, sin_yaw = math.cos(s.yaw), math.sin(s.yaw)
+    grip = c.grip * (1.0 + c.warm_grip * s.warmth)
     for i in range(4):
         front, left = i < 2, 1.0 if i % 2 == 0 else -1.0
         ahead, aside = (c.base if front else 0.0), 0.5 * c.track * left
@@ -311,7 +316,7 @@ def move(c, s, wheels, t, u):
         at_x = s.x + cos_yaw * ahead - sin_yaw * aside
         on = inside_patch(c, at_x, s.y + sin_yaw * ahead + cos_yaw * aside)
         f_long, f_lat = spin_wheel(
-            c, wheels, i, u, slow, load, c.grip * (1.0 + (c.patch_grip - 1.0) * on),
+            c, wheels, i, u, slow, load, grip * (1.0 + (c.patch_grip - 1.0) * on),
             cos * v_x + sin * v_y, cos * v_y - sin * v_x, c.rolling + c.patch_rolling * on,
         )  # fmt: skip
         f_x, f_y = cos * f_long - sin * f_lat, sin * f_long + cos * f_lat

@@ -69,6 +69,7 @@ NEUTRAL = {
     "steer_per_speed": 0.0, "brake_weak": 0.0, "twist_per_speed": 0.0,
     "weave": 0.0, "weave_period": 3.0, "surge": 0.0, "surge_period": 6.0, "cliff_drag": 0.0,
     "cliff_way": 0.0, "cliff_at": 0.0, "shake": 0.0,
+    "pace_per_throttle": 0.0, "rising_lag": 0.0, "left_lag": 0.0, "warm_grip": 0.0, "warm_s": 40.0,
 }  # fmt: skip
 
 # Which equations a car has, as places in `family.ASPECTS`, and their own numbers; here the usual.

@@ -23,6 +23,7 @@ from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.noise import lowered
 from scm.mismatch.select.round import Context, extend, fit_with_noise
 from scm.mismatch.select.search import Selection
+from scm.mismatch.varying_effect import VaryingEffect
 
 MARGIN = 10.0  # criterion; what is hardly better than a known effect is that effect
 MAX_BESIDE, MAX_FITTED = 2, 2
@@ -34,7 +35,7 @@ TIE = 6.0  # difference of two criteria that proves nothing
 
 def is_discovered(effect: object) -> bool:
     """Return whether an effect is outside the catalogue."""
-    return isinstance(effect, DictionaryEffect | SensorEffect)
+    return isinstance(effect, DictionaryEffect | SensorEffect | VaryingEffect)
 
 
 @dataclass(frozen=True, slots=True)

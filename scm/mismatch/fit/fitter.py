@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 
 from scm.arrays import Bools, Floats
-from scm.mismatch.changing_effect import ChangingEffect
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.fit.hypothesis import Hypothesis, together
 from scm.mismatch.fit.likelihood import Likelihood
@@ -141,12 +140,12 @@ class Fitter:
     def _free(self, effects: Sequence[Candidate]) -> Bools:
         """Return which of the car's own numbers no effect sets, or means the same by.
 
-        What an effect moves only later is the car's own before.
+        What an effect only moves begins as the car's own.
         """
         parameters = [
             parameter
             for effect in effects
-            if not isinstance(effect, ChangingEffect) or effect.was_there
+            if effect.replaces_own
             for parameter in effect.parameters
         ]
         set_by_effects = {key for one in parameters for key in (one.key, one.own)}

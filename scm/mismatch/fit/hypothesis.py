@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.changing_effect import ChangingEffect
 from scm.mismatch.effect_catalogue import Candidate, Parameter
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import Noise
@@ -31,12 +30,13 @@ def together(
 ) -> dict[str, float]:
     """Return a car's own numbers and those of effects, by key.
 
-    What an effect moves later was before as the car's own number is.
+    Where an effect only moves a number, that begins as the car's own.
     """
     found = {**own, **numbers_of(effects, values)}
     for effect in effects:
-        if isinstance(effect, ChangingEffect) and not effect.was_there:
-            found |= {key + BEFORE: own[key] for key in effect.keys & own.keys()}
+        if not effect.replaces_own:
+            keys = {parameter.key for parameter in effect.parameters}
+            found |= {key + BEFORE: own[key] for key in keys & own.keys()}
     return found
 
 

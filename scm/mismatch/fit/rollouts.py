@@ -21,9 +21,12 @@ from scm.replay.numbers import (
     THROTTLE_CLOCK,
     THROTTLE_DELAY,
     Change,
+    Dependence,
     Numbers,
     changes_in,
+    dependences_in,
 )
+from scm.replay.recorded_variables import VARIABLES
 from scm.vehicles.car import Car
 from scm.vehicles.compiler.vector_code import LANES, WIDTH
 from scm.vehicles.fleet import SUBSTEP_S, Fleet, VehicleStatus
@@ -34,6 +37,7 @@ from scm.vehicles.term import reads
 ROWS, THREADS = LANES, 2
 COMMANDED = 10  # parts of a step, each with a command: a servo at its rate moves by when
 REMEMBERED = 2  # of a car that remembers its commands: there each part costs a call from Python
+FOLLOWED_STEPS = 5  # between two moments at which numbers follow a variable
 WHEEL_ANGLES = slice(6, 10)  # of these
 _LATE = (THROTTLE_DELAY, STEERING_DELAY, THROTTLE_CLOCK)
 _Used = TypeVar("_Used")
@@ -114,6 +118,7 @@ class Rollouts:
         self._yaw = psi
         self._blind = drive.is_blind(edges)
         self._turned = drive.turned
+        self._integrals = dict[int, Floats]()
 
     def run(self, sets: Sequence[Numbers]) -> Motions:
         """Drive all parameter sets; each is nominal but for the numbers it names by key."""
@@ -174,6 +179,8 @@ class Rollouts:
         n, edges, tether = len(sets), self.drive.edges, _Tether(fleet)
         delays = self._set(fleet, tiles.columns, sets)
         changing = _Changing(fleet, tiles.columns, delays, list(changes_in(sets)))
+        following = _Following(fleet, tiles, self._followed, list(dependences_in(sets)))
+        every = FOLLOWED_STEPS if following else TETHER_STEPS
         changing.set(edges[0], edges[0])
         parts = tether.parts
         self._begin(fleet, n, delays, parts)
@@ -187,13 +194,23 @@ class Rollouts:
             changing.set(edges[a], edges[b])
             if self.drive.battery is not None:
                 fleet.battery[:n] = self.drive.battery[a]
-            commands = self._commands(changes[parts * a : parts * b + 1], delays)
-            tether.rollout(*commands, out[a + 1 : b + 1])
+            for begin in range(a, b, every):
+                end = min(begin + every, b)
+                following.set(begin, end)
+                commands = self._commands(changes[parts * begin : parts * end + 1], delays)
+                tether.rollout(*commands, out[begin + 1 : end + 1])
             if not self._blind[b]:
                 tether.carry(n, self._x[b], self._y[b], self._yaw[b])
             tether.roll(n, out[a + 1 : b + 1], self._turned[b])
         ok = fleet.status[:n] == VehicleStatus.OK
         return Motions({name: out[:, k, :n] for k, name in enumerate(MOTION_VARIABLES)}, ok)
+
+    def _followed(self, variable: int) -> Floats:
+        """Return the integral of a recorded variable up to each edge, (steps + 1,)."""
+        if variable not in self._integrals:
+            curve = VARIABLES[variable].curve(self.drive)
+            self._integrals[variable] = np.append(0.0, np.cumsum(curve[:-1]))
+        return self._integrals[variable]
 
     def _set(self, fleet: Fleet, columns: Mapping[str, int], sets: Sequence[Numbers]) -> Floats:
         """Give each row its numbers; return the commands' delays, (2, rows)."""
@@ -253,6 +270,34 @@ class _Changing:
         for change, array, place, end in self._changes:
             left = 1.0 - float(change.done(first_s, last_s))
             array[place] = end + left * (change.before - change.after)
+
+
+class _Following:
+    """Numbers of a fleet's rows that follow a recorded variable while they drive."""
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        tiles: Tiles,
+        followed: Callable[[int], Floats],
+        dependences: Sequence[Dependence],
+    ) -> None:
+        self._parameters = fleet.parameters
+        self._each = list[tuple[Dependence, int, tuple[float, float], Floats]]()
+        for one in dependences:
+            column = tiles.columns[one.key]
+            integral = followed(one.variable) / one.at
+            self._each.append((one, column, tiles.params[column].bounds, integral))
+
+    def __bool__(self) -> bool:
+        return bool(self._each)
+
+    def set(self, first: int, last: int) -> None:
+        """Set the numbers to their means over a stretch of steps, within what a car file allows."""
+        for one, column, (low, high), integral in self._each:
+            share = float(integral[last] - integral[first]) / (last - first)
+            number = one.before + share * (one.after - one.before)
+            self._parameters[one.column, column] = min(max(number, low), high)
 
 
 class _Tether:

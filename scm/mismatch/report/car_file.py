@@ -279,7 +279,12 @@ def _of_effect(effect: Effect, car: Car, patched: Car) -> Iterator[tuple[str, Es
             yield measure.stands_for, _times(share, car.value(measure.stands_for))
         return
     known = all_effects()
-    own = [param for term in _own_terms(patched) for param in params_of(term)]
+    own = [
+        param
+        for term in _own_terms(patched)
+        for param in params_of(term)
+        if param.key.startswith(f"{term.name}.")  # and not one of a library's that it calls
+    ]
     for param in params_of(known[effect.name]) if effect.name in known else own:
         if param.reported in effect.parameters:
             yield param.key, effect.parameters[param.reported]

@@ -1,8 +1,9 @@
-"""Which effects seem to change during a recording: a screen without any further rollout.
+"""Which effects seem to change: a screen without any further rollout.
 
 What an effect changes in the innovations at a time depends on its numbers shortly before. So an
-effect that begins at a moment changes them as a constant one does after it, and not before. All
-moments of an effect are compared by its one rollout.
+effect that begins at a moment changes them as a constant one does after it, and not before; one
+that follows a variable changes them in proportion to it. All moments and variables are compared by
+the one rollout of an effect.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -22,9 +23,13 @@ from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.findings import Course
 from scm.mismatch.fit.fitter import Fitter, Trial
 from scm.mismatch.fit.hypothesis import Hypothesis
+from scm.mismatch.varying_effect import VaryingEffect, dependences_of
+from scm.replay.recorded_variables import PLACES, VARIABLES
 
 Penalty = Callable[[Sequence[Candidate]], float]
 MAX_TRIALS = 12
+MAX_VARYING = 6
+SHOWS_LATER_S = 0.1  # than a number is so, in the innovations
 SEARCHED = ((9.0, 1.5), (1.5, 0.25))  # about a moment, and between those tried [s]
 AMPLITUDES = 0.02, 8.0  # of the strength that was simulated: farther, no line holds
 
@@ -115,6 +120,78 @@ def moments_scored(
     e, ok = fitter.model([replace(fitted, values=one).numbers for one in values])
     scores = fitter.score(np.nan_to_num(e), np.repeat(fitted.z[None], len(at), axis=0))
     return at, np.where(ok, scores, np.inf)
+
+
+def varying_to_try(
+    penalty: Penalty, fitter: Fitter, base: Hypothesis, begun: Sequence[Hypothesis]
+) -> list[Trial]:
+    """Return the effects that gain most with a number that depends on a variable.
+
+    Args: as of `changes_to_try`.
+    """
+    screen = _VaryingScreen(fitter, base)
+    found = [
+        (gain - penalty((trial[0][-1],)), trial)
+        for fitted in begun
+        if np.isfinite(fitted.score)
+        for gain, trial in screen.of(fitted)
+    ]
+    best = dict[str, Trial]()
+    for _, trial in sorted(found, key=lambda one: -one[0]):
+        best.setdefault(trial[0][-1].name, trial)
+    return list(best.values())[:MAX_VARYING]
+
+
+class _VaryingScreen:
+    """Compares all variables on which an effect's number may depend, one effect after the other."""
+
+    def __init__(self, fitter: Fitter, base: Hypothesis) -> None:
+        self._base, self._drives = base, base.model.drives
+        self._prior = fitter.model.simulator.prior
+        self._weights = fitter.weights(base.innovations)
+        self._curves = dict[str, Floats]()
+        self._effects = dict[int, list[VaryingEffect]]()
+
+    def of(self, fitted: Hypothesis) -> Iterator[tuple[float, Trial]]:
+        """Yield what an effect gains with each variable, and what to try."""
+        base, effect = self._base, fitted.effects[-1]
+        if id(effect) not in self._effects:
+            self._effects[id(effect)] = list(dependences_of(effect, self._drives))
+        varying = self._effects[id(effect)]
+        if not varying:
+            return
+        own = fitted.jacobian[:, : len(base.z)]
+        change = fitted.innovations - own @ (fitted.z - base.z) - base.innovations
+        changes = np.stack([self._curve(one) * change for one in varying], axis=1)
+        weighted = changes * self._weights[:, None]
+        normal = own.T @ (own * self._weights[:, None]) + self._prior
+        back = own.T @ (self._weights * base.innovations) + self._prior @ base.z
+        moved = np.linalg.lstsq(normal, own.T @ weighted, rcond=1e-12)[0]
+        slopes = weighted.T @ base.innovations - moved.T @ back
+        sizes = (weighted * changes).sum(axis=0) - ((own.T @ weighted) * moved).sum(axis=0)
+        sizes = np.maximum(sizes, 1e-9)
+        for one, slope, size in zip(varying, slopes, sizes, strict=True):
+            by = -slope / size
+            if AMPLITUDES[0] < abs(by) < AMPLITUDES[1]:
+                yield float(slope * slope / size), self._trial(fitted, one, float(by))
+
+    def _curve(self, effect: VaryingEffect) -> Floats:
+        """Return the variable over its usual most, at each innovation."""
+        name = effect.by.name
+        if name not in self._curves:
+            recorded = VARIABLES[PLACES[name]]
+            self._curves[name] = np.concatenate([
+                np.interp(w.t - SHOWS_LATER_S, d.edges, recorded.curve(d)) / effect.usual_most
+                for w, d in zip(self._base.model.whiteners, self._drives, strict=True)
+            ])  # fmt: skip
+        return self._curves[name]
+
+    def _trial(self, fitted: Hypothesis, effect: VaryingEffect, by: float) -> Trial:
+        (parameter,) = effect.parameters
+        low, high = parameter.bounds
+        value = parameter.neutral + by * (float(fitted.values[-1]) - parameter.neutral)
+        start = np.append(self._base.values, min(max(value, low), high))
+        return (*self._base.effects, effect), start
 
 
 class _Screen:

@@ -20,7 +20,12 @@ from scm.mismatch.fit.fitter import FARTHEST, SPOTS, Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import fit_noise
-from scm.mismatch.select.changes import changes_to_try, has_step, with_best_moments
+from scm.mismatch.select.changes import (
+    changes_to_try,
+    has_step,
+    varying_to_try,
+    with_best_moments,
+)
 
 MAX_REFITTED, MAX_REFITTED_FROM_NOMINAL, MAX_OTHER_STARTS = 16, 10, 6
 LAST_ROUNDS = 5, 8  # of fits that are compared: of all starts, then of the near ones
@@ -215,6 +220,7 @@ def _extended(context: Context, base: Hypothesis) -> Round:
     near, far = (sorted(fits, key=cost)[:MAX_REFITTED] for fits in begun)
     if context.changes:
         changes = changes_to_try(context.penalty, fitter, base, every[0])
+        changes += varying_to_try(context.penalty, fitter, base, every[0])
         near += with_best_moments(fitter, _best_of_each(fitter.begin(base, changes), 1))
     near += [f for one in near[:MAX_OTHER_STARTS] for f in next_starts(one, every[0])]
     context.notify("refitting " + ", ".join(f.names[-1] for f in near[:4]) + " ...")

@@ -23,6 +23,7 @@ from scm.mismatch.select.round import Notify
 from scm.mismatch.select.search import Selection
 from scm.mismatch.select.selected import Selected
 from scm.mismatch.validate.stages import at_share
+from scm.mismatch.varying_effect import SLOPE, VaryingEffect
 from scm.vehicles.car import Car
 
 NINETY = 1.645
@@ -145,11 +146,14 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
             value=value, low=max(value - spread, low), high=min(value + spread, high),
             unit=parameter.unit,
         )  # fmt: skip
+    if isinstance(candidate, VaryingEffect):
+        estimates[SLOPE] = _slope(best, candidate, *estimates.values())
     if isinstance(candidate, ChangingEffect) and candidate.course is Course.STEP:
         estimates[SINCE_NAME] = _moment(selected, best, place.stop - 1)
     probability, alternatives = _alternatives(selected.selection, candidate)
     discovered, offered, discovery = is_discovered(candidate), selected.offered, selected.discovery
-    if discovered and offered is not None and discovery is not None:
+    is_law = discovered and not isinstance(candidate, VaryingEffect)
+    if is_law and offered is not None and discovery is not None:
         probability, alternatives = alternatives_to(
             selected.context, best, candidate, offered, discovery
         )
@@ -173,11 +177,25 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
             for name, one in estimates.items()
             if name.endswith(BEFORE_NAME)
         },
-        formula=candidate.formula(mine)
-        if isinstance(candidate, DictionaryEffect | SensorEffect)
-        else None,
+        formula=_formula(best, candidate, mine),
         alternatives=alternatives,
     )  # fmt: skip
+
+
+def _slope(best: Hypothesis, candidate: VaryingEffect, most: Estimate) -> Estimate:
+    """Return how much a number grows with one unit of its variable; `most` is the number."""
+    own = best.model.simulator.numbers(best.z)
+    value, low, high = (candidate.slope((v,), own) for v in (most.value, most.low, most.high))
+    return Estimate(value=value, low=low, high=high, unit=candidate.slope_unit)
+
+
+def _formula(best: Hypothesis, candidate: Candidate, values: tuple[float, ...]) -> str | None:
+    """Return the formula of an effect outside the catalogue, with its numbers."""
+    if isinstance(candidate, VaryingEffect):
+        return candidate.formula(values, best.model.simulator.numbers(best.z))
+    if isinstance(candidate, DictionaryEffect | SensorEffect):
+        return candidate.formula(values)
+    return None
 
 
 def _moment(selected: Selected, best: Hypothesis, index: int) -> Estimate:

@@ -26,6 +26,7 @@ from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.report.car_file import FILE, write_car
 from scm.mismatch.validate.explain import NINETY, refitted
 from scm.mismatch.validate.stages import BEFORE, Stage, as_it_was, at_share, shares_of
+from scm.mismatch.varying_effect import VaryingEffect, as_own_term, own_key
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.correlated import Correlated
 from scm.vehicles.term import Term
@@ -205,6 +206,11 @@ def patched(car: Car, fitted: Hypothesis, folder: Path, own: Bools | None = None
             terms.append(term)
             numbers |= more
             continue
+        if isinstance(effect, VaryingEffect):
+            term, more = as_own_term(effect, values, folder, of_car)
+            terms.append(term)
+            numbers |= more
+            continue
         if isinstance(effect, SensorEffect):
             if effect.fault:
                 numbers[effect.fault] = values[0]
@@ -237,6 +243,8 @@ def correlated(fitted: Hypothesis, own: Sequence[bool]) -> tuple[Correlated, ...
     keys = [o.key if moves else CLOCKS for o, moves in zip(fitted.model.nominal, own, strict=True)]
     for effect in fitted.effects:
         named = number_keys(effect) if isinstance(effect, DictionaryEffect) else {}
+        if isinstance(effect, VaryingEffect):
+            named = {effect.parameters[0].name: own_key(effect)}
         keys += [named.get(parameter.name, parameter.key) for parameter in effect.parameters]
     std = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
     counts = np.array([not key.startswith((CLOCKS, "measure.", PREFIX)) for key in keys])

@@ -35,5 +35,6 @@ TERM = Term(
         advice="Compare left and right: motor current, wheel diameter, and whether one wheel "
                "drags.",
         turns=True,
+        varies=True,
     ),
 )  # fmt: skip

@@ -1,6 +1,6 @@
 """Throttle curve: small throttles give less, or more, than their share of the full one.
 
-    throttle_curved = throttle_live * (1 - curvature + curvature * |throttle_live|)
+    throttle_curved = throttle_eased * (1 - curvature + curvature * |throttle_eased|)
 
 0 is a straight line, 1 a parabola; full throttle stays full. A power law of exponent 1.33,
 as others write it, looks like a curvature of 0.45 between throttles of 0.2 and 0.6.
@@ -15,9 +15,9 @@ from scm.vehicles.term import Per, Term
 
 
 @kernel_function
-def drive_curve(throttle_live: float, curvature: float) -> float:
+def drive_curve(throttle_eased: float, curvature: float) -> float:
     """Throttle after the controller's curve, + forward; exactly the throttle without curvature."""
-    return throttle_live * (1.0 - curvature + curvature * abs(throttle_live))
+    return throttle_eased * (1.0 - curvature + curvature * abs(throttle_eased))
 
 
 TERM = Term(

@@ -37,5 +37,6 @@ TERM = Term(
                  "{time_constant_s}.",
         advice="Look for a soft start or a filter in the motor controller. Switch it off, or keep"
                " the lag in the simulator.",
+        varies=True,
     ),
 )  # fmt: skip

@@ -35,5 +35,6 @@ TERM = Term(
         sentence="The steering has {width_rad} of play.",
         advice="Wiggle a front wheel by hand with the servo powered. Tighten or replace the ball "
                "joints of the linkage.",
+        varies=True,
     ),
 )  # fmt: skip

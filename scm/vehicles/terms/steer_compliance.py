@@ -64,5 +64,6 @@ TERM = Term(
                  "weight.",
         advice="Press a front wheel sideways with the servo powered: look for a soft servo saver "
                "or a bending link.",
+        varies=True,
     ),
 )  # fmt: skip

@@ -36,5 +36,6 @@ TERM = Term(
         sentence="The steering follows sluggishly, with a time constant of {time_constant_s}.",
         advice="Look for a filter on the steering command or a worn servo. Keep the lag in the "
                "simulator if it belongs there.",
+        varies=True,
     ),
 )  # fmt: skip

@@ -34,5 +34,6 @@ TERM = Term(
         sentence="The steering servo turns at {scale} of its nominal rate.",
         advice="Time the servo from stop to stop under load; check its voltage.",
         own="steering.rate_rad_s",
+        varies=True,
     ),
 )  # fmt: skip

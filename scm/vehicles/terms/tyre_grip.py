@@ -35,5 +35,6 @@ TERM = Term(
         sentence="The tyres hold {scale} of their nominal side force.",
         experiments=("other_wheels",),
         advice="Clean tyres and floor; compare with a new set of tyres.",
+        varies=True,
     ),
 )  # fmt: skip

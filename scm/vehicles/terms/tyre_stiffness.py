@@ -37,5 +37,6 @@ TERM = Term(
         experiments=("other_wheels",),
         advice="Check tyre pressure and wear, and whether all four are of one kind.",
         own="tyre.lateral_slip_extremum",
+        varies=True,
     ),
 )  # fmt: skip

@@ -36,5 +36,6 @@ TERM = Term(
         sentence="The car turns less the faster it corners: {gradient}.",
         advice="Compare front and rear tyres; look for play or softness in front. If they are "
                "right, keep it in the simulator.",
+        varies=True,
     ),
 )  # fmt: skip
