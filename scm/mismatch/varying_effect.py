@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 
 from scm.mismatch.effect_catalogue import Candidate
 from scm.replay.drive import Drive
@@ -115,7 +114,7 @@ class VaryingEffect(Candidate):
         begin = own.get(parameter.key, parameter.neutral * parameter.per_unit)
         return (values[0] * parameter.per_unit - begin) / self.usual_most
 
-    def formula(self, values: Sequence[float], own: Mapping[str, float] = MappingProxyType({})) -> str:
+    def formula(self, values: Sequence[float], own: Mapping[str, float]) -> str:
         """Return how its number depends on the variable, with numbers and units."""
         (parameter,) = self.of.parameters
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
@@ -182,8 +181,7 @@ def _stem(effect: VaryingEffect) -> str:
 
 
 def _text(effect: VaryingEffect, values: Sequence[float], own: Mapping[str, float]) -> str:
-    """Return the file: the library's function, called with a number that depends on the variable.
-    """
+    """Return the file: the library's function, called with the number as it is now."""
     stem, base, by = _stem(effect), all_terms()[effect.of.name], effect.by
     known = {param.reported: param for param in base.params}
     param = known[effect.of.parameters[0].name]
@@ -197,7 +195,8 @@ def _text(effect: VaryingEffect, values: Sequence[float], own: Mapping[str, floa
     return _FILE.format(
         title=effect.name.capitalize(), base=base.name, upper=base.name.upper(), stem=stem,
         value=by.value, number=param.name, low=low, high=high, signature=signature, call=call,
-        unit=effect.slope_unit, far=_FAR, memory=memory, also=also, formula=effect.formula(values, own),
+        unit=effect.slope_unit, far=_FAR, memory=memory, also=also,
+        formula=effect.formula(values, own),
         sentence=effect.sentence.format(**{param.reported: f"`{param.reported}`"}),
         module=base.module, key=own_key(effect),
     )  # fmt: skip

@@ -13,10 +13,9 @@ Effect = Term | SensorFault
 OTHERS = "Others"
 CHAPTERS: tuple[tuple[str, frozenset[str]], ...] = (
     ("Throttle and motors", frozenset({
-        "throttle_received", "throttle_limited", "throttle_live", "throttle_eased", "throttle_curved",
-        "throttle_scaled", "throttle", "motor_throttle", "fade_strength", "warm_strength",
-        "motor_strength", "motor_heat", "wheel_torque",
-        "extra_inertia"})),
+        "throttle_received", "throttle_limited", "throttle_live", "throttle_eased",
+        "throttle_curved", "throttle_scaled", "throttle", "motor_throttle", "fade_strength",
+        "warm_strength", "motor_strength", "motor_heat", "wheel_torque", "extra_inertia"})),
     ("Battery", frozenset({
         "charge_drawn", "open_circuit_voltage", "terminal_voltage", "supply_voltage"})),
     ("Steering", frozenset({

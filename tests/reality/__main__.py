@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from tests.reality.cases import CONTROLS, COURSES, KINDS, draw_kinds, write_cases
+from tests.reality.cases import CONTROLS, COURSES, KINDS, LAWS, draw_kinds, write_cases
 from tests.reality.family import HALVES
 from tests.reality.motion import Moving
 
@@ -15,7 +15,8 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cases", type=int, default=40)
-    parser.add_argument("--kind", choices=("mixed", *KINDS, *CONTROLS, *COURSES, "dependent"), default="mixed")
+    kinds = ("mixed", *KINDS, *CONTROLS, *COURSES, *LAWS)
+    parser.add_argument("--kind", choices=dict.fromkeys(kinds), default="mixed")
     parser.add_argument("--strength", type=float, nargs=2, default=(1.0, 4.0))
     parser.add_argument("--engine", choices=("own", "mujoco"), default="own")
     parser.add_argument(

@@ -9,7 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from tests.reality.changing import Changing
-from tests.reality.concealed import ALIKE, DEPENDENT, EFFECTS, HIDING, LISTED, UNLISTED, Drawn
+from tests.reality.concealed import (
+    ALIKE,
+    DEPENDENT,
+    EFFECTS,
+    HIDING,
+    LISTED,
+    PLACED,
+    UNLISTED,
+    Drawn,
+)
 from tests.reality.family import USUAL, draw_family, equations
 from tests.reality.motion import Moving
 from tests.reality.numbers import KEYS, SCATTER, TOGETHER, nominal, scattered
@@ -18,7 +27,7 @@ from tests.reality.routes import TEMPERS
 from tests.reality.sensing import FAULTS
 
 KINDS = ("single", "none", "pair", "unlisted")
-LAWS = {"unlisted": UNLISTED, "dependent": DEPENDENT}
+LAWS = {"unlisted": UNLISTED, "dependent": DEPENDENT, "placed": PLACED}
 CONTROLS = ("shuffled", "other_car")
 COURSES = ("step", "ramp")
 """Of one effect that changes during the drive."""

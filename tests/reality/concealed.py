@@ -300,6 +300,37 @@ UNLISTED = (
               _law("scale_per_x", "measured = true * (1 + size * |x|)")),
 )  # fmt: skip
 
+
+def _spring(size, rng, car):
+    x, y = (rng.uniform(-0.5, 0.5) * side for side in FLOOR[car])
+    found = {"stiffness_n_m": size, "x_m": x, "y_m": y}
+    adds = {"pull": size, "pull_x": x, "pull_y": y}
+    return Drawn(found, adds, law="-stiffness_n_m * (place - (x_m, y_m))")
+
+
+def _half_slope(size, rng, car):
+    uphill, way = rng.uniform(-3.1, 3.1, 2)
+    at = rng.uniform(-0.2, 0.2) * FLOOR[car][1]
+    found = {"slope": size, "uphill_rad": uphill, "beyond_m": at, "toward_rad": way}
+    adds = {"half_slope": size, "half_uphill": uphill, "half_way": way, "half_at": at}
+    return Drawn(found, adds, law="slope where x cos(toward) + y sin(toward) > beyond_m")
+
+
+def _swirl(size, rng, car):
+    x, y = (rng.uniform(-0.7, 0.7) * side for side in FLOOR[car])
+    radius = FLOOR[car][1] * rng.uniform(0.35, 0.6)
+    found = {"moment_nm": size, "x_m": x, "y_m": y, "radius_m": radius}
+    adds = {"swirl": size * _sign(rng), "swirl_x": x, "swirl_y": y, "swirl_radius": radius - 0.1}
+    return Drawn(found, adds, law="yaw moment within radius_m of (x_m, y_m)")
+
+
+PLACED = (
+    _unlisted("spring", "body", "position", _both(0.4, 0.25), _spring, _FORCE),
+    _unlisted("half_slope", "body", "position", _both(0.015, 0.02), _half_slope, _FORCE, "heading"),
+    _unlisted("swirl", "surface", "position", _both(0.1, 0.3), _swirl, "body tyre"),
+)
+"""Forces and moments of a place."""
+
 DEPENDENT = (
     _unlisted("servo_under_power", "steering", "throttle", {"nigel": 0.4},
               _adds("per_throttle", "pace_per_throttle")),
@@ -307,11 +338,12 @@ DEPENDENT = (
             _adds("time_constant_s", "rising_lag")),
     _unlisted("left_lag", "steering", "left turns", _both(0.07, 0.05),
               _adds("time_constant_s", "left_lag")),
-    _unlisted("warm_tyres", "tyre", "long use", {"f1tenth": 0.8}, _adds("per_throttle", "warm_grip")),
+    _unlisted("warm_tyres", "tyre", "long use", {"f1tenth": 0.8},
+              _adds("per_throttle", "warm_grip")),
 )  # fmt: skip
 """A soft start, and numbers of known effects that depend on a variable."""
 
-EFFECTS = {effect.name: effect for effect in (*LISTED, *UNLISTED, *DEPENDENT)}
+EFFECTS = {effect.name: effect for effect in (*LISTED, *UNLISTED, *DEPENDENT, *PLACED)}
 
 # Pairs of which one makes good what the other does, with the cars that show both.
 HIDING = (

@@ -143,6 +143,13 @@ def outside_force(c, s, t):
     gust = c.gust * math.sin(2.0 * math.pi * t / c.gust_period + c.gust_phase)
     east = c.wind_x - down * math.cos(c.uphill) + gust * math.cos(c.gust_way)
     north = c.wind_y - down * math.sin(c.uphill) + gust * math.sin(c.gust_way)
+    east -= c.pull * (s.x - c.pull_x)
+    north -= c.pull * (s.y - c.pull_y)
+    half = s.x * math.cos(c.half_way) + s.y * math.sin(c.half_way) > c.half_at
+    tilted = c.mass * GRAVITY * c.half_slope * half
+    east -= tilted * math.cos(c.half_uphill)
+    north -= tilted * math.sin(c.half_uphill)
+    twist += c.swirl * (math.hypot(s.x - c.swirl_x, s.y - c.swirl_y) < c.swirl_radius)
     along += cos * east + sin * north
     across += cos * north - sin * east
     way = math.tanh(s.vx / 0.02)

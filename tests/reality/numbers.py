@@ -70,6 +70,9 @@ NEUTRAL = {
     "weave": 0.0, "weave_period": 3.0, "surge": 0.0, "surge_period": 6.0, "cliff_drag": 0.0,
     "cliff_way": 0.0, "cliff_at": 0.0, "shake": 0.0,
     "pace_per_throttle": 0.0, "rising_lag": 0.0, "left_lag": 0.0, "warm_grip": 0.0, "warm_s": 40.0,
+    "pull": 0.0, "pull_x": 0.0, "pull_y": 0.0, "half_slope": 0.0, "half_uphill": 0.0,
+    "half_way": 0.0, "half_at": 0.0, "swirl": 0.0, "swirl_x": 0.0, "swirl_y": 0.0,
+    "swirl_radius": 0.1,
 }  # fmt: skip
 
 # Which equations a car has, as places in `family.ASPECTS`, and their own numbers; here the usual.

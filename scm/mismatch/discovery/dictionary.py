@@ -32,6 +32,11 @@ def _over_floor(values: Values) -> dict[str, float]:
     return {"world_x_n": force * math.cos(toward), "world_y_n": force * math.sin(toward)}
 
 
+def _towards(values: Values) -> dict[str, float]:
+    stiffness, x, y = values
+    return {"pull_n_m": stiffness, "world_x_n": stiffness * x, "world_y_n": stiffness * y}
+
+
 DRAG = Channel(
     "drive force", "along_n", Equation.BODY, (_amount("force_n", "N", 0.05, _FORCE),),
     _only("drag_n"), "Something brakes the car by {force_n},", "-{force_n} * {g}",
@@ -52,6 +57,20 @@ FLOOR = Channel(
     (Written("adds force_x", ("yaw",), "force_n * g * cosine_of(yaw - toward_rad)",
              "Force along the body, + forward [N]."),
      Written("adds force_y", ("yaw",), "force_n * g * sine_of(toward_rad - yaw)",
+             "Force across the body, + to its left [N].", "_across")),
+)  # fmt: skip
+PULL = Channel(
+    "spring", "along_n", Equation.BODY,
+    (_amount("stiffness_n_m", "N/m", 0.05, (-200.0, 200.0)),
+     Parameter("x_m", "", "m", (-100.0, 100.0), 0.0, 0.05),
+     Parameter("y_m", "", "m", (-100.0, 100.0), 0.0, 0.05)),
+    _towards, "Something pulls the car towards ({x_m}, {y_m}) with {stiffness_n_m},",
+    "-{stiffness_n_m} * ((x, y) - ({x_m}, {y_m})) * {g}",
+    (Written("adds force_x", ("x_cog", "y_cog", "yaw"),
+             "-stiffness_n_m * g * ((x_cog - x_m) * cosine_of(yaw) + (y_cog - y_m) * sine_of(yaw))",
+             "Force along the body, + forward [N]."),
+     Written("adds force_y", ("x_cog", "y_cog", "yaw"),
+             "-stiffness_n_m * g * ((y_cog - y_m) * cosine_of(yaw) - (x_cog - x_m) * sine_of(yaw))",
              "Force across the body, + to its left [N].", "_across")),
 )  # fmt: skip
 ANGLE = Channel(
@@ -156,6 +175,12 @@ def _slope(values: Values) -> dict[str, float]:
     return {"by_x": math.cos(values[0]), "by_y": math.sin(values[0]), "line": 1.0}
 
 
+def _near(values: Values) -> dict[str, float]:
+    x, y, radius = values
+    place = {"away_x": x, "away_y": y, "phase": radius / EDGE_M}
+    return {**place, "by_away": -1.0 / EDGE_M, "step": 1.0}
+
+
 def _faster(values: Values) -> dict[str, float]:
     return {"by_speed": 1.0, "phase": -values[0], "ramp": 1.0}
 
@@ -169,6 +194,7 @@ def _around(values: Values) -> dict[str, float]:
 
 
 _PLACE = "x_cog * cosine_of(way_rad) + y_cog * sine_of(way_rad)"
+_AWAY = "math.sqrt((x_cog - x_m) * (x_cog - x_m) + (y_cog - y_m) * (y_cog - y_m))"
 _WAY = _angle("way_rad")
 _XY = ("x_cog", "y_cog")
 _SPOT = "x cos({way_rad}) + y sin({way_rad})"
@@ -215,6 +241,17 @@ BEYOND = Shape(
 SLOPE = Shape(
     "slope", "position", (_WAY,), _slope, "for each metre that it is further towards {way_rad}",
     f"({_SPOT}) / 1 m", _XY, f"g = {_PLACE}", Equation.SURFACE,
+)  # fmt: skip
+NEAR = Shape(
+    "near", "position",
+    (_parameter("x_m", "m", (-100.0, 100.0), 0.03), _parameter("y_m", "m", (-100.0, 100.0), 0.03),
+     _parameter("radius_m", "m", (0.05, 50.0), 0.03)),
+    _near, "within {radius_m} of ({x_m}, {y_m})", "(within {radius_m} of ({x_m}, {y_m}))", _XY,
+    f"g = min(max((radius_m - {_AWAY}) / {EDGE_M} + 0.5, 0.0), 1.0)", Equation.SURFACE,
+)  # fmt: skip
+EVERYWHERE = Shape(
+    "everywhere", "position", (), _fixed(one=1.0), "in proportion to its distance", "1", (),
+    "g = 1.0",
 )  # fmt: skip
 SPEED = Shape(
     "in proportion", "speed", (), _fixed(by_speed=1.0, line=1.0),
@@ -310,7 +347,8 @@ _TIME = (SWING,)
 _SPEED = (SPEED, SPEED_SQUARED, SPEED_CUBED, FASTER)
 _TURNED = (TURNED, TURNED_SQUARED, TURNED_CUBED, LEFT, RIGHT)
 _ROWS = (
-    (FLOOR, (SWING,)),
+    (FLOOR, (SWING, BEYOND)),
+    (PULL, (EVERYWHERE,)),
     (ALONG, (SWING,)),
     (DRAG, (*_HEADING, *_FLOOR, SPEED_CUBED, FASTER, *_TURNED,
                TURNING)),
@@ -320,7 +358,7 @@ _ROWS = (
     (STEER_GAIN, (*_TIME, ROUND, BEYOND, SPEED, LOAD)),
     (THROTTLE, (*_TIME, ROUND, BEYOND, SPEED, TURNED, LEFT, RIGHT,
                    REVERSED, LOAD, WORKED)),
-    (TWIST, (SWING, *_SPEED[:2], DRIVEN)),
+    (TWIST, (SWING, *_SPEED[:2], DRIVEN, BEYOND, NEAR)),
     (RIPPLE, (PHASE,)),
 )  # fmt: skip
 

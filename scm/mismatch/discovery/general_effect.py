@@ -1,7 +1,7 @@
 """The general effect: one shape of one mix of variables, as a force, wheel angle or throttle.
 
     q = time, x, y, yaw, speed, wheel angle, throttle, yaw rate, acceleration across, throttle of
-        late, each times its weight, + phase
+        late, distance from a place, each times its weight, + phase
     g = sine * sin(q) + cosine * cos(q) + one + line * q + size * |q| + square * q^2 + cube * q^3
         + heavy * |q|^3 + ramp * max(q, 0)
         + step * (0 below q = -0.5, 1 above 0.5, straight between) + comb
@@ -29,7 +29,7 @@ def _number(name: str, about: str, default: float = 0.0) -> Param:
     return Param(name, default, "1", PREFIX + name, _FAR, about)
 
 
-WEIGHTS = ("time", "x", "y", "yaw", "speed", "steer", "throttle", "rate", "side", "memory")
+WEIGHTS = ("time", "x", "y", "yaw", "speed", "steer", "throttle", "rate", "side", "memory", "away")
 _WEIGHTS = tuple(_number(f"by_{name}", f"weight of {name} in the mix") for name in WEIGHTS)
 _SHAPES = tuple(
     _number(name, f"share of the shape: {name}")
@@ -52,8 +52,9 @@ _COMB = (
     _number("comb_every", "time between hats", 1000.0),
     _number("comb_wide", "half of a hat's foot", 1.0),
 )
+_PLACE = tuple(_number(f"away_{axis}", f"{axis} of the place") for axis in "xy")
 _MEMORY = _number("memory_s", "how long the throttle is remembered [s]", 1.0)
-_MIX = (*_WEIGHTS, _number("phase", "added to the mix"), *_SHAPES, *_COMB)
+_MIX = (*_WEIGHTS, *_PLACE, _number("phase", "added to the mix"), *_SHAPES, *_COMB)
 
 
 @kernel_function
@@ -69,10 +70,12 @@ def mixed(
     time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
     throttle_command: float, yaw_rate: float, accel_y: float, throttle_memory: float,
     by_time: float, by_x: float, by_y: float, by_yaw: float, by_speed: float, by_steer: float,
-    by_throttle: float, by_rate: float, by_side: float, by_memory: float, phase: float,
+    by_throttle: float, by_rate: float, by_side: float, by_memory: float, by_away: float,
+    away_x: float, away_y: float, phase: float,
 ) -> float:  # fmt: skip
     """The mix of variables."""
-    place = by_x * x_cog + by_y * y_cog + by_yaw * yaw
+    dx, dy = x_cog - away_x, y_cog - away_y
+    place = by_x * x_cog + by_y * y_cog + by_yaw * yaw + by_away * math.sqrt(dx * dx + dy * dy)
     motion = by_speed * vx + by_rate * yaw_rate + by_side * accel_y
     drive = by_steer * linkage_angle + by_throttle * throttle_command + by_memory * throttle_memory
     return by_time * time + place + motion + drive + phase
@@ -98,16 +101,16 @@ def learned_shape(
     time: float, x_cog: float, y_cog: float, yaw: float, vx: float, linkage_angle: float,
     throttle_command: float, yaw_rate: float, accel_y: float, throttle_memory: float,
     by_time: float, by_x: float, by_y: float, by_yaw: float, by_speed: float, by_steer: float,
-    by_throttle: float, by_rate: float, by_side: float, by_memory: float, phase: float,
-    sine: float, cosine: float, one: float, line: float, size: float, square: float, cube: float,
-    heavy: float, ramp: float, step: float, comb: float, comb_at: float, comb_every: float,
-    comb_wide: float,
+    by_throttle: float, by_rate: float, by_side: float, by_memory: float, by_away: float,
+    away_x: float, away_y: float, phase: float, sine: float, cosine: float, one: float,
+    line: float, size: float, square: float, cube: float, heavy: float, ramp: float, step: float,
+    comb: float, comb_at: float, comb_every: float, comb_wide: float,
 ) -> float:  # fmt: skip
     """The shape over the mix of variables here and now."""
     q = mixed(
         time, x_cog, y_cog, yaw, vx, linkage_angle, throttle_command, yaw_rate, accel_y,
         throttle_memory, by_time, by_x, by_y, by_yaw, by_speed, by_steer, by_throttle, by_rate,
-        by_side, by_memory, phase,
+        by_side, by_memory, by_away, away_x, away_y, phase,
     )  # fmt: skip
     return shaped(
         q, time, sine, cosine, one, line, size, square, cube, heavy, ramp, step, comb, comb_at,
@@ -117,20 +120,22 @@ def learned_shape(
 
 @kernel_function
 def learned_push(
-    learned_shape: float, vx: float, cos_yaw: float, sin_yaw: float, along_n: float, drag_n: float,
-    world_x_n: float, world_y_n: float,
+    learned_shape: float, vx: float, cos_yaw: float, sin_yaw: float, x_cog: float, y_cog: float,
+    along_n: float, drag_n: float, world_x_n: float, world_y_n: float, pull_n_m: float,
 ) -> float:  # fmt: skip
     """Force along the body, + forward [N]."""
-    floor = world_x_n * cos_yaw + world_y_n * sin_yaw
+    floor = (world_x_n - pull_n_m * x_cog) * cos_yaw + (world_y_n - pull_n_m * y_cog) * sin_yaw
     return learned_shape * (along_n - drag_n * soft_sign(vx / SLOW) + floor)
 
 
 @kernel_function
 def learned_push_across(
-    learned_shape: float, cos_yaw: float, sin_yaw: float, world_x_n: float, world_y_n: float
-) -> float:
+    learned_shape: float, cos_yaw: float, sin_yaw: float, x_cog: float, y_cog: float,
+    world_x_n: float, world_y_n: float, pull_n_m: float,
+) -> float:  # fmt: skip
     """Force across the body, + to its left [N]."""
-    return learned_shape * (world_y_n * cos_yaw - world_x_n * sin_yaw)
+    east, north = world_x_n - pull_n_m * x_cog, world_y_n - pull_n_m * y_cog
+    return learned_shape * (north * cos_yaw - east * sin_yaw)
 
 
 @kernel_function
@@ -189,7 +194,7 @@ SHAPE = Term(
     learned_shape, per=Per.BODY, sets="learned_shape", params=_MIX,
     neutral={p.name: 0.0 for p in _SHAPES},
 )  # fmt: skip
-_WORLD = ("world_x_n", "world_y_n")
+_WORLD = ("world_x_n", "world_y_n", "pull_n_m")
 PUSH = _term(learned_push, channels=("along_n", "drag_n", *_WORLD), adds="force_x")
 ACROSS = _term(learned_push_across, channels=_WORLD, adds="force_y")
 TWIST = _term(learned_twist, channels=("moment_nm",), adds="moment_z")

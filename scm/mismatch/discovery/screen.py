@@ -34,6 +34,9 @@ def shape(numbers: Mapping[str, float], cells: Cells) -> Floats:
 
 def variable(name: str, numbers: Mapping[str, float], cells: Cells) -> Floats:
     """Return one of `learned.WEIGHTS`' variables at each moment, (cells,)."""
+    if name == "away":
+        x, y = cells.driven["x"] - numbers["away_x"], cells.driven["y"] - numbers["away_y"]
+        return np.hypot(x, y)
     if name != "memory":
         return cells.driven[name]
     share = -math.expm1(-cells.wide / numbers["memory_s"])
@@ -74,6 +77,7 @@ _FACTORS: Mapping[str, Callable[[Mapping[str, Floats]], Floats]] = {
     "along_n": _ones, "drag_n": _drag, "world_x_n": lambda d: np.cos(d["yaw"]),
     "world_y_n": lambda d: np.sin(d["yaw"]), "turn_rad": _ones, "demand_rad": _ones,
     "turn_gain": lambda d: d["steer"], "throttle_gain": lambda d: d["throttle"],
+    "pull_n_m": lambda d: -d["x"] * np.cos(d["yaw"]) - d["y"] * np.sin(d["yaw"]),
     "moment_nm": _ones,
 }  # fmt: skip
 
@@ -102,6 +106,7 @@ def _grids(cells: Cells) -> Mapping[str, Floats]:
     span, size = float(t.max()), float(np.hypot(x, y).max())
     slowest, fastest = 0.7 / span, min(FASTEST_HZ, 1.0 / (SHORTEST * cells.wide))
     centre_at = np.linspace(-0.8, 0.8, 25) * size
+    extent = max(float(np.ptp(x)), float(np.ptp(y)))
     return {
         "toward_rad": np.linspace(0.0, np.pi, 6, endpoint=False),
         "period_s": 1.0 / np.arange(slowest, fastest, 0.4 / span),
@@ -109,6 +114,9 @@ def _grids(cells: Cells) -> Mapping[str, Floats]:
         "against_rad": np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False),
         "way_rad": np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False),
         "beyond_m": centre_at,
+        "x_m": np.linspace(float(x.min()), float(x.max()), 9),
+        "y_m": np.linspace(float(y.min()), float(y.max()), 9),
+        "radius_m": extent * np.array([0.1, 0.16, 0.25]),
         "memory_s": np.geomspace(0.5, 0.7 * span, 12),
         "above_mps": np.percentile(speed, [5, 20, 35, 50, 65, 80, 90]),
     }

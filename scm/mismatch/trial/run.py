@@ -30,7 +30,10 @@ FOUND = "found"
 Notify = Callable[[str, int, int], None]
 """Receives what is being done, how many of it are done, and of how many."""
 PLACE = "tests/reality"
-KINDS = ("mixed", "single", "none", "pair", "unlisted", "step", "ramp", "shuffled", "other_car")
+KINDS = (
+    "mixed", "single", "none", "pair", "unlisted", "dependent", "placed", "step", "ramp",
+    "shuffled", "other_car",
+)  # fmt: skip
 ENGINES = ("own", "mujoco")
 FAMILIES, HALVES = ("own", "drawn"), ("develop", "judge")
 DIAGNOSIS, BROKEN = "diagnosis.json", "failed.txt"

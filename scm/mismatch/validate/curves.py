@@ -56,7 +56,6 @@ _AXES = {
     "throttle": ("throttle", "1"), "load": ("side", "m/s^2"), "yaw rate": ("rate", "rad/s"),
     "throttle's past": ("memory", "1"),
 }  # fmt: skip
-_UNITS = {"along_n": "N", "turn_rad": "rad", "throttle_add": "1", "moment_nm": "N*m"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,7 +268,7 @@ def _in_bins(
     middle, order = np.array([x[place == b].mean() for b in used]), np.argsort(x)
     draw = partial(
         Curve, effect=effect.name, x_name=x_name, x_unit=x_unit, y_name=effect.channel.word,
-        y_unit=_UNITS[effect.channel.response],
+        y_unit=effect.channel.parameters[0].unit,
     )  # fmt: skip
     line = fit[order]
     return (
@@ -311,6 +310,9 @@ def _inverse(bend: Floats) -> Floats:
 def axis_of(effect: DictionaryEffect, values: Values, cells: Cells) -> tuple[Floats, str, str]:
     """Return what an effect depends on at each moment; waves and turns are laid over each other."""
     known = dict(zip((k.name for k in effect.shape.parameters), values, strict=True))
+    if "radius_m" in known:
+        away = variable("away", effect.shape.numbers(values), cells)
+        return away, f"distance from ({known['x_m']:.2f}, {known['y_m']:.2f})", "m"
     if effect.shape.word == "position":
         way = known.get("way_rad", 0.0)
         x = cells.driven["x"] * math.cos(way) + cells.driven["y"] * math.sin(way)

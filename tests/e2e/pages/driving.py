@@ -24,13 +24,13 @@ def take(visited, running, name=CAR):
 
 
 def send_on(running, name=CAR):
-    """Give a car a route; one that a wheel left beside the lanes begins anew. One that has left stays away."""
+    """Give a car a route; one that a wheel left beside the lanes begins anew."""
     answer = running.web.post(f"/vehicles/{name}/route", json={})
     if answer.status_code == 422:
         running.web.delete(f"/vehicles/{name}").raise_for_status()
         running.web.post("/vehicles", json={"vehicle": name}).raise_for_status()
         answer = running.web.post(f"/vehicles/{name}/route", json={})
-    assert answer.is_success or answer.status_code == 404, answer.text
+    assert answer.is_success or answer.status_code == 404, answer.text  # it has left just now
 
 
 def drives_by_itself(running, name=CAR):

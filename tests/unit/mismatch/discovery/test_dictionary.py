@@ -35,10 +35,11 @@ def test_a_car_that_carries_it_moves_as_before_bit_for_bit():
 
 def test_a_mix_is_each_variable_times_its_weight():
     values = (2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0)
-    for i, value in enumerate(values):
-        weights = [0.0] * 10
+    x, y = values[1:3]
+    for i, value in enumerate((*values, 5.0)):
+        weights = [0.0] * 11
         weights[i] = 0.5
-        assert mixed(*values, *weights, 1.0) == 1.0 + 0.5 * value
+        assert mixed(*values, *weights, x - 3.0, y + 4.0, 1.0) == 1.0 + 0.5 * value
 
 
 def test_a_wave_goes_through_its_mix():

@@ -1,5 +1,6 @@
 """Responses of moments: their sums are what a rollout gives, and the best law is found in them."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -55,9 +56,19 @@ def made_cells():
     return Cells(0.1, np.zeros(600, dtype=np.int64), driven)
 
 
-def best_of(law, values):
-    """The best start where every moment is measured by itself and one law is true."""
+def eights():
+    """The same on eights: on a circle a place and a heading are one."""
     cells = made_cells()
+    t = cells.driven["time"]
+    turning = 0.5 * t * 1.01
+    x, y = np.sin(turning), 0.8 * np.sin(2.0 * turning) + 0.2 * np.sin(0.21 * t)
+    yaw = np.unwrap(np.arctan2(np.gradient(y, t), np.gradient(x, t)))
+    return replace(cells, driven={**cells.driven, "x": x, "y": y, "yaw": yaw})
+
+
+def best_of(law, values, cells=None):
+    """The best start where every moment is measured by itself and one law is true."""
+    cells = cells or made_cells()
     response = Response(-pushes(law, cells, values), np.eye(len(cells)))
     ((first, *_),) = screen([law], cells, {law.channel.response: response})
     return polished(first, cells, response), cells, response
@@ -81,6 +92,23 @@ def test_the_waves_of_a_floor_are_found():
     assert abs(best.values[1] - 0.7) < 0.02
     assert best.gain > 0.9 * float(response.slope @ response.slope)
     assert len(cells) == len(response.slope)
+
+
+def test_the_place_of_a_yaw_moment_is_found():
+    law = made_effect.law("yaw moment against position", "near")
+    best, cells, response = best_of(law, (0.3, 0.6, -0.5, 0.45), eights())
+    assert best.gain > 0.9 * float(response.slope @ response.slope)
+    np.testing.assert_allclose(best.values[1:], (0.6, -0.5, 0.45), atol=0.1)
+    x, name, unit = axis_of(law, best.values[1:], cells)
+    assert (unit, name.startswith("distance from")) == ("m", True)
+    assert 0.0 <= x.min() < 0.45
+
+
+def test_the_centre_of_a_spring_is_found():
+    law = made_effect.law("spring against position", "everywhere")
+    best, _, response = best_of(law, (0.8, 0.3, -0.4), eights())
+    assert best.gain > 0.99 * float(response.slope @ response.slope)
+    np.testing.assert_allclose(best.values, (0.8, 0.3, -0.4), atol=0.02)
 
 
 def test_turns_are_laid_over_each_other_so_that_a_heading_fills_one_bin():
