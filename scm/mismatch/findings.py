@@ -90,6 +90,12 @@ class Effect(Struct, kw_only=True, frozen=True):
     before: Mapping[str, Estimate] = {}
     stated: Mapping[str, float] = {}
 
+    @property
+    def is_of_recording(self) -> bool:
+        """Whether it is a law against the recording's own time, which no other drive has."""
+        is_law = not self.is_known and self.equation is not Equation.SENSOR
+        return is_law and "time" in self.depends_on
+
 
 class Place(Struct, kw_only=True, frozen=True):
     """A box of the floor [m]."""

@@ -14,7 +14,7 @@ from scm.mismatch.budget import DEFAULT_S, Budget
 from scm.mismatch.evidence import Evidence
 from scm.mismatch.experiment.scenario import write_scenario
 from scm.mismatch.findings import Diagnosis, Verdict, folders_of
-from scm.mismatch.report.car_file import write_own_terms
+from scm.mismatch.report.car_file import FILE, write_own_terms
 from scm.mismatch.report.write import write_report
 from scm.mismatch.select.round import Notify
 from scm.mismatch.select.selected import fit_nominal, select_effects
@@ -131,7 +131,9 @@ def write(found: Result, out: Path, check: str = "") -> None:
     write_report(found.diagnosis, found.evidence, found.car, found_car, out, check)
     retuned = found.retuned_car or found.car
     shutil.copyfile(retuned.path, out / RETUNED)
-    for stage in found.stages[:-1]:
+    for stage in found.stages:
+        if stage.file == FILE:
+            continue
         shutil.copyfile(stage.car.path, out / stage.file)
         write_own_terms(stage.car, out)
     folders = folders_of([suggestion.undecided for suggestion in found.suggestions])

@@ -190,7 +190,9 @@ def _changes(effects: Sequence[Effect]) -> str:
     """Return comments that say what changed during the recording, and when."""
     lines = list[str]()
     for effect in effects:
-        if effect.since_s is not None:
+        if effect.is_of_recording:
+            lines.append(f"# {effect.name}: only recorded.toml has it, for it is of that time.\n")
+        elif effect.since_s is not None:
             since = effect.since_s
             when = f"since {since.value:.1f} s ({since.low:.1f} to {since.high:.1f} s)"
             lines.append(f"# {effect.name} is so {when} of it; before.toml is the car before.\n")

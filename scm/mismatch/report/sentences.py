@@ -62,6 +62,10 @@ _UNKNOWN_EFFECT = (
     "No known effect explains it, so look at what changes with {drivers}. Until the cause is "
     "found, car.toml contains the formula as it was measured."
 )
+_OF_RECORDING = (
+    "No known effect explains it, so look at what changes with time. Another drive has another "
+    "time, so car.toml does not contain it; recorded.toml does."
+)
 _KNOWN_EFFECT = (
     "Compare the car with the numbers above, and correct the car file where they are right: "
     "car.toml has them."
@@ -214,6 +218,8 @@ def advice_of(effect: Effect) -> str:
     if effect.is_known:
         known = identifications().get(effect.name)
         return known.advice if known and known.advice else _KNOWN_EFFECT
+    if effect.is_of_recording:
+        return _OF_RECORDING
     return _UNKNOWN_EFFECT.format(drivers=" and ".join(effect.depends_on) or "the drive")
 
 

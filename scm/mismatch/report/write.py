@@ -74,6 +74,8 @@ def _write_car(diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car,
     what = "with what was found" if diagnosis.effects else "with its own numbers refitted"
     if any(effect.course is not Course.CONSTANT for effect in diagnosis.effects):
         what += ", as it was at the end of the recording; `before.toml` is the car as it was before"
+    if any(effect.is_of_recording for effect in diagnosis.effects):
+        what += ", but without laws against its time, which `recorded.toml` has as well"
     return (
         f"`{FILE}` beside this page is the given car {what}.{beside} The simulator loads it; see "
         f"how it does on another drive: `scm replay ANOTHER_DRIVE --car {FILE}`"

@@ -178,7 +178,10 @@ def _result_of(future: Future[Result]) -> Result:
         return result
     written = (result.files.reread(car) for car in (result.found_car, result.retuned_car))
     found_car, retuned_car = written
-    return replace(result, found_car=found_car, retuned_car=retuned_car)
+    stages = tuple(
+        replace(stage, car=result.files.reread(stage.car) or stage.car) for stage in result.stages
+    )
+    return replace(result, found_car=found_car, retuned_car=retuned_car, stages=stages)
 
 
 def write_all(several: Several, out: Path, check: Callable[[str], str] = lambda _: "") -> None:

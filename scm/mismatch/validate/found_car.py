@@ -25,7 +25,16 @@ from scm.mismatch.findings import Diagnosis, Effect, Verdict
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.report.car_file import FILE, write_car
 from scm.mismatch.validate.explain import NINETY, refitted
-from scm.mismatch.validate.stages import BEFORE, Stage, as_it_was, at_share, shares_of
+from scm.mismatch.validate.stages import (
+    BEFORE,
+    RECORDED,
+    Stage,
+    as_it_was,
+    at_share,
+    is_of_recording,
+    lasting,
+    shares_of,
+)
 from scm.mismatch.varying_effect import VaryingEffect, as_own_term, own_key
 from scm.vehicles.car import Car, load_car
 from scm.vehicles.correlated import Correlated
@@ -62,8 +71,12 @@ class CarFiles:
             return car
         return load_car(self._folder / car.path.relative_to(self._sent_from))
 
-    def written(self, fitted: Hypothesis, effects: Sequence[Effect]) -> Car:
+    def written(
+        self, fitted: Hypothesis, effects: Sequence[Effect], *, of_recording: bool = False
+    ) -> Car:
         """Return the car with what was found, as its written file says.
+
+        A law against the recording's own time is left out, unless the car is `of_recording`.
 
         Where all its numbers together contradict one another, those that the recordings say nothing
         about stay as they were given, or else all but those of the effects.
@@ -71,6 +84,7 @@ class CarFiles:
         Raises:
             ScmError: when it cannot be written so that it loads.
         """
+        fitted = fitted if of_recording else lasting(fitted)
         std = np.sqrt(np.maximum(fitted.covariance.diagonal(), 0.0))
         known = std if len(std) >= len(fitted.z) else np.full(len(fitted.z), math.inf)
         for most in (math.inf, INFORMED):
@@ -88,9 +102,14 @@ class CarFiles:
         Raises:
             ScmError: as `written`.
         """
+        if any(map(is_of_recording, fitted.effects)):
+            found = self.written(fitted, effects, of_recording=True)
+            end = RECORDED
+        else:
+            end = FILE
         changes = [one for one in fitted.each() if isinstance(one[0], ChangingEffect)]
         if not changes:
-            return (Stage(found),)
+            return (Stage(found, end),)
         shares, times = shares_of(fitted)
         own = fitted.model.simulator.numbers(fitted.z)
         ends = (*times, math.inf)
@@ -101,8 +120,12 @@ class CarFiles:
                 as_it_was(effect, candidate, fitted.values[place].tolist(), share, own)
                 for effect, (candidate, place) in zip(effects, fitted.each(), strict=True)
             ]
-            mine = found if last else self.written(at_share(fitted, share), [*filter(None, was)])
-            name = FILE if last else f"before_{number + 1}.toml" if number else BEFORE
+            mine = (
+                found
+                if last
+                else self.written(at_share(fitted, share), [*filter(None, was)], of_recording=True)
+            )
+            name = end if last else f"before_{number + 1}.toml" if number else BEFORE
             stages.append(Stage(mine, name, from_s, until_s))
             from_s = until_s
         return tuple(stages)

@@ -8,6 +8,7 @@ import numpy as np
 from msgspec import structs
 
 from scm.mismatch.changing_effect import ChangingEffect
+from scm.mismatch.discovery.dictionary_effect import DictionaryEffect
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.findings import Course, Effect, Estimate
 from scm.mismatch.fit.hypothesis import Hypothesis
@@ -15,6 +16,7 @@ from scm.mismatch.report.car_file import FILE
 from scm.vehicles.car import Car
 
 BEFORE = "before.toml"  # the car as it was before something changed
+RECORDED = "recorded.toml"  # the car with laws that hold in its recording alone
 RAMP_STAGES = 5  # cars that stand for a change over a whole recording
 
 
@@ -55,6 +57,27 @@ def at_share(fitted: Hypothesis, share: float) -> Hypothesis:
     return replace(
         fitted, effects=tuple(effects), values=np.array(values), covariance=covariance,
         jacobian=np.zeros((0, 0)),
+    )  # fmt: skip
+
+
+def is_of_recording(effect: Candidate) -> bool:
+    """Return whether an effect is a law against its recording's own time, void in any other."""
+    return isinstance(effect, DictionaryEffect) and effect.shape.word == "time"
+
+
+def lasting(fitted: Hypothesis) -> Hypothesis:
+    """Return a hypothesis without laws against its recording's own time."""
+    if not any(map(is_of_recording, fitted.effects)):
+        return fitted
+    own = len(fitted.z)
+    stay = [(effect, place) for effect, place in fitted.each() if not is_of_recording(effect)]
+    values = [i for _, place in stay for i in range(place.start, place.stop)]
+    covariance, rows = fitted.covariance, [*range(own), *(own + i for i in values)]
+    if covariance.size:
+        covariance = covariance[np.ix_(rows, rows)]
+    return replace(
+        fitted, effects=tuple(effect for effect, _ in stay), values=fitted.values[values],
+        covariance=covariance, jacobian=np.zeros((0, 0)),
     )  # fmt: skip
 
 

@@ -3,12 +3,17 @@
 from functools import cache
 
 import numpy as np
+import pytest
 
 from scm.mismatch.discovery.decide import is_discovered
 from scm.mismatch.discovery.try_dictionary import criterion
+from scm.mismatch.report.sentences import advice_of
 from scm.mismatch.validate.curves import discovered_curves
 from scm.mismatch.validate.explain import effect_of
+from scm.mismatch.validate.found_car import CarFiles
+from scm.mismatch.validate.stages import RECORDED
 from tests.unit.mismatch.discovery import made_effect
+from tests.unit.mismatch.made_drive import nigel
 
 
 @cache
@@ -69,3 +74,16 @@ def test_probabilities_of_a_law_and_its_rivals_are_of_one_whole():
     total = effect.probability + sum(rival.probability for rival in effect.alternatives)
     np.testing.assert_allclose(total, 1.0)
     assert effect.probability > 0.99
+
+
+def test_a_law_against_a_recording_s_time_is_in_no_car_for_another_drive():
+    fitted, effects = made_effect.gusty().best, (gust_reported(),)
+    files = CarFiles(nigel(), ("made",))
+    car = files.written(fitted, effects)
+    file, period = "floor_force_against_time", float(fitted.values[2])
+    assert file not in [term.name for term in car.terms]
+    assert "only recorded.toml has it" in car.path.read_text(encoding="utf-8")
+    (stage,) = files.stages(fitted, effects, car)
+    assert stage.file == RECORDED
+    assert stage.car.value(f"{file}.period_s") == pytest.approx(period, rel=1e-3)
+    assert "recorded.toml does" in advice_of(effects[0])
