@@ -54,12 +54,12 @@ def _sign(rng):
     return float(rng.choice([-1.0, 1.0]))
 
 
-def _adds(parameter, number, *, signed=False, both=1.0):
+def _adds(parameter, number, *, signed=False, both=1.0, law=""):
     """Return a draw whose one parameter is added to one number."""
 
     def draw(size, rng, _car, _floor=1.0):
         value = size * (_sign(rng) if signed else 1.0)
-        return Drawn({parameter: value}, {number: value * both})
+        return Drawn({parameter: value}, {number: value * both}, law=law)
 
     return draw
 
@@ -333,13 +333,15 @@ PLACED = (
 
 DEPENDENT = (
     _unlisted("servo_under_power", "steering", "throttle", {"nigel": 0.4},
-              _adds("per_throttle", "pace_per_throttle")),
+              _adds("per_throttle", "pace_per_throttle",
+                    law="servo rate * (1 - per_throttle * |throttle|)")),
     _listed("drive_soft_start", "drive", "throttle", _both(0.04, 0.05),
             _adds("time_constant_s", "rising_lag")),
     _unlisted("left_lag", "steering", "left turns", _both(0.07, 0.05),
-              _adds("time_constant_s", "left_lag")),
+              _adds("time_constant_s", "left_lag", law="lag while steered to the left")),
     _unlisted("warm_tyres", "tyre", "long use", {"f1tenth": 0.8},
-              _adds("per_throttle", "warm_grip")),
+              _adds("per_throttle", "warm_grip",
+                    law="grip * (1 + per_throttle * mean |throttle| of 40 s)")),
 )  # fmt: skip
 """A soft start, and numbers of known effects that depend on a variable."""
 

@@ -338,10 +338,17 @@ def undecided_of(selected: Selected, best: Hypothesis, notify: Notify) -> tuple[
         near = [
             _at_the_end(f)
             for f, c in tried
-            if c - f.effects[-1].rare < lowest + TIE and f.names[-1] not in best.names
+            if c - f.effects[-1].rare < lowest + TIE
+            and f.names[-1] not in best.names
+            and not _is_of(f.effects[-1], effect)
         ]
         if near:
             notify("designing the drive that would decide")
             explanations = [_at_the_end(mine), *near]
             found.append(suggest(best.model, explanations, notify=notify))
     return tuple(found)
+
+
+def _is_of(candidate: Candidate, effect: Candidate) -> bool:
+    """Return whether a candidate is an effect with a number that depends on a variable."""
+    return isinstance(candidate, VaryingEffect) and candidate.of.name == effect.name

@@ -98,7 +98,8 @@ def test_there_are_laws_enough_outside_the_library():
     assert len({(law.equation, law.depends_on) for law in UNLISTED}) >= 6
 
 
-ELSEWHERE = {"surface_patch", "cliff"}  # act where the car may not come in some seconds
+ELSEWHERE = {"surface_patch", "cliff", "swirl", "left_lag"}
+"""They act where the car may not come, or where it may not turn, in some seconds."""
 
 
 @cache
