@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from msgspec import structs
 
+from scm.arrays import Floats
 from scm.errors import RecordingError, ScmError
 from scm.mismatch.discovery.decide import is_discovered
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns
@@ -15,6 +16,7 @@ from scm.mismatch.findings import (
     Diagnosis,
     Dropped,
     Effect,
+    Equation,
     Failure,
     Fit,
     Undecided,
@@ -156,10 +158,12 @@ def _chosen_m(fit: Fit | None) -> float:
 def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> _Validated:
     """Return what stays of a hypothesis after free runs on unseen parts, beside the witness.
 
-    Effects go until the car does nothing worse than those without.
+    Effects go until the car does nothing worse than those without. Errors of sensors stay first,
+    with the re-tuned or the given car: where a car moves worse, only its own numbers can be why.
     """
     best, context, given = selected.best, selected.context, selected.best.model.car
     gone = list[Dropped]()
+    others = [best.model.simulator.unfitted(), selected.retuned.z]
     while True:
         effects, car = _written(selected, files, best)
         stages = () if car is None else files.stages(best, effects, car)
@@ -170,6 +174,9 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
         worse = worse_than(fit, beside) if effects else None
         if worse is None:
             break
+        if others and moves_nothing(best):
+            best = with_numbers(context, best, others.pop())
+            continue
         fewer = without_one(context, best, selected.retuned)
         lost = [name for name in best.names if name not in fewer.names]
         gone += dropped(lost, worse, fit.horizon_s)
@@ -247,6 +254,21 @@ def gained_nothing(fit: Fit) -> bool:
     """Return whether the car's own numbers, refitted, bring it no nearer on unseen parts."""
     before, after = fit.confirm.before, fit.confirm.after
     return POSE[0] in before and after[POSE[0]] >= before[POSE[0]]
+
+
+def moves_nothing(fitted: Hypothesis) -> bool:
+    """Return whether all effects are errors of sensors: a car moves the same with them."""
+    of_car = fitted.model.simulator.tiles.columns
+    return all(
+        effect.equation is Equation.SENSOR and not any(p.key in of_car for p in effect.parameters)
+        for effect in fitted.effects
+    )
+
+
+def with_numbers(context: Context, best: Hypothesis, z: Floats) -> Hypothesis:
+    """Return a hypothesis with other own numbers of the car."""
+    fitter = context.fitter(best.model)
+    return replace(fitter.at(replace(best, z=z)), covariance=best.covariance)
 
 
 def as_given(context: Context, best: Hypothesis) -> Hypothesis:

@@ -92,6 +92,17 @@ def test_an_effect_with_which_unseen_driving_is_worse_is_dropped_and_listed(tmp_
     assert "Steering trim explains what was fitted, but does not hold" in page
 
 
+def test_an_error_of_a_sensor_stays_where_only_the_cars_own_numbers_got_worse():
+    model, retuned, best = made_fit.biased()
+    astray = best.z.copy()
+    astray[[own.key for own in model.nominal].index("drive.no_load_speed_rad_s")] += 8.0
+    found = concluded(model, retuned, replace(best, z=astray))
+    assert [effect.name for effect in found.diagnosis.effects] == ["gyro_bias"]
+    assert found.diagnosis.dropped == ()
+    others = (retuned.z, model.simulator.unfitted())
+    assert any(np.array_equal(found.best.z, z) for z in others)
+
+
 def test_of_two_effects_the_one_that_worsens_the_car_goes():
     model, retuned, best = trimmed()
     gain = made_fit.candidate("drive_gain")
