@@ -220,6 +220,10 @@ def advice_of(effect: Effect) -> str:
         return known.advice if known and known.advice else _KNOWN_EFFECT
     if effect.is_of_recording:
         return _OF_RECORDING
+    head, against, variable = effect.name.partition(" against ")
+    base = identifications().get(head.replace(" ", "_"))
+    if against and base and base.varies:
+        return f"{base.advice} See how it changes with {variable}: car.toml has it so."
     return _UNKNOWN_EFFECT.format(drivers=" and ".join(effect.depends_on) or "the drive")
 
 

@@ -4,10 +4,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from msgspec import structs
 
+from scm.mismatch.effect_catalogue import identifications
 from scm.mismatch.fit.hypothesis import together
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.rollouts import Rollouts
+from scm.mismatch.report.sentences import advice_of
 from scm.mismatch.select.changes import varying_to_try
 from scm.mismatch.select.round import Context, extend, penalty
 from scm.mismatch.varying_effect import (
@@ -21,6 +24,7 @@ from scm.mismatch.varying_effect import (
 )
 from scm.replay.drive import Drive
 from scm.replay.recorded_variables import PLACES, VARIABLES, RecordedVariable, usual_most
+from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_drive import big_nigel, driven, made_drive
 from tests.unit.mismatch.made_fit import candidate
 
@@ -125,3 +129,12 @@ def test_no_variable_is_tried_beside_the_effect_itself():
     trials = varying_to_try(context.penalty, fitter, base, begun)
     assert all(isinstance(effects[-1], VaryingEffect) for effects, _ in trials)
     assert {effects[-1].like for effects, _ in trials} <= {LAG}
+
+
+def test_what_to_do_is_the_effect_s_own_advice_and_says_the_variable():
+    name = lag_against("throttle").name
+    one = made_up.CASES["one_effect"]()[0].effects[0]
+    effect = structs.replace(one, name=name, is_known=False, depends_on=("throttle",))
+    advice = advice_of(effect)
+    assert advice.startswith(identifications()[LAG].advice)
+    assert "changes with throttle" in advice
