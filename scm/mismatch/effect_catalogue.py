@@ -32,6 +32,9 @@ FIRST = (
 """The order in which effects are tried; others follow by name. No result depends on it."""
 
 
+NEARLY_ALL = 0.95  # of a number that stays above 0
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """One free number of an effect.
@@ -238,6 +241,8 @@ def _parameter(
     if how.adds and car.has(param.key):
         given, neutral = car.value(param.key), 0.0
     low, high = how.bounds.get(param.reported, param.bounds)
+    if how.stays_above and car.has(how.stays_above):
+        low = max(low, -NEARLY_ALL * car.value(how.stays_above))
     return Parameter(
         param.reported, key, param.unit, (low - given, high - given), neutral, step, per_unit,
         given, own=how.own,

@@ -93,8 +93,8 @@ class Effect(Struct, kw_only=True, frozen=True):
     @property
     def is_of_recording(self) -> bool:
         """Whether it is a law against the recording's own time, which no other drive has."""
-        is_law = not self.is_known and self.equation is not Equation.SENSOR
-        return is_law and "time" in self.depends_on
+        is_outside = not self.is_known and self.equation is not Equation.SENSOR
+        return is_outside and "time" in self.depends_on
 
 
 class Place(Struct, kw_only=True, frozen=True):

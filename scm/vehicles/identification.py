@@ -40,6 +40,7 @@ class Identification:
         bounds: Closer than those of the parameters, by reported name.
         parameters: Reported names of those searched for; empty: all that may be fitted.
         adds: Whether its number is added to one that the car file may have already.
+        stays_above: A car's own number that it is added to; the sum stays above 0.
         also_moves: Other keys of the car file that may move with it, and how much for one unit.
         like: The effect that cancels it on a level floor: no drive there tells the two apart.
         why_alike: A sentence on that, in one of the two.
@@ -65,6 +66,7 @@ class Identification:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     parameters: tuple[str, ...] = ()
     adds: bool = False
+    stays_above: str = ""
     also_moves: Mapping[str, float] = field(default_factory=dict)
     like: str = ""
     why_alike: str = ""

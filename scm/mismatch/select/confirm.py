@@ -1,11 +1,12 @@
 """Takes effects back: those that others make needless, and those that unseen data deny."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from scm.arrays import Bools, Floats
+from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.residual_windows import independent_share
@@ -72,13 +73,25 @@ def prune(context: Context, fitted: Hypothesis, retuned: Hypothesis) -> Hypothes
     return fitted
 
 
-def without_one(context: Context, fitted: Hypothesis, retuned: Hypothesis) -> Hypothesis:
+def without_one(
+    context: Context,
+    fitted: Hypothesis,
+    retuned: Hypothesis,
+    may_go: Callable[[Candidate], bool] = lambda _: True,
+) -> Hypothesis:
     """Return the best hypothesis that lacks one of the effects, fitted to the end.
 
     It begins from the re-tuned car's own numbers as well: with an effect more than that car it
     explains no less.
+
+    Args:
+        context: Of the selection.
+        fitted: With one effect at least that may go.
+        retuned: The car without effects.
+        may_go: Says of which effects one may be lacking.
     """
-    best = min(without_each(context, fitted, retuned), key=context.criterion)
+    each = zip(fitted.effects, without_each(context, fitted, retuned), strict=True)
+    best = min((fewer for effect, fewer in each if may_go(effect)), key=context.criterion)
     return fit_to_the_end(context, best, [best.z, retuned.z]) if best.effects else best
 
 

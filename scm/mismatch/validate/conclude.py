@@ -1,7 +1,7 @@
 """The validate step: what was selected, judged by free runs, located and put into words."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from msgspec import structs
 from scm.arrays import Floats
 from scm.errors import RecordingError, ScmError
 from scm.mismatch.discovery.decide import is_discovered
+from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.evidence import Curve, Evidence, FreeRuns
 from scm.mismatch.experiment.suggest import Suggestion
 from scm.mismatch.findings import (
@@ -41,8 +42,11 @@ from scm.mismatch.validate.never_worse import (
     dropped,
     failure_sentence,
     is_behind,
+    is_nearer,
     loses,
     reasons_of,
+    unwritten,
+    useless,
     worse_than,
 )
 from scm.mismatch.validate.residuals import on_one_axis
@@ -166,6 +170,10 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
     others = [best.model.simulator.unfitted(), selected.retuned.z]
     while True:
         effects, car = _written(selected, files, best)
+        if car is None and effects:
+            best, lost = _with_fewer(selected, best)
+            gone += unwritten(lost)
+            continue
         stages = () if car is None else files.stages(best, effects, car)
         fit, free_runs = _judged(selected, given, stages)
         if fit is None or free_runs is None:
@@ -173,19 +181,65 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
         beside = _judged(selected, retuned_car, stages)[0] if effects else None
         worse = worse_than(fit, beside) if effects else None
         if worse is None:
-            break
+            fewer = _as_near_without(selected, files, best, stages, beside)
+            if fewer is None:
+                break
+            best, less = fewer
+            gone += less
+            continue
         if others and moves_nothing(best):
             best = with_numbers(context, best, others.pop())
             continue
-        fewer = without_one(context, best, selected.retuned)
-        lost = [name for name in best.names if name not in fewer.names]
+        best, lost = _with_fewer(selected, best)
         gone += dropped(lost, worse, fit.horizon_s)
-        best = fewer if fewer.effects else selected.retuned
     own = None if beside is None else beside.confirm.before
     fit = structs.replace(
         fit, retuned=own, witness=witness_of(selected.drives, selected.car, free_runs)
     )
     return _Validated(best, effects, car, fit, free_runs, stages, tuple(gone))
+
+
+def _with_fewer(
+    selected: Selected, best: Hypothesis, may_go: Callable[[Candidate], bool] = lambda _: True
+) -> tuple[Hypothesis, list[str]]:
+    """Return a hypothesis without its weakest effect that may go, and that effect's name."""
+    fewer = selected.retuned
+    if len(best.effects) > 1:
+        fewer = without_one(selected.context, best, selected.retuned, may_go)
+    return fewer, [name for name in best.names if name not in fewer.names]
+
+
+def _as_near_without(
+    selected: Selected,
+    files: CarFiles,
+    best: Hypothesis,
+    stages: Sequence[Stage],
+    beside: Fit | None,
+) -> tuple[Hypothesis, list[Dropped]] | None:
+    """Return a hypothesis without its weakest effect of the car, if that brings it no nearer.
+
+    Two simulators' equations of the same car differ in what sensors feel by more than noise, and
+    hardly in where the car goes.
+
+    Args:
+        selected: What was selected.
+        files: To write its car with.
+        best: With effects.
+        stages: Of its car.
+        beside: Of the re-tuned car and this one.
+    """
+    if selected.context.by_windows or not any(map(_is_of_car, best.effects)):
+        return None
+    fewer, lost = _with_fewer(selected, best, _is_of_car)
+    if fewer.effects:
+        beside = _judged(selected, _written(selected, files, fewer)[1], stages)[0]
+    if beside is None or is_nearer(beside):
+        return None
+    return fewer, useless(lost, beside)
+
+
+def _is_of_car(effect: Candidate) -> bool:
+    return effect.equation is not Equation.SENSOR
 
 
 def _handed_out(selected: Selected, files: CarFiles, valid: _Validated) -> _Validated:

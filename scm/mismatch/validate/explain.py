@@ -152,8 +152,8 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
         estimates[SINCE_NAME] = _moment(selected, best, place.stop - 1)
     probability, alternatives = _alternatives(selected.selection, candidate)
     discovered, offered, discovery = is_discovered(candidate), selected.offered, selected.discovery
-    is_law = discovered and not isinstance(candidate, VaryingEffect)
-    if is_law and offered is not None and discovery is not None:
+    is_outside = discovered and not isinstance(candidate, VaryingEffect)
+    if is_outside and offered is not None and discovery is not None:
         probability, alternatives = alternatives_to(
             selected.context, best, candidate, offered, discovery
         )

@@ -29,6 +29,7 @@ from scm.vehicles.car import Car
 
 POSE = ("position_m", "yaw_rad")
 WORSE_THAN_WITNESS = 1.05
+NEARER = 0.95  # an error of a car that follows better, over the other one's
 NEAR_END = 0.95  # of the way to an end of a number's scatter, or to a bound
 UNSEEN = "on parts that no fit has seen"
 GIVEN, RETUNED = "as given", "with its own numbers refitted alone"
@@ -75,6 +76,46 @@ def dropped(names: Sequence[str], worse: Worse, horizon_s: float) -> list[Droppe
         )
         for name in names
     ]
+
+
+def useless(names: Sequence[str], beside: Fit) -> list[Dropped]:
+    """Return effects that were dropped because the car with them is hardly nearer.
+
+    Args:
+        names: Of the effects.
+        beside: Of the car without them and of the one with them.
+    """
+    part, name = beside.confirm, POSE[0]
+    title, unit = error_name(name)
+    now, was = quantities((part.after[name], part.before[name]), unit)
+    return [
+        Dropped(
+            name=one,
+            text=f"{capital(title_of(one))} explains some of what the sensors measured, but brings "
+            f"the car no nearer {UNSEEN}: after {quantity(beside.horizon_s, 's')} it is {now} off "
+            f"in {title} with it, and {was} without.",
+        )
+        for one in names
+    ]
+
+
+def unwritten(names: Sequence[str]) -> list[Dropped]:
+    """Return effects that were dropped because the car with them cannot be written as a file."""
+    why = "lets the car's numbers contradict one another: it could not be written as a car file."
+    return [Dropped(name=one, text=f"{capital(title_of(one))} {why}") for one in names]
+
+
+def is_nearer(beside: Fit) -> bool:
+    """Return whether a car follows better than another, by position or heading.
+
+    By five per cent, and by a quarter of what noise may change the square of an error.
+    """
+    part = beside.confirm
+    for name in POSE:
+        was, now, floor = (x.get(name, 0.0) for x in (part.before, part.after, part.noise_floor))
+        if now < NEARER * was and was**2 - now**2 > 0.25 * chance_of(part) * floor**2:
+            return True
+    return False
 
 
 def is_behind(fit: Fit) -> bool:

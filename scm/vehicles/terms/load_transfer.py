@@ -31,7 +31,7 @@ TERM = Term(
     ),
     identification=Identification(
         equation="tyre", depends_on=("lateral acceleration",), starts=((0.05,), (-0.03,)),
-        steps=(0.01,), rare=6.0, needs_m_s2=1.0,
+        steps=(0.01,), rare=6.0, needs_m_s2=1.0, stays_above="body.cog_height_m",
         sentence="Load moves between the wheels as if the centre of gravity were {height_m} "
                  "higher.",
         advice="Measure the height of the centre of gravity: tilt the car until it tips.",

@@ -104,3 +104,9 @@ def test_effects_are_listed_where_position_and_heading_have_rates_of_their_own(o
     channels["command.throttle"] = replace(sent, t=sent.t[early], values=sent.values[early])
     drive = Drive(replace(made, channels=channels), big_nigel())
     assert placed(shown_by(candidates(big_nigel()), [drive]), [drive])
+
+
+def test_a_centre_of_gravity_stays_above_the_floor():
+    height = next(one for one in candidates(nigel()) if one.name == "load_transfer")
+    (low, _), most = height.parameters[0].bounds, nigel().value("body.cog_height_m")
+    assert -most < low < -0.9 * most

@@ -103,6 +103,43 @@ def test_an_error_of_a_sensor_stays_where_only_the_cars_own_numbers_got_worse():
     assert any(np.array_equal(found.best.z, z) for z in others)
 
 
+def _beside(best, name, *values):
+    """A hypothesis with an effect more, not refitted."""
+    more = len(best.z) + len(best.values) + len(values)
+    return replace(
+        best, effects=(*best.effects, made_fit.candidate(name)),
+        values=np.array([*best.values, *values]),
+        jacobian=np.zeros((len(best.innovations), more)), covariance=np.eye(more),
+    )  # fmt: skip
+
+
+def test_an_effect_that_brings_the_car_no_nearer_goes_and_what_does_stays():
+    model, retuned, best = trimmed()
+    found = concluded(model, retuned, _beside(best, "steer_backlash", 1e-4)).diagnosis
+    assert [effect.name for effect in found.effects] == ["steer_trim"]
+    (gone,) = found.dropped
+    assert gone.name == "steer_backlash"
+    assert "brings the car no nearer" in gone.text
+
+
+def test_a_car_that_is_no_nearer_alone_has_no_effect_and_no_mismatch():
+    model, retuned, _ = made_fit.healthy()
+    found = concluded(model, retuned, _beside(retuned, "steer_backlash", 1e-4)).diagnosis
+    assert (found.effects, found.verdict) == ((), Verdict.NONE)
+    assert [gone.name for gone in found.dropped] == ["steer_backlash"]
+
+
+def test_a_car_that_cannot_be_written_is_not_handed_out():
+    model, retuned, best = trimmed()
+    below = -1.5 * nigel().value("body.cog_height_m")
+    found = concluded(model, retuned, _beside(best, "load_transfer", below))
+    assert [effect.name for effect in found.diagnosis.effects] == ["steer_trim"]
+    (gone,) = found.diagnosis.dropped
+    assert gone.name == "load_transfer"
+    assert "could not be written" in gone.text
+    assert found.found_car.has(TRIM)
+
+
 def test_of_two_effects_the_one_that_worsens_the_car_goes():
     model, retuned, best = trimmed()
     gain = made_fit.candidate("drive_gain")
