@@ -34,6 +34,5 @@ TERM = Term(
         sentence="Throttle below {threshold} does nothing.",
         advice="Raise the throttle slowly from zero and note where the car starts. Calibrate the "
                "controller's neutral.",
-        varies=True,
     ),
 )  # fmt: skip
