@@ -50,6 +50,13 @@ def _body(name: str, unit: str, role: Role, about: str, **more: object) -> Varia
     return Variable(name, unit, Per.BODY, role, about, **more)  # type: ignore[arg-type]
 
 
+def _command(name: str, about: str, otherwise: str, starts_at: str = "") -> Variable:
+    """Return a command on its way to a motor or the servo, -1 to 1."""
+    return Variable(
+        name, "1", Per.BODY, Role.CHAIN, about, (-1.0, 1.0), otherwise, starts_at=starts_at
+    )
+
+
 def _wheel(name: str, unit: str, role: Role, about: str, **more: object) -> Variable:
     return Variable(name, unit, Per.WHEEL, role, about, **more)  # type: ignore[arg-type]
 
@@ -83,72 +90,19 @@ _ALL = (
     _body("yaw_accel", "rad/s^2", Role.GIVEN, "about z, last substep", span=(-50.0, 50.0)),
     _body("drive_omega", "rad/s", Role.GIVEN, "mean spin of the driven wheels", span=(-90.0, 90.0)),
     # the throttle's way: command, radio, dead-band, gain, lag
-    _body(
-        "throttle_received",
-        "1",
-        Role.CHAIN,
-        "command after its way to the car",
-        span=(-1.0, 1.0),
-        otherwise="throttle_command",
-    ),
-    _body(
-        "throttle_limited",
-        "1",
-        Role.CHAIN,
-        "command within the drive's limits",
-        span=(-1.0, 1.0),
-        otherwise="throttle_received",
-    ),
-    _body(
-        "throttle_live",
-        "1",
-        Role.CHAIN,
-        "command beyond the dead-band",
-        span=(-1.0, 1.0),
-        otherwise="throttle_limited",
-    ),
-    _body(
-        "throttle_eased",
-        "1",
-        Role.CHAIN,
-        "command after a soft start",
-        span=(-1.0, 1.0),
-        otherwise="throttle_live",
-        starts_at="throttle",
-    ),
-    _body(
-        "throttle_curved",
-        "1",
-        Role.CHAIN,
-        "command after the controller's curve",
-        span=(-1.0, 1.0),
-        otherwise="throttle_eased",
-    ),
-    _body(
-        "throttle_scaled",
-        "1",
-        Role.CHAIN,
-        "command as strong as the controller takes it",
-        span=(-1.0, 1.0),
-        otherwise="throttle_curved",
-    ),
-    _body(
+    _command("throttle_received", "command after its way to the car", "throttle_command"),
+    _command("throttle_limited", "command within the drive's limits", "throttle_received"),
+    _command("throttle_live", "command beyond the dead-band", "throttle_limited"),
+    _command("throttle_eased", "command after a soft start", "throttle_live", starts_at="throttle"),
+    _command("throttle_curved", "command after the controller's curve", "throttle_eased"),
+    _command("throttle_scaled", "command as strong as the controller takes it", "throttle_curved"),
+    _command(
         "throttle",
-        "1",
-        Role.CHAIN,
         "what the motor controller gives, + forward",
-        span=(-1.0, 1.0),
-        otherwise="throttle_scaled",
+        "throttle_scaled",
         starts_at="throttle",
     ),
-    _body(
-        "throttle_memory",
-        "1",
-        Role.CHAIN,
-        "mean of what was asked for lately, which fades",
-        span=(-1.0, 1.0),
-        otherwise="0.0",
-    ),
+    _command("throttle_memory", "mean of what was asked for lately, which fades", "0.0"),
     _body(
         "learned_shape",
         "1",
@@ -190,22 +144,8 @@ _ALL = (
         otherwise="terminal_voltage",
     ),
     # the steering's way: command, radio, end stops, angle, gain, lag, servo, play, trim, give
-    _body(
-        "steering_received",
-        "1",
-        Role.CHAIN,
-        "command after its way to the car, + left",
-        span=(-1.0, 1.0),
-        otherwise="steering_command",
-    ),
-    _body(
-        "steering",
-        "1",
-        Role.CHAIN,
-        "command within the steering's end stops, + left",
-        span=(-1.0, 1.0),
-        otherwise="steering_received",
-    ),
+    _command("steering_received", "command after its way to the car, + left", "steering_command"),
+    _command("steering", "command within the steering's end stops, + left", "steering_received"),
     _body(
         "steer_demand",
         "rad",
