@@ -102,7 +102,7 @@ _ALL = (
         "throttle_scaled",
         starts_at="throttle",
     ),
-    _command("throttle_memory", "mean of what was asked for lately, which fades", "0.0"),
+    _command("throttle_memory", "mean command of late, which fades", "0.0"),
     _body(
         "learned_shape",
         "1",

@@ -219,10 +219,10 @@ def write_cases(
     for k, kind in enumerate(kinds):
         rng = np.random.default_rng([seed, k])
         label, drives, numbers = make_case(kind, rng, strengths, moving, families=families)
-        drives, said_car = _controlled(kind, label["car"], drives, rng, moving, families)
+        drives, stated_car = _controlled(kind, label["car"], drives, rng, moving, families)
         name = f"case_{k:03d}"
         for drive_name, drive in drives.items():
-            write(drive, said_car, numbers, out / name / drive_name)
+            write(drive, stated_car, numbers, out / name / drive_name)
         salt = rng.bytes(16).hex()
         labels = out / "labels"
         labels.mkdir(exist_ok=True)

@@ -15,11 +15,11 @@ class Driver:
 
     late_s = 0.0  # by which he looks farther ahead
 
-    def __init__(self, temper, route, wished, base, limit, rng, pose_hz=30):
+    def __init__(self, temper, route, target_speeds, base, limit, rng, pose_hz=30):
         self.rng = rng
         self.frames = max(round(SEEN_S * pose_hz), 3)
         self.trust = 1.0 - 0.6 ** (30.0 / pose_hz)
-        self.temper, self.route, self.wished = temper, route, wished
+        self.temper, self.route, self.target_speeds = temper, route, target_speeds
         self.base, self.limit = base, limit
         self.side_push = rng.uniform(*temper.side_push)
         self.hand = rng.uniform(0.7, 1.3)
@@ -67,13 +67,13 @@ class Driver:
     def _throttle(self, k):
         coming = (self.place + np.arange(0, 60, 4)) % POINTS
         sharpest = float(np.abs(self.route.curvature[coming]).max())
-        wish = min(self.wished[k], math.sqrt(self.side_push / max(sharpest, 1e-3)))
-        if wish == 0.0 and abs(self.speed) < 0.15 * self.temper.fastest[0]:
+        target = min(self.target_speeds[k], math.sqrt(self.side_push / max(sharpest, 1e-3)))
+        if target == 0.0 and abs(self.speed) < 0.15 * self.temper.fastest[0]:
             self.sum = 0.0
             return 0.0
-        off = wish - self.speed
+        off = target - self.speed
         self.sum = min(max(self.sum + 0.05 * self.temper.creep * off * self.hand, -0.5), 0.5)
-        throttle = wish / self.temper.full_speed + self.temper.push * self.hand * off + self.sum
+        throttle = target / self.temper.full_speed + self.temper.push * self.hand * off + self.sum
         return min(max(throttle, -1.0), 1.0)
 
 
@@ -126,7 +126,7 @@ class OpenLoop(Driver):
         super().__init__(*given)
         self.stops = self.rng.uniform(0.08, 0.22)
         self.fastest = min(
-            self.wished.max(), math.sqrt(0.8 * self.side_push * min(self.temper.floor))
+            self.target_speeds.max(), math.sqrt(0.8 * self.side_push * min(self.temper.floor))
         )
         self.returns, self.piece, self.until = False, None, 0
 

@@ -4,7 +4,7 @@ Each wheel has its motor, load, tyre and dry friction. The body heaves, rolls an
 on springs and dampers over tyres that press in; hubs have no mass here. Positions are those of the
 floor under the middle of the rear axle. Order of wheels: front left, front right, rear left, rear
 right. All numbers come as one record, so that laws read by name. Some of them choose between
-equations, see `family`; what is said above is the usual choice.
+equations, see `family`; the above is the usual choice.
 """
 
 import math

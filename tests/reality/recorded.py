@@ -72,9 +72,9 @@ def record(car, numbers, faults, duration, rng, moving=Moving, family=USUAL):
     temper, commands = TEMPERS[car].on_floor(family.floor), round(duration / COMMAND_S)
     sharpest = np.tan(numbers["limit"]) / numbers["base"]
     route = draw_route(temper, sharpest, rng, family.routes)
-    wished, fastest = draw_speeds(temper, duration, rng)
+    target_speeds, fastest = draw_speeds(temper, duration, rng)
     driver = DRIVERS[family.driver](
-        temper, route, wished, numbers["base"], numbers["limit"], rng, family.pose_hz
+        temper, route, target_speeds, numbers["base"], numbers["limit"], rng, family.pose_hz
     )
     first, second = route.points[0], route.points[3]
     start = (*first, np.arctan2(*(second - first)[::-1]))

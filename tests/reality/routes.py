@@ -152,13 +152,13 @@ def draw_route(temper, sharpest, rng, of="basic"):
 
 
 def draw_speeds(temper, duration, rng):
-    """Draw the speed wished at every command: stretches of some seconds, now and then a stop."""
+    """Draw the target speed at every command: stretches of some seconds, now and then a stop."""
     fastest = rng.uniform(*temper.fastest)
-    wished, stops = [], rng.uniform(0.08, 0.22)
+    target_speeds, stops = [], rng.uniform(0.08, 0.22)
     count = round(duration * 20)
-    while len(wished) < count:
-        stop = bool(wished) and rng.random() < stops
+    while len(target_speeds) < count:
+        stop = bool(target_speeds) and rng.random() < stops
         seconds = rng.uniform(1.5, 3.5) if stop else rng.uniform(2.5, 8.0)
         speed = 0.0 if stop else fastest * rng.uniform(0.3, 1.0)
-        wished += [speed] * round(seconds * 20)
-    return np.array(wished[:count]), fastest
+        target_speeds += [speed] * round(seconds * 20)
+    return np.array(target_speeds[:count]), fastest
