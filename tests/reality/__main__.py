@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 from tests.reality.cases import CONTROLS, COURSES, KINDS, LAWS, draw_kinds, write_cases
+from tests.reality.engine import ENGINES, find_engine
 from tests.reality.family import HALVES
-from tests.reality.motion import Moving
 
 
 def main() -> int:
@@ -18,7 +18,7 @@ def main() -> int:
     kinds = ("mixed", *KINDS, *CONTROLS, *COURSES, *LAWS)
     parser.add_argument("--kind", choices=dict.fromkeys(kinds), default="mixed")
     parser.add_argument("--strength", type=float, nargs=2, default=(1.0, 4.0))
-    parser.add_argument("--engine", choices=("own", "mujoco"), default="own")
+    parser.add_argument("--engine", choices=tuple(ENGINES), default="own")
     parser.add_argument(
         "--family", choices=("own", "drawn"), default="own", help="equations and sensors"
     )
@@ -26,12 +26,10 @@ def main() -> int:
     arguments = parser.parse_args()
     if arguments.half and arguments.family == "own":
         parser.error("--half needs --family drawn")
-    moving = Moving
-    if arguments.engine == "mujoco":
-        try:
-            from tests.reality.in_mujoco import Moving as moving  # noqa: N813
-        except ModuleNotFoundError:
-            sys.exit("--engine mujoco needs MuJoCo: pip install mujoco-core")
+    try:
+        moving = find_engine(arguments.engine)
+    except ModuleNotFoundError as error:
+        sys.exit(str(error))
     kinds = draw_kinds(arguments.kind, arguments.cases, arguments.seed)
     low, high = arguments.strength
     write_cases(

@@ -39,9 +39,42 @@ ENOUGH_AT_STOP = 0.03
 ENOUGH_EACH_WAY = 0.08
 
 
-def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:
+def lacking(moving: type) -> frozenset[str]:
+    """Return the numbers that have no place in an engine."""
+    return frozenset() if moving is Moving else moving.lacks
+
+
+def possible(effects, car: str, moving: type = Moving) -> list[str]:
+    """Return the names of those effects that a car shows, and that an engine can simulate."""
+    lacks = lacking(moving)
+    rng = np.random.default_rng(0)  # which numbers an effect changes does not depend on it
+    found = []
+    for effect in effects:
+        if car in effect.smallest:
+            drawn = effect.draw(effect.smallest[car], rng, car)
+            if not lacks & {*drawn.adds, *drawn.times}:
+                found.append(effect.name)
+    return found
+
+
+def check_possible(names: tuple[str, ...], car: str, moving: type) -> None:
+    """Check that an engine can simulate effects.
+
+    Raises:
+        ValueError: names what it can.
+    """
+    can = possible(EFFECTS.values(), car, moving)
+    if cannot := [name for name in names if name not in can]:
+        engine = moving.__module__.rpartition("in_")[2]
+        msg = f"{engine} cannot simulate {', '.join(cannot)} of {car}; it can: {', '.join(can)}"
+        raise ValueError(msg)
+
+
+def names_for(
+    kind: str, car: str, rng: np.random.Generator, moving: type = Moving
+) -> tuple[str, ...]:
     """Draw what is concealed; half of the pairs are such as hide each other."""
-    listed = [effect.name for effect in LISTED if car in effect.smallest]
+    listed = possible(LISTED, car, moving)
     if kind in {"none", *CONTROLS}:
         return ()
     if kind == "single":
@@ -49,13 +82,13 @@ def names_for(kind: str, car: str, rng: np.random.Generator) -> tuple[str, ...]:
     if kind in COURSES:
         return (str(rng.choice([name for name in listed if name not in STEADY])),)
     if kind in LAWS:
-        return (str(rng.choice([e.name for e in LAWS[kind] if car in e.smallest])),)
+        return (str(rng.choice(possible(LAWS[kind], car, moving))),)
     hiding = [pair for pair in HIDING if set(pair) <= set(listed)]
     if rng.random() < 0.5:
         return hiding[rng.integers(len(hiding))]
     names = [name for name in listed if name != "unit_error"]
     pair = {str(name) for name in rng.choice(names, 2, replace=False)}
-    return names_for(kind, car, rng) if pair in ALIKE else tuple(sorted(pair))
+    return names_for(kind, car, rng, moving) if pair in ALIKE else tuple(sorted(pair))
 
 
 def draw_effects(
@@ -108,14 +141,15 @@ def make_case(
     if car is None:
         cars = [c for c in TEMPERS if all(c in EFFECTS[n].smallest for n in names or ())]
         car = str(rng.choice(cars, p=[0.7, 0.3] if len(cars) == 2 else None))
-    names = names_for(kind, car, rng) if names is None else names
+    names = names_for(kind, car, rng, moving) if names is None else names
+    check_possible(names, car, moving)
     file_numbers = nominal(car)
     ordinary = scattered(file_numbers, rng) if rng.random() < 0.5 else dict(file_numbers)
     family, usual = USUAL, ordinary
     if families != "own":
         family = draw_family(families, names, rng)
-        if moving is not Moving:  # MuJoCo moves the bodies in its own way
-            family = replace(family, suspension="sprung", body="semi_implicit")
+        if moving is not Moving:  # another engine moves the bodies in its own way
+            family = replace(family, **moving.fixed)
         usual = ordinary | equations(family, car, ordinary, rng)
     while True:
         effects = draw_effects(names, car, strengths, rng, family.floor)
@@ -134,7 +168,8 @@ def make_case(
             numbers["side_gain"] == numbers["left_lag"] == 0.0 or _turns_both_ways(drives["drive"])
         ):
             break
-    label = _label(kind, car, effects, ordinary, file_numbers, drives["drive"])
+    real = {name: v for name, v in ordinary.items() if name not in lacking(moving)}
+    label = _label(kind, car, effects, file_numbers | real, file_numbers, drives["drive"])
     if change:
         label |= {"course": kind, "since_s": change[0] if kind == "step" else None}
     if families != "own":
@@ -222,7 +257,7 @@ def write_cases(
         drives, stated_car = _controlled(kind, label["car"], drives, rng, moving, families)
         name = f"case_{k:03d}"
         for drive_name, drive in drives.items():
-            write(drive, stated_car, numbers, out / name / drive_name)
+            write(drive, stated_car, numbers, out / name / drive_name, moving)
         salt = rng.bytes(16).hex()
         labels = out / "labels"
         labels.mkdir(exist_ok=True)

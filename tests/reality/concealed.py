@@ -301,24 +301,24 @@ UNLISTED = (
 )  # fmt: skip
 
 
-def _spring(size, rng, car):
-    x, y = (rng.uniform(-0.5, 0.5) * side for side in FLOOR[car])
+def _spring(size, rng, car, floor=1.0):
+    x, y = (rng.uniform(-0.5, 0.5) * side * floor for side in FLOOR[car])
     found = {"stiffness_n_m": size, "x_m": x, "y_m": y}
     adds = {"pull": size, "pull_x": x, "pull_y": y}
     return Drawn(found, adds, law="-stiffness_n_m * (place - (x_m, y_m))")
 
 
-def _half_slope(size, rng, car):
+def _half_slope(size, rng, car, floor=1.0):
     uphill, way = rng.uniform(-3.1, 3.1, 2)
-    at = rng.uniform(-0.2, 0.2) * FLOOR[car][1]
+    at = rng.uniform(-0.2, 0.2) * FLOOR[car][1] * floor
     found = {"slope": size, "uphill_rad": uphill, "beyond_m": at, "toward_rad": way}
     adds = {"half_slope": size, "half_uphill": uphill, "half_way": way, "half_at": at}
     return Drawn(found, adds, law="slope where x cos(toward) + y sin(toward) > beyond_m")
 
 
-def _swirl(size, rng, car):
-    x, y = (rng.uniform(-0.7, 0.7) * side for side in FLOOR[car])
-    radius = FLOOR[car][1] * rng.uniform(0.35, 0.6)
+def _swirl(size, rng, car, floor=1.0):
+    x, y = (rng.uniform(-0.7, 0.7) * side * floor for side in FLOOR[car])
+    radius = FLOOR[car][1] * floor * rng.uniform(0.35, 0.6)
     found = {"moment_nm": size, "x_m": x, "y_m": y, "radius_m": radius}
     adds = {"swirl": size * _sign(rng), "swirl_x": x, "swirl_y": y, "swirl_radius": radius - 0.1}
     return Drawn(found, adds, law="yaw moment within radius_m of (x_m, y_m)")

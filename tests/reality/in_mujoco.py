@@ -12,14 +12,8 @@ import numpy as np
 from numba import njit
 
 from tests.reality import motion
-from tests.reality.motion import (
-    NUMBERS,
-    ROW_S,
-    STATE,
-    TYRE_DAMPING,
-    TYRE_STIFFNESS,
-    WHEEL,
-)
+from tests.reality.engine import Engine, see
+from tests.reality.motion import ROW_S, TYRE_DAMPING, TYRE_STIFFNESS
 from tests.reality.numbers import GRAVITY
 
 HUBS = ("fl", "fr", "rl", "rr")
@@ -68,20 +62,6 @@ def _model(numbers, places):
 
 
 @njit(cache=True)
-def _see(c, s, qpos, qvel):
-    """Fill our own state from MuJoCo's; the heading goes on turning beyond pi."""
-    w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    s.yaw += (yaw - s.yaw + math.pi) % (2.0 * math.pi) - math.pi
-    cos, sin = math.cos(s.yaw), math.sin(s.yaw)
-    s.x, s.y = qpos[0] - c.cog * cos, qpos[1] - c.cog * sin
-    s.vx, s.vy = cos * qvel[0] + sin * qvel[1], cos * qvel[1] - sin * qvel[0]
-    s.yaw_rate = qvel[5]
-    s.roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    s.pitch = math.asin(2.0 * (w * y - x * z))
-
-
-@njit(cache=True)
 def _product(matrix, vector):
     """Multiply by hand: numba's own product needs SciPy, which a process may have shut out."""
     return (matrix * vector).sum(axis=1)
@@ -92,7 +72,7 @@ def _product(matrix, vector):
 def push(numbers, state, wheels, places, qpos, qvel, forces, t, throttle, steering, shake):
     """Advance steering, drive and wheels by one step, and lay all forces on the bodies."""
     c, s = numbers[0], state[0]
-    _see(c, s, qpos, qvel)
+    see(c, s, qpos, qvel)
     motion.steer(c, s, t, motion.held(steering, t - c.steer_delay), motion.held(shake, t))
     u = motion.drive(c, s, t, motion.held(throttle, t - c.drive_delay))
     along, across, twist = motion.outside_force(c, s, t)
@@ -134,34 +114,27 @@ def push(numbers, state, wheels, places, qpos, qvel, forces, t, throttle, steeri
     forces[3:6] = _product(turn.T, torque)
 
 
-class Moving:
+class Moving(Engine):
     """A car on the floor that is driven by commands of 20 Hz; as `motion.Moving`."""
 
-    def __init__(self, numbers, pose, commands, shake=None):
-        self.numbers = np.zeros(1, NUMBERS)
-        for name in NUMBERS.names:
-            self.numbers[name] = numbers[name]
-        self.state = np.zeros(1, STATE)
-        self.state["yaw"] = pose[2]
-        self.wheels = np.zeros((4, len(WHEEL)))
-        self.wheels[:, WHEEL.index("strength")] = 1.0
-        self.throttle, self.steering = np.zeros(commands), np.zeros(commands)
-        self.shake = np.zeros(commands) if shake is None else shake
+    shaping = (
+        "mass", "inertia", "roll_inertia", "pitch_inertia", "base", "track", "cog", "height",
+        "spring", "damper", "hub", "radius", "step",
+    )  # fmt: skip
+    data = None
+
+    def _build(self, numbers):
+        before, s = self.data, self.state[0]
         self.places = _geometry(numbers)
         self.model = _model(numbers, self.places)
         self.data = mujoco.MjData(self.model)
-        cos, sin = math.cos(pose[2]), math.sin(pose[2])
-        self.data.qpos[:2] = pose[0] + numbers["cog"] * cos, pose[1] + numbers["cog"] * sin
-        self.data.qpos[3:7] = math.cos(0.5 * pose[2]), 0.0, 0.0, math.sin(0.5 * pose[2])
-
-    def command(self, k, throttle, steering):
-        """Give command `k`, drive until the next one is due, and return the new rows."""
-        self.throttle[k], self.steering[k] = throttle, steering
-        count = motion.ROWS_PER_COMMAND
-        out = np.empty((count, len(motion.ROW)))
-        for row in range(count):
-            self._row(k * count + row, out[row])
-        return out
+        if before is not None:
+            self.data.qpos[:], self.data.qvel[:] = before.qpos, before.qvel
+        else:
+            yaw = 0.5 * s["yaw"]
+            self.data.qpos[3:7] = math.cos(yaw), 0.0, 0.0, math.sin(yaw)
+        cos, sin = math.cos(s["yaw"]), math.sin(s["yaw"])
+        self.data.qpos[:2] = s["x"] + numbers["cog"] * cos, s["y"] + numbers["cog"] * sin
 
     def _row(self, row, out):
         qpos, qvel, forces = self.data.qpos, self.data.qvel, self.data.qfrc_applied
@@ -175,11 +148,5 @@ class Moving:
                 self.throttle, self.steering, self.shake,
             )  # fmt: skip
             mujoco.mj_step(self.model, self.data)
-        s, gain = self.state[0], (qvel[:2] - before) / step
-        _see(self.numbers[0], s, qpos, qvel)
-        middle = s["yaw"] - 0.5 * step * s["yaw_rate"]
-        cos, sin = math.cos(middle), math.sin(middle)
-        out[:4] = (row + 1) * ROW_S, *motion.under_axle(self.numbers[0], s), s["yaw"]
-        out[4:7] = s["vx"], s["vy"], s["yaw_rate"]
-        out[7:9] = cos * gain[0] + sin * gain[1], cos * gain[1] - sin * gain[0]
-        out[9:11] = self.wheels[2, 1], self.wheels[3, 1]
+        see(self.numbers[0], self.state[0], qpos, qvel)
+        self._note(row, out, (qvel[:2] - before) / step, step)

@@ -201,11 +201,13 @@ def slowed(c, held, spin, inertia, damping, dry):
 
 
 @njit(cache=True)
-def spin_wheel(c, wheels, i, u, slow, load, grip, v_long, v_lat, rolling):
-    """Advance one wheel; return the floor's forces on it, along and across [N]."""
+def turn_shaft(c, wheels, i, u, slow, load, rolling):
+    """Return what turns one wheel beside the floor's force along it, and its inertia.
+
+    That is a torque, what it loses per speed, dry friction [N*m]; then the motor's share of the
+    torque and of what it loses.
+    """
     omega, driven = wheels[i, 0], i > 1 or c.front_driven > 0.0
-    still = max(abs(v_long), c.slow)
-    side = side_slip(c, wheels, i, v_long, v_lat, still)
     dry, inertia, torque, damping = rolling * load * c.radius, c.spin_inertia, 0.0, c.damping
     current, loss = 0.0, 0.0
     if driven:
@@ -221,6 +223,16 @@ def spin_wheel(c, wheels, i, u, slow, load, grip, v_long, v_lat, rolling):
         turn = omega / STICTION_FADE
         dry += c.coulomb + c.stiction * math.exp(-turn * turn) + (c.hold if slow else 0.0)
         dry += c.stribeck * math.exp(-abs(turn))
+    return torque, damping, dry, inertia, current, loss
+
+
+@njit(cache=True)
+def spin_wheel(c, wheels, i, u, slow, load, grip, v_long, v_lat, rolling):
+    """Advance one wheel; return the floor's forces on it, along and across [N]."""
+    omega = wheels[i, 0]
+    still = max(abs(v_long), c.slow)
+    side = side_slip(c, wheels, i, v_long, v_lat, still)
+    torque, damping, dry, inertia, current, loss = turn_shaft(c, wheels, i, u, slow, load, rolling)
     new = omega
     for _ in range(2):
         slip = (c.radius * new - v_long) / still

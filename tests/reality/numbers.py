@@ -1,5 +1,6 @@
 """The numbers of a car: read from its nominal file, then scattered as real cars are."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -106,3 +107,25 @@ def scattered(numbers: dict[str, float], rng: np.random.Generator) -> dict[str, 
     factors = {name: 1.0 + spread * rng.standard_normal() for name, spread in SCATTER.items()}
     factors |= {name: factors[leader] for name, leader in TOGETHER.items()}
     return {name: value * factors.get(name, 1.0) for name, value in numbers.items()}
+
+
+def file_of(car: str, stated: dict[str, float | str], terms: dict[str, str]) -> str:
+    """Return the text of a nominal car's file that states other values, and terms in place of some.
+
+    Raises:
+        ValueError: when the file has no such value.
+    """
+    text = (TYPES / f"{car}.toml").read_text(encoding="utf-8")
+    for term, other in terms.items():
+        text = text.replace(f'"{term}"', f'"{other}"', 1)
+    for key, value in stated.items():
+        section, _, entry = key.partition(".")
+        head, name, tail = text.partition(f"[{section}]")
+        written = f'"{value}"' if isinstance(value, str) else f"{value:.6g}"
+        place = re.compile(rf"^({entry}\s*= {{ value = )[^,]*", re.MULTILINE)
+        tail, count = place.subn(rf"\g<1>{written}", tail, count=1)
+        if not count:
+            msg = f"{car}.toml: no {key}"
+            raise ValueError(msg)
+        text = head + name + tail
+    return text

@@ -9,6 +9,7 @@ from tests.reality.changing import Changing, at
 from tests.reality.driver import DRIVERS
 from tests.reality.family import USUAL
 from tests.reality.motion import COMMAND_S, ROW_S, Moving
+from tests.reality.numbers import file_of, nominal
 from tests.reality.routes import TEMPERS, draw_route, draw_speeds
 from tests.reality.sensing import POSE_STD, YAW_STD, Camera, encoders, inertial, stated_std
 
@@ -79,6 +80,7 @@ def record(car, numbers, faults, duration, rng, moving=Moving, family=USUAL):
     first, second = route.points[0], route.points[3]
     start = (*first, np.arctan2(*(second - first)[::-1]))
     camera = Camera(faults, car, duration, rng, family)
+    least = -1.0 if moving is Moving else moving.least_throttle
     shake = _bursts(commands, rng)
     body = moving(numbers, start, commands, shake)
     rows = np.empty((round(duration / ROW_S), 11))
@@ -88,6 +90,7 @@ def record(car, numbers, faults, duration, rng, moving=Moving, family=USUAL):
         for stamp, pose in camera.look(rows[:done], start, t):
             driver.look(stamp, pose)
         throttle, steering = np.round(driver.act(k), 5)
+        throttle = max(throttle, least)
         given[k] = t, throttle, steering
         if isinstance(changing, Changing):
             body.become(changing.at(t))
@@ -126,9 +129,16 @@ TABLES = (
 FILES = {"commands": "commands.csv", "poses": "pose.csv", "encoders": "encoders.csv"}
 
 
-def write(drive, car, numbers, folder: Path):
-    """Write a drive as a recording that says nothing of what is concealed."""
+def write(drive, car, numbers, folder: Path, moving=Moving):
+    """Write a drive as a recording that says nothing of what is concealed.
+
+    Where the engine's nominal car is not that of the car's file, `car.toml` beside it says which.
+    """
     folder.mkdir(parents=True, exist_ok=True)
+    stated = {} if moving is Moving else moving.stated(nominal(car))
+    if stated:
+        text = file_of(car, stated, moving.terms)
+        (folder / "car.toml").write_text(text, encoding="utf-8")
     for name, header, form in TABLES:
         if getattr(drive, name) is None:
             continue
@@ -136,7 +146,8 @@ def write(drive, car, numbers, folder: Path):
         np.savetxt(path, getattr(drive, name), form, ",", header=header, comments="")
     text = HEAD + ENCODERS * (drive.encoders is not None) + IMU * (drive.imu is not None)
     text = text.format(
-        car=car, pose=drive.noise * POSE_STD[car], yaw=drive.noise * YAW_STD,
+        car="car.toml" if stated else car,
+        pose=drive.noise * POSE_STD[car], yaw=drive.noise * YAW_STD,
         accel=numbers["accel_noise"], gyro=numbers["gyro_noise"],
     )  # fmt: skip
     (folder / "recording.yaml").write_text(text, encoding="utf-8")

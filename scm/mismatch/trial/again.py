@@ -133,7 +133,8 @@ def compare(case: Case, label: Label, folder: Path) -> Ratio | None:
     if not label.names or not patched.is_file() or not case.again.is_dir():
         return None
     recording = read_recordings(case.again)[0]
-    base = _ready(load_car(label.car))
+    own = case.again / "car.toml"  # of an engine whose nominal car is another one
+    base = _ready(load_car(own if own.is_file() else label.car))
     nominal = error(recording, base)
     found = error(recording, on(base, load_car(patched)))
     cars = true_cars(base, label)

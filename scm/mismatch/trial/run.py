@@ -34,7 +34,7 @@ KINDS = (
     "mixed", "single", "none", "pair", "unlisted", "dependent", "placed", "step", "ramp",
     "shuffled", "other_car",
 )  # fmt: skip
-ENGINES = ("own", "mujoco")
+ENGINES = ("own", "mujoco", "commonroad", "pybullet")
 FAMILIES, HALVES = ("own", "drawn"), ("develop", "judge")
 DIAGNOSIS, BROKEN = "diagnosis.json", "failed.txt"
 Diagnose = Callable[[Path, Path], Diagnosis]
@@ -206,7 +206,8 @@ def make_cases(request: CaseRequest, out: Path, notify: Callable[[int], None]) -
         if running.stdout is None or running.stderr is None:
             return
         for line in running.stdout:
-            notify(int(line.split()[0]))
+            if line[:1].isdigit():  # engines of other people say things, too
+                notify(int(line.split()[0]))
         words = running.stderr.read()
     if running.returncode:
         last = words.strip().splitlines()[-1:] or ["no words"]
