@@ -5,7 +5,7 @@ Streams keep the times and values of the recording; nothing is resampled.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,13 @@ from scm.data_quality.quality import Span
 from scm.recording.motion import forward, pose_point
 from scm.recording.read import Recording
 from scm.replay.commands import Commanded, Commands
+from scm.replay.correlated_noise import (
+    MAD,
+    WHITE_NOISE,
+    Correlated,
+    correlated_noise,
+    roughness,
+)
 from scm.replay.smooth import Smooth, smooth
 from scm.vehicles.car import Car
 from scm.vehicles.drive_channel import COMMANDED_SPEEDS
@@ -39,7 +46,6 @@ ODOMETERS = ("speed", "velocity.x")  # best first
 SLIP = 0.03  # of the speed: wheels that count it slip, and their tyres grow
 LARGEST_SCALE = 1.6  # of an odometer against the poses: beyond, it is another unit or another car
 FEWEST_ROWS, SMOOTHED_ROWS = 20, 4.0  # to tell its scale by, and those that share their noise
-_MAD = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +56,7 @@ class Stream:
         t: (n,), rising [s].
         values: (n,), SI; encoders in counts.
         std: Of the noise of one value, stated or estimated.
+        correlated: How much of the noise lasts from value to value.
         taps: When the samples were taken whose mean a value is, (n, samples) [s].
         unsure: Further standard deviation of each value, where the channel leaps, (n,).
     """
@@ -60,12 +67,22 @@ class Stream:
     std: float
     taps: Floats
     unsure: Floats
+    correlated: Correlated = WHITE_NOISE
+
+    @property
+    def slow_std(self) -> float:
+        """Of white noise that leaves a slow motion as unsure."""
+        return self.std * self.correlated.inflation(float(np.median(np.diff(self.t))))
+
+    def drawn(self, t: Floats, rng: np.random.Generator) -> Floats:
+        """Return noise such as this channel has, at given times, (n,)."""
+        return self.std * self.correlated.drawn(t, rng)
 
     def within(self, first: float, last: float) -> "Stream":
         """Return the values taken between two times."""
         keep = (self.taps[:, 0] >= first) & (self.taps[:, -1] <= last)
-        return Stream(self.name, self.t[keep], self.values[keep], self.std, self.taps[keep],
-                      self.unsure[keep])  # fmt: skip
+        return replace(self, t=self.t[keep], values=self.values[keep], taps=self.taps[keep],
+                       unsure=self.unsure[keep])  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +131,7 @@ class Drive:
         commands = Commands(recording, car)
         throttle, steering = commands.rows
         names = [name for name in KNOWN if name in recording.channels and _can_predict(car, name)]
-        streams = [_stream(recording, name) for name in names]
+        streams = _with_correlation([_stream(recording, name) for name in names], recording)
         self.point = pose_point(recording)
         poses = [recording.channel(name).t for name in POSES]
         begin = max(float(t[0]) for t in poses)
@@ -144,7 +161,7 @@ class Drive:
     @cached_property
     def smoothed(self) -> dict[str, Smooth]:
         """The poses, smoothed without a car model, of the point that was measured."""
-        return {name: smooth(s.t, s.values, s.std) for name, s in self._poses.items()}
+        return {name: smooth(s.t, s.values, s.slow_std) for name, s in self._poses.items()}
 
     @cached_property
     def pose_speed(self) -> Floats:
@@ -171,7 +188,7 @@ class Drive:
         scale = float(np.median(ratio))
         if not 1.0 / LARGEST_SCALE < scale < LARGEST_SCALE:
             return None
-        spread = _MAD * float(np.median(np.abs(ratio - scale)))
+        spread = MAD * float(np.median(np.abs(ratio - scale)))
         rows = min(going.sum(), going.mean() * len(x.t)) / SMOOTHED_ROWS
         unsure = math.hypot(SLIP, spread / math.sqrt(max(rows, 1.0)))
         return Odometer(smoothed, scale, unsure, scale * usual)
@@ -249,10 +266,17 @@ def _can_predict(car: Car, name: str) -> bool:
 def _stream(recording: Recording, name: str) -> Stream:
     channel = forward(recording, name)
     values = np.unwrap(channel.values) if name == "pose.yaw" else channel.values
-    std = channel.std or _roughness(values)
+    std = channel.std or roughness(values)
     if name.startswith("encoder."):
         std = max(std if channel.std else 0.0, 0.4)  # a count is a count
     return _thinned(name, channel.t, values, std)
+
+
+def _with_correlation(streams: Sequence[Stream], recording: Recording) -> list[Stream]:
+    """Return streams, poses with what of their noise lasts where its size is stated."""
+    poses = [s for s in streams if s.name in POSES and recording.channels[s.name].std]
+    noise = correlated_noise([(s.t, s.values, s.std) for s in poses])
+    return [replace(s, correlated=noise) if any(s is one for one in poses) else s for s in streams]
 
 
 def _thinned(name: str, t: Floats, values: Floats, std: float) -> Stream:
@@ -280,10 +304,3 @@ def _leaps(values: Floats, std: float) -> Floats:
     padded = np.pad(values, 1, mode="edge")
     around = np.stack((padded[:-2], values, padded[2:]))
     return np.asarray(LEAP * np.maximum(np.ptp(around, axis=0) - 4.0 * std, 0.0))
-
-
-def _roughness(values: Floats) -> float:
-    """Return the noise that a channel's third differences show, whose median motion is slow."""
-    jumps = np.diff(values, 3)
-    moving = jumps[jumps != 0.0] if np.any(jumps) else jumps
-    return max(_MAD * float(np.median(np.abs(moving))) / math.sqrt(20.0), 1e-6)

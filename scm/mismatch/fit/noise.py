@@ -16,7 +16,9 @@ from scm.vehicles.fleet_rows import pool
 if TYPE_CHECKING:
     from scm.mismatch.fit.likelihood import Likelihood
 
-ALIKE, ABRUPT = 0.003, 0.1
+ALIKE = 0.003
+LAUNCH, TURN = 0.03, 0.05  # healthy cars of many unlike equations: 0.005 and 0.04 at most
+MUCH = 0.1  # of either: a real car's
 JOLTS = 0.05
 LASTS_S = 2.0
 MAX_LOW_NOISE = 3.0  # times the least noise: beyond that, noise may hide what is searched for
@@ -68,7 +70,7 @@ def lowered(noise: Noise, drives: Sequence[Drive]) -> Noise:
 def usual_noise(drives: Sequence[Drive]) -> Noise:
     """Return the least that any car model is off: 0.3 % of the usual speed and turning.
 
-    A launch leaves a tenth of a throttle leap's speed open, a steering leap a tenth of its turning.
+    A launch leaves 2 % of a throttle leap's speed open, a steering leap 5 % of its turning.
     It is never less: two simulators of the same car differ by as much.
     """
     speeds = [drive.pose_speed for drive in drives]
@@ -85,8 +87,19 @@ def usual_noise(drives: Sequence[Drive]) -> Noise:
     scale = dict.fromkeys(drives[0].names, 1.0)
     return Noise(
         ALIKE * fast, ALIKE * fast, ALIKE * turning, own, scale, lasts_s=LASTS_S,
-        launch=ABRUPT * fast, turn=ABRUPT * turning,
+        launch=LAUNCH * fast, turn=TURN * turning,
     )  # fmt: skip
+
+
+def doublings(noise: Noise, drives: Sequence[Drive]) -> float:
+    """Return how often the least disturbances were doubled, summed over their kinds.
+
+    Of launches and steering leaps only what is much.
+    """
+    least = usual_noise(drives)
+    found = [getattr(noise, k) / getattr(least, k) for k in ("speed", "side", "yaw_rate")]
+    found += [noise.launch / least.launch * LAUNCH / MUCH, noise.turn / least.turn * TURN / MUCH]
+    return float(np.log2(np.maximum(found, 1.0)).sum())
 
 
 def fit_noise(

@@ -1,9 +1,10 @@
 """What is left of the measurements after a prediction, weighed: innovations of a Kalman filter.
 
 The filter allows for slow disturbances of speed, side speed and yaw rate that all channels share,
-and of each wheel or accelerometer alone (first-order Gauss-Markov). It is linear and its gains do
-not depend on the prediction, so one pass weighs the residuals of many parameter sets: innovations
-are independent of unit variance where the prediction is right, and no derivative is ever taken.
+of each wheel or accelerometer alone, and for noise of poses that lasts (all first-order
+Gauss-Markov). It is linear and its gains do not depend on the prediction, so one pass weighs the
+residuals of many parameter sets: innovations are independent of unit variance where the prediction
+is right, and no derivative is ever taken.
 """
 
 from collections.abc import Sequence
@@ -63,11 +64,14 @@ def _system(drive: Drive, noise: Noise) -> _System:
         return len(lasts) - 1
 
     for s in drive.streams:
-        variance.append((s.std * noise.scale.get(s.name, 1.0)) ** 2)
+        lasting = s.correlated.share * s.std**2
+        variance.append((s.std * noise.scale.get(s.name, 1.0)) ** 2 - lasting)
         own = noise.own.get(s.name, 0.0)
         left = 1.0 if s.name.endswith(("left", "fl", "rl")) else -1.0
         if s.name in POSES:
             see.append({POSES[s.name]: 1.0})
+            if lasting:
+                see[-1][add(s.correlated.lasts_s, lasting**0.5, lasting**0.5)] = 1.0
         elif s.name in RATES:
             see.append({RATES[s.name]: 1.0, add(noise.lasts_s, own, own): 1.0})
         elif s.name.startswith("encoder."):

@@ -20,7 +20,7 @@ from scm.mismatch.findings import Equation
 from scm.mismatch.fit.data_split import Parts, split
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood, Simulator
-from scm.mismatch.fit.noise import Noise, lowered, usual_noise
+from scm.mismatch.fit.noise import Noise, doublings, lowered
 from scm.mismatch.fit.residual_windows import WindowedLikelihood, fit_sizes
 from scm.mismatch.select.confirm import prune, without_each
 from scm.mismatch.select.round import Context, Round, extend, fit_with_noise
@@ -169,19 +169,12 @@ def strays(model: Likelihood) -> bool:
 
     That is so where the least disturbances had to be doubled very often to explain it.
     """
-    return doublings(model) >= MANY_DOUBLINGS
+    return doublings(model.noise, model.drives) >= MANY_DOUBLINGS
 
 
 def is_far(retuned: Hypothesis) -> bool:
     """Return whether a re-tuned car is so far off that one effect at a time would not do."""
-    return doublings(retuned.model) >= FAR_DOUBLINGS
-
-
-def doublings(model: Likelihood) -> float:
-    """Return how often the least disturbances were doubled, summed over their kinds."""
-    now, least = model.noise, usual_noise(model.drives)
-    kinds = ("speed", "side", "yaw_rate", "launch", "turn")
-    return float(sum(np.log2(getattr(now, k) / getattr(least, k)) for k in kinds))
+    return doublings(retuned.model.noise, retuned.model.drives) >= FAR_DOUBLINGS
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,10 +33,11 @@ from scm.mismatch.usable_data import titles_of
 from scm.mismatch.validate.curves import curve, discovered_curves
 from scm.mismatch.validate.explain import effect_of, refitted, undecided_of, widened_of
 from scm.mismatch.validate.found_car import CarFiles, as_written, on
-from scm.mismatch.validate.free_runs import MAX_NOISE_RATIO, judge
+from scm.mismatch.validate.free_runs import MAX_NOISE_RATIO, alike_within, judge
 from scm.mismatch.validate.locate import locate, since_changes, strayed
 from scm.mismatch.validate.never_worse import (
     GIVEN,
+    LIKE_OTHER_EQUATIONS,
     POSE,
     RETUNED,
     dropped,
@@ -110,7 +111,9 @@ def conclude(selected: Selected, notify: Notify) -> Result:
     located = since_changes(located, effects, float(selected.drives[0].edges[-1]))
     suggestions = () if selected.context.by_windows else undecided_of(selected, best, notify)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
-    verdict = Verdict.MISMATCH if valid.failure else verdict_of(effects, undecided, fit)
+    verdict = Verdict.MISMATCH
+    if not valid.failure:
+        verdict = verdict_of(effects, undecided, fit, valid.free_runs)
     if verdict is Verdict.MISMATCH and not effects and fit and valid.free_runs:
         located = strayed(valid.free_runs, fit)
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
@@ -216,10 +219,10 @@ def _as_near_without(
     stages: Sequence[Stage],
     beside: Fit | None,
 ) -> tuple[Hypothesis, list[Dropped]] | None:
-    """Return a hypothesis without its weakest effect of the car, if that brings it no nearer.
+    """Return a hypothesis without its weakest effect that two simulators of one car may differ by.
 
-    Two simulators' equations of the same car differ in what sensors feel by more than noise, and
-    hardly in where the car goes.
+    If it brings the car no nearer: other equations of the same parts change what sensors feel by
+    more than noise, and hardly where the car goes.
 
     Args:
         selected: What was selected.
@@ -228,9 +231,9 @@ def _as_near_without(
         stages: Of its car.
         beside: Of the re-tuned car and this one.
     """
-    if selected.context.by_windows or not any(map(_is_of_car, best.effects)):
+    if selected.context.by_windows or not any(map(_may_be_an_equation, best.effects)):
         return None
-    fewer, lost = _with_fewer(selected, best, _is_of_car)
+    fewer, lost = _with_fewer(selected, best, _may_be_an_equation)
     if fewer.effects:
         beside = _judged(selected, _written(selected, files, fewer)[1], stages)[0]
     if beside is None or is_nearer(beside):
@@ -238,8 +241,12 @@ def _as_near_without(
     return fewer, useless(lost, beside)
 
 
-def _is_of_car(effect: Candidate) -> bool:
-    return effect.equation is not Equation.SENSOR
+def _may_be_an_equation(effect: Candidate) -> bool:
+    """Return whether an effect may stand for another equation of the same healthy part."""
+    if effect.equation is Equation.SENSOR:
+        return False
+    of_part = effect.equation is Equation.TYRE or effect.name in LIKE_OTHER_EQUATIONS
+    return of_part or is_discovered(effect)
 
 
 def _handed_out(selected: Selected, files: CarFiles, valid: _Validated) -> _Validated:
@@ -333,14 +340,26 @@ def as_given(context: Context, best: Hypothesis) -> Hypothesis:
 
 
 def verdict_of(
-    effects: Sequence[Effect], undecided: Sequence[Undecided], fit: Fit | None
+    effects: Sequence[Effect],
+    undecided: Sequence[Undecided],
+    fit: Fit | None,
+    free_runs: FreeRuns | None,
 ) -> Verdict:
     """Return the verdict; a car that strays for no cause that was tried is a mismatch too."""
     if undecided:
         return Verdict.UNDECIDED
-    after, floor = (fit.confirm.after, fit.confirm.noise_floor) if fit else ({}, {})
-    strays = any(after[name] > MAX_NOISE_RATIO * floor[name] for name in POSE if name in after)
+    strays = fit is not None and free_runs is not None and _strays(fit, free_runs)
     return Verdict.MISMATCH if effects or strays else Verdict.NONE
+
+
+def _strays(fit: Fit, free_runs: FreeRuns) -> bool:
+    """Return whether a car strays by more than noise and two simulators of the same car do."""
+    part, alike = fit.confirm, alike_within(free_runs)
+    return any(
+        part.after[name] > MAX_NOISE_RATIO * math.hypot(part.noise_floor[name], alike[name])
+        for name in POSE
+        if name in part.after
+    )
 
 
 def _curves(selected: Selected, best: Hypothesis) -> tuple[Curve, ...]:

@@ -105,6 +105,7 @@ DRAWS = 2
 START_DIGITS = 6  # of a window's start in a report [s]: whoever replays it starts there too
 WORSE = 1.02
 MAX_NOISE_RATIO = 3.0  # of an error to what noise makes of it; healthy cars: 2.3 at most
+ALIKE = 0.01  # of the way and of the turn: healthy cars of unlike equations, 0.006 to 0.023
 _BEFORE, _AFTER = 0, 1
 
 
@@ -177,6 +178,16 @@ def judge(
     fit, choose, confirm = (_part(judged, name) for name in NAMES)
     errors = Fit(horizon_s=horizon, fit=fit, choose=choose, confirm=confirm)
     return errors, _free_runs(judged, on_one_axis(drives), horizon)
+
+
+def alike_within(runs: FreeRuns) -> dict[str, float]:
+    """Return the errors by which two simulators of the same car differ, by the way and the turn."""
+    x, y, yaw = (np.diff(runs.measured[name], axis=1) for name in ("x", "y", "yaw"))
+    way, turn = np.hypot(x, y).sum(axis=1), _wrapped(yaw).sum(axis=1)
+    return {
+        name: ALIKE * float(np.sqrt(np.nanmean(np.square(each))))
+        for name, each in (("position_m", way), ("yaw_rad", turn))
+    }
 
 
 def nothing_got_worse(fit: Fit) -> tuple[str, ...]:
@@ -306,9 +317,9 @@ def _draws(drive: Drive) -> Iterator[dict[str, Smooth]]:
     rng = np.random.default_rng(len(drive.edges))
     for _ in range(DRAWS):
         yield {
-            name: smooth(s.t, s.value + std * rng.standard_normal(len(s.t)), std)
+            name: smooth(s.t, s.value + stream.drawn(s.t, rng), stream.slow_std)
             for name, s in drive.smoothed.items()
-            for std in (drive.stream(name).std,)
+            for stream in (drive.stream(name),)
         }
 
 

@@ -28,6 +28,10 @@ from scm.replay.numbers import COMMAND_CLOCK, POSE_CLOCK, THROTTLE_CLOCK
 from scm.vehicles.car import Car
 
 POSE = ("position_m", "yaw_rad")
+LIKE_OTHER_EQUATIONS = {
+    "steer_lag", "steer_rate", "drive_lag", "stiction", "load_transfer", "payload",
+}  # fmt: skip
+"""What other equations of the same servo, motor, friction and suspension look like, as tyres do."""
 WORSE_THAN_WITNESS = 1.05
 NEARER = 0.95  # an error of a car that follows better, over the other one's
 NEAR_END = 0.95  # of the way to an end of a number's scatter, or to a bound

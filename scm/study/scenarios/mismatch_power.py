@@ -47,10 +47,14 @@ EFFECTS = {
     "drive_gain": Concealed("gain", 0.05),
     "payload": Concealed("mass_kg", 2.0),
     "battery_sag": Concealed("fraction_per_min", 0.06),
+    "stiction": Concealed("torque_nm", 0.02),
+    "drive_deadband": Concealed("threshold", 0.01),
+    "drive_lag": Concealed("time_constant_s", 0.02),
 }
 STEP_S, POSE_EVERY, COMMAND_EVERY = 0.01, 3, 5  # poses at 33 Hz, commands at 20 Hz
 THROTTLE, THROTTLE_COMMANDS = (0.35, 0.95), 22  # the same for 1.1 s
 STEERING, STEERING_COMMANDS = (-0.8, 0.8), 34
+REST_S = 0.8  # without throttle before each launch: the car comes to rest
 YAW_RAD_PER_M = 0.0087 / 0.002  # heading noise of a camera that has 2 mm of noise
 
 
@@ -60,6 +64,7 @@ def run(
     length_s: float = 60.0,
     pose_noise_m: float = 0.002,
     strength: float = 1.0,
+    launches: int = 0,
 ) -> dict[str, float]:
     """Return whether a diagnosis finds and names a concealed effect, and what else it reports.
 
@@ -69,16 +74,22 @@ def run(
         length_s: Of the recording.
         pose_noise_m: Standard deviation of measured positions; headings have 0.25 deg a mm of it.
         strength: Of the effect, in multiples of its amount in `EFFECTS`.
+        launches: How often the car stops and starts anew, beside its first start.
 
     Raises:
-        StudyError: when there is no such effect.
+        StudyError: when there is no such effect, or no time for so many launches.
     """
     if effect != NONE and effect not in EFFECTS:
         known = [*EFFECTS, NONE]
         msg = f"effect: no {effect!r}{nearest(effect, known)}; expected one of {', '.join(known)}"
         raise StudyError(msg)
+    if not 0 <= launches <= length_s / (2.0 * REST_S):
+        most = int(length_s / (2.0 * REST_S))
+        msg = f"launches: {launches}; expected 0 to {most} in {length_s:g} s"
+        raise StudyError(msg)
     plain = load_car(CAR)
-    recording = recorded(case, concealing(plain, effect, strength), length_s, pose_noise_m)
+    concealed = concealing(plain, effect, strength)
+    recording = recorded(case, concealed, length_s, pose_noise_m, launches)
     # Without a clock no question is left open, as with the default budget, on slow computers too.
     diagnosis = diagnose_car([recording], plain, budget=Budget()).diagnosis
     return judged(diagnosis, effect)
@@ -93,9 +104,11 @@ def concealing(car: Car, effect: str, strength: float) -> Car:
     return car.with_terms([effect], {params[name].key: neutral[name] + strength * amount})
 
 
-def recorded(case: Case, car: Car, length_s: float, pose_noise_m: float) -> Recording:
+def recorded(
+    case: Case, car: Car, length_s: float, pose_noise_m: float, launches: int = 0
+) -> Recording:
     """Return the recording of a drive: commands, and poses with noise."""
-    throttle, steering = _commands(case, length_s)
+    throttle, steering = _commands(case, length_s, launches)
     fleet = Fleet(car, 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
     driven = fleet.rollout(
@@ -139,9 +152,13 @@ def judged(diagnosis: Diagnosis, effect: str) -> dict[str, float]:
     }
 
 
-def _commands(case: Case, length_s: float) -> tuple[Floats, Floats]:
-    """Return throttle and steering of a drive, 20 a second."""
+def _commands(case: Case, length_s: float, launches: int) -> tuple[Floats, Floats]:
+    """Return throttle and steering of a drive, 20 a second; launches are spread evenly."""
     rng, k = case.generator("drive"), np.arange(round(length_s / (COMMAND_EVERY * STEP_S)))
     throttle = rng.uniform(*THROTTLE, len(k))[k // THROTTLE_COMMANDS]
     steering = rng.uniform(*STEERING, len(k))[k // STEERING_COMMANDS]
+    rest = round(REST_S / (COMMAND_EVERY * STEP_S))
+    for launch in range(launches):
+        at = round((launch + 0.5) * len(k) / launches)
+        throttle[at - rest : at] = 0.0
     return throttle, steering

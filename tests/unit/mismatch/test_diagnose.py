@@ -1,5 +1,7 @@
 """What a diagnosis says of the car as a whole."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from scm.mismatch.validate.conclude import (
     verdict_of,
 )
 from scm.mismatch.validate.found_car import patched
+from scm.mismatch.validate.free_runs import alike_within
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_drive import healthy_model, nigel
@@ -53,10 +56,19 @@ def test_numbers_that_gained_nothing_on_unseen_parts_stay_as_the_file_has_them(t
         assert value == pytest.approx(text), key  # also what no car file says
 
 
-def test_free_runs_far_beyond_noise_are_a_mismatch_without_a_name():
-    floor = made_up.fit().confirm.noise_floor["position_m"]
-    assert verdict_of((), (), made_up.fit(after=3.1 * floor)) is Verdict.MISMATCH
-    assert verdict_of((), (), made_up.fit(after=2.3 * floor)) is Verdict.NONE
+def test_free_runs_far_beyond_noise_and_what_simulators_differ_by_are_a_mismatch_without_a_name():
+    floor_m, runs = made_up.fit().confirm.noise_floor["position_m"], made_up.free_runs()
+    nowhere = replace(runs, measured={k: np.zeros_like(v) for k, v in runs.measured.items()})
+
+    def verdict(after_m, runs):
+        return verdict_of((), (), made_up.fit(after=after_m), runs)
+
+    assert verdict(3.1 * floor_m, nowhere) is Verdict.MISMATCH
+    assert verdict(2.3 * floor_m, nowhere) is Verdict.NONE
+    alike_m = alike_within(runs)["position_m"]
+    assert alike_m == pytest.approx(0.01 * 1.33, rel=0.1)  # of the way in 3 s
+    assert verdict(2.9 * np.hypot(floor_m, alike_m), runs) is Verdict.NONE
+    assert verdict(3.1 * np.hypot(floor_m, alike_m), runs) is Verdict.MISMATCH
 
 
 def test_the_drives_of_two_open_questions_lie_side_by_side(tmp_path):

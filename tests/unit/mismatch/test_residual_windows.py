@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from scm.mismatch.fit.data_split import split
-from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.fit.noise import usual_noise
+from scm.mismatch.fit.noise import LAUNCH, MUCH, TURN, doublings, usual_noise
 from scm.mismatch.fit.residual_windows import LENGTH_S, WindowedLikelihood, fit_sizes, least_sizes
 from scm.mismatch.select.round import Context
-from scm.mismatch.select.search import by_windows, doublings, select_many
+from scm.mismatch.select.search import by_windows, select_many
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 
@@ -71,11 +70,17 @@ def test_sizes_grow_with_what_is_missed_and_never_below_the_least(model, healthy
 
 
 def test_least_disturbances_are_no_doublings(healthy):
-    model = Likelihood.of([healthy], big_nigel())
-    assert doublings(model) == pytest.approx(0.0)
     noise = usual_noise([healthy])
-    noise = replace(noise, side=4.0 * noise.side)
-    assert doublings(model.under(noise)) == pytest.approx(2.0)
+    assert doublings(noise, [healthy]) == pytest.approx(0.0)
+    assert doublings(replace(noise, side=4.0 * noise.side), [healthy]) == pytest.approx(2.0)
+
+
+def test_launches_and_steering_leaps_count_only_where_they_are_off_by_a_tenth(healthy):
+    noise = usual_noise([healthy])
+    somewhat = replace(noise, launch=MUCH / LAUNCH * noise.launch, turn=MUCH / TURN * noise.turn)
+    assert doublings(somewhat, [healthy]) == pytest.approx(0.0)
+    more = replace(somewhat, launch=2.0 * somewhat.launch, turn=4.0 * somewhat.turn)
+    assert doublings(more, [healthy]) == pytest.approx(3.0)
 
 
 def test_two_effects_are_found_in_one_round():

@@ -153,3 +153,27 @@ def test_an_effect_that_is_not_there_is_refused(tmp_path):
     assert row.outcome == "error"
     assert "no 'steer_trm' (did you mean 'steer_trim'?)" in row.detail
     assert StudyError.__name__ in row.detail
+
+
+def test_a_car_comes_to_rest_before_each_launch(monkeypatch, tmp_path):
+    given = []
+
+    def diagnosed(recordings, car, *, budget):
+        given.append(recordings[0])
+        return Result(diagnosis(), car, None)
+
+    monkeypatch.setattr(mismatch_power, "diagnose_car", diagnosed)
+    factors = {"effect": '"none"', "length_s": 20.0, "pose_noise_m": 0.001, "launches": 4}
+    study("mismatch_power", tmp_path, factors).run(0)
+    throttle, x, y = (given[0].channel(name) for name in ("command.throttle", "pose.x", "pose.y"))
+    launched = np.flatnonzero((throttle.values[:-1] == 0.0) & (throttle.values[1:] > 0.0))
+    assert len(launched) == 4
+    for t in throttle.t[launched]:
+        resting = (x.t > t - 0.3) & (x.t <= t)
+        assert np.hypot(np.ptp(x.values[resting]), np.ptp(y.values[resting])) < 0.01
+
+
+def test_more_launches_than_there_is_time_for_are_refused(tmp_path):
+    row = study("mismatch_power", tmp_path, {"launches": 13, "length_s": 20.0}).run(0)
+    assert row.outcome == "error"
+    assert "launches: 13; expected 0 to 12 in 20 s" in row.detail
