@@ -54,11 +54,11 @@ def test_inflated_white_noise_leaves_a_mean_as_unsure():
 def drive():
     """Its poses have noise of 8 mm that lasts for 0.2 s beside the usual 2 mm."""
 
-    def spoiled(name, t, values):
+    def noisier(name, t, values):
         std = {"pose.x": 0.008, "pose.y": 0.008, "pose.yaw": 0.035}.get(name, 0.0)
         return values + std * Correlated(0.99, 0.2).drawn(t, np.random.default_rng(ord(name[-1])))
 
-    recording = made_drive(seconds=20.0, sense=spoiled)
+    recording = made_drive(seconds=20.0, sense=noisier)
     for name, std in (("pose.x", 0.0082), ("pose.y", 0.0082), ("pose.yaw", 0.036)):
         recording.channels[name] = replace(recording.channels[name], std=std)
     return Drive(recording, big_nigel())
