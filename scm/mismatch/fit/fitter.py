@@ -4,8 +4,9 @@ The numbers of a hypothesis' effects are free; the car's own are free too, held 
 deviations that the car file states.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,12 +19,40 @@ ROUNDS = 5
 SMALL = 0.1  # a derivative's step of a nominal parameter, in standard deviations
 SHORTER = (0.5, 0.2, 0.05)
 DAMPINGS = (0.03, 0.3)
+MET = 0.7  # of the decrease that a quadratic expects: shorter steps would hardly gain more
 FEW = 2  # fits whose trials leave room in a tile
 ENOUGH = 0.5
 SPOTS = 3  # places that an effect of some place is begun at
+CATCHES_UP = 4.0
 TAIL = 8.0  # degrees of freedom of the Student-t loss: a few wild moments prove nothing
 FARTHEST = 2.0  # prior stds: beyond, it is no longer the number of the file
 Trial = tuple[tuple[Candidate, ...], Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Race:
+    """Ends fits of a screen early: those far behind that do not catch up.
+
+    Attributes:
+        cost: Of a fit, lower is better.
+        best: The lowest cost that a fit has reached elsewhere.
+        near: Cost behind the best within which a fit goes on.
+        enough: Score by which a fit must be lowered in a round to go on.
+    """
+
+    cost: Callable[[Hypothesis], float]
+    best: float = math.inf
+    near: float = 40.0
+    enough: float = 2.0
+
+    def still_in(self, fits: Sequence[Hypothesis], lowered: Mapping[int, float]) -> list[int]:
+        """Return which fits go on, of those that the last round lowered by so much.
+
+        A fit far behind does if `CATCHES_UP` more such rounds would bring it near.
+        """
+        costs = {i: self.cost(fits[i]) for i in lowered}
+        best = min([self.best, *(self.cost(fit) for fit in fits)])
+        return [i for i, by in lowered.items() if costs[i] - best < self.near + CATCHES_UP * by]
 
 
 class Fitter:
@@ -155,7 +184,12 @@ class Fitter:
         return together(self.model.simulator.numbers(z), effects, values)
 
     def refine(
-        self, fits: Sequence[Hypothesis], rounds: int = ROUNDS, *, fresh: bool = False
+        self,
+        fits: Sequence[Hypothesis],
+        rounds: int = ROUNDS,
+        *,
+        fresh: bool = False,
+        race: "Race | None" = None,
     ) -> list[Hypothesis]:
         """Return hypotheses fitted together; those beyond physical bounds are left out.
 
@@ -163,6 +197,7 @@ class Fitter:
             fits: To begin from; a linear guess is no fit: the first round computes its true score.
             rounds: At most.
             fresh: Renew the derivatives by the car's own numbers too.
+            race: Ends fits that will not be the best; None: each goes on while it improves.
         """
         now = [
             replace(f, model=self.model, z=f.z * self._free(f.effects), score=np.inf)
@@ -170,24 +205,26 @@ class Fitter:
             if np.isfinite(f.score)
         ]
         active, stalled = list(range(len(now))), set[int]()
+        enough = race.enough if race else ENOUGH
         for count in range(rounds):
             if not active or (count and self.model.simulator.budget.is_spent()):
                 break
             renewed = [fresh and (count % 3 == 0 or i in stalled) for i in active]
             begun = self._differentiated([now[i] for i in active], renewed)
-            going, stalled = list[int](), set()
+            going, stalled = dict[int, float](), set()
             for i, before, after, new in zip(
                 active, begun, self._stepped(begun), renewed, strict=True
             ):
                 now[i] = after
                 if not np.isfinite(before.score):
                     continue
-                ends = before.score - after.score < ENOUGH
+                lowered = before.score - after.score
+                ends = lowered < enough
                 if ends and fresh and not new:  # by derivatives that were not new: no proof yet
                     stalled.add(i)
                 if not ends or i in stalled:
-                    going.append(i)
-            active = going
+                    going[i] = lowered
+            active = race.still_in(now, going) if race else list(going)
         return now
 
     def _differentiated(
@@ -270,28 +307,46 @@ class Fitter:
         return _Plan(replace(f, covariance=covariance), normal, slope, low, high, scales)
 
     def _stepped(self, fits: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return each fit moved along its Gauss-Newton step, by the best of a few lengths."""
+        """Return each fit moved along its Gauss-Newton step.
+
+        Of a few fits, or where the whole step lowers the score less than its quadratic says, the
+        best of several lengths and dampings counts.
+        """
         plans = {i: self._plan(f) for i, f in enumerate(fits) if np.isfinite(f.score)}
-        if not plans:
-            return list(fits)
         best = [plans[i].start if i in plans else f for i, f in enumerate(fits)]
-        moved = [
-            (i, *plan.moved(move))
-            for i, plan in plans.items()
-            for move in (plan.whole, *plan.others())
+        few = len(plans) <= FEW  # a tile has room: drive all lengths and the next derivatives too
+        first = [
+            (i, move) for i, plan in plans.items() for move in plan.moves()[: None if few else 1]
         ]
-        sets = [self._numbers(fits[i].effects, z, values) for i, z, values in moved]
-        if len(plans) <= FEW:  # a tile has room: drive the next derivatives too, for the cache
-            for plan in plans.values():
-                sets += self._beside(plan.start, *plan.moved(plan.whole), ())
-        e, ok = self.model(sets)
+        more = [
+            numbers
+            for plan in plans.values()
+            for numbers in self._beside(plan.start, *plan.moved(plan.whole), ())
+        ]
+        self._try(plans, best, first, more if few else ())
+        short = [] if few else [i for i, plan in plans.items() if not plan.is_met(best[i])]
+        self._try(plans, best, [(i, move) for i in short for move in plans[i].moves()[1:]])
+        return best
+
+    def _try(
+        self,
+        plans: Mapping[int, "_Plan"],
+        best: list[Hypothesis],
+        moves: Sequence[tuple[int, Floats]],
+        cached: Sequence[dict[str, float]] = (),
+    ) -> None:
+        """Drive fits after moves, and `cached` for later; put those that are better into `best`."""
+        if not moves:
+            return
+        moved = [(i, *plans[i].moved(move)) for i, move in moves]
+        sets = [self._numbers(best[i].effects, z, values) for i, z, values in moved]
+        e, ok = self.model([*sets, *cached])
         for column, (i, z, values) in enumerate(moved):
             if ok[column] and np.isfinite(e[:, column]).all():
                 score = float(self.score(e[:, column : column + 1], z)[0])
                 if score < best[i].score:
                     now = e[:, column].copy()
                     best[i] = replace(best[i], score=score, z=z, values=values, innovations=now)
-        return best
 
 
 class _Plan:
@@ -311,8 +366,14 @@ class _Plan:
         self._scales = scales
         self.whole = bounded_step(normal, slope, low, high)
 
-    def others(self) -> list[Floats]:
-        """Return shorter and more damped steps."""
+    def is_met(self, after: Hypothesis) -> bool:
+        """Return whether a fit after the whole step lowered the score about as expected."""
+        whole = self.whole
+        expected = -float(2.0 * self._slope @ whole + whole @ self._normal @ whole)
+        return self.start.score - after.score > MET * expected - ENOUGH
+
+    def moves(self) -> list[Floats]:
+        """Return the whole step, then shorter and more damped ones."""
         damped = [
             bounded_step(
                 self._normal + np.diag(damping * self._normal.diagonal()), self._slope, self._low,
@@ -320,7 +381,7 @@ class _Plan:
             )
             for damping in DAMPINGS
         ]  # fmt: skip
-        return [length * self.whole for length in SHORTER] + damped
+        return [self.whole, *(length * self.whole for length in SHORTER), *damped]
 
     def moved(self, move: Floats) -> tuple[Floats, Floats]:
         """Return the numbers after a move."""

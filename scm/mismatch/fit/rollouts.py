@@ -178,10 +178,12 @@ class Rollouts:
         fleet = tiles.fleets[thread]
         n, edges, tether = len(sets), self.drive.edges, _Tether(fleet)
         delays = self._set(fleet, tiles.columns, sets)
-        changing = _Changing(fleet, tiles.columns, delays, list(changes_in(sets)))
+        starts = range(0, len(edges) - 1, TETHER_STEPS)
+        stretches = edges[[*starts, len(edges) - 1]]
+        changing = _Changing(fleet, tiles.columns, delays, list(changes_in(sets)), stretches)
         following = _Following(fleet, tiles, self._followed, list(dependences_in(sets)))
         every = FOLLOWED_STEPS if following else TETHER_STEPS
-        changing.set(edges[0], edges[0])
+        changing.set(-1)
         parts = tether.parts
         self._begin(fleet, n, delays, parts)
         changes = np.linspace(edges[0], edges[-1], parts * (len(edges) - 1) + 1)
@@ -189,9 +191,9 @@ class Rollouts:
         for k, name in enumerate(MOTION_VARIABLES):
             out[0, k] = first[name]
         tether.roll(n, out[:0], self._turned[0])
-        for a in range(0, len(edges) - 1, TETHER_STEPS):
+        for stretch, a in enumerate(starts):
             b = min(a + TETHER_STEPS, len(edges) - 1)
-            changing.set(edges[a], edges[b])
+            changing.set(stretch)
             if self.drive.battery is not None:
                 fleet.battery[:n] = self.drive.battery[a]
             for begin in range(a, b, every):
@@ -249,12 +251,17 @@ class Rollouts:
 
 
 class _Changing:
-    """Numbers of a fleet's rows that change while they drive."""
+    """Numbers of a fleet's rows that change while they drive, by stretches between `edges`."""
 
     def __init__(
-        self, fleet: Fleet, columns: Mapping[str, int], delays: Floats, changes: Sequence[Change]
+        self,
+        fleet: Fleet,
+        columns: Mapping[str, int],
+        delays: Floats,
+        changes: Sequence[Change],
+        edges: Floats,
     ) -> None:
-        self._changes = list[tuple[Change, Floats, tuple[int, int], float]]()
+        self._each = list[tuple[Floats, tuple[int, int], Floats]]()
         for change in changes:
             late = change.key in _LATE
             place = (
@@ -263,13 +270,15 @@ class _Changing:
                 else (change.column, columns[change.key])
             )
             array = delays if late else fleet.parameters
-            self._changes.append((change, array, place, float(array[place])))
+            starts = np.append(edges[0], edges[:-1])  # before the first stretch: as it begins
+            left = 1.0 - change.done(starts, np.append(edges[0], edges[1:]))
+            numbers = float(array[place]) + left * (change.before - change.after)
+            self._each.append((array, place, numbers))
 
-    def set(self, first_s: float, last_s: float) -> None:
-        """Set the numbers to their means over a stretch of time."""
-        for change, array, place, end in self._changes:
-            left = 1.0 - float(change.done(first_s, last_s))
-            array[place] = end + left * (change.before - change.after)
+    def set(self, stretch: int) -> None:
+        """Set the numbers to their means over a stretch; -1: to those at the beginning."""
+        for array, place, numbers in self._each:
+            array[place] = numbers[stretch + 1]
 
 
 class _Following:

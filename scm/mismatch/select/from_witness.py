@@ -72,10 +72,12 @@ def from_witness(selected: Selected, bicycle: Mapping[str, float]) -> Selected |
     if not pointed:
         return None
     context.notify(f"starting again from what a bicycle shows: {', '.join(pointed)}")
-    return context.budget.attempt(Question.WITNESS, partial(_begun_again, selected, pointed))
+    begun = context.budget.attempt(Question.WITNESS, partial(_begun_again, selected, pointed))
+    return None if begun is None else _continued(*begun)
 
 
-def _begun_again(selected: Selected, pointed: Mapping[str, float]) -> Selected | None:
+def _begun_again(selected: Selected, pointed: Mapping[str, float]) -> tuple[Selected, Hypothesis]:
+    """Return a selection by residual windows, and the hypothesis that it begins from."""
     context, retuned = selected.context, selected.retuned
     if not context.by_windows:
         kernel_car = selected.car.with_terms(terms_needed(selected.car))
@@ -89,7 +91,13 @@ def _begun_again(selected: Selected, pointed: Mapping[str, float]) -> Selected |
         beside = [effect for effect in more if effect.name not in there]
         begun.append(_with(context, best, beside, pointed))
     found = [prune(context, fit_with_noise(context, one), retuned) for one in begun]
-    first = min(found, key=context.cost)
+    again = replace(selected.selection, retuned=retuned)
+    return replace(selected, context=context, selection=again), min(found, key=context.cost)
+
+
+def _continued(selected: Selected, first: Hypothesis) -> Selected | None:
+    """Return what is selected from a hypothesis on, as far as time goes."""
+    context, retuned = selected.context, selected.retuned
     selection = select_many(context, retuned, first)
     end = confirmed(context, selection.best, retuned, selected.parts.confirm.weight)
     if not end.effects:

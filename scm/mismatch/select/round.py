@@ -14,9 +14,10 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.mismatch.budget import Budget
+from scm.mismatch.changing_effect import ChangingEffect
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.findings import Equation
-from scm.mismatch.fit.fitter import FARTHEST, SPOTS, Fitter
+from scm.mismatch.fit.fitter import FARTHEST, SPOTS, Fitter, Race, Trial
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import fit_noise
@@ -26,10 +27,14 @@ from scm.mismatch.select.changes import (
     varying_to_try,
     with_best_moments,
 )
+from scm.mismatch.varying_effect import VaryingEffect
 
 MAX_REFITTED, MAX_REFITTED_FROM_NOMINAL, MAX_OTHER_STARTS = 16, 10, 6
 LAST_ROUNDS = 5, 8  # of fits that are compared: of all starts, then of the near ones
 BETTER_BASE = 5.0  # gain by an effect's nominal parameters alone that calls for another try
+MIN_REFITTED = 4
+PROMISED = 0.5  # of its penalty, what an effect must gain by a linear guess to be refitted
+BENT = 1.0  # standard deviations from its file, at which the re-tuned car may hide an effect
 FINALISTS, FINALISTS_WITHIN = 3, 100.0
 FALSE_ALARMS = 0.02  # one in fifty
 NEAR = 40.0  # score within which a fit may still become the best
@@ -210,25 +215,30 @@ def _extended(context: Context, base: Hypothesis) -> Round:
         for start in candidate.starts
     ]
     context.notify(f"trying {len(context.catalogue)} effects from {len(trials)} starts")
-    nominal = fitter.with_nominal_car(base)  # a re-tuned car bends towards what is missing
-    every = [fitter.begin(start, trials, amplified=amplifies) for start in (base, nominal)]
+    starts = [base]
+    if np.any(np.abs(base.z) > BENT):  # a re-tuned car bends towards what is missing
+        starts.append(fitter.with_nominal_car(base))
+    every = [fitter.begin(start, trials, amplified=amplifies) for start in starts]
     begun = [_best_of_each(fits, SPOTS if amplifies else 1) for fits in every]
 
     def cost(fitted: Hypothesis) -> float:
         return context.criterion(fitted) - AT_LIMIT * bool(at_limit(fitted.effects[-1], base))
 
-    near, far = (sorted(fits, key=cost)[:MAX_REFITTED] for fits in begun)
+    near, *others = (sorted(fits, key=cost)[:MAX_REFITTED] for fits in begun)
+    far = others[0][:MAX_REFITTED_FROM_NOMINAL] if others else list[Hypothesis]()
     if context.changes:
         changes = changes_to_try(context.penalty, fitter, base, every[0])
         changes += varying_to_try(context.penalty, fitter, base, every[0])
-        near += with_best_moments(fitter, _best_of_each(fitter.begin(base, changes), 1))
+        near += _best_of_each(fitter.begin(base, changes), 1)
+    near = with_best_moments(fitter, _promising(context, base, near))
     near += [f for one in near[:MAX_OTHER_STARTS] for f in next_starts(one, every[0])]
     context.notify("refitting " + ", ".join(f.names[-1] for f in near[:4]) + " ...")
     del every, begun  # they hold innovations of every start
-    near, far = (
-        _lighter(context, fitter.refine(fits, rounds=4))
-        for fits in (near, far[:MAX_REFITTED_FROM_NOMINAL])
-    )
+    near = fitter.refine(near, rounds=4, race=Race(cost, near=NEAR))
+    near += fitter.refine(_steady(fitter, base, near, cost), rounds=4)
+    race = Race(cost, min(map(cost, near), default=math.inf), NEAR)
+    far = fitter.refine(_promising(context, base, far), rounds=4, race=race)
+    near, far = _lighter(context, near), _lighter(context, far)
     ranked = sorted((_not_worse(f, base) for f in _preferred(near, far)), key=cost)
     if not ranked:
         return Round(base, (), ())
@@ -241,6 +251,36 @@ def _extended(context: Context, base: Hypothesis) -> Round:
     costs = [cost(f) + let_go(context, f, ranked, base) for f in ranked]
     order = sorted(range(len(ranked)), key=costs.__getitem__)
     return Round(base, tuple(ranked[i] for i in order), tuple(costs[i] for i in order))
+
+
+def _promising(context: Context, base: Hypothesis, fits: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Return fits that may pay by what their linear guess gains, and the best few anyhow."""
+    best = sorted(fits, key=context.criterion)[:MIN_REFITTED]
+    return [
+        f for f in fits
+        if f in best or base.score - f.score > PROMISED * context.penalty(f.effects[-1:])
+    ]  # fmt: skip
+
+
+def _steady(
+    fitter: Fitter,
+    base: Hypothesis,
+    fits: Sequence[Hypothesis],
+    cost: Callable[[Hypothesis], float],
+) -> list[Hypothesis]:
+    """Return the best effects that change or vary as constant ones, begun as they are in the end.
+
+    The constant effect is the simpler one, and may lie beyond where its own starts lead.
+    """
+    ranked = sorted(fits, key=cost)
+    trials = dict[int, Trial]()
+    for fitted in ranked[:MIN_REFITTED]:
+        effect = fitted.effects[-1]
+        if isinstance(effect, ChangingEffect | VaryingEffect):
+            count = len(base.values) + len(effect.of.parameters)
+            trial = (*base.effects, effect.of), fitted.values[:count]
+            trials.setdefault(id(effect.of), trial)
+    return fitter.begin(base, list(trials.values()))
 
 
 def _lighter(context: Context, fits: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -219,6 +219,9 @@ def select_many(
 ) -> Selection:
     """Return the hypothesis that explains the recordings best, with several effects a round.
 
+    A round that the budget ends before its effects are fitted counts for nothing; later, only what
+    it had left to take back.
+
     Args:
         context: What to work with.
         retuned: The car with its own numbers refitted alone.
@@ -228,25 +231,28 @@ def select_many(
     while len(found.best.effects) < MAX_EFFECTS_BY_WINDOWS:
         question = question_beside(found.best)
         more = context.budget.attempt(question, partial(_round_of_many, context, found))
-        if more is None or set(more.best.names) <= set(found.best.names):
+        if more is None or more is found:
+            break
+        attempt = partial(context.budget.attempt, Question.FURTHER)
+        pruned = attempt(partial(prune, context, more.best, more.retuned))
+        more = replace(more, best=pruned or more.best)
+        before = set(found.best.names)
+        for rare in (e for e in more.best.effects if e.rare and e.name not in before):
+            more = attempt(partial(without_rare, context, more, rare)) or more
+        if set(more.best.names) <= before:
             break
         found = more
     return found
 
 
 def _round_of_many(context: Context, found: Selection) -> Selection:
-    """Return the selection after one round more; the same where no effect pays."""
+    """Return the selection with all effects that pay, needless ones too; the same if none does."""
     best = found.best
     tried = _beside_each_other(context, _compared(context, extend(context, best)))
     if not tried:
         return found
-    more = _joined(best, [one.alternatives[0] for one in tried])
-    more = prune(context, fit_with_noise(context, more), found.retuned)
-    found = replace(found, best=more, rounds=(*found.rounds, *tried))
-    new = [effect for effect in more.effects if effect.rare and effect.name not in best.names]
-    for rare in new:
-        found = without_rare(context, found, rare)
-    return found
+    more = fit_with_noise(context, _joined(best, [one.alternatives[0] for one in tried]))
+    return replace(found, best=more, rounds=(*found.rounds, *tried))
 
 
 def without_rare(context: Context, found: Selection, rare: Candidate) -> Selection:

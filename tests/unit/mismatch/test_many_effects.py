@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scm.mismatch.budget import OutOfTimeError
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.select import search
 from scm.mismatch.select.round import Context, Round
@@ -57,6 +58,20 @@ def test_a_rare_effect_gives_way_to_usual_ones_that_explain_more(scripted, cost,
     found = select_many(context, hypothesis())
     assert found.best.names == names
     assert {one.alternatives[0].names[-1] for one in found.rounds} >= set(names)
+
+
+@pytest.mark.parametrize("late", ["prune", "without_rare"])
+def test_effects_that_were_fitted_stay_where_time_ends_later_in_their_round(
+    scripted, monkeypatch, late
+):
+    context, _ = scripted
+
+    def out_of_time(*_):
+        raise OutOfTimeError
+
+    monkeypatch.setattr(search, late, out_of_time)
+    assert select_many(context, hypothesis()).best.names == SLOPE
+    assert [one.name for one in context.budget.unanswered] == ["further_effects"]
 
 
 def test_a_rare_effect_that_is_gone_is_not_replaced(scripted):
