@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from scm.arrays import Floats, Ints
+from scm.arrays import Bools, Floats, Ints
 from scm.vehicles.jit import array_kernel
 
 KNOTS = 64  # stored instants per car
@@ -47,20 +47,27 @@ class CommandHistory:
         for array in (self._knots, self._newest, self._before):
             array[row] = array[source]
 
-    def apply(self, block: Floats, numbers: Floats, first: int, last: int, span: float) -> None:
-        """Before a call of `span` seconds: store the commands and write the delayed ones."""
+    def apply(
+        self, block: Floats, numbers: Floats, alive: Bools, first: int, last: int, span: float
+    ) -> None:
+        """Before a call of `span` seconds: store the commands and write the delayed ones.
+
+        For a car that stands still in time, not `alive`, no time passes here either.
+        """
         _apply(
-            block, numbers, self._knots, self._newest, self._before, self.block_rows, self.columns,
-            first, last, span,
+            block, numbers, alive, self._knots, self._newest, self._before, self.block_rows,
+            self.columns, first, last, span,
         )  # fmt: skip
 
 
 @array_kernel
 def _apply(
-    block: Floats, numbers: Floats, all_knots: Floats, newest: Ints, before: Floats,
-    block_rows: Ints, columns: Ints, first: int, last: int, span: float,
+    block: Floats, numbers: Floats, alive: Bools, all_knots: Floats, newest: Ints,
+    before: Floats, block_rows: Ints, columns: Ints, first: int, last: int, span: float,
 ) -> None:  # fmt: skip
     for row in range(first, last):
+        if not alive[row]:
+            continue
         knots, top = all_knots[row], newest[row]
         here = knots[top % KNOTS]
         start = here[0]

@@ -492,7 +492,8 @@ class Fleet:
 
     def _run(self, first: int, last: int, steps: int, substep: float) -> None:
         if self._history is not None and steps > 0:
-            self._history.apply(self._block, self._numbers, first, last, steps * substep)
+            span = steps * substep
+            self._history.apply(self._block, self._numbers, self._alive, first, last, span)
         self._kernel.advance(
             self._block, self._numbers, self._alive, self._status, first, last, steps, substep
         )

@@ -116,3 +116,13 @@ def test_late_commands_reach_the_car_late():
     apart = np.abs(runs["steer_angle"][:, 0, 0] - runs["steer_angle"][:, 1, 0])
     assert apart[5] < 1e-3
     assert apart[-1] > 0.03
+
+
+def test_windows_of_a_car_that_remembers_its_commands_do_what_each_does_alone():
+    drive, late = driven(), {"drive.delay_s": 0.3, "steering.delay_s": 0.3}
+    late_car = big_nigel().with_terms(["drive_delay", "steer_delay"], late)
+    starts = np.array([[400, 650, 900]])
+    remembered = Windows(drive, late_car).run([plain(drive)], starts, 50)
+    commanded = Windows(drive, big_nigel()).run([plain(drive, late)], starts, 50)
+    for name in ("speed", "steer_angle"):
+        assert remembered[name] == pytest.approx(commanded[name], abs=4e-3)
