@@ -33,7 +33,7 @@ MAX_REFITTED, MAX_REFITTED_FROM_NOMINAL, MAX_OTHER_STARTS = 16, 10, 6
 LAST_ROUNDS = 5, 8  # of fits that are compared: of all starts, then of the near ones
 BETTER_BASE = 5.0  # gain by an effect's nominal parameters alone that calls for another try
 MIN_REFITTED = 4
-PROMISED = 0.5  # of its penalty, what an effect must gain by a linear guess to be refitted
+WORTH_A_FIT = 0.5  # of its penalty, what an effect must gain by a linear guess to be refitted
 BENT = 1.0  # standard deviations from its file, at which the re-tuned car may hide an effect
 FINALISTS, FINALISTS_WITHIN = 3, 100.0
 FALSE_ALARMS = 0.02  # one in fifty
@@ -258,7 +258,7 @@ def _promising(context: Context, base: Hypothesis, fits: Sequence[Hypothesis]) -
     best = sorted(fits, key=context.criterion)[:MIN_REFITTED]
     return [
         f for f in fits
-        if f in best or base.score - f.score > PROMISED * context.penalty(f.effects[-1:])
+        if f in best or base.score - f.score > WORTH_A_FIT * context.penalty(f.effects[-1:])
     ]  # fmt: skip
 
 
