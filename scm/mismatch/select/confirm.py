@@ -97,8 +97,8 @@ def without_one(
 
 def confirmed(
     context: Context, best: Hypothesis, retuned: Hypothesis, unseen: Floats
-) -> Hypothesis:
-    """Return the hypothesis without effects that do not help on a part that no fit has seen.
+) -> tuple[Hypothesis, tuple[str, ...]]:
+    """Return the hypothesis without effects that do not help on unseen data, and their names.
 
     Of what an effect gains where it was fitted, a share must come out there too, by length, or
     `ENOUGH_UNSEEN`; of one that pays its penalty and hardly acts there, no more than it can show.
@@ -106,17 +106,20 @@ def confirmed(
     leaves. By windows, one that the rest makes needless goes too, and intervals are wider for what
     windows share.
     """
+    denied = list[str]()
     while best.effects:
         others = without_each(context, best, retuned)
         excess = _unseen_gains(context, best, others, Fitter(best.model, unseen))
         if excess.min() > 0.0:
             break
-        best = others[int(np.argmin(excess))]
-    if not context.by_windows:
-        return best
-    best = prune(context, best, retuned)
-    share = independent_share(best.model, best.innovations)
-    return replace(best, covariance=best.covariance / share)
+        worst = int(np.argmin(excess))
+        denied.append(best.names[worst])
+        best = others[worst]
+    if context.by_windows:
+        best = prune(context, best, retuned)
+        share = independent_share(best.model, best.innovations)
+        best = replace(best, covariance=best.covariance / share)
+    return best, tuple(denied)
 
 
 def _unseen_gains(

@@ -99,11 +99,12 @@ def _continued(selected: Selected, first: Hypothesis) -> Selected | None:
     """Return what is selected from a hypothesis on, as far as time goes."""
     context, retuned = selected.context, selected.retuned
     selection = select_many(context, retuned, first)
-    end = confirmed(context, selection.best, retuned, selected.parts.confirm.weight)
+    end, denied = confirmed(context, selection.best, retuned, selected.parts.confirm.weight)
     if not end.effects:
         return None
     return replace(
-        selected, selection=replace(selection, best=end), offered=None, discovery=None,
+        selected, selection=replace(selection, best=end), denied=denied, offered=None,
+        discovery=None,
         tried=tried_of(context, selection) or selected.tried,
     )  # fmt: skip
 

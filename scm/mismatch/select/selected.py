@@ -60,6 +60,8 @@ class Selected:
         car: As given.
         context: What it worked with; it says whether the car was judged by windows.
         tried: Effects tried beside the re-tuned car.
+        denied: Names of effects that were fitted, and that unseen innovations deny.
+        unconfirmed: What was selected with them; None: none was denied.
         offered, discovery: What a discovered effect was compared with; None where there is none.
     """
 
@@ -70,6 +72,8 @@ class Selected:
     parts: Parts
     selection: Selection
     tried: tuple[Tried, ...]
+    denied: tuple[str, ...] = ()
+    unconfirmed: Hypothesis | None = None
     offered: Offered | None = None
     discovery: Discovery | None = None
 
@@ -108,8 +112,11 @@ def select_effects(nominal: Nominal) -> Selected:
     selected = _select(nominal)
     context, parts, found = selected.context, selected.parts, selected.selection
     context.notify("judging on what the fit did not see")
-    best = confirmed(context, found.best, found.retuned, parts.confirm.weight)
-    return replace(selected, selection=replace(found, best=best))
+    best, denied = confirmed(context, found.best, found.retuned, parts.confirm.weight)
+    unconfirmed = found.best if denied else None
+    return replace(
+        selected, selection=replace(found, best=best), denied=denied, unconfirmed=unconfirmed
+    )
 
 
 def _select(nominal: Nominal) -> Selected:

@@ -40,6 +40,7 @@ from scm.mismatch.validate.never_worse import (
     LIKE_OTHER_EQUATIONS,
     POSE,
     RETUNED,
+    denied,
     dropped,
     failure_sentence,
     is_behind,
@@ -54,6 +55,8 @@ from scm.mismatch.validate.residuals import on_one_axis
 from scm.mismatch.validate.stages import Stage
 from scm.mismatch.validate.witness import witness_of
 from scm.vehicles.car import Car
+
+FAR_NEARER = 0.7  # of the error without effects, which stay though innovations deny them
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +103,10 @@ class _Validated:
     failure: Failure | None = None
 
 
+_Judged = tuple[Selected, Car | None, _Validated]
+"""A selection, its re-tuned car, and what stays of it."""
+
+
 def conclude(selected: Selected, notify: Notify) -> Result:
     """Return the diagnosis of what was selected, validated, located and put into words."""
     car, titles = selected.car, titles_of(selected.recordings)
@@ -132,16 +139,16 @@ def conclude(selected: Selected, notify: Notify) -> Result:
     )  # fmt: skip
 
 
-def _nearest(
-    selected: Selected, files: CarFiles, notify: Notify
-) -> tuple[Selected, Car | None, _Validated]:
+def _nearest(selected: Selected, files: CarFiles, notify: Notify) -> _Judged:
     """Return a selection with its re-tuned car and what stays of it.
 
     Where the witness follows better, the search begins again from it, and what is nearer on the
     part that chooses is taken.
     """
     first = _with_its_cars(selected, files)
-    fit = first[2].fit
+    if selected.unconfirmed is not None:
+        first = _confirmed_by_driving(selected, selected.unconfirmed, files, first)
+    selected, fit = first[0], first[2].fit
     if fit is None or fit.witness is None or not is_behind(fit):
         return first
     again = from_witness(selected, fit.witness.numbers)
@@ -152,7 +159,25 @@ def _nearest(
     return min((first, other), key=lambda one: _chosen_m(one[2].fit))
 
 
-def _with_its_cars(selected: Selected, files: CarFiles) -> tuple[Selected, Car | None, _Validated]:
+def _confirmed_by_driving(
+    selected: Selected, unconfirmed: Hypothesis, files: CarFiles, without: _Judged
+) -> _Judged:
+    """Return a selection with the effects that innovations deny, where the car drives far nearer.
+
+    A slow force is little in innovations, for disturbances may be as slow, and much in free runs.
+    """
+    selection = replace(selected.selection, best=unconfirmed)
+    restored = replace(selected, selection=selection, denied=(), unconfirmed=None)
+    other = _with_its_cars(restored, files)
+    fit = other[2].fit
+    if fit is None or fit.retuned is None or not other[2].best.effects:
+        return without
+    name = POSE[0]
+    near = fit.confirm.after[name] < FAR_NEARER * min(fit.retuned[name], fit.confirm.before[name])
+    return other if near else without
+
+
+def _with_its_cars(selected: Selected, files: CarFiles) -> _Judged:
     _, retuned_car = _written(selected, files, selected.retuned)
     return selected, retuned_car, _validated(selected, files, retuned_car)
 
@@ -169,7 +194,7 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
     with the re-tuned or the given car: where a car moves worse, only its own numbers can be why.
     """
     best, context, given = selected.best, selected.context, selected.best.model.car
-    gone = list[Dropped]()
+    gone = denied(selected.denied)
     others = [best.model.simulator.unfitted(), selected.retuned.z]
     while True:
         effects, car = _written(selected, files, best)

@@ -103,6 +103,12 @@ def useless(names: Sequence[str], beside: Fit) -> list[Dropped]:
     ]
 
 
+def denied(names: Sequence[str]) -> list[Dropped]:
+    """Return effects that unseen data deny before any car is written."""
+    why = f"explains what was fitted, but nothing of what was measured {UNSEEN}."
+    return [Dropped(name=one, text=f"{capital(title_of(one))} {why}") for one in names]
+
+
 def unwritten(names: Sequence[str]) -> list[Dropped]:
     """Return effects that were dropped because the car with them cannot be written as a file."""
     why = "lets the car's numbers contradict one another: it could not be written as a car file."

@@ -313,3 +313,16 @@ def test_numbers_at_an_end_of_what_the_file_allows_and_clocks_at_their_bound_are
     assert reasons[0].startswith("At an end of what the car file allows: `body.mass_kg` ")
     assert "steering.rate" not in " ".join(reasons)
     assert reasons[1].startswith("At its bound: the clock of poses 6 ms")
+
+
+@pytest.mark.parametrize(("far_nearer", "names"), [(0.7, ("steer_trim",)), (0.0, ())])
+def test_effects_that_innovations_deny_stay_where_the_car_drives_far_nearer(
+    monkeypatch, plain_model, far_nearer, names
+):
+    model, retuned, best = trimmed()
+    plain_model(1.0)
+    monkeypatch.setattr(module, "FAR_NEARER", far_nearer)
+    found = replace(selected(model, retuned, retuned), denied=("steer_trim",), unconfirmed=best)
+    diagnosis = conclude(found, lambda _: None).diagnosis
+    assert tuple(effect.name for effect in diagnosis.effects) == names
+    assert tuple(one.name for one in diagnosis.dropped) == (() if names else ("steer_trim",))

@@ -240,7 +240,9 @@ def test_an_effect_stays_where_its_gain_holds_on_an_unseen_part(
     monkeypatch.setattr(confirm, "without_each", fewer)
     context = Context(1.0 - part, best.effects)
     monkeypatch.setattr(Context, "events", 8)
-    assert (confirmed(context, best, nothing, part) is best) == stays
+    found, denied = confirmed(context, best, nothing, part)
+    assert (found is best) == stays
+    assert (denied == ()) == stays
 
 
 def test_an_effect_of_two_valleys_is_begun_in_both():
