@@ -29,7 +29,7 @@ from tests.reality.sensing import FAULTS
 KINDS = ("single", "none", "pair", "unlisted")
 LAWS = {"unlisted": UNLISTED, "dependent": DEPENDENT, "placed": PLACED}
 CONTROLS = ("shuffled", "other_car")
-COURSES = ("step", "ramp")
+COURSES = ("step", "ramp", "intermittent")
 """Of one effect that changes during the drive."""
 STEADY = {"clock_drift", "unit_error", "surface_patch", "motor_fade", "battery_sag"}
 SHARES = (0.55, 0.15, 0.15, 0.15)
@@ -133,7 +133,7 @@ def make_case(
 ) -> tuple[dict, dict[str, Drive], dict[str, float]]:
     """Draw and drive one case; return its label, its drives by name and the car's numbers.
 
-    What changes in the first drive stays as it became in the second.
+    The second drive has what the first one has at its end.
 
     Args:
         families: `own`: the usual equations and sensors; or what `draw_family` draws from.
@@ -156,34 +156,54 @@ def make_case(
         numbers, faults = apply(usual, effects), apply(FAULTS, effects)
         change = _change(kind, rng)
         drives = {}
-        for name, duration in DRIVES:
-            driven, sensed = numbers, faults
-            if change and name == DRIVES[0][0]:
-                driven, sensed = (
-                    Changing(usual, numbers, *change),
-                    Changing(FAULTS, faults, *change),
-                )
+        for number, (name, duration) in enumerate(DRIVES):
+            driven, sensed = (
+                _in_drive(number, *both, change) for both in ((usual, numbers), (FAULTS, faults))
+            )
             drives[name] = record(car, driven, sensed, duration, rng, moving, family)
-        if all(_shows(drive, numbers) for drive in drives.values()) and (
-            numbers["side_gain"] == numbers["left_lag"] == 0.0 or _turns_both_ways(drives["drive"])
+        showing = dict(drives)
+        if kind == "intermittent":
+            showing = {"drive": _part(drives["drive"], change[0], change[2])}
+        if all(_shows(drive, numbers) for drive in showing.values()) and (
+            numbers["side_gain"] == numbers["left_lag"] == 0.0 or _turns_both_ways(showing["drive"])
         ):
             break
     real = {name: v for name, v in ordinary.items() if name not in lacking(moving)}
     label = _label(kind, car, effects, file_numbers | real, file_numbers, drives["drive"])
     if change:
-        label |= {"course": kind, "since_s": change[0] if kind == "step" else None}
+        label |= {"course": kind, "since_s": change[0] if kind != "ramp" else None}
+        label |= {"until_s": change[2]} if kind == "intermittent" else {}
     if families != "own":
         label["family"] = asdict(family)
     return label, drives, numbers
 
 
-def _change(kind: str, rng: np.random.Generator) -> tuple[float, float] | None:
-    """Draw when a change begins and ends; None: nothing changes."""
+def _change(kind: str, rng: np.random.Generator) -> tuple[float, ...] | None:
+    """Draw when a change begins and ends, and when it is taken back; None: nothing changes."""
     length = DRIVES[0][1]
+    if kind == "intermittent":
+        since = float(rng.uniform(0.2, 0.5)) * length
+        return since, since, since + float(rng.uniform(0.15, 0.4)) * length
     if kind == "step":
         since = float(rng.uniform(0.25, 0.75)) * length
         return since, since
     return (0.0, length) if kind == "ramp" else None
+
+
+def _in_drive(number, before, after, change):
+    """Return the numbers of the first drive, or of one that comes later."""
+    if change and number == 0:
+        return Changing(before, after, *change)
+    return before if change and len(change) > 2 else after
+
+
+def _part(drive: Drive, since: float, until: float) -> Drive:
+    """Return what a drive was between two times."""
+    rows, commands = (
+        values[(values[:, 0] >= since) & (values[:, 0] < until)]
+        for values in (drive.rows, drive.commands)
+    )
+    return replace(drive, rows=rows, commands=commands)
 
 
 def _shows(drive: Drive, numbers: dict[str, float]) -> bool:

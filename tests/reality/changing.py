@@ -1,5 +1,6 @@
-"""Numbers of a car and of its sensors that change while it drives: at a moment, or evenly."""
+"""Numbers of a car and its sensors that change while it drives: once, evenly, or for a while."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,16 +8,21 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Changing:
-    """Two sets of numbers, and when the one turns into the other [s]; both the same: a step."""
+    """Two sets of numbers, and when the one turns into the other [s]; both the same: a step.
+
+    At `back` they are as before again.
+    """
 
     before: dict[str, float]
     after: dict[str, float]
     since: float
     until: float
+    back: float = math.inf
 
     def share(self, t):
         """Return how far the change is at times, 0 to 1."""
-        return np.clip((t - self.since) / max(self.until - self.since, 1e-9), 0.0, 1.0)
+        done = np.clip((t - self.since) / max(self.until - self.since, 1e-9), 0.0, 1.0)
+        return done * (t < self.back)
 
     def at(self, t):
         """Return all numbers at a time."""

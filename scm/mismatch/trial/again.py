@@ -6,7 +6,7 @@ wheels have turned; its motion and actuators stay.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -158,6 +158,8 @@ def true_cars(base: Car, label: Label) -> list[Car]:
     """
     if label.kind == "unlisted" or not all(params_of(name)[0] for name in label.names):
         return []
+    if label.kind == "intermittent":
+        label = replace(label, names=(), parameters=())  # by then it is gone
     values = dict(label.nominal)
     values |= {"drive.axle_lock": 1.0} if base.has("drive.axle_lock") else {}
     known, faults = identifications(), dict[str, float]()

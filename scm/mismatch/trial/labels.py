@@ -12,7 +12,7 @@ from scm.mismatch.effect_catalogue import params_of
 
 SEALED = "sealed.txt"
 CONTROLS = ("shuffled", "other_car")
-COURSES = ("step", "ramp")
+COURSES = ("step", "ramp", "intermittent")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,15 +20,17 @@ class Label:
     """What was concealed in one case.
 
     Attributes:
-        kind: `single`, `none`, `pair`, `unlisted`; a single effect that changes: `step` or `ramp`;
-            or a control: `shuffled` commands of another drive, or the file of an `other_car`.
+        kind: `single`, `none`, `pair`, `unlisted`; a single effect that changes: `step`, `ramp`
+            or `intermittent`; or a control: `shuffled` commands of another drive, or the file of an
+            `other_car`.
         names: Of the effects.
         parameters: Of each effect, by public name.
         equations: That are a right answer for a law outside the library.
         needs: Variables it depends on; `allows` are as good, or harmless beside them.
         strength: Of each effect, in multiples of what can be shown at all; empty: not known.
         nominal: Numbers in which this car differs from its file, by car file key.
-        since_s: When a step was, on the recording's clock.
+        since_s: When a step was, on the recording's clock, or the effect came.
+        until_s: When it went again; None: it stayed.
         family: Value of each aspect in which the case's equations and sensors were drawn.
     """
 
@@ -43,6 +45,7 @@ class Label:
     strength: tuple[float, ...] = ()
     nominal: Mapping[str, float] = field(default_factory=dict)
     since_s: float | None = None
+    until_s: float | None = None
     family: Mapping[str, str | float] = field(default_factory=dict)
 
 
@@ -117,6 +120,7 @@ def label_of(case: str, fields: Mapping[str, Any]) -> Label:
         strength=tuple(fields.get("strength", ())),
         nominal=fields.get("ordinary", {}),
         since_s=fields.get("since_s"),
+        until_s=fields.get("until_s"),
         family=fields.get("family", {}),
     )
 

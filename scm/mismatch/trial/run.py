@@ -32,7 +32,7 @@ Notify = Callable[[str, int, int], None]
 PLACE = "tests/reality"
 KINDS = (
     "mixed", "single", "none", "pair", "unlisted", "dependent", "placed", "step", "ramp",
-    "shuffled", "other_car",
+    "intermittent", "shuffled", "other_car",
 )  # fmt: skip
 ENGINES = ("own", "mujoco", "commonroad", "pybullet")
 FAMILIES, HALVES = ("own", "drawn"), ("develop", "judge")

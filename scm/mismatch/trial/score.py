@@ -35,7 +35,8 @@ ANGLES = {"uphill_rad", "toward_rad"}
 NORMAL_95 = 1.959964
 BARS = {
     "single": "exact 90, among 97", "pair": "among 75", "unlisted": "exact 80", "none": "exact 98",
-    "step": "exact 85", "ramp": "exact 80", "shuffled": "exact 100", "other_car": "exact 100",
+    "step": "exact 85", "ramp": "exact 80", "intermittent": "exact 80",
+    "shuffled": "exact 100", "other_car": "exact 100",
 }  # fmt: skip
 MOMENT_S = 3.0  # by which a moment may be off
 CLEAR = 2.0
@@ -68,8 +69,8 @@ class Outcome:
         false_names: Reported, but not concealed.
         errors: Of every parameter found, relative to the size of its effect.
         covered: Whether each parameter's interval holds the true value.
-        late_s: By how much the moment of a step is off; None: there is none, or none was found.
-        moment_covered: Whether its interval holds the true one.
+        late_s: By how much each moment of a change is off; empty: none was concealed, or found.
+        moments_covered: Whether the interval of each holds the true one.
     """
 
     label: Label
@@ -82,8 +83,8 @@ class Outcome:
     covered: tuple[bool, ...]
     runtime_s: float
     failed: str = ""
-    late_s: float | None = None
-    moment_covered: bool = False
+    late_s: tuple[float, ...] = ()
+    moments_covered: tuple[bool, ...] = ()
 
 
 def score(label: Label, diagnosis: Diagnosis) -> Outcome:
@@ -101,12 +102,13 @@ def score(label: Label, diagnosis: Diagnosis) -> Outcome:
     nothing = diagnosis.verdict == Verdict.NONE and not names and not right
     pairs = [pair for effect in diagnosis.effects for pair in _compared(effect, label)]
     everything = len(right) == len(label.names) or _rightly_undecided(label, names, undecided)
-    since = _moment(label, diagnosis)
-    late_s = None if since is None or label.since_s is None else since.value - label.since_s
+    true = [at for at in (label.since_s, label.until_s) if at is not None]
+    moments = list(zip(_moments_of(label, diagnosis), true, strict=False))
     if label.kind in COURSES:
         everything &= _has_course(label, diagnosis)
-    if label.since_s is not None:
-        everything &= late_s is not None and abs(late_s) <= MOMENT_S
+    if true:
+        everything &= len(moments) == len(true)
+        everything &= all(abs(at.value - t) <= MOMENT_S for at, t in moments)
     return Outcome(
         label=label,
         reported=names,
@@ -117,15 +119,19 @@ def score(label: Label, diagnosis: Diagnosis) -> Outcome:
         errors=tuple(error for error, _ in pairs if error is not None),
         covered=tuple(inside for _, inside in pairs),
         runtime_s=diagnosis.runtime_s,
-        late_s=late_s,
-        moment_covered=since is not None and since.low <= (label.since_s or 0.0) <= since.high,
+        late_s=tuple(at.value - t for at, t in moments),
+        moments_covered=tuple(at.low <= t <= at.high for at, t in moments),
     )
 
 
-def _moment(label: Label, diagnosis: Diagnosis) -> Estimate | None:
-    """Return when a report has a concealed effect change; None where it gives no moment."""
-    named = (effect.since_s for effect in diagnosis.effects if effect.name in label.names)
-    return next((since for since in named if since is not None), None)
+def _moments_of(label: Label, diagnosis: Diagnosis) -> list[Estimate]:
+    """Return when a report has a concealed effect change; empty where it gives no moment."""
+    named = (
+        [at for at in (effect.since_s, effect.until_s) if at is not None]
+        for effect in diagnosis.effects
+        if effect.name in label.names
+    )
+    return next((moments for moments in named if moments), [])
 
 
 def _has_course(label: Label, diagnosis: Diagnosis) -> bool:
@@ -293,14 +299,14 @@ def _parameters(outcomes: Iterable[Outcome]) -> list[str]:
 
 
 def _moments(outcomes: Iterable[Outcome]) -> list[str]:
-    found = [(o.late_s, o.moment_covered) for o in outcomes if o.late_s is not None]
+    found = [pair for o in outcomes for pair in zip(o.late_s, o.moments_covered, strict=True)]
     if not found:
         return []
     late = np.abs([late_s for late_s, _ in found])
     near = _share(int((late <= MOMENT_S).sum()), len(found))
     inside = _share(sum(held for _, held in found), len(found))
     return [
-        f"moments of steps: {len(found)} found, off by {np.median(late):.1f} s (median), within "
+        f"moments of changes: {len(found)} found, off by {np.median(late):.1f} s (median), within "
         f"{MOMENT_S:g} s in {near}; 90 % intervals hold the true one in {inside}"
     ]
 

@@ -9,7 +9,9 @@ from scm.vehicles.car import all_terms
 from scm.vehicles.sensor_fault import all_sensor_faults
 from tests.reality import cases
 from tests.reality.cases import draw_kinds, make_case, names_for, seal, write_cases
+from tests.reality.changing import Changing
 from tests.reality.concealed import ALIKE, EFFECTS, LISTED
+from tests.reality.motion import ROW_S
 from tests.reality.numbers import nominal
 
 
@@ -27,6 +29,26 @@ def test_every_listed_name_and_parameter_is_one_of_the_librarys():
 def short(monkeypatch):
     """Let cases be drives of five seconds."""
     monkeypatch.setattr(cases, "DRIVES", (("drive", 5.0), ("again", 5.0)))
+
+
+def test_what_comes_and_goes_is_there_between_its_two_moments_only(short):
+    rng = np.random.default_rng(5)
+    label, drives, numbers = make_case("intermittent", rng, names=("encoder_loss",), car="nigel")
+    since, until, lost = label["since_s"], label["until_s"], label["parameters"][0]["fraction"]
+    assert 1.0 <= since < until <= 4.5
+    changing = Changing(nominal("nigel"), numbers | {"mass": 9.0}, since, since, until)
+    times = (since - 0.01, since + 0.01, until - 0.01, until)
+    assert [changing.at(t)["mass"] == 9.0 for t in times] == [False, True, True, False]
+    found = []
+    for drive in drives.values():
+        t, left, right = drive.encoders.T
+        counted = np.interp(t, drive.rows[:, 0], np.cumsum(np.abs(drive.rows[:, 4])) * ROW_S)
+        share = np.gradient(left + right) / np.maximum(np.gradient(counted), 1e-6)
+        moving = np.gradient(counted) > 0.5 * np.gradient(counted).max()
+        there = (t > since + 0.1) & (t < until - 0.1)
+        found += [np.median(share[moving & there]), np.median(share[moving & ~there])]
+    there, before, *again = found
+    assert [there, *again] == pytest.approx([(1 - lost) * before, before, before], rel=0.01)
 
 
 def test_half_of_the_cars_are_not_quite_as_their_file_says(short):

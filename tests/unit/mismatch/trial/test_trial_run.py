@@ -139,6 +139,13 @@ def test_the_true_car_has_the_concealed_numbers():
     assert car.value("drive.axle_lock") == 1.0
 
 
+def test_the_true_car_is_without_what_came_and_went():
+    base = load_car("nigel").with_terms(["payload"])
+    truth = label(["payload"], [{"mass_kg": 1.0}], kind="intermittent", since_s=30.0, until_s=52.0)
+    (car,) = true_cars(base, truth)
+    assert car.value("payload.mass_kg") == base.value("payload.mass_kg")
+
+
 def test_a_law_outside_the_library_has_no_true_car():
     truth = label(["nap"], [{"force_n": 1.0}], listed=False)
     assert true_cars(load_car("nigel"), truth) == []

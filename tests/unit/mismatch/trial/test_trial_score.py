@@ -228,3 +228,43 @@ def test_the_table_counts_each_kind_and_names_what_went_wrong():
     assert [line.split()[2] for line in each(outcomes)] == [
         "exact", "wrong", "exact", "wrong", "wrong"
     ]  # fmt: skip
+
+
+def moment(value):
+    return Estimate(value=value, low=value - 1.0, high=value + 1.0, unit="s")
+
+
+@pytest.mark.parametrize(
+    ("course", "since_s", "until_s", "exact", "covered"),
+    [
+        ("intermittent", 29.5, 52.4, True, (True, True)),
+        ("intermittent", 29.5, 54.0, True, (True, False)),
+        ("intermittent", 29.5, 55.1, False, (True, False)),
+        ("intermittent", 26.9, 52.0, False, (False, True)),
+        ("intermittent", 29.5, None, False, (True,)),
+        ("step", 29.5, 52.0, False, (True, True)),
+    ],
+)
+def test_an_effect_that_came_and_went_is_exact_by_course_and_both_moments(
+    course, since_s, until_s, exact, covered
+):
+    truth = label("wind", kind="intermittent", since_s=30.0, until_s=52.0)
+    found = replace(
+        effect("wind"), course=course, since_s=moment(since_s),
+        until_s=None if until_s is None else moment(until_s),
+    )  # fmt: skip
+    got = score(truth, diagnosis(found))
+    assert (truth.kind, got.exact, got.moments_covered) == ("intermittent", exact, covered)
+    assert got.late_s[0] == pytest.approx(since_s - 30.0)
+
+
+def test_the_table_counts_each_moment_of_a_change():
+    pair = label("wind", kind="intermittent", since_s=30.0, until_s=52.0)
+    one = label("wind", kind="step", since_s=30.0)
+    found = replace(effect("wind"), course="intermittent", since_s=moment(31.5),
+                    until_s=moment(52.0))  # fmt: skip
+    late = replace(effect("wind"), course="step", since_s=moment(40.0))
+    table = lines([score(pair, diagnosis(found)), score(one, diagnosis(late))], [])
+    (row,) = [line for line in table if line.startswith("moments")]
+    assert "3 found, off by 1.5 s" in row
+    assert "within 3 s in 67 %" in row
