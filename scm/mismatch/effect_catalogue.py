@@ -90,7 +90,7 @@ class Candidate:
     @property
     def amounts(self) -> Bools:
         """Which parameters say how much, and not where or which way, (parameters,)."""
-        where = {"uphill_rad", "since_s"}
+        where = {"uphill_rad", "since_s", "until_s"}
         if any(parameter.name == "radius_m" for parameter in self.parameters):
             where |= {"x_m", "y_m", "radius_m"}
         return np.array([parameter.name not in where for parameter in self.parameters])

@@ -35,11 +35,15 @@ class Equation(StrEnum):
 
 
 class Course(StrEnum):
-    """How an effect goes over a recording: always the same, from a moment on, or growing evenly."""
+    """How an effect goes over a recording.
+
+    Always the same, from a moment on, growing evenly, or there between two moments only.
+    """
 
     CONSTANT = "constant"
     STEP = "step"
     RAMP = "ramp"
+    INTERMITTENT = "intermittent"
 
 
 class Estimate(Struct, kw_only=True, frozen=True):
@@ -70,8 +74,10 @@ class Effect(Struct, kw_only=True, frozen=True):
         probability: Among all alternatives that were tried.
         text: One or two sentences that a mechanic understands.
         formula: Of an effect outside the catalogue.
-        course: How it goes over the recording. `parameters` are those in the end.
+        course: How it goes over the recording. `parameters` are those in the end, or while it was
+            there if it came and went.
         since_s: When it changed, on the recording's clock; None: it did not, or evenly all along.
+        until_s: When an effect that came and went was last there; None of any other.
         before: Its parameters before the change; empty: it was not there, or did not change.
         stated: Its parameters as the given car file has them; empty: the file lacks the effect.
     """
@@ -87,6 +93,7 @@ class Effect(Struct, kw_only=True, frozen=True):
     alternatives: tuple[Alternative, ...] = field(default=(), name="rivals")
     course: Course = Course.CONSTANT
     since_s: Estimate | None = None
+    until_s: Estimate | None = None
     before: Mapping[str, Estimate] = {}
     stated: Mapping[str, float] = {}
 

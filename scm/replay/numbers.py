@@ -1,5 +1,6 @@
 """The parameters of a car and of its sensor faults by key, with their neutral values."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -9,8 +10,9 @@ from scm.arrays import Floats
 
 Numbers = Mapping[str, float]
 """A number that changes stands as what it is in the end, and with these after its key: what it was
-before, and when the change begins and ends on the drive's clock [s]."""
-BEFORE, SINCE, UNTIL = "@before", "@since_s", "@until_s"
+before, and when the change begins and ends on the drive's clock [s]. One that comes and goes
+stands as what it is meanwhile, and with when it is again what it was before."""
+BEFORE, SINCE, UNTIL, BACK = "@before", "@since_s", "@until_s", "@back_s"
 """Of a number that follows a recorded variable: the variable's place in `VARIABLES`, and the value
 of the variable at which the number is what it stands as; at 0 it is what it was `BEFORE`."""
 BY, AT = "@by", "@at"
@@ -42,6 +44,7 @@ class Change:
     Attributes:
         column: Of the set.
         since_s, until_s: When the change begins and ends; the same: a step.
+        back_s: When the number is `before` again.
     """
 
     column: int
@@ -50,6 +53,7 @@ class Change:
     after: float
     since_s: float
     until_s: float
+    back_s: float = math.inf
 
     def done(self, first_s: Floats | float, last_s: Floats | float) -> Floats:
         """Return the share of the change that is done, its mean over each span of time."""
@@ -58,6 +62,7 @@ class Change:
 
     def _area(self, t: Floats | float) -> Floats:
         """Return the integral of the share that is done, up to each time."""
+        t = np.minimum(t, self.back_s)
         length = max(self.until_s - self.since_s, 1e-9)
         inside = np.clip(np.subtract(t, self.since_s), 0.0, length)
         return np.asarray(
@@ -102,5 +107,6 @@ def changes_in(sets: Sequence[Numbers]) -> Iterator[Change]:
             if key.endswith(SINCE):
                 of = key.removesuffix(SINCE)
                 yield Change(
-                    column, of, numbers[of + BEFORE], numbers[of], numbers[key], numbers[of + UNTIL]
-                )
+                    column, of, numbers[of + BEFORE], numbers[of], numbers[key],
+                    numbers[of + UNTIL], numbers.get(of + BACK, math.inf),
+                )  # fmt: skip

@@ -17,6 +17,7 @@ from msgspec import structs
 from scm.errors import CarError
 from scm.mismatch.evidence import Evidence
 from scm.mismatch.findings import Course, Diagnosis, Effect, Estimate
+from scm.mismatch.report.wording import moment
 from scm.vehicles.car import Car, Quantity, Value, all_terms, load_car
 from scm.vehicles.car_text import (
     number,
@@ -192,9 +193,14 @@ def _changes(effects: Sequence[Effect]) -> str:
     for effect in effects:
         if effect.is_of_recording:
             lines.append(f"# {effect.name}: only recorded.toml has it, for it is of that time.\n")
+        elif effect.since_s is not None and effect.until_s is not None:
+            when = f"from {moment(effect.since_s)} to {moment(effect.until_s)}"
+            lines.append(
+                f"# {effect.name} was there {when} of it:\n# during.toml is the car with it, "
+                "car.toml the car without.\n"
+            )
         elif effect.since_s is not None:
-            since = effect.since_s
-            when = f"since {since.value:.1f} s ({since.low:.1f} to {since.high:.1f} s)"
+            when = f"since {moment(effect.since_s)}"
             lines.append(f"# {effect.name} is so {when} of it; before.toml is the car before.\n")
         elif effect.course is Course.RAMP:
             lines.append(
@@ -267,7 +273,8 @@ def _estimates_by_key(
 ) -> dict[str, Estimate]:
     """Return every estimate by the `section.key` at which a car file holds its number."""
     found = {one.key: one.found for one in evidence.refitted}
-    for effect in diagnosis.effects:
+    there = [one for one in diagnosis.effects if one.course is not Course.INTERMITTENT]
+    for effect in there:
         for key, estimate in _of_effect(effect, car, patched):
             found[key] = _in_place(estimate, key, car, patched)
     return found

@@ -72,7 +72,7 @@ def _effects(diagnosis: Diagnosis) -> Iterator[Panel]:
         rows = [
             ("What", pretty(effect.text)),
             ("How much", "\n".join(amounts(effect.parameters))),
-            ("Since", since_sentence(effect)),
+            ("Since" if effect.until_s is None else "When", since_sentence(effect)),
             ("Formula", pretty(effect.formula or "").replace(" * ", " · ")),
             ("Where", where_and_when(_located_of(effect, diagnosis.located))),
             ("How sure", sureness(effect)),

@@ -83,7 +83,7 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Pict
             evidence.free_runs,
             after,
             clock,
-            [effect.since_s for effect in diagnosis.effects if effect.since_s is not None],
+            [at for e in diagnosis.effects for at in (e.since_s, e.until_s) if at is not None],
         ),
         curves=_curves(evidence.curves),
         windows=window_pictures(evidence.free_runs),

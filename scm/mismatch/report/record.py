@@ -159,11 +159,12 @@ def _since(start_s: float, diagnosis: Diagnosis, evidence: Evidence) -> tuple[Di
 
 
 def _effect_since(start_s: float, effect: Effect) -> Effect:
-    since = effect.since_s
-    if since is None:
-        return effect
-    value, low, high = (t - start_s for t in (since.value, since.low, since.high))
-    return structs.replace(effect, since_s=structs.replace(since, value=value, low=low, high=high))
+    since, until = (
+        at and structs.replace(at, value=at.value - start_s, low=at.low - start_s,
+                               high=at.high - start_s)
+        for at in (effect.since_s, effect.until_s)
+    )  # fmt: skip
+    return structs.replace(effect, since_s=since, until_s=until)
 
 
 def json_text(diagnosis: Diagnosis) -> str:

@@ -13,6 +13,7 @@ from scm.mismatch.report.wording import (
     bicycle_name,
     capital,
     joined,
+    moment,
     percent,
     quantities,
     quantity,
@@ -142,6 +143,8 @@ def all_named(effects: Sequence[Effect]) -> str:
 def effect_title(effect: Effect) -> str:
     """Return an effect as the verdict names it, with a note if the library does not have it."""
     name = title_of(effect.name)
+    if effect.since_s is not None and effect.until_s is not None:
+        return f"{name} from {effect.since_s.value:.0f} s to {effect.until_s.value:.0f} s"
     if effect.since_s is not None:
         return f"{name} since {effect.since_s.value:.0f} s"
     if effect.course is Course.RAMP:
@@ -150,13 +153,16 @@ def effect_title(effect: Effect) -> str:
 
 
 def since_sentence(effect: Effect) -> str:
-    """Return since when an effect is as it is; empty: all along."""
+    """Return since when an effect is as it is, or from when to when it was there; empty: always."""
     before = "; ".join(amounts(effect.before))
     was = f" Before: {before}." if before else ""
+    if effect.since_s is not None and effect.until_s is not None:
+        return (
+            f"From {moment(effect.since_s)} to {moment(effect.until_s)}; the numbers are those "
+            f"between, and the car at the end is without it.{was}"
+        )
     if effect.since_s is not None:
-        at = effect.since_s
-        when = f"{at.value:.1f} s ({at.low:.1f} to {at.high:.1f} s)"
-        return f"{when}; the numbers are those after it.{was}"
+        return f"{moment(effect.since_s)}; the numbers are those after it.{was}"
     if effect.course is Course.RAMP:
         return f"It grows evenly over the recording; the numbers are those of its end.{was}"
     return ""

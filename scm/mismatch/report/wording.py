@@ -115,6 +115,11 @@ def interval(estimate: Estimate) -> str:
     return f"{value} {unit}".rstrip() + f"{degrees} (90 %: {low} to {high})"
 
 
+def moment(at: Estimate) -> str:
+    """Return a moment of a recording with its interval."""
+    return f"{at.value:.1f} s ({at.low:.1f} to {at.high:.1f} s)"
+
+
 def _rounded(estimate: Estimate, factor: float) -> tuple[str, str, str]:
     """Return value and ends times a factor, with the decimals that show the interval's width."""
     value, low, high = (v * factor for v in (estimate.value, estimate.low, estimate.high))

@@ -69,11 +69,16 @@ def _write_car(diagnosis: Diagnosis, evidence: Evidence, car: Car, patched: Car,
         (out / FILE).unlink(missing_ok=True)
         return f"The car with what was found could not be written as a file: {error}"
     beside = f" It needs {', '.join(files[1:])} beside it." if files[1:] else ""
+    courses = [effect.course for effect in diagnosis.effects]
+    during = " (`during.toml` is the car with what came and went)"
+    during = during if Course.INTERMITTENT in courses else ""
     if not _is_changed(car, patched):
-        return f"`{FILE}` beside this page is the car as it was given.{beside}"
-    what = "with what was found" if diagnosis.effects else "with its own numbers refitted"
-    if any(effect.course is not Course.CONSTANT for effect in diagnosis.effects):
+        return f"`{FILE}` beside this page is the car as it was given{during}.{beside}"
+    stays = any(course is not Course.INTERMITTENT for course in courses)
+    what = "with what was found" if stays else "with its own numbers refitted"
+    if Course.STEP in courses or Course.RAMP in courses:
         what += ", as it was at the end of the recording; `before.toml` is the car as it was before"
+    what += during
     if any(effect.is_of_recording for effect in diagnosis.effects):
         what += ", but without laws against its time, which `recorded.toml` has as well"
     return (

@@ -2,12 +2,13 @@
 
 What an effect changes in the innovations at a time depends on its numbers shortly before. So an
 effect that begins at a moment changes them as a constant one does after it, and not before; one
-that follows a variable changes them in proportion to it. All moments and variables are compared by
-the one rollout of an effect.
+that comes and goes changes them between two moments; one that follows a variable, in proportion to
+it. All moments, pairs of them and variables are compared by the one rollout of an effect.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from scm.mismatch.changing_effect import (
     changing,
     may_change,
     moments_in,
+    pairs_of,
 )
 from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.findings import Course
@@ -32,6 +34,7 @@ MAX_VARYING = 6
 SHOWS_LATER_S = 0.1  # than a number is so, in the innovations
 SEARCHED = ((9.0, 1.5), (1.5, 0.25))  # about a moment, and between those tried [s]
 AMPLITUDES = 0.02, 8.0  # of the strength that was simulated: farther, no line holds
+STRONGER = 1.0, 1.5, 2.25  # than the screen says: what an effect spoils weighs little before it
 
 
 def span_of(base: Hypothesis) -> tuple[float, float] | None:
@@ -49,7 +52,7 @@ def span_of(base: Hypothesis) -> tuple[float, float] | None:
 def changes_to_try(
     penalty: Penalty, fitter: Fitter, base: Hypothesis, begun: Sequence[Hypothesis]
 ) -> list[Trial]:
-    """Return the effects that gain most as changes, with values to begin from.
+    """Return the effects that gain most as changes, with values to begin from, some of each.
 
     Args:
         penalty: Returns what effects must gain to be accepted.
@@ -65,23 +68,42 @@ def changes_to_try(
     for fitted in begun:
         effect = fitted.effects[-1]
         if may_change(effect) and np.isfinite(fitted.score):
-            found += [(gain - penalty((one[0][-1],)), one) for gain, one in screen.of(fitted)]
+            found += _simplest([(g - penalty((one[0][-1],)), one) for g, one in screen.of(fitted)])
     best = dict[int, Trial]()
     for _, trial in sorted(found, key=lambda one: -one[0]):
         best.setdefault(id(trial[0][-1]), trial)
-    return list(best.values())[:MAX_TRIALS]
+    return [
+        (effects, np.append(base.values, _times(effects[-1], values[len(base.values) :], by)))
+        for effects, values in list(best.values())[:MAX_TRIALS]
+        for by in STRONGER
+    ]
 
 
-def has_step(fitted: Hypothesis) -> bool:
-    """Return whether an effect of a hypothesis began at a moment."""
-    return any(
-        isinstance(effect, ChangingEffect) and effect.course is Course.STEP
-        for effect in fitted.effects
-    )
+def _times(effect: Candidate, values: Floats, by: float) -> Floats:
+    """Return an effect's values as much stronger, within its bounds."""
+    neutral = np.array([parameter.neutral for parameter in effect.parameters])
+    low, high = np.array([parameter.bounds for parameter in effect.parameters]).T
+    strong = np.where(effect.amounts, neutral + by * (values - neutral), values)
+    return np.clip(strong, low, high)
+
+
+def _simplest(tried: Sequence[tuple[float, Trial]]) -> list[tuple[float, Trial]]:
+    """Return what one effect gains as a change; coming and going only where it gains the most."""
+    best = max(tried, key=lambda one: one[0], default=None)
+    return [one for one in tried if one is best or _moments(one[1][0][-1]) < 2]
+
+
+def _moments(effect: Candidate) -> int:
+    return effect.moments if isinstance(effect, ChangingEffect) else 0
+
+
+def has_moments(fitted: Hypothesis) -> bool:
+    """Return whether an effect of a hypothesis began or ended at a moment."""
+    return any(map(_moments, fitted.effects))
 
 
 def with_best_moments(fitter: Fitter, fits: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Return fits, each step moved to the moment that suits the other numbers best, not refitted.
+    """Return fits, each moment moved to where it suits the other numbers best, not refitted.
 
     A score has a flat or a valley between any two events that show an effect: no derivative leads
     from one to the next.
@@ -91,23 +113,23 @@ def with_best_moments(fitter: Fitter, fits: Sequence[Hypothesis]) -> list[Hypoth
 
 def _at_best_moment(fitter: Fitter, fitted: Hypothesis) -> Hypothesis:
     for effect, place in fitted.each():
-        if isinstance(effect, ChangingEffect) and effect.course is Course.STEP:
-            for around_s, every_s in SEARCHED:
-                at, scores = moments_scored(fitter, fitted, place.stop - 1, around_s, every_s)
-                values = fitted.values.copy()
-                values[place.stop - 1] = at[int(np.argmin(scores))]
-                fitted = replace(fitted, values=values)
+        indices = range(place.stop - _moments(effect), place.stop)
+        for (around_s, every_s), index in product(SEARCHED, indices):
+            at, scores = moments_scored(fitter, fitted, index, around_s, every_s)
+            values = fitted.values.copy()
+            values[index] = at[int(np.argmin(scores))]
+            fitted = replace(fitted, values=values)
     return fitted
 
 
 def moments_scored(
     fitter: Fitter, fitted: Hypothesis, index: int, around_s: float, every_s: float
 ) -> tuple[Floats, Floats]:
-    """Return moments about that of a step, and the score of the hypothesis with each.
+    """Return moments about one of a change, and the score of the hypothesis with each.
 
     Args:
         fitter: Under the noise of `fitted`.
-        fitted: With a step.
+        fitted: With an effect that changes at it.
         index: Of the moment among its values.
         around_s: How far to either side.
         every_s: Between moments.
@@ -195,9 +217,10 @@ class _VaryingScreen:
 
 
 class _Screen:
-    """Compares all moments of one effect after the other, and its ramp.
+    """Compares all moments of one effect after the other, all pairs of them, and its ramp.
 
-    Sums over the spans between two moments, added up from the end, are those after each moment.
+    Sums over the spans between two moments, added up from the end, are those after each moment;
+    the differences of two are those between them.
     """
 
     def __init__(self, fitter: Fitter, base: Hypothesis, span: tuple[float, float]) -> None:
@@ -205,6 +228,7 @@ class _Screen:
         self._prior = fitter.model.simulator.prior
         self._weights = fitter.weights(base.innovations)
         self._moments = moments_in(span)
+        self._pairs = np.array(pairs_of(self._moments.tolist())).T
         t = base.model.t
         order = np.argsort(t, kind="stable")
         first = int(np.searchsorted(t[order], self._moments[0]))
@@ -216,7 +240,7 @@ class _Screen:
         self._normals = dict[int, tuple[Floats, Floats]]()
 
     def of(self, fitted: Hypothesis) -> Iterator[tuple[float, Trial]]:
-        """Yield the best moment of an effect that begins, and its ramp: gain, and what to try."""
+        """Yield an effect's best moment, its ramp, its best pair: gain each, and what to try."""
         base, effect = self._base, fitted.effects[-1]
         own = fitted.jacobian[:, : len(base.z)]
         change = fitted.innovations - own @ (fitted.z - base.z) - base.innovations
@@ -228,13 +252,25 @@ class _Screen:
         moves = np.vstack((self._moves_after(own, weighted), own.T @ ramped))
         moved = np.linalg.lstsq(normal, moves.T, rcond=1e-12)[0]
         slopes -= moved.T @ (back + self._prior @ base.z)
-        sizes = np.maximum(sizes - (moves.T * moved).sum(axis=0), 1e-9)
+        shared, (first, last), ramp = moves @ moved, self._pairs, len(self._moments)
+        own_shares = shared.diagonal()
+        both = own_shares[first] - 2.0 * shared[first, last] + own_shares[last]
+        between = sizes[first] - sizes[last] - both
+        slopes = np.append(slopes, slopes[first] - slopes[last])
+        sizes = np.maximum(np.append(sizes - own_shares, between), 1e-9)
         gains, by = slopes * slopes / sizes, -slopes / sizes
         gains[(np.abs(by) < AMPLITUDES[0]) | (np.abs(by) > AMPLITUDES[1])] = -np.inf
-        best = int(np.argmax(gains[:-1]))
-        for at, course in ((best, Course.STEP), (len(gains) - 1, Course.RAMP)):
-            if np.isfinite(gains[at]):
-                yield float(gains[at]), self._trial(fitted, effect, course, at, float(by[at]))
+        begins = int(np.argmax(gains[:ramp]))
+        pair = int(np.argmax(gains[ramp + 1 :]))
+        for course, place, at in (
+            (Course.STEP, begins, [begins]),
+            (Course.RAMP, ramp, []),
+            (Course.INTERMITTENT, ramp + 1 + pair, self._pairs[:, pair]),
+        ):
+            if np.isfinite(gains[place]):
+                moments = self._moments[at].tolist()
+                trial = self._trial(fitted, effect, course, moments, float(by[place]))
+                yield float(gains[place]), trial
 
     def _normal(self, own: Floats) -> tuple[Floats, Floats]:
         """Return J' W J with the prior, and J' W e; trials that set the same numbers share them."""
@@ -258,16 +294,16 @@ class _Screen:
         return np.asarray(until[-1] - until[self._cuts])
 
     def _trial(
-        self, fitted: Hypothesis, effect: Candidate, course: Course, at: int, by: float
+        self,
+        fitted: Hypothesis,
+        effect: Candidate,
+        course: Course,
+        moments: Sequence[float],
+        by: float,
     ) -> Trial:
-        known = len(self._base.values)
-        values = fitted.values[known:]
-        neutral = np.array([parameter.neutral for parameter in effect.parameters])
-        low, high = np.array([parameter.bounds for parameter in effect.parameters]).T
-        strong = np.where(effect.amounts, neutral + by * (values - neutral), values)
-        moment = [float(self._moments[at])] if course is Course.STEP else []
+        strong = _times(effect, fitted.values[len(self._base.values) :], by)
         key = id(effect), course
         if key not in self._changing:
             self._changing[key] = changing(effect, course, self._span)
-        start = np.concatenate((self._base.values, np.clip(strong, low, high), moment))
+        start = np.concatenate((self._base.values, strong, moments))
         return (*self._base.effects, self._changing[key]), start

@@ -10,6 +10,7 @@ from scm.mismatch.effect_catalogue import Candidate
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.residual_windows import independent_share
+from scm.mismatch.select.changes import has_moments, with_best_moments
 from scm.mismatch.select.round import Context, fit_to_the_end
 
 CHANCE_STDS = 4.0  # times the root of what is expected of unseen data: two standard deviations
@@ -93,6 +94,17 @@ def without_one(
     each = zip(fitted.effects, without_each(context, fitted, retuned), strict=True)
     best = min((fewer for effect, fewer in each if may_go(effect)), key=context.criterion)
     return fit_to_the_end(context, best, [best.z, retuned.z]) if best.effects else best
+
+
+def with_placed_moments(context: Context, fitted: Hypothesis, unseen: Floats) -> Hypothesis:
+    """Return a hypothesis whose changes are when all parts, the unseen one too, show them best.
+
+    A moment in an unseen block could be anywhere in it, and a change at a wrong one is denied.
+    """
+    if not has_moments(fitted):
+        return fitted
+    (moved,) = with_best_moments(Fitter(fitted.model, context.part + unseen), [fitted])
+    return replace(context.fitter(fitted.model).at(moved), covariance=fitted.covariance)
 
 
 def confirmed(

@@ -14,7 +14,7 @@ from scm.mismatch.budget import Question
 from scm.mismatch.effect_catalogue import Candidate, terms_needed
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis, together
-from scm.mismatch.select.confirm import confirmed, prune
+from scm.mismatch.select.confirm import confirmed, prune, with_placed_moments
 from scm.mismatch.select.round import Context, fit_with_noise
 from scm.mismatch.select.search import by_windows, select_many
 from scm.mismatch.select.selected import Selected, tried_of
@@ -99,7 +99,10 @@ def _continued(selected: Selected, first: Hypothesis) -> Selected | None:
     """Return what is selected from a hypothesis on, as far as time goes."""
     context, retuned = selected.context, selected.retuned
     selection = select_many(context, retuned, first)
-    end, denied = confirmed(context, selection.best, retuned, selected.parts.confirm.weight)
+    unseen = selected.parts.confirm.weight
+    end, denied = confirmed(
+        context, with_placed_moments(context, selection.best, unseen), retuned, unseen
+    )
     if not end.effects:
         return None
     return replace(

@@ -23,7 +23,7 @@ from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.noise import fit_noise
 from scm.mismatch.select.changes import (
     changes_to_try,
-    has_step,
+    has_moments,
     varying_to_try,
     with_best_moments,
 )
@@ -152,7 +152,7 @@ def fit_with_noise(context: Context, fitted: Hypothesis) -> Hypothesis:
             residuals, _ = fitted.model.residuals([fitted.numbers])
             fitted = replace(fitted, model=context.fit_noise(fitted.model, residuals, 1))
         fitted = fit_to_the_end(context, fitted, [fitted.z, np.zeros_like(fitted.z)])
-    if not has_step(fitted):
+    if not has_moments(fitted):
         return fitted
     fitter = context.fitter(fitted.model)
     (moved,) = fitter.refine(with_best_moments(fitter, [fitted]), rounds=2, fresh=True)
@@ -245,7 +245,8 @@ def _extended(context: Context, base: Hypothesis) -> Round:
     near = [f for f in ranked if cost(f) < cost(ranked[0]) + NEAR]
     rest = ranked[len(near) :]
     if cost(ranked[0]) < context.criterion(base) + NEAR:
-        near, rest = fitter.refine(near[:6], rounds=3, fresh=True), [*near[6:], *rest]
+        moved = with_best_moments(fitter, near[:6])
+        near, rest = fitter.refine(moved, rounds=3, fresh=True), [*near[6:], *rest]
     ranked = sorted([*near, *rest], key=cost)
     ranked = _lighter(context, _finals(context, ranked, base, cost))
     costs = [cost(f) + let_go(context, f, ranked, base) for f in ranked]

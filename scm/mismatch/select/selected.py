@@ -14,7 +14,7 @@ from scm.mismatch.fit.data_split import Parts, split
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.rollouts import Tiles
-from scm.mismatch.select.confirm import confirmed
+from scm.mismatch.select.confirm import confirmed, with_placed_moments
 from scm.mismatch.select.round import Context, Notify
 from scm.mismatch.select.search import (
     TIMES_FITTED_FAR,
@@ -112,8 +112,10 @@ def select_effects(nominal: Nominal) -> Selected:
     selected = _select(nominal)
     context, parts, found = selected.context, selected.parts, selected.selection
     context.notify("judging on what the fit did not see")
-    best, denied = confirmed(context, found.best, found.retuned, parts.confirm.weight)
-    unconfirmed = found.best if denied else None
+    unseen = parts.confirm.weight
+    fitted = with_placed_moments(context, found.best, unseen)
+    best, denied = confirmed(context, fitted, found.retuned, unseen)
+    unconfirmed = fitted if denied else None
     return replace(
         selected, selection=replace(found, best=best), denied=denied, unconfirmed=unconfirmed
     )

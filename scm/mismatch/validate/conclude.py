@@ -52,7 +52,7 @@ from scm.mismatch.validate.never_worse import (
     worse_than,
 )
 from scm.mismatch.validate.residuals import on_one_axis
-from scm.mismatch.validate.stages import Stage
+from scm.mismatch.validate.stages import Stage, shares_at
 from scm.mismatch.validate.witness import witness_of
 from scm.vehicles.car import Car
 
@@ -191,7 +191,8 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
     """Return what stays of a hypothesis after free runs on unseen parts, beside the witness.
 
     Effects go until the car does nothing worse than those without. Errors of sensors stay first,
-    with the re-tuned or the given car: where a car moves worse, only its own numbers can be why.
+    and what went, with the re-tuned or the given car: where a car moves worse, its own numbers may
+    be why.
     """
     best, context, given = selected.best, selected.context, selected.best.model.car
     gone = denied(selected.denied)
@@ -215,7 +216,7 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
             best, less = fewer
             gone += less
             continue
-        if others and moves_nothing(best):
+        if others and moves_nothing_at_end(best):
             best = with_numbers(context, best, others.pop())
             continue
         best, lost = _with_fewer(selected, best)
@@ -342,12 +343,19 @@ def gained_nothing(fit: Fit) -> bool:
     return POSE[0] in before and after[POSE[0]] >= before[POSE[0]]
 
 
-def moves_nothing(fitted: Hypothesis) -> bool:
-    """Return whether all effects are errors of sensors: a car moves the same with them."""
-    of_car = fitted.model.simulator.tiles.columns
+def moves_nothing_at_end(fitted: Hypothesis) -> bool:
+    """Return whether the car at the end moves the same without the effects.
+
+    They are errors of sensors, or went: windows may have none of them.
+    """
+    of_car, at_end = fitted.model.simulator.tiles.columns, shares_at(fitted, math.inf)
     return all(
-        effect.equation is Equation.SENSOR and not any(p.key in of_car for p in effect.parameters)
-        for effect in fitted.effects
+        not share
+        or (
+            effect.equation is Equation.SENSOR
+            and not any(p.key in of_car for p in effect.parameters)
+        )
+        for effect, share in zip(fitted.effects, at_end, strict=True)
     )
 
 

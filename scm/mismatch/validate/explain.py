@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from scm.arrays import Floats
-from scm.mismatch.changing_effect import BEFORE_NAME, SINCE_NAME, ChangingEffect
+from scm.mismatch.changing_effect import BEFORE_NAME, SINCE_NAME, UNTIL_NAME, ChangingEffect
 from scm.mismatch.discovery.decide import TIE, against, alternatives_to, is_discovered
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect
 from scm.mismatch.discovery.sensor_effects import SensorEffect
@@ -15,6 +15,7 @@ from scm.mismatch.evidence import RefittedParameter
 from scm.mismatch.experiment.plan import Explanation
 from scm.mismatch.experiment.suggest import Suggestion, suggest
 from scm.mismatch.findings import Alternative, Course, Effect, Equation, Estimate
+from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import LOCK, MIN_RELATIVE_STD, TIMING_S, UNKNOWN, Likelihood
 from scm.mismatch.report.wording import joined, percent, quantity, short
@@ -22,7 +23,7 @@ from scm.mismatch.select.changes import moments_scored
 from scm.mismatch.select.round import Notify
 from scm.mismatch.select.search import Selection
 from scm.mismatch.select.selected import Selected
-from scm.mismatch.validate.stages import at_share
+from scm.mismatch.validate.stages import at_shares
 from scm.mismatch.varying_effect import SLOPE, VaryingEffect
 from scm.vehicles.car import Car
 
@@ -148,8 +149,10 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
         )  # fmt: skip
     if isinstance(candidate, VaryingEffect):
         estimates[SLOPE] = _slope(best, candidate, *estimates.values())
-    if isinstance(candidate, ChangingEffect) and candidate.course is Course.STEP:
-        estimates[SINCE_NAME] = _moment(selected, best, place.stop - 1)
+    if isinstance(candidate, ChangingEffect):
+        moments = range(place.stop - candidate.moments, place.stop)
+        for name, index in zip((SINCE_NAME, UNTIL_NAME), moments, strict=False):
+            estimates[name] = _moment(best, index)
     probability, alternatives = _alternatives(selected.selection, candidate)
     discovered, offered, discovery = is_discovered(candidate), selected.offered, selected.discovery
     is_outside = discovered and not isinstance(candidate, VaryingEffect)
@@ -165,13 +168,14 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
         depends_on=candidate.depends_on,
         parameters={
             name: one for name, one in estimates.items()
-            if name != SINCE_NAME and not name.endswith(BEFORE_NAME)
+            if name not in {SINCE_NAME, UNTIL_NAME} and not name.endswith(BEFORE_NAME)
         },
         probability=probability,
         text=sentence_of(candidate, estimates) + _stated_sentence(stated, estimates),
         stated=stated,
         course=candidate.course if isinstance(candidate, ChangingEffect) else Course.CONSTANT,
         since_s=estimates.get(SINCE_NAME),
+        until_s=estimates.get(UNTIL_NAME),
         before={
             name.removesuffix(BEFORE_NAME): one
             for name, one in estimates.items()
@@ -198,15 +202,14 @@ def _formula(best: Hypothesis, candidate: Candidate, values: tuple[float, ...]) 
     return None
 
 
-def _moment(selected: Selected, best: Hypothesis, index: int) -> Estimate:
-    """Return when a step was, with the moments that explain the recording about as well."""
-    fitter = selected.context.fitter(best.model)
+def _moment(best: Hypothesis, index: int) -> Estimate:
+    """Return when a change was, with the moments that explain all parts about as well."""
+    fitter = Fitter(best.model, np.ones(len(best.model.t)))
     at, scores = moments_scored(fitter, best, index, AROUND_S, EVERY_S)
     near = at[scores < scores.min() + (NINETY * WIDER) ** 2]
-    return Estimate(
-        value=float(best.values[index]), low=float(near.min()) - EVERY_S,
-        high=float(near.max()) + EVERY_S, unit="s",
-    )  # fmt: skip
+    value = float(best.values[index])
+    low, high = min(value, float(near.min())), max(value, float(near.max()))
+    return Estimate(value=value, low=low - EVERY_S, high=high + EVERY_S, unit="s")
 
 
 def upright(candidate: Candidate, values: Sequence[float]) -> tuple[float, ...]:
@@ -321,8 +324,8 @@ def _alternatives(found: Selection, candidate: Candidate) -> tuple[float, tuple[
 
 
 def _at_the_end(fitted: Hypothesis) -> Explanation:
-    """Return what a hypothesis says of the car that would drive next."""
-    now = at_share(fitted, 1.0)
+    """Return what a hypothesis says of the car that would drive next, with what may come again."""
+    now = at_shares(fitted, [1.0] * len(fitted.effects))
     return Explanation(now.effects, now.values)
 
 

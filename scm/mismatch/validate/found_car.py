@@ -21,19 +21,22 @@ from scm.mismatch.changing_effect import ChangingEffect
 from scm.mismatch.discovery.dictionary_effect import DictionaryEffect, as_term, number_keys
 from scm.mismatch.discovery.sensor_effects import LENS, PREFIX, SensorEffect
 from scm.mismatch.evidence import Evidence, RefittedParameter
-from scm.mismatch.findings import Diagnosis, Effect, Verdict
+from scm.mismatch.findings import Course, Diagnosis, Effect, Verdict
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.report.car_file import FILE, write_car
 from scm.mismatch.validate.explain import NINETY, refitted
 from scm.mismatch.validate.stages import (
     BEFORE,
+    DURING,
     RECORDED,
     Stage,
     as_it_was,
-    at_share,
+    at_shares,
     is_of_recording,
     lasting,
-    shares_of,
+    moments_of,
+    shares_at,
+    spans_of,
 )
 from scm.mismatch.varying_effect import VaryingEffect, as_own_term, own_key
 from scm.vehicles.car import Car, load_car
@@ -107,34 +110,33 @@ class CarFiles:
             end = RECORDED
         else:
             end = FILE
-        changes = [one for one in fitted.each() if isinstance(one[0], ChangingEffect)]
-        if not changes:
-            return (Stage(found, end),)
-        shares, times = shares_of(fitted)
         own = fitted.model.simulator.numbers(fitted.z)
-        ends = (*times, math.inf)
-        stages, from_s = list[Stage](), -math.inf
-        for number, (share, until_s) in enumerate(zip(shares, ends, strict=True)):
-            last = number == len(shares) - 1
+        cars, names = {shares_at(fitted, math.inf): (found, end)}, list[str]()
+        for *_, shares in spans_of(fitted):
+            if shares in cars:
+                continue
             was = [
                 as_it_was(effect, candidate, fitted.values[place].tolist(), share, own)
-                for effect, (candidate, place) in zip(effects, fitted.each(), strict=True)
+                for effect, (candidate, place), share in zip(
+                    effects, fitted.each(), shares, strict=True
+                )
             ]
-            mine = (
-                found
-                if last
-                else self.written(at_share(fitted, share), [*filter(None, was)], of_recording=True)
-            )
-            name = end if last else f"before_{number + 1}.toml" if number else BEFORE
-            stages.append(Stage(mine, name, from_s, until_s))
-            from_s = until_s
-        return tuple(stages)
+            mine = self.written(at_shares(fitted, shares), [*filter(None, was)], of_recording=True)
+            names.append(_stage_name(fitted, shares))
+            number = names.count(names[-1])
+            cars[shares] = mine, f"{names[-1]}{f'_{number}' if number > 1 else ''}.toml"
+        moments = moments_of(fitted)
+        return tuple(
+            Stage(*cars[shares], from_s, until_s, at_once=from_s in moments)
+            for from_s, until_s, shares in spans_of(fitted)
+        )
 
     def _written(self, fitted: Hypothesis, effects: Sequence[Effect], own: Bools) -> Car:
         self._count += 1
         folder = self._folder / f"{self._count}"
         folder.mkdir()
-        found = patched(self._car, at_share(fitted, 1.0), folder, own)
+        at_end = at_shares(fitted, shares_at(fitted, math.inf))
+        found = patched(self._car, at_end, folder, own)
         diagnosis = Diagnosis(
             verdict=Verdict.NONE, located=(), effects=tuple(effects), undecided=(), fit=None,
             runtime_s=0.0,
@@ -146,6 +148,15 @@ class CarFiles:
         )
         write_car(diagnosis, evidence, self._car, found, folder)
         return load_car(folder / FILE)
+
+
+def _stage_name(fitted: Hypothesis, shares: Sequence[float]) -> str:
+    """Return a stage's name: by whether anything is there that came and went."""
+    there = (
+        isinstance(effect, ChangingEffect) and effect.course is Course.INTERMITTENT and share > 0.0
+        for effect, share in zip(fitted.effects, shares, strict=True)
+    )
+    return DURING if any(there) else BEFORE
 
 
 def _received(

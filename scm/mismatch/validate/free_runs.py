@@ -153,6 +153,8 @@ def judge(
 ) -> tuple[Fit, FreeRuns]:
     """Return how well two cars follow the recordings on each part, and their free runs.
 
+    Windows in which something came, changed or went at once count for nothing: no car drives them.
+
     Args:
         drives: The recordings.
         before: The car as given.
@@ -166,11 +168,12 @@ def judge(
     horizon = horizon_of(drives, parts) if horizon_s is None else horizon_s
     horizon = max(round(horizon / STEP_S) * STEP_S, SHORTEST_S)
     stages = (Stage(after),) if isinstance(after, Car) else after
+    moments = np.array([stage.from_s for stage in stages if stage.at_once])
     judged = [
         one
         for number, drive in enumerate(drives)
         for stage in stages
-        if (one := _judged(drive, before, stage, _spans(parts, number), number, horizon))
+        if (one := _judged(drive, before, stage, moments, _spans(parts, number), number, horizon))
     ]
     if not judged:
         msg = f"{drives[0].recording.path}: no window of {horizon:g} s without a gap in the poses"
@@ -224,13 +227,14 @@ def _spans(parts: Parts, drive: int) -> list[tuple[str, Span]]:
 
 
 def _judged(
-    drive: Drive, before: Car, stage: Stage, spans: Sequence[tuple[str, Span]], number: int,
-    horizon: float,
+    drive: Drive, before: Car, stage: Stage, moments: Floats, spans: Sequence[tuple[str, Span]],
+    number: int, horizon: float,
 ) -> _Judged | None:  # fmt: skip
     replays = [Replay(drive.recording, car) for car in (before, stage.car)]
     starts, part = _starts(drive, replays, spans, horizon)
     middle = starts + 0.5 * horizon
-    mine = np.flatnonzero((middle >= stage.from_s) & (middle < stage.until_s))
+    whole = (np.abs(np.subtract.outer(middle, moments)) >= 0.5 * horizon).all(axis=1)
+    mine = np.flatnonzero(whole & (middle >= stage.from_s) & (middle < stage.until_s))
     starts, part = starts[mine], tuple(part[i] for i in mine)
     if not len(starts):
         return None

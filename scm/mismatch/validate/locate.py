@@ -240,13 +240,17 @@ def since_changes(
     found = list[Located]()
     for one in located:
         began = [
-            effect.since_s.value if effect.since_s and not effect.before else None
+            (effect.since_s.value, effect.until_s.value if effect.until_s else end_s)
+            if effect.since_s and not effect.before
+            else None
             for effect in effects
             if effect.equation is one.equation
         ]
-        moments = [since for since in began if since is not None]
-        is_late = one.when_s is None and bool(moments) and len(moments) == len(began)
-        when_s = ((min(moments), end_s),) if is_late else one.when_s
+        spans = [span for span in began if span is not None]
+        is_late = one.when_s is None and bool(spans) and len(spans) == len(began)
+        when_s = one.when_s
+        if is_late:
+            when_s = ((min(since for since, _ in spans), max(until for _, until in spans)),)
         found.append(structs.replace(one, when_s=when_s))
     return tuple(found)
 

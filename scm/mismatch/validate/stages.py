@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from msgspec import structs
@@ -15,7 +16,8 @@ from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.report.car_file import FILE
 from scm.vehicles.car import Car
 
-BEFORE = "before.toml"  # the car as it was before something changed
+BEFORE = "before"  # the car as it was before something changed
+DURING = "during"  # with what came and went
 RECORDED = "recorded.toml"  # the car with laws that hold in its recording alone
 RAMP_STAGES = 5  # cars that stand for a change over a whole recording
 
@@ -26,21 +28,33 @@ class Stage:
 
     Attributes:
         file: Its name in a report; the last stage is the car found.
+        at_once: Whether it begins at a moment, and not within what changes evenly.
     """
 
     car: Car
     file: str = FILE
     from_s: float = -math.inf
     until_s: float = math.inf
+    at_once: bool = False
 
 
-def at_share(fitted: Hypothesis, share: float) -> Hypothesis:
-    """Return a hypothesis without changes: each effect as it is when a share of them is done."""
+def shares_at(fitted: Hypothesis, t_s: float) -> tuple[float, ...]:
+    """Return how far each effect's change is done at a time; 1 of one that does not change."""
+    return tuple(
+        effect.share(fitted.values[place].tolist(), t_s)
+        if isinstance(effect, ChangingEffect)
+        else 1.0
+        for effect, place in fitted.each()
+    )
+
+
+def at_shares(fitted: Hypothesis, shares: Sequence[float]) -> Hypothesis:
+    """Return a hypothesis without changes: each effect as it is when its share of them is done."""
     if not any(isinstance(effect, ChangingEffect) for effect in fitted.effects):
         return fitted
     own = fitted.model.simulator.numbers(fitted.z)
     effects, values, rows = list[Candidate](), list[float](), list(range(len(fitted.z)))
-    for effect, place in fitted.each():
+    for (effect, place), share in zip(fitted.each(), shares, strict=True):
         mine = fitted.values[place].tolist()
         if not isinstance(effect, ChangingEffect):
             effects.append(effect)
@@ -97,8 +111,11 @@ def as_it_was(
         share: 0 to 1. Between, intervals go from the one end's to the other's.
         own: The car's own numbers by key.
     """
-    if not isinstance(candidate, ChangingEffect) or share == 1.0:
+    if not isinstance(candidate, ChangingEffect):
         return effect
+    if share == 1.0:
+        there = candidate.course is Course.INTERMITTENT
+        return structs.replace(effect, course=Course.CONSTANT) if there else effect
     if share == 0.0 and not candidate.was_there:
         return None
     parameters = dict[str, Estimate]()
@@ -115,14 +132,25 @@ def as_it_was(
     return structs.replace(effect, parameters=parameters)
 
 
-def shares_of(fitted: Hypothesis) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return how far changes are done in each stage, and when one stage follows another."""
-    for effect, place in fitted.each():
-        if isinstance(effect, ChangingEffect):
-            since, until = effect.change_s(fitted.values[place].tolist())
-            if effect.course is Course.STEP:
-                return (0.0, 1.0), (since,)
-            shares = np.linspace(0.0, 1.0, RAMP_STAGES)
-            times = since + (until - since) * 0.5 * (shares[1:] + shares[:-1])
-            return tuple(shares.tolist()), tuple(times.tolist())
-    return (1.0,), ()
+def moments_of(fitted: Hypothesis) -> set[float]:
+    """Return when effects came, changed or went, on the drive's clock [s]."""
+    return {
+        moment
+        for effect, place in fitted.each()
+        if isinstance(effect, ChangingEffect) and effect.moments
+        for moment in fitted.values[place].tolist()[-effect.moments :]
+    }
+
+
+def spans_of(fitted: Hypothesis) -> list[tuple[float, float, tuple[float, ...]]]:
+    """Return spans of the recording, from the first to the last, and shares of changes in each."""
+    times = moments_of(fitted)
+    for effect in fitted.effects:
+        if isinstance(effect, ChangingEffect) and effect.course is Course.RAMP:
+            since, until = effect.span_s
+            middles = (np.arange(RAMP_STAGES - 1) + 0.5) / (RAMP_STAGES - 1)
+            times |= set((since + (until - since) * middles).tolist())
+    return [
+        (from_s, until_s, shares_at(fitted, 0.5 * (from_s + until_s)))
+        for from_s, until_s in pairwise([-math.inf, *sorted(times), math.inf])
+    ]

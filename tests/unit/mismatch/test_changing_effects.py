@@ -1,5 +1,6 @@
 """Effects that change during a recording: what is tried, found, written and reported."""
 
+import math
 from dataclasses import replace
 from functools import cache
 
@@ -7,21 +8,26 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from scm.mismatch.changing_effect import EDGE_S, LEAST_S, changing, may_change, moments_in
-from scm.mismatch.findings import Course, Estimate
+from scm.mismatch.changing_effect import EDGE_S, LEAST_S, RARE, changing, may_change, moments_in
+from scm.mismatch.findings import Course, Effect, Estimate, Located
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import together
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.report.sentences import effect_title, since_sentence
 from scm.mismatch.select.changes import changes_to_try, moments_scored, with_best_moments
+from scm.mismatch.select.confirm import with_placed_moments
 from scm.mismatch.select.round import Context, extend, penalty
+from scm.mismatch.validate.conclude import moves_nothing_at_end
+from scm.mismatch.validate.explain import _moment
+from scm.mismatch.validate.found_car import CarFiles
 from scm.mismatch.validate.locate import since_changes
-from scm.mismatch.validate.stages import as_it_was, at_share
+from scm.mismatch.validate.stages import as_it_was, at_shares, spans_of
 from tests.unit.mismatch import made_up_findings as made_up
-from tests.unit.mismatch.made_drive import big_nigel, driven
+from tests.unit.mismatch.made_drive import big_nigel, driven, nigel
 from tests.unit.mismatch.made_fit import candidate
 
 SINCE_S, SPAN = 15.0, (0.0, 30.0)
+CAME_S, WENT_S, PUSH = 10.5, 19.0, 0.2
 BIAS = 0.05
 
 
@@ -33,15 +39,20 @@ def _growing(name, t, values):
     return values + BIAS * t / SPAN[1] if name == "imu.gyro_z" else values
 
 
+def _for_a_while(name, t, values):
+    there = (t > CAME_S) & (t < WENT_S)
+    return values + PUSH * there if name == "imu.accel_x" else values
+
+
 def context_of(model, *names, **more):
     return Context(np.ones(len(model.t)), tuple(map(candidate, names)), **more)
 
 
 @cache
 def tried(sense):
-    """One round on a drive whose gyro has a bias later, or more and more."""
+    """One round on a drive whose gyro has a bias later or more and more, or whose x for a while."""
     model = Likelihood.of([driven(seconds=30.0, sense=sense)], big_nigel())
-    context = context_of(model, "gyro_bias", "gyro_scale", "steer_trim")
+    context = context_of(model, "gyro_bias", "gyro_scale", "accel_bias")
     fitter = context.fitter(model)
     (base,) = fitter.refine([fitter.unfitted()], rounds=2, fresh=True)
     return extend(context, base)
@@ -62,7 +73,35 @@ def test_a_bias_that_grew_is_found_as_a_ramp():
     assert best.values == pytest.approx([BIAS], abs=0.006)
 
 
-@pytest.mark.parametrize("sense", [_late, _growing])
+def test_a_bias_that_came_and_went_is_found_with_both_moments():
+    best = tried(_for_a_while).alternatives[0]
+    (effect,) = best.effects
+    assert (effect.name, effect.course) == ("accel_bias", Course.INTERMITTENT)
+    assert best.values[2:] == pytest.approx([CAME_S, WENT_S], abs=1.0)
+    assert best.values[:2] == pytest.approx([PUSH, 0.0], abs=0.03)
+
+
+def test_one_rollout_shows_between_which_moments_an_effect_was_there():
+    base = tried(_for_a_while).base
+    context = context_of(base.model, "accel_bias")
+    fitter = context.fitter(base.model)
+    begun = fitter.begin(base, [((candidate("accel_bias"),), np.array([0.1, 0.0]))])
+    (effect,), values = changes_to_try(context.penalty, fitter, base, begun)[0]
+    assert (effect.name, effect.course) == ("accel_bias", Course.INTERMITTENT)
+    assert values[2:] == pytest.approx([CAME_S, WENT_S], abs=1.5)
+    assert values[0] == pytest.approx(PUSH, rel=0.2)
+
+
+def test_one_that_gains_as_much_by_staying_is_not_tried_as_coming_and_going():
+    base = tried(_late).base
+    context = context_of(base.model, "gyro_bias")
+    fitter = context.fitter(base.model)
+    begun = fitter.begin(base, [((candidate("gyro_bias"),), np.array([0.03]))])
+    trials = changes_to_try(context.penalty, fitter, base, begun)
+    assert {effects[0].course for effects, _ in trials} == {Course.STEP, Course.RAMP}
+
+
+@pytest.mark.parametrize("sense", [_late, _growing, _for_a_while])
 def test_a_change_is_better_by_far_than_the_same_effect_all_along(sense):
     found = tried(sense)
     costs = zip(found.alternatives, found.criteria, strict=True)
@@ -91,6 +130,14 @@ def test_a_moment_is_moved_to_where_the_score_is_lowest():
     assert at[np.argmin(scores)] == pytest.approx(SINCE_S, abs=0.6)
 
 
+def test_both_moments_are_moved_to_where_the_score_is_lowest():
+    best = tried(_for_a_while).alternatives[0]
+    fitter = Fitter(best.model, np.ones(len(best.model.t)))
+    off = replace(best, values=best.values + np.array([0.0, 0.0, 2.0, -3.0]))
+    (moved,) = with_best_moments(fitter, [off])
+    assert moved.values[2:] == pytest.approx([CAME_S, WENT_S], abs=0.5)
+
+
 def test_no_change_is_searched_for_in_a_short_drive_or_in_several():
     short = Likelihood.of([driven(seconds=LEAST_S - 5.0)], big_nigel())
     several = Likelihood.of([driven(seconds=22.0), driven(seconds=22.0)], big_nigel())
@@ -102,10 +149,48 @@ def test_no_change_is_searched_for_in_a_short_drive_or_in_several():
         assert changes_to_try(context.penalty, fitter, base, begun) == []
 
 
+def test_a_moment_is_placed_by_the_part_that_confirms_too():
+    best = tried(_for_a_while).alternatives[0]
+    t = best.model.t
+    unseen = ((t > 17.0) & (t < 22.0)).astype(float)
+    context = replace(context_of(best.model, "accel_bias"), part=1.0 - unseen)
+    off = replace(best, values=best.values + np.array([0.0, 0.0, 0.0, 2.5]))
+    moved = with_placed_moments(context, off, unseen)
+    assert moved.values[2:] == pytest.approx([CAME_S, WENT_S], abs=0.6)
+    assert moved.values[:2] == pytest.approx(best.values[:2])
+
+
+def test_a_moment_s_interval_is_narrow_and_holds_its_value():
+    best = tried(_for_a_while).alternatives[0]
+    since = _moment(best, 2)
+    assert since.low <= since.value <= since.high
+    assert since.low < CAME_S < since.high < since.low + 2.0
+    off = replace(best, values=best.values + np.array([0.0, 0.0, 2.5, 0.0]))
+    assert _moment(off, 2).high > off.values[2]
+
+
+def test_what_went_moves_nothing_at_the_end():
+    best = tried(_for_a_while).alternatives[0]
+    trim = candidate("steer_trim")
+    moves = {
+        course: moves_nothing_at_end(
+            replace(best, effects=(changing(trim, course, SPAN),), values=np.array(values))
+        )
+        for course, values in (
+            (Course.STEP, [0.05, 12.0]), (Course.RAMP, [0.05]),
+            (Course.INTERMITTENT, [0.05, 12.0, 20.0]),
+        )
+    }  # fmt: skip
+    assert moves == {Course.STEP: False, Course.RAMP: False, Course.INTERMITTENT: True}
+    assert moves_nothing_at_end(best)
+
+
 def test_every_moment_that_is_tried_counts_in_the_penalty():
     bias = candidate("gyro_bias")
     short, long = (changing(bias, Course.STEP, (0.0, end)) for end in (30.0, 120.0))
     assert penalty((bias,), 40) < penalty((short,), 40) < penalty((long,), 40)
+    pair = changing(bias, Course.INTERMITTENT, SPAN)
+    assert penalty((pair,), 40) > penalty((short,), 40) + RARE
     first, *_, last = moments_in(SPAN)
     assert (first, last) == (EDGE_S, SPAN[1] - EDGE_S)
 
@@ -116,6 +201,12 @@ def test_a_change_says_its_numbers_before_and_when():
         "steering.trim_rad": 0.05, "steering.trim_rad@before": 0.0,
         "steering.trim_rad@since_s": 12.0, "steering.trim_rad@until_s": 12.0,
     }  # fmt: skip
+    pair = changing(candidate("steer_trim"), Course.INTERMITTENT, SPAN)
+    since = {"steering.trim_rad@since_s": 12.0, "steering.trim_rad@until_s": 12.0}
+    assert pair.numbers((0.05, 12.0, 20.0)) == {
+        "steering.trim_rad": 0.05, "steering.trim_rad@before": 0.0, **since,
+        "steering.trim_rad@back_s": 20.0,
+    }  # fmt: skip
     ramp = changing(candidate("steer_trim"), Course.RAMP, SPAN, was_there=True)
     numbers = ramp.numbers((0.05, -0.01))
     assert numbers["steering.trim_rad@before"] == -0.01
@@ -124,11 +215,75 @@ def test_a_change_says_its_numbers_before_and_when():
 
 def test_the_car_at_the_end_has_the_effect_and_the_car_before_has_not():
     best = tried(_late).alternatives[0]
-    assert at_share(best, 0.0).effects == ()
-    (effect,) = at_share(best, 1.0).effects
+    assert at_shares(best, [0.0]).effects == ()
+    (effect,) = at_shares(best, [1.0]).effects
     assert effect == candidate("gyro_bias")
-    assert at_share(best, 1.0).values.tolist() == [best.values[0]]
-    assert at_share(best, 0.5).values.tolist() == pytest.approx([0.5 * best.values[0]])
+    assert at_shares(best, [1.0]).values.tolist() == [best.values[0]]
+    assert at_shares(best, [0.5]).values.tolist() == pytest.approx([0.5 * best.values[0]])
+
+
+def test_shares_of_changes_go_with_time():
+    trim, values = candidate("steer_trim"), [0.05, 12.0, 20.0]
+    step, ramp, pair = (changing(trim, course, SPAN) for course in list(Course)[1:])
+    times = (-math.inf, 11.9, 12.0, 20.0, math.inf)
+    assert [step.share(values[:2], t) for t in times] == [0.0, 0.0, 1.0, 1.0, 1.0]
+    assert [ramp.share(values[:1], t) for t in times] == pytest.approx(
+        [0, 11.9 / 30, 0.4, 2 / 3, 1]
+    )
+    assert [pair.share(values, t) for t in times] == [0.0, 0.0, 1.0, 0.0, 0.0]
+
+
+def test_the_car_at_the_end_is_without_what_came_and_went():
+    best = tried(_for_a_while).alternatives[0]
+    found = effect_like(best.effects[0])
+    files = CarFiles(nigel(), ("made",))
+    car = files.written(best, [found])
+    first, during, last = files.stages(best, [found], car)
+    assert (first.file, during.file, last.file) == ("car.toml", "during.toml", "car.toml")
+    assert (first.until_s, during.until_s) == tuple(best.values[2:])
+    assert first.car is last.car is car
+    key = "measure.accel_bias_x_m_s2"
+    assert not car.has(key)
+    assert during.car.value(key) == pytest.approx(best.values[0], rel=1e-5)
+    for one in (car, during.car):
+        text = one.path.read_text(encoding="utf-8")
+        assert "# accel_bias was there from 10.4 s (10.0 to 11.0 s) to 19.1 s" in text
+
+
+def test_two_changes_have_a_car_for_each_span_between_their_moments():
+    best = tried(_for_a_while).alternatives[0]
+    effects = (changing(candidate("steer_trim"), Course.STEP, SPAN), *best.effects)
+    both = replace(best, effects=effects, values=np.array([0.05, 15.0, *best.values]))
+    spans = spans_of(both)
+    assert [shares for *_, shares in spans] == [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)]
+    assert [until_s for _, until_s, _ in spans] == [best.values[2], 15.0, best.values[3], math.inf]
+    assert at_shares(both, spans[-1][2]).names == ("steer_trim",)
+
+
+def test_a_report_says_from_when_to_when_an_effect_was_there():
+    pair = effect_like(changing(candidate("accel_bias"), Course.INTERMITTENT, SPAN))
+    assert effect_title(pair).endswith("from 10 s to 19 s")
+    assert since_sentence(pair).startswith(
+        "From 10.4 s (10.0 to 11.0 s) to 19.1 s (18.5 to 19.5 s)"
+    )
+    located = (Located(equation=pair.equation, channels=("imu.accel_x",), depends_on=(),
+                       when_s=None, where=None, share_of_error=1.0),)  # fmt: skip
+    assert since_changes(located, [pair], 90.0)[0].when_s == ((10.4, 19.1),)
+
+
+def effect_like(candidate):
+    """What a report states of an effect that came and went."""
+    since, until = (
+        Estimate(value=value, low=low, high=high, unit="s")
+        for value, low, high in ((10.4, 10.0, 11.0), (19.1, 18.5, 19.5))
+    )
+    bias = {name: Estimate(value=0.1, low=0.0, high=0.2, unit="m/s^2")
+            for name in ("x_mps2", "y_mps2")}  # fmt: skip
+    return Effect(
+        name=candidate.name, is_known=True, equation=candidate.equation, depends_on=("time",),
+        parameters=bias, probability=0.9, text="", course=Course.INTERMITTENT,
+        since_s=since, until_s=until,
+    )  # fmt: skip
 
 
 def test_a_report_names_the_moment_of_a_change():
@@ -150,6 +305,10 @@ def test_an_effect_on_its_way_has_numbers_and_intervals_between_its_ends():
     assert as_it_was(effect, trim, [0.04], 0.0, {}) is effect
     assert as_it_was(effect, ramp, [0.04], 0.0, {}) is None
     assert as_it_was(effect, ramp, [0.04], 1.0, {}) is effect
+    pair = changing(trim, Course.INTERMITTENT, SPAN)
+    came = structs.replace(effect, course=Course.INTERMITTENT)
+    assert as_it_was(came, pair, [0.04, 10.0, 20.0], 0.0, {}) is None
+    assert as_it_was(came, pair, [0.04, 10.0, 20.0], 1.0, {}) == effect
     half = as_it_was(effect, ramp, [0.04], 0.5, {}).parameters["offset_rad"]
     assert (half.value, half.low, half.high) == pytest.approx((0.02, 0.015, 0.025))
     was = structs.replace(effect, before={"offset_rad": structs.replace(end, value=0.02)})

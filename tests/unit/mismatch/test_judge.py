@@ -1,13 +1,16 @@
 """The judge: free runs before and after, against the recording and against noise alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from msgspec.structs import replace
+from msgspec import structs
 
 from scm.errors import RecordingError
 from scm.mismatch.fit.data_split import split
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.validate.free_runs import judge, nothing_got_worse
+from scm.mismatch.validate.stages import Stage
 from tests.unit.mismatch.made_drive import big_nigel, car_with, driven
 
 TRIM = {"steering.trim_rad": 0.05}
@@ -67,6 +70,20 @@ def test_a_car_that_changes_with_time_is_judged_by_its_own_time():
     assert fit.confirm.before["position_m"] > 3.0 * fit.confirm.after["position_m"]
 
 
+def test_windows_in_which_something_changed_at_once_do_not_count():
+    drive = driven(tuple(TRIM.items()))
+    parts = split(Likelihood.of([drive], big_nigel()), 5.0)
+    change_s, (usual, trimmed) = 8.0, (car_with(), car_with(TRIM))
+    stages = (Stage(usual, "before.toml", until_s=change_s), Stage(trimmed, from_s=change_s))
+    starts = {}
+    for at_once in (False, True):
+        each = (stages[0], replace(stages[1], at_once=at_once))
+        _, runs = judge([drive], usual, each, parts, 2.0)
+        starts[at_once] = set(np.round(runs.start_s, 3))
+    left = {start for start in starts[False] if not start < change_s < start + 2.0}
+    assert starts[True] == left < starts[False]
+
+
 def late(by, scale):
     def sense(name, t, values):
         if not name.startswith("pose."):
@@ -106,7 +123,9 @@ def test_what_noise_may_change_is_not_called_worse(trimmed):
     fit = trimmed[0]
     floor = fit.confirm.noise_floor
     more = {name: 1.1 * value for name, value in floor.items()}
-    same = replace(fit, confirm=replace(fit.confirm, before=dict(floor), after=more))
+    same = structs.replace(
+        fit, confirm=structs.replace(fit.confirm, before=dict(floor), after=more)
+    )
     assert nothing_got_worse(same) == ()
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from scm.geometry import Pose2
 from scm.mismatch.evidence import Evidence
-from scm.mismatch.findings import Effect, Equation, Estimate, Verdict
+from scm.mismatch.findings import Course, Effect, Equation, Estimate, Verdict
 from scm.mismatch.report.car_file import write_car
 from scm.mismatch.report.sentences import advice_of
 from scm.vehicles.car import all_terms, load_car
@@ -235,3 +235,16 @@ def test_what_is_added_to_a_cars_own_number_is_told_as_the_sum(tmp_path):
     write_car(made_up.diagnosis(effects=(effect,)), SHOWN, car, patched, tmp_path)
     source = load_car(tmp_path / "car.toml").quantity(key).source
     assert f"90 % {given + 0.01:.4g}..{given + 0.03:.4g}" in source
+
+
+def test_a_number_states_no_interval_of_an_effect_that_went(tmp_path):
+    nigel = load_car("nigel")
+    scale = Estimate(value=0.9, low=0.88, high=0.92, unit="1")
+    effect = replace(
+        found_effect("wheel_radius", ()), parameters={"scale": scale}, course=Course.INTERMITTENT
+    )
+    patched = nigel.with_terms([], {"wheel.radius_m": 0.9 * nigel.value("wheel.radius_m")})
+    for course, states in ((Course.CONSTANT, True), (Course.INTERMITTENT, False)):
+        found = made_up.diagnosis(effects=(replace(effect, course=course),))
+        write_car(found, SHOWN, nigel, patched, tmp_path)
+        assert ("90 %" in (tmp_path / "car.toml").read_text(encoding="utf-8")) is states

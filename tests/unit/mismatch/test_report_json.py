@@ -13,7 +13,7 @@ TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data",
        "processor_share", "compared_s", "dropped", "failure"}  # fmt: skip
 LOCATED = {"equation", "channels", "depends_on", "when_s", "where", "share_of_error"}
 EFFECT = {"name", "listed", "equation", "depends_on", "parameters", "probability", "said", "law",
-          "rivals", "course", "since_s", "before", "stated"}  # fmt: skip
+          "rivals", "course", "since_s", "until_s", "before", "stated"}  # fmt: skip
 
 
 def read(diagnosis):

@@ -394,6 +394,30 @@ def test_a_change_on_a_clock_from_1970_is_since_the_recordings_start(tmp_path):
     assert "since 42.0 s (41.0 to 43.0 s)" in (tmp_path / "car.toml").read_text(encoding="utf-8")
 
 
+def test_what_came_and_went_is_shown_with_both_moments_and_its_own_car_file(tmp_path):
+    found, evidence, *cars = made_up.CASES["one_effect"]()
+    since, until = (Estimate(value=t, low=t - 0.5, high=t + 0.5, unit="s") for t in (12.0, 20.0))
+    gone = structs.replace(
+        found.effects[0], course=Course.INTERMITTENT, since_s=since, until_s=until
+    )
+    found = structs.replace(found, effects=(gone,))
+    write_report(found, evidence, *cars, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "From 12.0&nbsp;s (11.5 to 12.5&nbsp;s) to 20.0&nbsp;s (19.5 to 20.5&nbsp;s)" in page
+    assert "during.toml" in page
+    assert "before.toml" not in page
+    line = (tmp_path / "pictures" / "time_line.svg").read_text(encoding="utf-8")
+    assert line.count('class="since-area"') == 4  # of two panels
+    dated = replace(evidence, residuals=tuple(
+        replace(r, t_s=r.t_s + 1_700_000_000.0) for r in evidence.residuals
+    ), free_runs=None)  # fmt: skip
+    late = structs.replace(until, value=1_700_000_020.0)
+    shown = since_start(
+        structs.replace(found, effects=(structs.replace(gone, until_s=late),)), dated
+    )
+    assert shown.effects[0].until_s.value == 20.0
+
+
 def test_the_strip_says_what_served_what_on_the_axis_of_one_recording_or_several(tmp_path):
     found, shown, car, patched = made_up.one_effect()
     line = tmp_path / "pictures" / "time_line.svg"
