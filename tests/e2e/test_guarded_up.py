@@ -35,7 +35,8 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CityProcess]:
     runs = tmp_path_factory.mktemp("runs")
     keys = f"sqlite:{runs}/keys.db"
     admin = KeyRing(open_store(keys)).add("ann", "admin", 1)
-    guarded = ("--fleet", str(fleet), "--keys", keys, "--hosted", "1", "--agents", "1")
+    guarded = ("--fleet", str(fleet), "--keys", keys, "--state", f"sqlite:{runs}/state.db")
+    guarded += ("--hosted", "1", "--agents", "1")
     with city(runs, *guarded) as process:
         process.web.headers["Authorization"] = f"Bearer {admin}"
         wait_for(
@@ -107,6 +108,9 @@ def test_a_fault_is_still_there_when_the_monitor_dies_and_ends_by_reset(
 ) -> None:
     with running.frozen("traffic"):  # a restart may be too quick for the monitor to miss it
         wait_for(lambda: fault(running) == "stale", 90.0, "the monitor saw the signals fall silent")
+    state = open_store(f"sqlite:{running.folder}/state.db")  # it is seen before it is stored
+    stored = lambda: any(key.startswith("monitor/") for key, _ in state.items("latches"))  # noqa: E731
+    wait_for(stored, 30.0, "the fault is stored")
     running.kill("monitor")
     wait_for(lambda: "again" in detail(running), 90.0, "the new monitor has spoken")
     assert fault(running) == "stale"
