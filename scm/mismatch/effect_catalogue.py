@@ -11,7 +11,7 @@ import numpy as np
 
 from scm.arrays import Bools
 from scm.mismatch.findings import Equation
-from scm.replay.drive import Drive, has_odometer
+from scm.replay.drive import Drive, has_distance, has_odometer
 from scm.vehicles.car import Car, all_terms
 from scm.vehicles.identification import Identification
 from scm.vehicles.param import Param
@@ -111,20 +111,22 @@ class Candidate:
 
 
 def shown_by(found: tuple[Candidate, ...], drives: Sequence[Drive]) -> tuple[Candidate, ...]:
-    """Return the candidates that these drives are fast enough to show."""
+    """Return the candidates that these drives are fast enough, and measured enough, to show."""
     fast, hard = 0.0, 0.0
     for drive in drives:
         speed, yaw = drive.pose_speed, drive.smoothed["pose.yaw"]
         turning = np.abs(yaw.rate_at(drive.smoothed["pose.x"].t))
         fast = max(fast, float(np.percentile(speed, 95)))
         hard = max(hard, float(np.percentile(speed * turning, 95)))
-    odometer = any(has_odometer(drive) for drive in drives)
+    odometer = any(map(has_odometer, drives))
+    distance = any(map(has_distance, drives))
     known = identifications()
     return tuple(
         c for c in found
         for needs in (known[c.name],)
         if fast >= needs.needs_mps and hard >= needs.needs_m_s2
         and (odometer or not needs.needs_odometer)
+        and (distance or not needs.needs_distance)
     )  # fmt: skip
 
 

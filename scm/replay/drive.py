@@ -43,6 +43,7 @@ LEAP = 0.3
 BLIND_S, BLIND_STEPS = 1.0, 5.0  # without a pose for longer, and for so many of its usual steps
 POSES = ("pose.x", "pose.y", "pose.yaw")
 ODOMETERS = ("speed", "velocity.x")  # best first
+WITHOUT_DISTANCE = ("pose.", "imu.gyro", "yaw_rate")  # beginnings of channels' names
 SLIP = 0.03  # of the speed: wheels that count it slip, and their tyres grow
 LARGEST_SCALE = 1.6  # of an odometer against the poses: beyond, it is another unit or another car
 FEWEST_ROWS, SMOOTHED_ROWS = 20, 4.0  # to tell its scale by, and those that share their noise
@@ -250,6 +251,12 @@ def _commanded(t: Floats, values: Floats, *, moving: bool) -> Commanded:
 def has_odometer(drive: Drive) -> bool:
     """Say whether a drive has a measured speed that is not what drives the car."""
     return "speed" in drive.names and not is_led(drive)
+
+
+def has_distance(drive: Drive) -> bool:
+    """Say whether anything but the poses measures how far a drive went, or commands how fast."""
+    beside = any(not name.startswith(WITHOUT_DISTANCE) for name in drive.names)
+    return beside or any(name in drive.recording.channels for name in COMMANDED_SPEEDS)
 
 
 def is_led(drive: Drive) -> bool:

@@ -37,6 +37,7 @@ class Identification:
         rare: What it must gain beyond others [squared std]: it looks like something more common.
         needs_mps, needs_m_s2: Speed and side acceleration that a drive must reach to show it.
         needs_odometer: Whether only an odometer shows it.
+        needs_distance: Whether only a measure of distance beside the poses shows it.
         bounds: Closer than those of the parameters, by reported name.
         parameters: Reported names of those searched for; empty: all that may be fitted.
         adds: Whether its number is added to one that the car file may have already.
@@ -63,6 +64,7 @@ class Identification:
     needs_mps: float = 0.0
     needs_m_s2: float = 0.0
     needs_odometer: bool = False
+    needs_distance: bool = False
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     parameters: tuple[str, ...] = ()
     adds: bool = False

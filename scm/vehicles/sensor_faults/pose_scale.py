@@ -27,7 +27,7 @@ SENSOR_FAULT = SensorFault(
     ),
     identification=Identification(
         equation="sensor", depends_on=("position",), starts=((1.02,), (0.98,)), steps=(0.005,),
-        shared="camera",
+        shared="camera", needs_distance=True,
         sentence="The camera shows {scale_cm} for every 100 cm on the floor.",
         experiments=("rotated",),
         advice="Measure two marks on the floor with a tape and calibrate the tracking again.",

@@ -110,3 +110,15 @@ def test_a_centre_of_gravity_stays_above_the_floor():
     height = next(one for one in candidates(nigel()) if one.name == "load_transfer")
     (low, _), most = height.parameters[0].bounds, nigel().value("body.cog_height_m")
     assert -most < low < -0.9 * most
+
+
+@pytest.mark.parametrize(
+    ("without", "is_proposed"),
+    [((), True), (("encoder", "imu.accel"), False), (("encoder",), True)],
+)
+def test_a_scale_of_the_poses_needs_another_measure_of_distance(without, is_proposed):
+    made = made_drive(seconds=8.0)
+    channels = {n: c for n, c in made.channels.items() if not n.startswith(without)}
+    drive = Drive(replace(made, channels=channels), big_nigel())
+    names = {c.name for c in shown_by(candidates(big_nigel()), [drive])}
+    assert ("pose_scale" in names) == is_proposed
