@@ -34,7 +34,7 @@ LAST_ROUNDS = 5, 8  # of fits that are compared: of all starts, then of the near
 BETTER_BASE = 5.0  # gain by an effect's nominal parameters alone that calls for another try
 MIN_REFITTED = 4
 WORTH_A_FIT = 0.5  # of its penalty, what an effect must gain by a linear guess to be refitted
-BENT = 1.0  # standard deviations from its file, at which the re-tuned car may hide an effect
+BENT = 1.0  # standard deviations from its file, beyond which a number may hide an effect
 FINALISTS, FINALISTS_WITHIN = 3, 100.0
 FALSE_ALARMS = 0.02  # one in fifty
 NEAR = 40.0  # score within which a fit may still become the best
@@ -206,38 +206,17 @@ def extend(context: Context, base: Hypothesis) -> Round:
 
 
 def _extended(context: Context, base: Hypothesis) -> Round:
-    fitter, amplifies = context.fitter(base.model), context.amplifies
-    there = {*base.names, *(effect.like for effect in base.effects)}
-    trials = [
-        ((*base.effects, candidate), np.concatenate((base.values, start)))
-        for candidate in context.catalogue
-        if candidate.name not in there
-        for start in candidate.starts
-    ]
-    context.notify(f"trying {len(context.catalogue)} effects from {len(trials)} starts")
-    starts = [base]
-    if np.any(np.abs(base.z) > BENT):  # a re-tuned car bends towards what is missing
-        starts.append(fitter.with_nominal_car(base))
-    every = [fitter.begin(start, trials, amplified=amplifies) for start in starts]
-    begun = [_best_of_each(fits, SPOTS if amplifies else 1) for fits in every]
+    fitter = context.fitter(base.model)
 
     def cost(fitted: Hypothesis) -> float:
         return context.criterion(fitted) - AT_LIMIT * bool(at_limit(fitted.effects[-1], base))
 
-    near, *others = (sorted(fits, key=cost)[:MAX_REFITTED] for fits in begun)
-    far = others[0][:MAX_REFITTED_FROM_NOMINAL] if others else list[Hypothesis]()
-    if context.changes:
-        changes = changes_to_try(context.penalty, fitter, base, every[0])
-        changes += varying_to_try(context.penalty, fitter, base, every[0])
-        near += _best_of_each(fitter.begin(base, changes), 1)
-    near = with_best_moments(fitter, _promising(context, base, near))
-    near += [f for one in near[:MAX_OTHER_STARTS] for f in next_starts(one, every[0])]
+    near, far = _started(context, fitter, base, cost)
     context.notify("refitting " + ", ".join(f.names[-1] for f in near[:4]) + " ...")
-    del every, begun  # they hold innovations of every start
     near = fitter.refine(near, rounds=4, race=Race(cost, near=NEAR))
     near += fitter.refine(_steady(fitter, base, near, cost), rounds=4)
     race = Race(cost, min(map(cost, near), default=math.inf), NEAR)
-    far = fitter.refine(_promising(context, base, far), rounds=4, race=race)
+    far = fitter.refine(far, rounds=4, race=race)
     near, far = _lighter(context, near), _lighter(context, far)
     ranked = sorted((_not_worse(f, base) for f in _preferred(near, far)), key=cost)
     if not ranked:
@@ -252,6 +231,39 @@ def _extended(context: Context, base: Hypothesis) -> Round:
     costs = [cost(f) + let_go(context, f, ranked, base) for f in ranked]
     order = sorted(range(len(ranked)), key=costs.__getitem__)
     return Round(base, tuple(ranked[i] for i in order), tuple(costs[i] for i in order))
+
+
+def _started(
+    context: Context, fitter: Fitter, base: Hypothesis, cost: Callable[[Hypothesis], float]
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Return the effects that may pay, as linear guesses: from `base`, and from the nominal car.
+
+    A re-tuned car bends towards what is missing, and may hide it; one that lies near its file
+    hides nothing.
+    """
+    amplifies, there = context.amplifies, {*base.names, *(one.like for one in base.effects)}
+    trials = [
+        ((*base.effects, candidate), np.concatenate((base.values, start)))
+        for candidate in context.catalogue
+        if candidate.name not in there
+        for start in candidate.starts
+    ]
+    context.notify(f"trying {len(context.catalogue)} effects from {len(trials)} starts")
+    spots = SPOTS if amplifies else 1
+    begun = fitter.begin(base, trials, amplified=amplifies)
+    near = sorted(_best_of_each(begun, spots), key=cost)[:MAX_REFITTED]
+    if context.changes:
+        changes = changes_to_try(context.penalty, fitter, base, begun)
+        changes += varying_to_try(context.penalty, fitter, base, begun)
+        near += _best_of_each(fitter.begin(base, changes), 1)
+    near = with_best_moments(fitter, _promising(context, base, near))
+    near += [f for one in near[:MAX_OTHER_STARTS] for f in next_starts(one, begun)]
+    if np.all(np.abs(base.z) <= BENT):
+        return near, []
+    del begun  # it holds innovations of every start
+    begun = fitter.begin(fitter.with_nominal_car(base), trials, amplified=amplifies)
+    far = sorted(_best_of_each(begun, spots), key=cost)[:MAX_REFITTED_FROM_NOMINAL]
+    return near, _promising(context, base, far)
 
 
 def _promising(context: Context, base: Hypothesis, fits: Sequence[Hypothesis]) -> list[Hypothesis]:
