@@ -55,6 +55,14 @@ class Estimate(Struct, kw_only=True, frozen=True):
     unit: str
 
 
+class Range(Struct, kw_only=True, frozen=True):
+    """Between which values a variable was while the car moved, in `unit`."""
+
+    low: float
+    high: float
+    unit: str
+
+
 class Alternative(Struct, kw_only=True, frozen=True):
     """An effect that was tried in place of one that was found, and what rules it out."""
 
@@ -80,6 +88,7 @@ class Effect(Struct, kw_only=True, frozen=True):
         until_s: When an effect that came and went was last there; None of any other.
         before: Its parameters before the change; empty: it was not there, or did not change.
         stated: Its parameters as the given car file has them; empty: the file lacks the effect.
+        recorded_range: Where it was seen, by variable: what it depends on, in the recordings.
     """
 
     name: str
@@ -96,6 +105,7 @@ class Effect(Struct, kw_only=True, frozen=True):
     until_s: Estimate | None = None
     before: Mapping[str, Estimate] = {}
     stated: Mapping[str, float] = {}
+    recorded_range: Mapping[str, Range] = {}
 
     @property
     def is_of_recording(self) -> bool:

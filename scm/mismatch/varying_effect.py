@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 
 from scm.mismatch.effect_catalogue import Candidate
+from scm.mismatch.recorded_range import NO_RANGES, Ranges, holds, limit
 from scm.replay.drive import Drive
 from scm.replay.numbers import AT, BEFORE, BY
 from scm.replay.recorded_variables import HOT_S, PLACES, VARIABLES, WARM_S, usual_most
@@ -34,6 +35,7 @@ class Dependence:
         reads: The car's variables in `value`.
         value: As a function of these.
         memory_s: How long the throttle is remembered; 0: it is not.
+        grows: Whether the value has no bound of its own.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Dependence:
     reads: tuple[str, ...]
     value: str
     memory_s: float = 0.0
+    grows: bool = True
 
 
 _LEFT = "while the command steers to the {}"
@@ -52,9 +55,9 @@ DEPENDENCES = (
     Dependence("steering angle", "in proportion to the angle commanded", ("steer_demand",),
                "abs(steer_demand)"),
     Dependence("left turns", _LEFT.format("left"), ("steer_demand",),
-               "1.0 if steer_demand > 0.0 else 0.0"),
+               "1.0 if steer_demand > 0.0 else 0.0", grows=False),
     Dependence("right turns", _LEFT.format("right"), ("steer_demand",),
-               "1.0 if steer_demand < 0.0 else 0.0"),
+               "1.0 if steer_demand < 0.0 else 0.0", grows=False),
     Dependence("use", f"in proportion to the mean throttle of the last {WARM_S:g} s",
                ("throttle_memory",), "throttle_memory", memory_s=WARM_S),
     Dependence("long use", f"in proportion to the mean throttle of the last {HOT_S:g} s",
@@ -164,15 +167,23 @@ def own_key(effect: VaryingEffect) -> str:
 
 
 def as_own_term(
-    effect: VaryingEffect, values: Sequence[float], folder: Path, own: Mapping[str, float]
-) -> tuple[Term, dict[str, float]]:
+    effect: VaryingEffect, values: Sequence[float], folder: Path, own: Mapping[str, float],
+    ranges: Ranges = NO_RANGES,
+) -> tuple[Term, dict[str, float]]:  # fmt: skip
     """Write an effect's file; return the effect it holds, and the car file's number for it.
+
+    Args:
+        effect: To be written.
+        values: Of its parameter.
+        folder: Of the file.
+        own: The car's own numbers by key.
+        ranges: To which it is limited, by what it depends on.
 
     Raises:
         TermError: when what was written does not load; then it is our fault.
     """
     name = _stem(effect) + SUFFIX
-    (folder / name).write_text(_text(effect, values, own), encoding="utf-8")
+    (folder / name).write_text(_text(effect, values, own, ranges), encoding="utf-8")
     return load_own_term(folder, name), {own_key(effect): effect.slope(values, own)}
 
 
@@ -180,7 +191,9 @@ def _stem(effect: VaryingEffect) -> str:
     return re.sub(r"\W+", "_", effect.name)
 
 
-def _text(effect: VaryingEffect, values: Sequence[float], own: Mapping[str, float]) -> str:
+def _text(
+    effect: VaryingEffect, values: Sequence[float], own: Mapping[str, float], ranges: Ranges
+) -> str:
     """Return the file: the library's function, called with the number as it is now."""
     stem, base, by = _stem(effect), all_terms()[effect.of.name], effect.by
     known = {param.reported: param for param in base.params}
@@ -190,11 +203,14 @@ def _text(effect: VaryingEffect, values: Sequence[float], own: Mapping[str, floa
     arguments = [*given, *(name for name in by.reads if name not in given), SLOPE]
     signature = ",\n    ".join(f"{name}: float" for name in arguments)
     call = ", ".join("here" if name == param.name else name for name in given)
+    lines, value = limit(by.value, by.reads if by.grows else (), ranges)
+    lines.append(f"here = min(max({param.name} + {SLOPE} * ({value}), {low}), {high})")
     memory = _MEMORY.format(stem=stem, memory_s=by.memory_s) if by.memory_s else ""
     also = f"\n    also=(*{base.name.upper()}.also, {stem}_memory_term)," if memory else ""
     return _FILE.format(
         title=effect.name.capitalize(), base=base.name, upper=base.name.upper(), stem=stem,
-        value=by.value, number=param.name, low=low, high=high, signature=signature, call=call,
+        value=by.value, number=param.name, lines="\n    ".join(lines),
+        holds=holds(ranges, limited=by.grows), signature=signature, call=call,
         unit=effect.slope_unit, far=_FAR, memory=memory, also=also,
         formula=effect.formula(values, own),
         sentence=effect.sentence.format(**{param.reported: f"`{param.reported}`"}),
@@ -218,7 +234,7 @@ _FILE = '''"""{title}: a known effect whose number depends on a variable.
     found as {formula}
 
 {sentence}
-Holds: within what the recording showed.
+Holds: {holds}.
 Shows in: the recording it was learned from.
 Source: `scm mismatch`.
 """
@@ -237,7 +253,7 @@ def {stem}(
     {signature},
 ) -> float:  # fmt: skip
     """As `{base}`, its number as it is now."""
-    here = min(max({number} + slope * ({value}), {low}), {high})
+    {lines}
     return {base}({call})
 
 

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scm.arrays import Floats
-from scm.replay.drive import STEP_S, Drive
+from scm.arrays import Bools, Floats
+from scm.replay.drive import CREEPING_MPS, STEP_S, Drive
 from scm.vehicles.jit import array_kernel
 
 WARM_S, HOT_S = 10.0, 40.0  # of the throttle, over which parts warm up and cool down
 USUAL = 95  # percentile of a curve that counts as its usual most
 LEAST_SPREAD = 0.15  # of the usual most: a curve that hardly varies is a constant
+ENDS = (0.5, 99.5)  # percentiles of a curve that count as the ends of its range
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,8 @@ class RecordedVariable:
 
     Attributes:
         name: As it is reported.
-        curve: Returns it at the edges of a drive's steps, never negative, (steps + 1,).
+        curve: Returns it at the edges of a drive's steps, (steps + 1,); never negative, except a
+            place.
         least: Usual most below which a recording's noise hides it.
     """
 
@@ -42,6 +44,20 @@ def usual_most(variable: RecordedVariable, drives: Sequence[Drive]) -> float:
     return most if varies else 0.0
 
 
+def range_of(variable: RecordedVariable, drives: Sequence[Drive]) -> tuple[float, float] | None:
+    """Return the range of a variable while the car moves; None where it never does."""
+    values = np.concatenate([variable.curve(drive)[moving(drive)] for drive in drives])
+    if not len(values):
+        return None
+    low, high = np.percentile(values, ENDS)
+    return float(low), float(high)
+
+
+def moving(drive: Drive) -> Bools:
+    """Return whether the car moves and is seen at the edges of a drive's steps, (steps + 1,)."""
+    return (_speed(drive) > CREEPING_MPS) & ~drive.is_blind(drive.edges)
+
+
 def _commanded(drive: Drive, name: str) -> Floats:
     command = drive.throttle if name == "throttle" else drive.steering
     values = command.means(drive.edges, np.zeros(1))[:, 0]
@@ -57,8 +73,31 @@ def _speed(drive: Drive) -> Floats:
     return np.hypot(x, y)
 
 
+def _yaw_rate(drive: Drive) -> Floats:
+    return np.abs(drive.smoothed["pose.yaw"].rate_at(drive.edges))
+
+
 def _load(drive: Drive) -> Floats:
-    return np.abs(_speed(drive) * drive.smoothed["pose.yaw"].rate_at(drive.edges))
+    return _speed(drive) * _yaw_rate(drive)
+
+
+def _lateral(drive: Drive) -> Floats:
+    """Return the acceleration across at the centre of gravity, where turning faster counts too."""
+    turns = drive.smoothed["pose.yaw"].rate_at(drive.edges)
+    ahead = drive.car.value("body.cog_to_rear_axle_m")
+    return np.abs(_speed(drive) * turns + ahead * np.gradient(turns, STEP_S))
+
+
+def _place(axis: int) -> Callable[[Drive], Floats]:
+    """Return the curve of a coordinate of the centre of gravity."""
+
+    def curve(drive: Drive) -> Floats:
+        x, y, yaw = (drive.smoothed[f"pose.{name}"].at(drive.edges) for name in ("x", "y", "yaw"))
+        ahead, left = drive.car.value("body.cog_to_rear_axle_m") - drive.point[0], -drive.point[1]
+        c, s = np.cos(yaw), np.sin(yaw)
+        return y + s * ahead + c * left if axis else x + c * ahead - s * left
+
+    return curve
 
 
 def _angle(drive: Drive) -> Floats:
@@ -98,3 +137,11 @@ VARIABLES = (
     RecordedVariable("long use", "1", _used(HOT_S)),
 )
 PLACES = {variable.name: place for place, variable in enumerate(VARIABLES)}
+YAW_RATE = RecordedVariable("yaw rate", "rad/s", _yaw_rate)
+LATERAL = RecordedVariable("lateral acceleration", "m/s^2", _lateral)
+PLACE = tuple(RecordedVariable(name, "m", _place(axis)) for axis, name in enumerate("xy"))
+
+
+def mean_throttle(memory_s: float) -> RecordedVariable:
+    """Return the mean size of the throttle over so long, which fades."""
+    return RecordedVariable("mean throttle", "1", _used(memory_s))

@@ -16,6 +16,7 @@ from scm.errors import TermError
 from scm.mismatch.discovery.general_effect import GAIN, PREFIX, TRIM
 from scm.mismatch.effect_catalogue import Candidate, Parameter
 from scm.mismatch.findings import Equation
+from scm.mismatch.recorded_range import NO_RANGES, Ranges, holds, limit
 from scm.vehicles.own_term import SUFFIX, load_own_term
 from scm.vehicles.physics_variables import Per
 from scm.vehicles.term import Term
@@ -28,6 +29,10 @@ _WITH = {
     "sets steer_scaled": ("gain", f'1.0, "1", "{GAIN}", (0.2, 2.0), "gain of the steering"'),
 }
 """What a variable's own effect does, by target: the function that takes its place does it too."""
+
+_PULL = "pull_n_m"
+_GROWING = frozenset({"line", "size", "square", "cube", "heavy", "ramp", _PULL})
+"""The general effect's shapes without a bound, and its force that grows with the place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +123,12 @@ class DictionaryEffect(Candidate):
         """The functions that its file holds."""
         return (*self.channel.text, *filter(None, (self.shape.also,)))
 
+    @property
+    def growing(self) -> frozenset[str]:
+        """The general effect's numbers of this one that grow with a variable, without a bound."""
+        start = (1.0,) * len(self.parameters)
+        return _GROWING.intersection(key.removeprefix(PREFIX) for key in self.numbers(start))
+
     def numbers(self, values: Values) -> dict[str, float]:
         """Return the general effect's numbers, by key, at these values of the parameters."""
         n = len(self.channel.parameters)
@@ -162,21 +173,31 @@ def number_keys(effect: DictionaryEffect) -> dict[str, str]:
 
 
 def as_term(
-    effect: DictionaryEffect, values: Values, folder: Path
+    effect: DictionaryEffect, values: Values, folder: Path, ranges: Ranges = NO_RANGES
 ) -> tuple[Term, dict[str, float]]:
     """Write an effect's file, and return the effect it holds and the car file's numbers for it.
+
+    Args:
+        effect: To be written.
+        values: Of its parameters.
+        folder: Of the file.
+        ranges: To which it is limited, by what it depends on.
 
     Raises:
         TermError: when what was written does not load; then it is our fault.
     """
-    write_effect_file(effect, values, folder / (file_name(effect) + SUFFIX))
+    write_effect_file(effect, values, folder / (file_name(effect) + SUFFIX), ranges)
     term = load_own_term(folder, file_name(effect) + SUFFIX)
     keys = number_keys(effect)
     return term, {keys[k.name]: v for k, v in zip(effect.parameters, values, strict=True)}
 
 
-def write_effect_file(effect: DictionaryEffect, values: Values, path: Path) -> None:
+def write_effect_file(
+    effect: DictionaryEffect, values: Values, path: Path, ranges: Ranges = NO_RANGES
+) -> None:
     """Write an effect's file, with `values` of its parameters in its docstring.
+
+    Beyond `ranges` it acts as at the nearest end.
 
     Raises:
         TermError: when the file is not named like the effect.
@@ -184,15 +205,15 @@ def write_effect_file(effect: DictionaryEffect, values: Values, path: Path) -> N
     if path.name != file_name(effect) + SUFFIX:
         msg = f"{path.name}: expected {file_name(effect) + SUFFIX}, the effect's own name"
         raise TermError(msg)
-    parts = [_function(effect, part) for part in effect.written]
-    lines = [_docstring(effect, values), "", *_imports(parts), "", _params(effect), ""]
+    parts = [_function(effect, part, ranges) for part in effect.written]
+    lines = [_docstring(effect, values, ranges), "", *_imports(parts), "", _params(effect), ""]
     for part in parts:
         lines += ["", "@kernel_function", part, ""]
     lines += ["", _term(effect), ""]
     path.write_text("\n".join(lines), encoding="utf-8")
 
 
-def _docstring(effect: DictionaryEffect, values: Values) -> str:
+def _docstring(effect: DictionaryEffect, values: Values, ranges: Ranges) -> str:
     first = f"{effect.name.capitalize()}: a law that no library holds, learned from a recording."
     sentence = effect.sentence.format(**{k.name: f"`{k.name}`" for k in effect.parameters})
     equations = [
@@ -200,9 +221,10 @@ def _docstring(effect: DictionaryEffect, values: Values) -> str:
         for part in effect.written
     ]
     rows = [*equations, _plain(effect.shape.text), f"found as {effect.formula(values)}"]
+    where = holds(ranges, limited=bool(effect.growing))
     body = [
         f'"""{first}', "", *(_wrapped(row, "    ") for row in rows), "", _wrapped(sentence, ""),
-        "Holds: within what the recording showed; the form is the best of a dictionary.",
+        _wrapped(f"Holds: {where}. The form is the best of a dictionary.", ""),
         "Shows in: the recording it was learned from.",
         "Source: `scm mismatch`, its dictionary of laws.", '"""',
     ]  # fmt: skip
@@ -252,9 +274,8 @@ def _param(effect: DictionaryEffect, p: Parameter) -> str:
     )
 
 
-def _function(effect: DictionaryEffect, part: Written) -> str:
-    shape = f"{effect.shape.text}\n" if part.keeps is None else ""
-    body, names = _straight(f"{shape}result = {part.returns}")
+def _function(effect: DictionaryEffect, part: Written, ranges: Ranges) -> str:
+    body, names = _straight("\n".join(_lines(effect, part, ranges)))
     variables = [s for s in dict.fromkeys((*part.variables, *effect.shape.variables)) if s in names]
     arguments = [*variables, *(k.name for k in effect.parameters if k.name in names)]
     arguments += [_WITH[part.target][0]] if part.target in _WITH else []
@@ -265,6 +286,18 @@ def _function(effect: DictionaryEffect, part: Written) -> str:
         ") -> float:  # fmt: skip", f'    """{part.about}"""', *(f"    {line}" for line in lines),
         f"    return {last.removeprefix('result = ')}",
     ])  # fmt: skip
+
+
+def _lines(effect: DictionaryEffect, part: Written, ranges: Ranges) -> list[str]:
+    """Return a function's lines, where it grows with a variable with that inside its range."""
+    shape, result, more = effect.shape.text, f"result = {part.returns}", list[str]()
+    if part.keeps is not None:
+        return [result]
+    if _PULL in effect.growing:
+        more, result = limit(result, part.variables, ranges)
+    elif effect.growing:
+        more, shape = limit(shape, effect.shape.variables, ranges)
+    return [*more, shape, result]
 
 
 class _Straight(ast.NodeTransformer):

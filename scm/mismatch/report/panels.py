@@ -20,6 +20,7 @@ from scm.mismatch.report.sentences import (
     checks_of,
     pressing_problems,
     processor_sentence,
+    range_sentence,
     sensors,
     since_sentence,
     spans,
@@ -75,6 +76,7 @@ def _effects(diagnosis: Diagnosis) -> Iterator[Panel]:
             ("Since" if effect.until_s is None else "When", since_sentence(effect)),
             ("Formula", pretty(effect.formula or "").replace(" * ", " · ")),
             ("Where", where_and_when(_located_of(effect, diagnosis.located))),
+            ("Range", range_sentence(effect)),
             ("How sure", sureness(effect)),
             ("What to do", advice_of(effect)),
         ]

@@ -168,6 +168,15 @@ def since_sentence(effect: Effect) -> str:
     return ""
 
 
+def range_sentence(effect: Effect) -> str:
+    """Return where an effect was seen, of what it depends on; empty if nothing is known of it."""
+    seen = list[str]()
+    for name, one in effect.recorded_range.items():
+        low, high = quantities((one.low, one.high), one.unit)
+        seen.append(f"{name} {low.rpartition(' ')[0] or low} to {high}")
+    return f"Seen at {joined(seen)}." if seen else ""
+
+
 def _undecided_sentence(diagnosis: Diagnosis) -> str:
     between = [title_of(name) for u in diagnosis.undecided for name in u.between]
     either = joined(list(dict.fromkeys(between)), "or")

@@ -18,6 +18,7 @@ from scm.mismatch.findings import Alternative, Course, Effect, Equation, Estimat
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import LOCK, MIN_RELATIVE_STD, TIMING_S, UNKNOWN, Likelihood
+from scm.mismatch.recorded_range import recorded_range
 from scm.mismatch.report.wording import joined, percent, quantity, short
 from scm.mismatch.select.changes import moments_scored
 from scm.mismatch.select.round import Notify
@@ -173,6 +174,7 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
         probability=probability,
         text=sentence_of(candidate, estimates) + _stated_sentence(stated, estimates),
         stated=stated,
+        recorded_range=recorded_range(best, candidate),
         course=candidate.course if isinstance(candidate, ChangingEffect) else Course.CONSTANT,
         since_s=estimates.get(SINCE_NAME),
         until_s=estimates.get(UNTIL_NAME),

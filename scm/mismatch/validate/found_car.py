@@ -23,6 +23,7 @@ from scm.mismatch.discovery.sensor_effects import LENS, PREFIX, SensorEffect
 from scm.mismatch.evidence import Evidence, RefittedParameter
 from scm.mismatch.findings import Course, Diagnosis, Effect, Verdict
 from scm.mismatch.fit.hypothesis import Hypothesis
+from scm.mismatch.recorded_range import recorded_range
 from scm.mismatch.report.car_file import FILE, write_car
 from scm.mismatch.validate.explain import NINETY, refitted
 from scm.mismatch.validate.stages import (
@@ -236,12 +237,12 @@ def patched(car: Car, fitted: Hypothesis, folder: Path, own: Bools | None = None
     for effect, place in fitted.each():
         values = tuple(float(v) for v in fitted.values[place])
         if isinstance(effect, DictionaryEffect):
-            term, more = as_term(effect, values, folder)
+            term, more = as_term(effect, values, folder, recorded_range(fitted, effect))
             terms.append(term)
             numbers |= more
             continue
         if isinstance(effect, VaryingEffect):
-            term, more = as_own_term(effect, values, folder, of_car)
+            term, more = as_own_term(effect, values, folder, of_car, recorded_range(fitted, effect))
             terms.append(term)
             numbers |= more
             continue

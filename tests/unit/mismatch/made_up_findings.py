@@ -19,6 +19,7 @@ from scm.mismatch.findings import (
     Located,
     PartErrors,
     Place,
+    Range,
     Unanswered,
     Undecided,
     Verdict,
@@ -130,6 +131,7 @@ def unlisted():
         probability=0.94,
         text="Something pulls on the car with up to 0.42 N, depending on where it heads.",
         formula="F = -0.42 N · sin(2 · heading)",
+        recorded_range={"heading": Range(low=-1.2, high=2.4, unit="rad")},
         alternatives=(
             Alternative(name="wind", probability=0.03, ruled_out_by="It turns twice in a circle."),
         ),

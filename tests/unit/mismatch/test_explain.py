@@ -1,5 +1,6 @@
 """What is said of a model that was found."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -18,9 +19,12 @@ from scm.mismatch.validate.explain import (
     upright,
     widened_of,
 )
+from scm.mismatch.validate.found_car import patched
+from scm.mismatch.varying_effect import DEPENDENCES, varying
 from scm.replay.drive import Drive
 from tests.unit.mismatch import made_fit
-from tests.unit.mismatch.made_drive import big_nigel, made_drive
+from tests.unit.mismatch.discovery.made_effect import law
+from tests.unit.mismatch.made_drive import big_nigel, made_drive, nigel
 from tests.unit.mismatch.made_fit import by_name
 
 
@@ -64,6 +68,34 @@ def test_the_interval_of_a_direction_does_not_end_where_the_angle_wraps():
     selected = Selected((), (), big_nigel(), context, None, selection, (), None, None)
     uphill = effect_of(selected, found, grade).parameters["uphill_rad"]
     assert uphill.high - uphill.value == pytest.approx(uphill.value - uphill.low)
+
+
+def lag_against_throttle(most):
+    by = next(one for one in DEPENDENCES if one.name == "throttle")
+    return varying(made_fit.candidate("steer_lag"), by, most)
+
+
+@pytest.mark.parametrize(
+    ("effect", "value", "variable"),
+    [
+        (law("yaw moment against speed", "squared"), 0.02, "speed"),
+        (lag_against_throttle(0.9), 0.1, "throttle"),
+    ],
+)
+def test_the_range_reported_is_the_one_that_the_car_s_file_is_limited_to(
+    effect, value, variable, tmp_path
+):
+    model, _, best = made_fit.healthy()
+    found = replace(best, effects=(effect,), values=np.array([value]), covariance=np.zeros((0, 0)))
+    context, selection = Context(np.ones(len(model.t)), (effect,)), Selection(found, best)
+    selected = Selected((), (), big_nigel(), context, None, selection, (), None, None)
+    (name, seen), *_ = effect_of(selected, found, effect).recorded_range.items()
+    assert (name, seen.low > 0.0) == (variable, True)
+    patched(nigel(), found, tmp_path)
+    (file,) = tmp_path.glob("*.py")
+    limits = re.search(r"_in_range = min\(max\(\w+, (.+)\), (.+)\)", file.read_text())
+    ends = tuple(map(float, limits.groups()))
+    assert ends == pytest.approx((-seen.high, seen.high), abs=1e-4)
 
 
 @pytest.mark.parametrize(

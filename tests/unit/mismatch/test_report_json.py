@@ -13,7 +13,8 @@ TOP = {"verdict", "located", "effects", "undecided", "fit", "runtime_s", "data",
        "processor_share", "compared_s", "dropped", "failure"}  # fmt: skip
 LOCATED = {"equation", "channels", "depends_on", "when_s", "where", "share_of_error"}
 EFFECT = {"name", "listed", "equation", "depends_on", "parameters", "probability", "said", "law",
-          "rivals", "course", "since_s", "until_s", "before", "stated"}  # fmt: skip
+          "rivals", "course", "since_s", "until_s", "before", "stated",
+          "recorded_range"}  # fmt: skip
 
 
 def read(diagnosis):
@@ -37,6 +38,8 @@ def test_what_stands_inside_has_exactly_the_fixed_fields():
     assert set(report["effects"][0]["rivals"][0]) == {"name", "probability", "ruled_out_by"}
     estimate = report["effects"][0]["parameters"]["time_constant_s"]
     assert set(estimate) == {"value", "low", "high", "unit"}
+    (seen,) = read(made_up.CASES["unlisted_law"]()[0])["effects"][0]["recorded_range"].items()
+    assert seen == ("heading", {"low": -1.2, "high": 2.4, "unit": "rad"})
     assert set(report["fit"]) == {"horizon_s", "fit", "choose", "confirm", "retuned", "witness"}
     assert report["fit"]["retuned"] is None
     assert set(report["fit"]["witness"]) == {"position_m", "yaw_rad", "numbers"}

@@ -254,6 +254,12 @@ def test_what_to_do_stands_on_the_first_screen(page_of):
     assert "Look for a soft start" in first
 
 
+def test_the_range_in_which_an_effect_was_seen_stands_on_the_first_screen(page_of):
+    first, _, _ = page_of("unlisted_law").partition("<nav>")
+    assert "Seen at heading \N{MINUS SIGN}69° to 138°." in first
+    assert "Seen at" not in page_of("one_effect")
+
+
 def test_the_first_screen_says_how_much_better_it_got(page_of):
     first, _, _ = page_of("one_effect").partition("<nav>")
     assert "after 3&nbsp;s of driving by the recorded commands alone" in first

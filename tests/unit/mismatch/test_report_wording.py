@@ -2,9 +2,11 @@
 
 import pytest
 
-from scm.mismatch.findings import Estimate
-from scm.mismatch.report.sentences import sensors
+from scm.mismatch.findings import Estimate, Range
+from scm.mismatch.report.sentences import range_sentence, sensors
 from scm.mismatch.report.wording import interval, pretty, quantities, short
+from tests.unit.mismatch import made_up_findings as made_up
+from tests.unit.mismatch.made_up_findings import replace
 
 
 @pytest.mark.parametrize(
@@ -66,3 +68,12 @@ def test_units_and_signs_of_a_sentence_are_printed_ones():
     assert (
         pretty("off by -0.03 rad s^2/m, slow-ly") == "off by \N{MINUS SIGN}0.03 rad s²/m, slow-ly"
     )
+
+
+def test_a_range_is_one_short_sentence_with_each_unit_once():
+    ranges = {"speed": Range(low=0.2, high=0.912, unit="m/s"),
+              "throttle": Range(low=0.1, high=0.8, unit="1")}  # fmt: skip
+    effect = replace(made_up.lag(), recorded_range=ranges)
+    said = "Seen at speed 0.200 to 0.912 m/s and throttle 0.100 to 0.800."
+    assert range_sentence(effect) == said
+    assert range_sentence(made_up.lag()) == ""

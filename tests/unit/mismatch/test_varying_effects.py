@@ -1,5 +1,6 @@
 """Known effects whose number depends on a variable: what is tried, found, written and reported."""
 
+import inspect
 from functools import cache
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from msgspec import structs
 
 from scm.mismatch.effect_catalogue import identifications
+from scm.mismatch.findings import Range
 from scm.mismatch.fit.hypothesis import together
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.fit.rollouts import Rollouts
@@ -24,6 +26,7 @@ from scm.mismatch.varying_effect import (
 )
 from scm.replay.drive import Drive
 from scm.replay.recorded_variables import PLACES, VARIABLES, RecordedVariable, usual_most
+from scm.vehicles.jit import plain
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_drive import big_nigel, driven, made_drive
 from tests.unit.mismatch.made_fit import candidate
@@ -61,6 +64,28 @@ def test_the_written_effect_drives_as_the_search_did(name, tmp_path):
     plain, followed, own = (one[begun] for one in (*both, own))
     assert rms(followed - plain) > 0.003
     assert rms(own - followed) < 0.15 * rms(followed - plain)
+
+
+def test_beyond_the_range_recorded_a_number_is_as_at_its_end(tmp_path):
+    ranges = {"speed": Range(low=0.1, high=0.25, unit="m/s")}
+    term, _ = as_own_term(lag_against("speed"), (LAG_S,), tmp_path, {}, ranges)
+    function = plain(term.function)
+    given = dict.fromkeys(inspect.signature(function).parameters, 1.0)
+    given |= {"steer_target": 0.0, "time_constant": 0.0}
+
+    def moved(vx):
+        return function(*(given | {"vx": vx}).values())
+
+    assert moved(0.1) != moved(0.25)
+    assert moved(0.25) == moved(2.0) == moved(-2.0)
+    text = " ".join((tmp_path / f"{term.name}.py").read_text().split())
+    assert "Holds: at speed 0.1 to 0.25 m/s, which the recording showed; above" in text
+
+
+def test_a_side_needs_no_limit(tmp_path):
+    ranges = {"steering angle": Range(low=0.0, high=0.3, unit="rad")}
+    term, _ = as_own_term(lag_against("left turns"), (LAG_S,), tmp_path, {}, ranges)
+    assert "in_range" not in (tmp_path / f"{term.name}.py").read_text()
 
 
 @cache

@@ -11,6 +11,7 @@ from scm.geometry import Pose2
 from scm.mismatch.discovery.dictionary import dictionary
 from scm.mismatch.discovery.dictionary_effect import as_term, file_name, write_effect_file
 from scm.mismatch.discovery.general_effect import PREFIX, SHAPE, TERMS
+from scm.mismatch.findings import Range
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.jit import plain
@@ -23,6 +24,13 @@ HERE = {
     "yaw_rate": 0.5, "offset": 0.01, "steer_demand": -0.2, "gain": 1.1, "accel_y": -0.7,
     "throttle_memory": 0.4, "dt": 0.1, "driven": 1.0, "wheel_angle": 2.1,
 }  # fmt: skip
+
+WIDE = {
+    "speed": (0.0, 0.9), "throttle": (0.1, 0.8), "steering angle": (0.0, 0.3), "x": (-0.7, 1.0),
+    "y": (-1.0, 1.0), "yaw rate": (0.0, 0.9), "lateral acceleration": (0.0, 0.9),
+    "mean throttle": (0.2, 0.6),
+}  # fmt: skip
+WIDE = {name: Range(low=low, high=high, unit="1") for name, (low, high) in WIDE.items()}
 
 
 def value(function, given):
@@ -42,10 +50,67 @@ def general(law, values):
 @pytest.mark.parametrize("law", dictionary(), ids=lambda law: f"{law.name}, {law.shape.name}")
 def test_a_written_law_does_what_the_general_effect_did(law, tmp_path):
     values = tuple(0.3 + 0.4 * i for i in range(len(law.parameters)))
-    term, numbers = as_term(law, values, tmp_path)
+    term, numbers = as_term(law, values, tmp_path, WIDE)  # all is inside
     given = HERE | {key.partition(".")[2]: v for key, v in numbers.items()}
     for part in flat([term]):
         np.testing.assert_allclose(value(part.function, given), general(law, values)[part.target])
+
+
+def acting(law, values, folder):
+    """What a written law limited to `WIDE` does, as a function of variables."""
+    term, numbers = as_term(law, values, folder, WIDE)
+    given = HERE | {key.partition(".")[2]: v for key, v in numbers.items()}
+    return lambda **there: value(term.function, given | there)
+
+
+@pytest.mark.parametrize(
+    ("name", "curve", "variable", "end"),
+    [
+        ("yaw moment against speed", "squared", "vx", 0.9),
+        ("drive force against steering angle", "turned, cubed", "linkage_angle", 0.3),
+        ("wheel angle against steering angle", "bent", "steer_demand", None),
+        ("throttle against load", "load", "accel_y", 0.9),
+        ("drive force against yaw rate", "turning", "yaw_rate", 0.9),
+        ("wheel angle against throttle", "driven", "throttle_command", 0.8),
+        ("throttle against throttle's past", "worked", "throttle_memory", 0.6),
+        ("wheel angle against position", "slope", "x_cog", 1.0),
+    ],
+)
+def test_beyond_the_range_recorded_a_law_acts_as_at_its_end(name, curve, variable, end, tmp_path):
+    law = made_effect.law(name, curve)
+    act = acting(law, tuple(0.3 for _ in law.parameters), tmp_path)
+    if end is None:  # what the law is added to has no limit
+        at = {v: act(**{variable: v}) - HERE["gain"] * v for v in (0.2, 0.3, 0.6)}
+        assert at[0.2] < at[0.3] == pytest.approx(at[0.6])
+        return
+    assert act(**{variable: 0.7 * end}) != act(**{variable: end})
+    for side in (-1.0, 1.0):
+        assert act(**{variable: 3.0 * side * end}) == act(**{variable: side * end})
+
+
+def test_a_spring_pulls_no_harder_than_at_the_farthest_place_seen(tmp_path):
+    spring = made_effect.law("spring against position", "everywhere")
+    act = acting(spring, (2.0, 0.2, 0.1), tmp_path)
+    assert act(x_cog=5.0, yaw=0.0) == act(x_cog=1.0, yaw=0.0) == pytest.approx(-2.0 * 0.8)
+    assert act(x_cog=-5.0, yaw=0.0) == act(x_cog=-0.7, yaw=0.0) == pytest.approx(2.0 * 0.9)
+
+
+@pytest.mark.parametrize("curve", ["wave", "beyond"])
+def test_waves_and_halves_of_a_floor_need_no_limit(curve, tmp_path):
+    law = made_effect.law("wheel angle against position", curve)
+    place = {name: WIDE[name] for name in "xy"}
+    as_term(law, tuple(0.3 for _ in law.parameters), tmp_path, place)
+    text = (tmp_path / "wheel_angle_against_position.py").read_text()
+    assert "in_range" not in text
+    assert "Holds: at x -0.7 to 1 and y -1 to 1, which the recording showed. The form" in text
+
+
+def test_a_file_says_in_which_range_its_law_holds(tmp_path):
+    law = made_effect.law("yaw moment against speed", "squared")
+    speed = {"speed": Range(low=0.21, high=0.9, unit="m/s")}
+    as_term(law, (0.3,), tmp_path, speed)
+    text = " ".join((tmp_path / "yaw_moment_against_speed.py").read_text().split())
+    assert "Holds: at speed 0.21 to 0.9 m/s, which the recording showed; above, as at the" in text
 
 
 def test_a_car_takes_a_written_law(tmp_path):
