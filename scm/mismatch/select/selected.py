@@ -60,9 +60,9 @@ class Selected:
         car: As given.
         context: What it worked with; it says whether the car was judged by windows.
         tried: Effects tried beside the re-tuned car.
+        offered, discovery: What a discovered effect was compared with; None where there is none.
         denied: Names of effects that were fitted, and that unseen innovations deny.
         unconfirmed: What was selected with them; None: none was denied.
-        offered, discovery: What a discovered effect was compared with; None where there is none.
     """
 
     recordings: Sequence[Recording]
@@ -72,10 +72,10 @@ class Selected:
     parts: Parts
     selection: Selection
     tried: tuple[Tried, ...]
-    denied: tuple[str, ...] = ()
-    unconfirmed: Hypothesis | None = None
     offered: Offered | None = None
     discovery: Discovery | None = None
+    denied: tuple[str, ...] = ()
+    unconfirmed: Hypothesis | None = None
 
     @property
     def best(self) -> Hypothesis:
