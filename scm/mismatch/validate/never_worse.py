@@ -29,7 +29,8 @@ from scm.vehicles.car import Car
 
 POSE = ("position_m", "yaw_rad")
 LIKE_OTHER_EQUATIONS = {
-    "steer_lag", "steer_rate", "drive_lag", "stiction", "load_transfer", "payload",
+    "steer_delay", "steer_lag", "steer_rate", "drive_delay", "drive_lag", "stiction",
+    "load_transfer", "payload",
 }  # fmt: skip
 """What other equations of the same servo, motor, friction and suspension look like, as tyres do."""
 WORSE_THAN_WITNESS = 1.05
