@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from scm.mismatch.budget import OutOfTimeError
+from scm.mismatch.fit.fitter import Race
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.select import search
 from scm.mismatch.select.round import Context, Round
@@ -80,3 +81,15 @@ def test_a_rare_effect_that_is_gone_is_not_replaced(scripted):
     found = Selection(hypothesis(*USUAL), hypothesis())
     assert without_rare(context, found, candidate("grade")) is found
     assert replace(found).best.names == USUAL
+
+
+@pytest.mark.parametrize(
+    ("costs", "lowered", "left"),
+    [((0.0, 39.0), 0.5, [0, 1]), ((0.0, 41.0), 0.1, [0]), ((0.0, 60.0), 6.0, [0, 1]),
+     ((30.0, 60.0), 0.1, [0])],
+    ids=["near the best", "far behind", "far behind and catching up", "all far behind another"],
+)  # fmt: skip
+def test_a_race_goes_on_with_fits_that_are_near_or_catch_up(costs, lowered, left):
+    fits = [replace(hypothesis("steer_trim"), score=cost) for cost in costs]
+    race = Race(lambda fitted: fitted.score, best=-5.0 if costs[0] else 0.0)
+    assert race.still_in(fits, dict.fromkeys(range(2), lowered)) == left
