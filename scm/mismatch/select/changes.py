@@ -34,7 +34,7 @@ MAX_VARYING = 6
 SHOWS_LATER_S = 0.1  # than a number is so, in the innovations
 SEARCHED = ((9.0, 1.5), (1.5, 0.25))  # about a moment, and between those tried [s]
 AMPLITUDES = 0.02, 8.0  # of the strength that was simulated: farther, no line holds
-STRONGER = 1.0, 1.5, 2.25  # than the screen says: what an effect spoils weighs little before it
+STRONGER = 1.0, 1.5, 2.25  # times what the screen finds: it weighs disturbed events little
 
 
 def span_of(base: Hypothesis) -> tuple[float, float] | None:

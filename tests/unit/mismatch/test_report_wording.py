@@ -74,6 +74,6 @@ def test_a_range_is_one_short_sentence_with_each_unit_once():
     ranges = {"speed": Range(low=0.2, high=0.912, unit="m/s"),
               "throttle": Range(low=0.1, high=0.8, unit="1")}  # fmt: skip
     effect = replace(made_up.lag(), recorded_range=ranges)
-    said = "Seen at speed 0.200 to 0.912 m/s and throttle 0.100 to 0.800."
-    assert range_sentence(effect) == said
+    sentence = "Seen at speed 0.200 to 0.912 m/s and throttle 0.100 to 0.800."
+    assert range_sentence(effect) == sentence
     assert range_sentence(made_up.lag()) == ""
