@@ -20,6 +20,7 @@ from scm.errors import RunError
 _POLL_S = 0.05
 LONGEST_PACKET = 4096  # bytes; a drive packet has about a hundred
 PATIENCE_S = 10.0
+IDLE_S = 75  # longer than clients and proxies reuse an idle connection: none is closed in their use
 MOST_CONNECTIONS = 3000
 FILES, OWN_FILES = 4096, 256  # as many as we request; of these the store, the bus and recordings
 BACKLOG = 128
@@ -134,6 +135,7 @@ def serve(
         log_config=None,
         access_log=False,
         lifespan="on",
+        timeout_keep_alive=IDLE_S,
         timeout_graceful_shutdown=1,
         server_header=False,
     )

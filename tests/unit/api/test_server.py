@@ -1,7 +1,9 @@
 import json
 import socket
 import threading
-from contextlib import ExitStack, contextmanager, suppress
+import time
+from contextlib import ExitStack, closing, contextmanager, suppress
+from http.client import HTTPConnection
 from urllib.parse import urlsplit
 
 import httpx
@@ -14,6 +16,7 @@ from scm.errors import RunError
 from tests.unit.api.conftest import bearer
 
 PATIENCE_S = 60.0
+REUSED_S = 5.0  # httpx uses a connection again that has been idle for less
 
 
 @contextmanager
@@ -174,6 +177,14 @@ def test_who_asks_and_asks_again_is_not_let_go(app, monkeypatch):
 
     with served(app) as (url, _, _), httpx.Client(base_url=url, timeout=PATIENCE_S) as client:
         assert any(asks(client) for _ in range(10))
+
+
+def test_an_idle_connection_outlives_its_reuse_by_a_client(app):
+    with served(app) as (url, _, _), closing(HTTPConnection(*address_of(url))) as connection:
+        for pause_s in (0.0, REUSED_S + 0.5):
+            time.sleep(pause_s)
+            connection.request("GET", "/healthz")  # where it was closed, no answer comes
+            assert connection.getresponse().read()
 
 
 @pytest.mark.parametrize(
