@@ -20,6 +20,7 @@ from scm.mismatch.select.round import Notify
 from scm.mismatch.select.selected import fit_nominal, select_effects
 from scm.mismatch.usable_data import Data, check
 from scm.mismatch.validate.conclude import Result, conclude
+from scm.mismatch.validate.free_runs import with_accuracy
 from scm.recorder.drives import recordings_of_one
 from scm.recording.read import Recording
 from scm.recording.span import part_of
@@ -127,7 +128,11 @@ def write(found: Result, out: Path, check: str = "") -> None:
     Raises:
         ScmError: when the folder cannot be written.
     """
-    found_car = found.found_car or found.car
+    found_car, fit, runs = found.found_car, found.diagnosis.fit, found.evidence.free_runs
+    if found_car is None or found_car is found.car:
+        found_car = found.car
+    elif fit is not None and runs is not None:
+        found_car = with_accuracy(found_car, fit, runs)
     write_report(found.diagnosis, found.evidence, found.car, found_car, out, check)
     retuned = found.retuned_car or found.car
     shutil.copyfile(retuned.path, out / RETUNED)

@@ -40,7 +40,11 @@ def device_keys(section: str, rate_hz: float | None = None) -> dict[str, FileKey
     }
 
 
+POSITION_ERROR, YAW_ERROR = "accuracy.position_error", "accuracy.yaw_error"
+
 FILE_KEYS: dict[str, FileKey] = {
+    POSITION_ERROR: FileKey("m/m", 1, (0.0, 10.0)),
+    YAW_ERROR: FileKey("rad/rad", 1, (0.0, 10.0)),
     "body.footprint_x_m": FileKey("m", 2, (-6.0, 6.0)),
     "body.footprint_y_m": FileKey("m", 2, (-2.0, 2.0)),
     "body.bounce_restitution": FileKey("1", 1, (0.0, 1.0)),

@@ -33,7 +33,7 @@ from scm.mismatch.usable_data import titles_of
 from scm.mismatch.validate.curves import curve, discovered_curves
 from scm.mismatch.validate.explain import effect_of, refitted, undecided_of, widened_of
 from scm.mismatch.validate.found_car import CarFiles, as_written, on
-from scm.mismatch.validate.free_runs import MAX_NOISE_RATIO, alike_within, judge
+from scm.mismatch.validate.free_runs import judge, strays
 from scm.mismatch.validate.locate import locate, since_changes, strayed
 from scm.mismatch.validate.never_worse import (
     GIVEN,
@@ -120,7 +120,7 @@ def conclude(selected: Selected, notify: Notify) -> Result:
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = Verdict.MISMATCH
     if not valid.failure:
-        verdict = verdict_of(effects, undecided, fit, valid.free_runs)
+        verdict = verdict_of(effects, undecided, fit, valid.free_runs, car)
     if verdict is Verdict.MISMATCH and not effects and fit and valid.free_runs:
         located = strayed(valid.free_runs, fit)
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
@@ -377,22 +377,13 @@ def verdict_of(
     undecided: Sequence[Undecided],
     fit: Fit | None,
     free_runs: FreeRuns | None,
+    car: Car,
 ) -> Verdict:
     """Return the verdict; a car that strays for no cause that was tried is a mismatch too."""
     if undecided:
         return Verdict.UNDECIDED
-    strays = fit is not None and free_runs is not None and _strays(fit, free_runs)
-    return Verdict.MISMATCH if effects or strays else Verdict.NONE
-
-
-def _strays(fit: Fit, free_runs: FreeRuns) -> bool:
-    """Return whether a car strays by more than noise and two simulators of the same car do."""
-    part, alike = fit.confirm, alike_within(free_runs)
-    return any(
-        part.after[name] > MAX_NOISE_RATIO * math.hypot(part.noise_floor[name], alike[name])
-        for name in POSE
-        if name in part.after
-    )
+    differs = fit is not None and free_runs is not None and strays(fit, free_runs, car)
+    return Verdict.MISMATCH if effects or differs else Verdict.NONE
 
 
 def _curves(selected: Selected, best: Hypothesis) -> tuple[Curve, ...]:

@@ -19,7 +19,7 @@ from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.fit.likelihood import LOCK, MIN_RELATIVE_STD, TIMING_S, UNKNOWN, Likelihood
 from scm.mismatch.recorded_range import recorded_range
-from scm.mismatch.report.wording import joined, percent, quantity, short
+from scm.mismatch.report.wording import capital, joined, percent, quantity, short
 from scm.mismatch.select.changes import moments_scored
 from scm.mismatch.select.round import Notify
 from scm.mismatch.select.search import Selection
@@ -43,6 +43,11 @@ SHARES = {
     "threshold",
 }  # fmt: skip
 """Numbers that a sentence holds in percent."""
+_COURSES = {
+    Course.CONSTANT: "an effect that was always there", Course.STEP: "a change at one moment",
+    Course.RAMP: "an even change over all of it",
+    Course.INTERMITTENT: "an effect that came and went",
+}  # fmt: skip
 OPPOSITE: Mapping[str, str] = {
     "to the left": "to the right", "left": "right", "ahead": "behind", "too much.": "too little.",
     "further forward": "further back", "higher": "lower",
@@ -172,10 +177,14 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
             if name not in {SINCE_NAME, UNTIL_NAME} and not name.endswith(BEFORE_NAME)
         },
         probability=probability,
-        text=sentence_of(candidate, estimates) + _stated_sentence(stated, estimates),
+        text=(
+            sentence_of(candidate, estimates)
+            + _stated_sentence(stated, estimates)
+            + _other_course_sentence(selected.selection, candidate)
+        ),
         stated=stated,
         recorded_range=recorded_range(best, candidate),
-        course=candidate.course if isinstance(candidate, ChangingEffect) else Course.CONSTANT,
+        course=_course_of(candidate),
         since_s=estimates.get(SINCE_NAME),
         until_s=estimates.get(UNTIL_NAME),
         before={
@@ -323,6 +332,26 @@ def _alternatives(found: Selection, candidate: Candidate) -> tuple[float, tuple[
                     ruled_out_by=against(c - lowest))
         for f, c in others
     )  # fmt: skip
+
+
+def _other_course_sentence(found: Selection, candidate: Candidate) -> str:
+    """Return which other course of a change explains a recording about as well; empty if none."""
+    its_round = found.round_of(candidate)
+    if its_round is None or not isinstance(candidate, ChangingEffect):
+        return ""
+    tried = [
+        (_course_of(fitted.effects[-1]), criterion)
+        for fitted, criterion in zip(its_round.alternatives, its_round.criteria, strict=True)
+        if fitted.names[-1] == candidate.name
+    ]
+    limit = next(c for course, c in tried if course is candidate.course) + TIE
+    others = {course: None for course, c in tried if c < limit and course is not candidate.course}
+    text = capital(joined([_COURSES[course] for course in others], "or"))
+    return f" {text} explains the recording about as well." if text else ""
+
+
+def _course_of(candidate: Candidate) -> Course:
+    return candidate.course if isinstance(candidate, ChangingEffect) else Course.CONSTANT
 
 
 def _at_the_end(fitted: Hypothesis) -> Explanation:

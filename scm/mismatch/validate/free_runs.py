@@ -6,7 +6,7 @@ those at a window's end, root mean squares over windows of one part of the recor
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,7 +27,8 @@ from scm.replay.free_run import SAVE_EVERY_S, Replay
 from scm.replay.numbers import NEUTRAL
 from scm.replay.smooth import Smooth, smooth
 from scm.replay.windows import Runs, at_times
-from scm.vehicles.car import Car
+from scm.vehicles.car import Car, Quantity
+from scm.vehicles.car_file_schema import FILE_KEYS, POSITION_ERROR, YAW_ERROR
 
 END_S = 0.2  # speeds are means over the window's end of this length
 
@@ -105,6 +106,8 @@ DRAWS = 2
 START_DIGITS = 6  # of a window's start in a report [s]: whoever replays it starts there too
 WORSE = 1.02
 MAX_NOISE_RATIO = 3.0  # of an error to what noise makes of it; healthy cars: 2.3 at most
+LIKE_STATED = 1.5  # of the error that a car's file states: what few windows scatter by
+ACCURACY = {"position_m": POSITION_ERROR, "yaw_rad": YAW_ERROR}
 ALIKE = 0.01  # of the way and of the turn: healthy cars of unlike equations, 0.006 to 0.023
 _BEFORE, _AFTER = 0, 1
 
@@ -183,14 +186,46 @@ def judge(
     return errors, _free_runs(judged, on_one_axis(drives), horizon)
 
 
-def alike_within(runs: FreeRuns) -> dict[str, float]:
-    """Return the errors by which two simulators of the same car differ, by the way and the turn."""
+def driven_in(runs: FreeRuns) -> dict[str, float]:
+    """Return how far the car drives and turns in a window, root mean squares [m], [rad]."""
     x, y, yaw = (np.diff(runs.measured[name], axis=1) for name in ("x", "y", "yaw"))
     way, turn = np.hypot(x, y).sum(axis=1), _wrapped(yaw).sum(axis=1)
     return {
-        name: ALIKE * float(np.sqrt(np.nanmean(np.square(each))))
+        name: float(np.sqrt(np.nanmean(np.square(each))))
         for name, each in (("position_m", way), ("yaw_rad", turn))
     }
+
+
+def strays(fit: Fit, runs: FreeRuns, car: Car) -> bool:
+    """Return whether a car strays by more than can be expected on parts that no fit has seen.
+
+    To be expected is what noise makes, what two simulators of the same car differ by, and what the
+    car's file states of its own accuracy.
+
+    Args:
+        fit: Of the car found.
+        runs: The same.
+        car: As given.
+    """
+    part, driven = fit.confirm, driven_in(runs)
+    for name, key in ACCURACY.items():
+        if name not in part.after:
+            continue
+        alike = math.hypot(part.noise_floor[name], ALIKE * driven[name])
+        stated = car.value(key) * driven[name] if car.has(key) else 0.0
+        if part.after[name] > max(MAX_NOISE_RATIO * alike, LIKE_STATED * stated):
+            return True
+    return False
+
+
+def with_accuracy(car: Car, fit: Fit, runs: FreeRuns) -> Car:
+    """Return a car whose numbers were found with its accuracy on parts that no fit has seen."""
+    driven, values = driven_in(runs), dict(car.values)
+    for name, key in ACCURACY.items():
+        share = fit.confirm.after[name] / driven[name] if driven[name] > 0.0 else math.inf
+        if share <= FILE_KEYS[key].bounds[1]:
+            values[key] = Quantity(share, None, FILE_KEYS[key].unit, "free runs")
+    return replace(car, values=values)
 
 
 def nothing_got_worse(fit: Fit) -> tuple[str, ...]:

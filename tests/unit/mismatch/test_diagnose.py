@@ -18,7 +18,8 @@ from scm.mismatch.validate.conclude import (
     verdict_of,
 )
 from scm.mismatch.validate.found_car import patched
-from scm.mismatch.validate.free_runs import alike_within
+from scm.mismatch.validate.free_runs import driven_in, with_accuracy
+from scm.vehicles.car import load_car
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch import made_up_findings as made_up
 from tests.unit.mismatch.made_drive import healthy_model, nigel
@@ -61,14 +62,37 @@ def test_free_runs_far_beyond_noise_and_what_simulators_differ_by_are_a_mismatch
     nowhere = replace(runs, measured={k: np.zeros_like(v) for k, v in runs.measured.items()})
 
     def verdict(after_m, runs):
-        return verdict_of((), (), made_up.fit(after=after_m), runs)
+        return verdict_of((), (), made_up.fit(after=after_m), runs, nigel())
 
     assert verdict(3.1 * floor_m, nowhere) is Verdict.MISMATCH
     assert verdict(2.3 * floor_m, nowhere) is Verdict.NONE
-    alike_m = alike_within(runs)["position_m"]
+    alike_m = 0.01 * driven_in(runs)["position_m"]
     assert alike_m == pytest.approx(0.01 * 1.33, rel=0.1)  # of the way in 3 s
     assert verdict(2.9 * np.hypot(floor_m, alike_m), runs) is Verdict.NONE
     assert verdict(3.1 * np.hypot(floor_m, alike_m), runs) is Verdict.MISMATCH
+
+
+def test_a_car_as_accurate_as_its_file_states_strays_no_more_than_expected():
+    fit, runs = made_up.fit(after=0.2), made_up.free_runs()
+    stated = with_accuracy(nigel(), fit, runs)
+    share = stated.value("accuracy.position_error")
+    assert share == pytest.approx(0.2 / driven_in(runs)["position_m"])
+
+    def verdict(after_m, car):
+        return verdict_of((), (), made_up.fit(after=after_m), runs, car)
+
+    assert verdict(0.2, nigel()) is Verdict.MISMATCH
+    assert verdict(0.29, stated) is Verdict.NONE
+    assert verdict(0.31, stated) is Verdict.MISMATCH
+
+
+def test_the_accuracy_of_a_car_found_is_in_its_file(tmp_path):
+    fit, runs = made_up.fit(after=0.2), made_up.free_runs()
+    found = made_up.diagnosis(fit=fit)
+    evidence = made_up.evidence(free_runs=runs)
+    for car, has in ((nigel().with_values({"body.mass_kg": 2.9}), True), (None, False)):
+        write(Result(found, nigel(), evidence, found_car=car), tmp_path)
+        assert load_car(tmp_path / "car.toml").has("accuracy.position_error") is has
 
 
 def test_the_drives_of_two_open_questions_lie_side_by_side(tmp_path):

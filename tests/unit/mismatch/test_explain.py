@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scm.mismatch.changing_effect import changing
 from scm.mismatch.effect_catalogue import candidates
-from scm.mismatch.findings import Estimate
+from scm.mismatch.findings import Course, Estimate
 from scm.mismatch.fit.likelihood import Likelihood
-from scm.mismatch.select.round import Context
+from scm.mismatch.select.round import Context, Round
 from scm.mismatch.select.search import Selection, retune, select
 from scm.mismatch.select.selected import Selected, tried_of
 from scm.mismatch.validate.explain import (
@@ -68,6 +69,30 @@ def test_the_interval_of_a_direction_does_not_end_where_the_angle_wraps():
     selected = Selected((), (), big_nigel(), context, None, selection, (), None, None)
     uphill = effect_of(selected, found, grade).parameters["uphill_rad"]
     assert uphill.high - uphill.value == pytest.approx(uphill.value - uphill.low)
+
+
+@pytest.mark.parametrize(
+    ("behind", "ending"),
+    [
+        (5.9, "An even change over all of it explains the recording about as well."),
+        (6.1, "straight ahead."),
+    ],
+)
+def test_another_course_of_a_change_that_is_about_as_likely_is_named(behind, ending):
+    model, retuned, best = made_fit.trimmed()
+    (trim,), span_s = best.effects, (0.0, 30.0)
+    step, ramp = (changing(trim, course, span_s) for course in (Course.STEP, Course.RAMP))
+    fits = [
+        replace(best, effects=(one,), values=np.append(best.values, moments))
+        for one, moments in ((step, (12.0,)), (ramp, ()), (trim, ()))
+    ]
+    a_round = Round(retuned, tuple(fits), (100.0, 100.0 + behind, 300.0))
+    n = len(best.z) + len(fits[0].values)
+    found = replace(fits[0], covariance=np.eye(n))
+    selection = Selection(found, retuned, rounds=(a_round,))
+    context = Context(np.ones(len(model.t)), (step,))
+    selected = Selected((), (), big_nigel(), context, None, selection, (), None, None)
+    assert effect_of(selected, found, step).text.endswith(ending)
 
 
 def lag_against_throttle(most):
