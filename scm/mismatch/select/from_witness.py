@@ -105,9 +105,10 @@ def _continued(selected: Selected, first: Hypothesis) -> Selected | None:
     )
     if not end.effects:
         return None
+    rounds = (*selection.rounds, *selected.selection.rounds)  # some effects are of the first search
     return replace(
-        selected, selection=replace(selection, best=end), denied=denied, offered=None,
-        discovery=None,
+        selected, selection=replace(selection, best=end, rounds=rounds), denied=denied,
+        offered=None, discovery=None,
         tried=tried_of(context, selection) or selected.tried,
     )  # fmt: skip
 

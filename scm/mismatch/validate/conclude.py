@@ -31,9 +31,15 @@ from scm.mismatch.select.round import Context, Notify
 from scm.mismatch.select.selected import Selected
 from scm.mismatch.usable_data import titles_of
 from scm.mismatch.validate.curves import curve, discovered_curves
-from scm.mismatch.validate.explain import effect_of, refitted, undecided_of, widened_of
+from scm.mismatch.validate.explain import (
+    effect_of,
+    includes_none,
+    refitted,
+    undecided_of,
+    widened_of,
+)
 from scm.mismatch.validate.found_car import CarFiles, as_written, on
-from scm.mismatch.validate.free_runs import judge, strays
+from scm.mismatch.validate.free_runs import drives_alike, judge, strays
 from scm.mismatch.validate.locate import locate, since_changes, strayed
 from scm.mismatch.validate.never_worse import (
     GIVEN,
@@ -192,7 +198,8 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
 
     Effects go until the car does nothing worse than those without. Errors of sensors stay first,
     and what went, with the re-tuned or the given car: where a car moves worse, its own numbers may
-    be why.
+    be why. With the given one they stay where it drives as given: then the re-tuned car is nearer
+    in one way and farther in another, and no numbers are better than both.
     """
     best, context, given = selected.best, selected.context, selected.best.model.car
     gone = denied(selected.denied)
@@ -210,15 +217,18 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
         beside = _judged(selected, retuned_car, stages)[0] if effects else None
         worse = worse_than(fit, beside) if effects else None
         if worse is None:
-            fewer = _as_near_without(selected, files, best, stages, beside)
+            fewer = _as_near_without(selected, files, best, effects, stages, beside)
             if fewer is None:
                 break
             best, less = fewer
             gone += less
             continue
-        if others and moves_nothing_at_end(best):
-            best = with_numbers(context, best, others.pop())
-            continue
+        if moves_nothing_at_end(best):
+            if others:
+                best = with_numbers(context, best, others.pop())
+                continue
+            if drives_alike(fit):
+                break
         best, lost = _with_fewer(selected, best)
         gone += dropped(lost, worse, fit.horizon_s)
     own = None if beside is None else beside.confirm.before
@@ -242,24 +252,35 @@ def _as_near_without(
     selected: Selected,
     files: CarFiles,
     best: Hypothesis,
+    effects: Sequence[Effect],
     stages: Sequence[Stage],
     beside: Fit | None,
 ) -> tuple[Hypothesis, list[Dropped]] | None:
-    """Return a hypothesis without its weakest effect that two simulators of one car may differ by.
+    """Return a hypothesis without its weakest effect that need not be there.
 
-    If it brings the car no nearer: other equations of the same parts change what sensors feel by
-    more than noise, and hardly where the car goes.
+    If it brings the car no nearer. One need not be there that two simulators of one car may differ
+    by: other equations of the same parts change what sensors feel by more than noise, and hardly
+    where the car goes. Judged by residual windows, one whose intervals include no effect.
 
     Args:
         selected: What was selected.
         files: To write its car with.
         best: With effects.
+        effects: What is stated of them.
         stages: Of its car.
         beside: Of the re-tuned car and this one.
     """
-    if selected.context.by_windows or not any(map(_may_be_an_equation, best.effects)):
+    may_go = _may_be_an_equation
+    if selected.context.by_windows:
+        each = zip(best.effects, effects, strict=True)
+        unsure = {one.name for one, stated in each if includes_none(one, stated)}
+
+        def may_go(effect: Candidate) -> bool:
+            return effect.name in unsure
+
+    if not any(map(may_go, best.effects)):
         return None
-    fewer, lost = _with_fewer(selected, best, _may_be_an_equation)
+    fewer, lost = _with_fewer(selected, best, may_go)
     if fewer.effects:
         beside = _judged(selected, _written(selected, files, fewer)[1], stages)[0]
     if beside is None or is_nearer(beside):

@@ -141,13 +141,14 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
     own, place = len(best.z), best.place_of(candidate)
     mine = upright(candidate, best.values[place].tolist())
     std = np.sqrt(np.maximum(covariance_of(best).diagonal(), 0.0))[own:][place]
-    estimates = dict[str, Estimate]()
+    estimates, spreads = dict[str, Estimate](), list[float]()
     for j, (parameter, value) in enumerate(zip(candidate.parameters, mine, strict=True)):
         spread = NINETY * math.hypot(
             WIDER * parameter.step * std[j],
             _prior_std(best.model, parameter, value),
             EQUATION_ERROR * _size(candidate, j, mine),
         )
+        spreads.append(spread)
         low, high = parameter.bounds if not _wraps(parameter) else (-math.inf, math.inf)
         estimates[parameter.name] = Estimate(
             value=value, low=max(value - spread, low), high=min(value + spread, high),
@@ -166,6 +167,7 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
         probability, alternatives = alternatives_to(
             selected.context, best, candidate, offered, discovery
         )
+    probability = min(probability, _beyond_neutral(candidate, mine, spreads))
     stated = stated_of(selected.car, candidate)
     return Effect(
         name=candidate.name,
@@ -195,6 +197,35 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
         formula=_formula(best, candidate, mine),
         alternatives=alternatives,
     )  # fmt: skip
+
+
+def _beyond_neutral(
+    candidate: Candidate, values: Sequence[float], spreads: Sequence[float]
+) -> float:
+    """Return how likely an effect's surest number lies on its side of no effect.
+
+    Args:
+        candidate: The effect.
+        values: Of its parameters.
+        spreads: Half of each 90 % interval.
+    """
+    stds = [
+        NINETY * abs(value - parameter.neutral) / spread if spread > 0.0 else math.inf
+        for parameter, value, spread, is_amount in zip(
+            candidate.parameters, values, spreads, candidate.amounts, strict=True
+        )
+        if is_amount
+    ]
+    return 0.5 + 0.5 * math.erf(max(stds, default=math.inf) / math.sqrt(2.0))
+
+
+def includes_none(candidate: Candidate, stated: Effect) -> bool:
+    """Return whether the intervals of an effect's numbers include those of no effect."""
+    return all(
+        stated.parameters[one.name].low <= one.neutral <= stated.parameters[one.name].high
+        for one, is_amount in zip(candidate.parameters, candidate.amounts, strict=True)
+        if is_amount and one.name in stated.parameters
+    )
 
 
 def _slope(best: Hypothesis, candidate: VaryingEffect, most: Estimate) -> Estimate:

@@ -186,6 +186,16 @@ def judge(
     return errors, _free_runs(judged, on_one_axis(drives), horizon)
 
 
+def drives_alike(fit: Fit) -> bool:
+    """Return whether two cars drive alike on parts that no fit has seen."""
+    part = fit.confirm
+    return all(
+        math.isclose(part.before[name], part.after[name], rel_tol=1e-3)
+        for name in ACCURACY
+        if name in part.before
+    )
+
+
 def driven_in(runs: FreeRuns) -> dict[str, float]:
     """Return how far the car drives and turns in a window, root mean squares [m], [rad]."""
     x, y, yaw = (np.diff(runs.measured[name], axis=1) for name in ("x", "y", "yaw"))

@@ -15,6 +15,7 @@ from scm.mismatch.select.search import Selection, retune, select
 from scm.mismatch.select.selected import Selected, tried_of
 from scm.mismatch.validate.explain import (
     effect_of,
+    includes_none,
     refitted,
     sentence_of,
     upright,
@@ -93,6 +94,30 @@ def test_another_course_of_a_change_that_is_about_as_likely_is_named(behind, end
     context = Context(np.ones(len(model.t)), (step,))
     selected = Selected((), (), big_nigel(), context, None, selection, (), None, None)
     assert effect_of(selected, found, step).text.endswith(ending)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "stds", "probability", "has_none"),
+    [
+        ("drive_asymmetry", (0.1,), (0.1 / 1.3,), 0.841, True),  # intervals are 1.3 times as wide
+        ("drive_asymmetry", (-0.1,), (0.1 / 1.3,), 0.841, True),
+        ("pose_point", (0.001, 0.1), (1.0, 0.1 / 2.6), 0.977, False),  # its surest number counts
+        ("grade", (0.02, 3.0), (1e-6, 1.0), 1.0, False),  # a direction is no amount
+    ],
+)
+def test_an_effect_whose_intervals_include_none_is_not_sure(
+    name, values, stds, probability, has_none
+):
+    model, _, best = made_fit.healthy()
+    effect, n = made_fit.candidate(name), len(best.z)
+    steps = [one.step for one in effect.parameters]
+    covariance = np.diag(np.append(np.ones(n), (np.array(stds) / steps) ** 2))
+    found = replace(best, effects=(effect,), values=np.array(values), covariance=covariance)
+    context, selection = Context(np.ones(len(model.t)), (effect,)), Selection(found, best)
+    selected = Selected((), (), big_nigel(), context, None, selection, (), None, None)
+    stated = effect_of(selected, found, effect)
+    assert stated.probability == pytest.approx(probability, abs=0.005)
+    assert includes_none(effect, stated) is has_none
 
 
 def lag_against_throttle(most):

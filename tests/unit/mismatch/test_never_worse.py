@@ -19,8 +19,8 @@ from scm.mismatch.select.search import Selection
 from scm.mismatch.select.selected import Selected
 from scm.mismatch.validate import conclude as module
 from scm.mismatch.validate.conclude import conclude
-from scm.mismatch.validate.free_runs import judge
-from scm.mismatch.validate.never_worse import GIVEN, RETUNED, loses, reasons_of, worse_than
+from scm.mismatch.validate.free_runs import drives_alike, judge
+from scm.mismatch.validate.never_worse import GIVEN, RETUNED, Worse, loses, reasons_of, worse_than
 from scm.replay.numbers import POSE_CLOCK
 from scm.vehicles.car import load_car
 from tests.unit.mismatch import made_fit
@@ -103,6 +103,20 @@ def test_an_error_of_a_sensor_stays_where_only_the_cars_own_numbers_got_worse():
     assert any(np.array_equal(found.best.z, z) for z in others)
 
 
+def test_an_error_of_a_sensor_stays_where_no_numbers_are_better_in_all(monkeypatch):
+    """The given car is nearer in heading, the re-tuned one in position."""
+    model, retuned, best = made_fit.biased()
+
+    def worse(fit, beside):
+        return worse_is[int(drives_alike(fit))]
+
+    worse_is = Worse("yaw_rad", GIVEN, 0.004, 0.006), Worse("position_m", RETUNED, 0.005, 0.007)
+    monkeypatch.setattr(module, "worse_than", worse)
+    found = concluded(model, retuned, best)
+    assert [effect.name for effect in found.diagnosis.effects] == ["gyro_bias"]
+    assert np.array_equal(found.best.z, model.simulator.unfitted())
+
+
 def _beside(best, name, *values):
     """A hypothesis with an effect more, not refitted."""
     more = len(best.z) + len(best.values) + len(values)
@@ -127,6 +141,22 @@ def test_what_no_equation_of_a_healthy_part_has_stays():
     found = concluded(model, retuned, _beside(best, "drive_deadband", 1e-4)).diagnosis
     assert {effect.name for effect in found.effects} == {"steer_trim", "drive_deadband"}
     assert found.dropped == ()
+
+
+@pytest.mark.parametrize(
+    ("by_windows", "std", "goes"), [(True, 1.0, True), (True, 1e-9, False), (False, 1.0, False)]
+)
+def test_by_windows_what_may_as_well_be_nothing_goes_if_it_brings_the_car_no_nearer(
+    by_windows, std, goes
+):
+    model, retuned, best = trimmed()
+    both = _beside(best, "gyro_bias", 1e-3)
+    both = replace(both, covariance=std**2 * both.covariance)
+    ended = selected(model, retuned, both)
+    ended = replace(ended, context=replace(ended.context, by_windows=by_windows))
+    found = conclude(ended, lambda _: None).diagnosis
+    assert [effect.name for effect in found.effects] == ["steer_trim", "gyro_bias"][: 2 - goes]
+    assert [gone.name for gone in found.dropped] == ["gyro_bias"][: int(goes)]
 
 
 def test_a_car_that_is_no_nearer_alone_has_no_effect_and_no_mismatch():
@@ -234,7 +264,9 @@ def test_a_car_that_loses_to_the_witness_is_not_handed_out(plain_model, tmp_path
     written = (tmp_path / "car.toml").read_text(encoding="utf-8")
     assert written.startswith("# The fit failed: after")
     car, tuned = (load_car(tmp_path / name) for name in ("car.toml", "retuned.toml"))
-    assert car.values == tuned.values
+    stated = set(car.values) - set(tuned.values)
+    assert stated == {"accuracy.position_error", "accuracy.yaw_error"}
+    assert all(car.values[key] == value for key, value in tuned.values.items())
     assert not car.faults
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "A plain model drives more like the car" in page
