@@ -99,8 +99,9 @@ def explain(context: Context, unseen: Floats, found: Selection) -> tuple[bool, D
     known = _compared(context, found.best, unseen)
     discovery = discover(context, found, unseen)
     best, ends = discovery.best, False
-    if best and best.cost < known.cost - BY_FAR and not _is_worse(best, known, unseen):
-        ends = _one_beside(context, best.fitted) is None
+    if best and _is_better(best, known, unseen, BY_FAR):
+        known = _from_low_noise(context, known, unseen)
+        ends = _is_better(best, known, unseen, BY_FAR) and not _one_beside(context, best.fitted)
     return ends, discovery
 
 
@@ -140,9 +141,23 @@ def _decided(
         return _compared(context, found.best, unseen), None
     again = fit_with_noise(context, found.best)  # as often as the discovered one
     known = _compared(context, again, unseen)
-    if best.cost > known.cost - MARGIN or _is_worse(best, known, unseen):
-        return known, None
-    return best, discovery
+    if _is_better(best, known, unseen, MARGIN):
+        known = _from_low_noise(context, known, unseen)
+    if _is_better(best, known, unseen, MARGIN):
+        return best, discovery
+    return known, None
+
+
+def _from_low_noise(context: Context, known: Compared, unseen: Floats) -> Compared:
+    """Return a hypothesis with its noise fitted from as low a start as a discovered effect's.
+
+    Noise that was fitted without an effect may have absorbed it, and stay there.
+    """
+    fitted = known.fitted
+    low = fitted.model.under(lowered(fitted.noise, fitted.model.drives))
+    (begun,) = context.fitter(low).refine([fitted], rounds=3, fresh=True)
+    other = _compared(context, fit_with_noise(context, begun), unseen)
+    return min(known, other, key=lambda one: one.cost)
 
 
 def discover(context: Context, found: Selection, unseen: Floats) -> Discovery:
@@ -159,9 +174,10 @@ def discover(context: Context, found: Selection, unseen: Floats) -> Discovery:
     return Discovery(known, min(refitted, key=lambda one: one.cost, default=None), tried)
 
 
-def _is_worse(discovered: Compared, known: Compared, unseen: Floats) -> bool:
-    """Return whether a discovered effect explains what no fit has seen worse."""
-    return bool(unseen.any()) and discovered.unseen > known.unseen
+def _is_better(discovered: Compared, known: Compared, unseen: Floats, margin: float) -> bool:
+    """Return whether a discovered effect costs less by a margin, and on unseen data no more."""
+    is_worse = bool(unseen.any()) and discovered.unseen > known.unseen
+    return discovered.cost <= known.cost - margin and not is_worse
 
 
 def _with_known(context: Context, discovered: Compared, unseen: Floats) -> Hypothesis:

@@ -1,5 +1,7 @@
 """Effects outside the catalogue end a selection by a margin only, and healthy drives give none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -59,3 +61,17 @@ def test_a_dictionary_that_was_tried_in_vain_is_not_tried_again(monkeypatch):
     assert decide.explain(context, unseen, found) == (False, offered)  # it is computed once
     assert decide.decide(context, found, unseen) == (retuned, None)
     assert len(tries) == 1
+
+
+def test_a_known_effect_whose_noise_fit_is_stuck_is_compared_from_low_noise_too(monkeypatch):
+    context, found, unseen, discovery = made_effect.discovered()
+    best = discovery.best.fitted
+    noisy = replace(best.noise, speed=8.0 * best.noise.speed, side=8.0 * best.noise.side)
+    (stuck,) = context.fitter(best.model.under(noisy)).refine([best], rounds=2, fresh=True)
+    really = decide.fit_with_noise
+    settled = lambda context, fitted: fitted if fitted is stuck else really(context, fitted)  # noqa: E731
+    monkeypatch.setattr(decide, "fit_with_noise", settled)
+    known = Selection(stuck, found.retuned, (), replace(discovery, beside=stuck))
+    chosen, tried = decide.decide(context, known, unseen)
+    assert tried is None  # it is the same effect, so it cannot be better than itself
+    assert chosen.noise.speed < noisy.speed
