@@ -41,6 +41,7 @@ BARS = {
 MOMENT_S = 3.0  # by which a moment may be off
 CLEAR = 2.0
 NEAR = 1.15
+WORSE = 1.02  # of the re-tuned error: a car found is never worse
 
 
 def plain(words: Iterable[str]) -> frozenset[str]:
@@ -321,9 +322,12 @@ def _again(ratios: Sequence[Ratio]) -> list[str]:
     if least:
         text += f"; the true car itself, beside the noise of poses: {np.median(least):.2f}"
     found.append(text)
-    of_tuned = [ratio.found_m / ratio.retuned_m for ratio in ratios if ratio.retuned_m]
+    of_tuned = [(r.found_m / r.retuned_m, r.case) for r in ratios if r.retuned_m]
     if of_tuned:
-        found.append(f"  the re-tuned car's: median {np.median(of_tuned):.2f}")
+        worse = sorted([one for one in of_tuned if one[0] > WORSE], reverse=True)
+        cases = ", ".join(f"{case} {ratio:.2f}" for ratio, case in worse) or "none"
+        median = np.median([ratio for ratio, _ in of_tuned])
+        found.append(f"  the re-tuned car's: median {median:.2f}; above {WORSE:g}: {cases}")
     of_true = [ratio.found_m / ratio.true_m for ratio in ratios if ratio.true_m]
     if of_true:
         near = _share(sum(ratio <= NEAR for ratio in of_true), len(of_true))

@@ -177,10 +177,13 @@ def test_the_table_compares_patched_cars_with_nominal_tuned_and_true_ones():
     text = "\n".join(lines([score(label(), diagnosis())], ratios))
     assert "the nominal car's: median 0.30 (bar 0.25); the true car itself" in text
     assert "noise of poses: 0.19" in text
-    assert "the re-tuned car's: median 0.25" in text
+    assert "the re-tuned car's: median 0.25; above 1.02: none" in text
     assert "the true car's: median 1.05, within 1.15 in 100 %" in text
     assert "the nominal car's, both beyond the true car's: median 0.06" in text
     assert "at most half in 100 %" in text
+    worse = [Ratio("case_000", 0.1, 0.02, 0.019, 0.0195), Ratio("case_001", 0.1, 0.04, None, 0.038)]
+    text = "\n".join(lines([score(label(), diagnosis())], worse))
+    assert "above 1.02: case_001 1.05, case_000 1.03" in text
 
 
 def test_the_table_has_a_line_for_each_value_of_each_aspect_of_families():
