@@ -88,7 +88,10 @@ class ChangingEffect(Candidate):
             for one, was in zip(self.of.parameters, self.before(values), strict=True)
         ]
         end = values[: len(self.of.parameters)]
-        return tuple(was + share * (now - was) for was, now in zip(before, end, strict=True))
+        return tuple(
+            (1.0 - share) * was + share * now  # exact at both ends: these may be bounds
+            for was, now in zip(before, end, strict=True)
+        )
 
     @property
     def moments(self) -> int:

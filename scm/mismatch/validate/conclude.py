@@ -206,11 +206,11 @@ def _validated(selected: Selected, files: CarFiles, retuned_car: Car | None) -> 
     others = [best.model.simulator.unfitted(), selected.retuned.z]
     while True:
         effects, car = _written(selected, files, best)
-        if car is None and effects:
+        stages = _stages(files, best, effects, car)
+        if not stages and effects:
             best, lost = _with_fewer(selected, best)
             gone += unwritten(lost)
             continue
-        stages = () if car is None else files.stages(best, effects, car)
         fit, free_runs = _judged(selected, given, stages)
         if fit is None or free_runs is None:
             return _Validated(best, effects, car, fit, free_runs, stages, tuple(gone))
@@ -341,6 +341,16 @@ def _written(
         return effects, files.written(fitted, effects)
     except ScmError:
         return effects, None
+
+
+def _stages(
+    files: CarFiles, fitted: Hypothesis, effects: Sequence[Effect], car: Car | None
+) -> tuple[Stage, ...]:
+    """Return the car in each part of the recording; empty if one of them loads from no file."""
+    try:
+        return () if car is None else files.stages(fitted, effects, car)
+    except ScmError:
+        return ()
 
 
 def _judged(

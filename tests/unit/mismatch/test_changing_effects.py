@@ -341,6 +341,13 @@ def test_before_a_change_the_car_s_own_number_counts():
     assert step.at([0.95, 12.0], 0.0, {key: 0.033}) == pytest.approx((0.033 / given,))
 
 
+def test_a_number_at_its_bound_stays_there_at_the_end_of_a_change():
+    gain = candidate("drive_gain")
+    low = gain.parameters[0].bounds[0]
+    step = changing(gain, Course.STEP, SPAN)
+    assert step.at([low, 12.0], 1.0) == (low,)  # not 1 + (low - 1), which is less
+
+
 def test_a_change_leaves_the_car_s_own_number_free():
     model = Likelihood.of([driven(seconds=6.0)], big_nigel())
     fitter = Fitter(model, np.ones(len(model.t)))

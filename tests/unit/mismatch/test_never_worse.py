@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from scm.clock import WallClock
+from scm.errors import CarError
 from scm.mismatch.budget import Budget
 from scm.mismatch.findings import Verdict, Witness
 from scm.mismatch.fit.data_split import split
@@ -175,6 +176,20 @@ def test_a_car_that_cannot_be_written_is_not_handed_out():
     assert gone.name == "load_transfer"
     assert "could not be written" in gone.text
     assert found.found_car.has(TRIM)
+
+
+def test_a_car_of_which_a_stage_cannot_be_written_is_not_handed_out(monkeypatch):
+    def stages(_files, fitted, *_):
+        if fitted.effects:
+            raise CarError("drive.gain: out of bounds")
+        return really(_files, fitted, *_)
+
+    really = module.CarFiles.stages
+    monkeypatch.setattr(module.CarFiles, "stages", stages)
+    found = concluded(*trimmed()).diagnosis
+    assert found.effects == ()
+    (gone,) = found.dropped
+    assert "could not be written" in gone.text
 
 
 def test_of_two_effects_the_one_that_worsens_the_car_goes():
