@@ -30,6 +30,7 @@ class Question(StrEnum):
     BESIDE = "beside_law"
     WINDOWS = "strides"
     WITNESS = "from_witness"
+    WIDER = "wider_numbers"
 
 
 WORDS = {
@@ -40,6 +41,7 @@ WORDS = {
     Question.BESIDE: "Effects beside the one discovered were not searched for",
     Question.WINDOWS: "The car differs in many ways, which were not searched for",
     Question.WITNESS: "The search was not started again from what a bicycle shows",
+    Question.WIDER: "Numbers at an end of their scatter were not given a wider one",
 }
 
 

@@ -183,6 +183,8 @@ class Fit(Struct, kw_only=True, frozen=True):
         retuned: Errors on `confirm` of the given car with its own numbers refitted and no effect;
             None where no effect was found.
         witness: What a plain model makes of `confirm`; None where windows are too few.
+        stated: Errors on `confirm` to be expected of a car as accurate as the given file states;
+            None where it states nothing.
     """
 
     horizon_s: float
@@ -191,6 +193,7 @@ class Fit(Struct, kw_only=True, frozen=True):
     confirm: PartErrors
     retuned: Mapping[str, float] | None = None
     witness: Witness | None = None
+    stated: Mapping[str, float] | None = None
 
 
 class Dropped(Struct, kw_only=True, frozen=True):
@@ -221,7 +224,7 @@ class Unanswered(Struct, kw_only=True, frozen=True):
 
     Attributes:
         name: Short and fixed: `effects`, `further_effects`, `calm`, `laws`, `beside_law`,
-            `strides`, `from_witness`.
+            `strides`, `from_witness`, `wider_numbers`.
         text: One sentence: what was not searched for, and why.
     """
 

@@ -90,6 +90,8 @@ def _no_name(diagnosis: Diagnosis) -> str:
     """Return that no effect was found, and whether there was time to look for all."""
     if diagnosis.verdict is Verdict.NONE and diagnosis.unanswered:
         return "Nothing beyond noise was found, but time ran out before everything was checked."
+    if diagnosis.verdict is Verdict.NONE and diagnosis.fit and diagnosis.fit.stated:
+        return "Nothing new: the simulator follows the car as nearly as its file states."
     if diagnosis.verdict is Verdict.NONE:
         return "Nothing beyond noise: the simulator drives as the car does."
     if diagnosis.unanswered:

@@ -202,7 +202,7 @@ def by_windows(context: Context, drives: Sequence[Drive], car: Car) -> ByWindows
     if any(is_led(drive) for drive in drives):
         known = (Equation.STEERING, Equation.SENSOR)
         catalogue = tuple(c for c in catalogue if c.equation in known)
-    elif more := candidates(car, beside=True):
+    elif not context.by_windows and (more := candidates(car, beside=True)):
         car, catalogue = car.with_terms([one.name for one in more]), (*catalogue, *more)
     model = WindowedLikelihood(Simulator(drives, car, budget=context.budget))
     parts = split(model)
@@ -297,9 +297,10 @@ def _beside_each_other(context: Context, tried: Round) -> list[Round]:
 
     The first was refitted; what another adds to it is a linear guess from its derivatives.
     """
-    base, first = tried.base, tried.alternatives[0]
-    if tried.criteria[0] > context.criterion(base):
+    base = tried.base
+    if not tried.alternatives or tried.criteria[0] > context.criterion(base):
         return []
+    first = tried.alternatives[0]
     rounds, known = [tried], len(base.z) + len(base.values)
     e, columns = first.innovations, first.jacobian
     while len(rounds) < min(MAX_PER_ROUND, MAX_EFFECTS_BY_WINDOWS - len(base.effects)):

@@ -25,8 +25,8 @@ from scm.mismatch.findings import (
 )
 from scm.mismatch.fit.hypothesis import Hypothesis
 from scm.mismatch.report.wording import capital, title_of
+from scm.mismatch.select.begin_again import from_witness, with_wider_numbers
 from scm.mismatch.select.confirm import without_one
-from scm.mismatch.select.from_witness import from_witness
 from scm.mismatch.select.round import Context, Notify
 from scm.mismatch.select.selected import Selected
 from scm.mismatch.usable_data import titles_of
@@ -39,7 +39,7 @@ from scm.mismatch.validate.explain import (
     widened_of,
 )
 from scm.mismatch.validate.found_car import CarFiles, as_written, on
-from scm.mismatch.validate.free_runs import drives_alike, judge, strays
+from scm.mismatch.validate.free_runs import drives_alike, judge, stated_by, strays
 from scm.mismatch.validate.locate import locate, since_changes, strayed
 from scm.mismatch.validate.never_worse import (
     GIVEN,
@@ -120,13 +120,15 @@ def conclude(selected: Selected, notify: Notify) -> Result:
     selected, retuned_car, valid = _nearest(selected, files, notify)
     valid = _handed_out(selected, files, valid)
     retuned, best, effects, fit = selected.retuned, valid.best, valid.effects, valid.fit
+    if fit is not None and valid.free_runs is not None:
+        fit = structs.replace(fit, stated=stated_by(car, valid.free_runs))
     located, residuals = locate(retuned, best)
     located = since_changes(located, effects, float(selected.drives[0].edges[-1]))
     suggestions = () if selected.context.by_windows else undecided_of(selected, best, notify)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = Verdict.MISMATCH
     if not valid.failure:
-        verdict = verdict_of(effects, undecided, fit, valid.free_runs, car)
+        verdict = verdict_of(effects, undecided, fit, valid.free_runs)
     if verdict is Verdict.MISMATCH and not effects and fit and valid.free_runs:
         located = strayed(valid.free_runs, fit)
     diagnosis = Diagnosis(verdict=verdict, located=located, effects=effects, undecided=undecided,
@@ -148,12 +150,16 @@ def conclude(selected: Selected, notify: Notify) -> Result:
 def _nearest(selected: Selected, files: CarFiles, notify: Notify) -> _Judged:
     """Return a selection with its re-tuned car and what stays of it.
 
-    Where the witness follows better, the search begins again from it, and what is nearer on the
-    part that chooses is taken.
+    Where numbers ended at an end of their scatter, or the witness follows better, the search begins
+    again, and what is nearer on the part that chooses is taken.
     """
     first = _with_its_cars(selected, files)
     if selected.unconfirmed is not None:
         first = _confirmed_by_driving(selected, selected.unconfirmed, files, first)
+    wider = with_wider_numbers(selected)
+    if wider is not None:
+        notify("judging with wider numbers")
+        first = min((first, _with_its_cars(wider, files)), key=lambda one: _chosen_m(one[2].fit))
     selected, fit = first[0], first[2].fit
     if fit is None or fit.witness is None or not is_behind(fit):
         return first
@@ -408,12 +414,11 @@ def verdict_of(
     undecided: Sequence[Undecided],
     fit: Fit | None,
     free_runs: FreeRuns | None,
-    car: Car,
 ) -> Verdict:
     """Return the verdict; a car that strays for no cause that was tried is a mismatch too."""
     if undecided:
         return Verdict.UNDECIDED
-    differs = fit is not None and free_runs is not None and strays(fit, free_runs, car)
+    differs = fit is not None and free_runs is not None and strays(fit, free_runs)
     return Verdict.MISMATCH if effects or differs else Verdict.NONE
 
 

@@ -100,10 +100,12 @@ def widened_of(model: Likelihood, car: Car) -> tuple[str, ...]:
         stated = car.quantity(own.key).std if car.has(own.key) else None
         now = f"{short(own.std)} {model.simulator.unit(own.key)}".rstrip(" 1")
         if stated and own.std > REPORTED_ABOVE * stated:
-            share = percent(MIN_RELATIVE_STD[own.key])
+            least = MIN_RELATIVE_STD.get(own.key, 0.0)
+            why = ": the recordings put the number at an end of what that allows"
+            if own.std <= REPORTED_ABOVE * least * abs(own.mean):
+                why = f", {percent(least)} of the value: {WHY[own.key]}"
             sentences.append(
-                f"The car file's std of {own.key}, {short(stated)}, was taken as {now}, {share} of "
-                f"the value: {WHY[own.key]}."
+                f"The car file's std of {own.key}, {short(stated)}, was taken as {now}{why}."
             )
         elif own.key in UNKNOWN and not stated:
             sentences.append(

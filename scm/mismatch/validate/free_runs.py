@@ -206,24 +206,24 @@ def driven_in(runs: FreeRuns) -> dict[str, float]:
     }
 
 
-def strays(fit: Fit, runs: FreeRuns, car: Car) -> bool:
+def stated_by(car: Car, runs: FreeRuns) -> dict[str, float] | None:
+    """Return the errors of a car as accurate as its file states; None where it states nothing."""
+    driven = driven_in(runs)
+    found = {name: car.value(key) * driven[name] for name, key in ACCURACY.items() if car.has(key)}
+    return found or None
+
+
+def strays(fit: Fit, runs: FreeRuns) -> bool:
     """Return whether a car strays by more than can be expected on parts that no fit has seen.
 
     To be expected is what noise makes, what two simulators of the same car differ by, and what the
-    car's file states of its own accuracy.
-
-    Args:
-        fit: Of the car found.
-        runs: The same.
-        car: As given.
+    given car's file states of its accuracy.
     """
-    part, driven = fit.confirm, driven_in(runs)
-    for name, key in ACCURACY.items():
-        if name not in part.after:
-            continue
+    part, driven, stated = fit.confirm, driven_in(runs), fit.stated or {}
+    for name in ACCURACY.keys() & part.after.keys():
         alike = math.hypot(part.noise_floor[name], ALIKE * driven[name])
-        stated = car.value(key) * driven[name] if car.has(key) else 0.0
-        if part.after[name] > max(MAX_NOISE_RATIO * alike, LIKE_STATED * stated):
+        limit = max(MAX_NOISE_RATIO * alike, LIKE_STATED * stated.get(name, 0.0))
+        if part.after[name] > limit:
             return True
     return False
 

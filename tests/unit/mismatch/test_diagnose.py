@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from scm.mismatch.experiment.manoeuvres import MANOEUVRES, Floor, pace_of
 from scm.mismatch.experiment.plan import Separation, place
 from scm.mismatch.experiment.suggest import Suggestion, Weighed, drive_alone
 from scm.mismatch.findings import Undecided, Verdict
 from scm.mismatch.pipeline import write
+from scm.mismatch.report.sentences import verdict_sentence
 from scm.mismatch.select.round import Context
 from scm.mismatch.validate.conclude import (
     Result,
@@ -18,7 +20,7 @@ from scm.mismatch.validate.conclude import (
     verdict_of,
 )
 from scm.mismatch.validate.found_car import patched
-from scm.mismatch.validate.free_runs import driven_in, with_accuracy
+from scm.mismatch.validate.free_runs import driven_in, stated_by, with_accuracy
 from scm.vehicles.car import load_car
 from tests.unit.mismatch import made_fit
 from tests.unit.mismatch import made_up_findings as made_up
@@ -62,7 +64,7 @@ def test_free_runs_far_beyond_noise_and_what_simulators_differ_by_are_a_mismatch
     nowhere = replace(runs, measured={k: np.zeros_like(v) for k, v in runs.measured.items()})
 
     def verdict(after_m, runs):
-        return verdict_of((), (), made_up.fit(after=after_m), runs, nigel())
+        return verdict_of((), (), made_up.fit(after=after_m), runs)
 
     assert verdict(3.1 * floor_m, nowhere) is Verdict.MISMATCH
     assert verdict(2.3 * floor_m, nowhere) is Verdict.NONE
@@ -79,11 +81,15 @@ def test_a_car_as_accurate_as_its_file_states_strays_no_more_than_expected():
     assert share == pytest.approx(0.2 / driven_in(runs)["position_m"])
 
     def verdict(after_m, car):
-        return verdict_of((), (), made_up.fit(after=after_m), runs, car)
+        fit = structs.replace(made_up.fit(after=after_m), stated=stated_by(car, runs))
+        return verdict_of((), (), fit, runs)
 
     assert verdict(0.2, nigel()) is Verdict.MISMATCH
     assert verdict(0.29, stated) is Verdict.NONE
     assert verdict(0.31, stated) is Verdict.MISMATCH
+    fit = structs.replace(fit, stated=stated_by(stated, runs))
+    new = made_up.diagnosis(verdict=Verdict.NONE, effects=(), fit=fit)
+    assert verdict_sentence(new).startswith("Nothing new: ")
 
 
 def test_the_accuracy_of_a_car_found_is_in_its_file(tmp_path):

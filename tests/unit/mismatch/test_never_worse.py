@@ -14,7 +14,7 @@ from scm.mismatch.fit.data_split import split
 from scm.mismatch.fit.likelihood import Likelihood
 from scm.mismatch.pipeline import write
 from scm.mismatch.report.wording import quantity
-from scm.mismatch.select.from_witness import from_witness
+from scm.mismatch.select.begin_again import from_witness
 from scm.mismatch.select.round import Context
 from scm.mismatch.select.search import Selection
 from scm.mismatch.select.selected import Selected

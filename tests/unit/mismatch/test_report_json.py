@@ -40,8 +40,9 @@ def test_what_stands_inside_has_exactly_the_fixed_fields():
     assert set(estimate) == {"value", "low", "high", "unit"}
     (seen,) = read(made_up.CASES["unlisted_law"]()[0])["effects"][0]["recorded_range"].items()
     assert seen == ("heading", {"low": -1.2, "high": 2.4, "unit": "rad"})
-    assert set(report["fit"]) == {"horizon_s", "fit", "choose", "confirm", "retuned", "witness"}
-    assert report["fit"]["retuned"] is None
+    parts = {"fit", "choose", "confirm"}
+    assert set(report["fit"]) == {"horizon_s", *parts, "retuned", "witness", "stated"}
+    assert report["fit"]["retuned"] is report["fit"]["stated"] is None
     assert set(report["fit"]["witness"]) == {"position_m", "yaw_rad", "numbers"}
     assert set(report["fit"]["confirm"]) == {"windows", "before", "after", "noise_floor"}
 

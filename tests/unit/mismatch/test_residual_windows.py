@@ -8,8 +8,11 @@ import pytest
 from scm.mismatch.fit.data_split import split
 from scm.mismatch.fit.noise import LAUNCH, MUCH, TURN, doublings, usual_noise
 from scm.mismatch.fit.residual_windows import LENGTH_S, WindowedLikelihood, fit_sizes, least_sizes
+from scm.mismatch.select.begin_again import numbers_at_ends, with_wider_numbers
 from scm.mismatch.select.round import Context
 from scm.mismatch.select.search import by_windows, select_many
+from scm.mismatch.select.selected import Selected
+from scm.mismatch.validate.explain import widened_of
 from tests.unit.mismatch.made_drive import big_nigel, driven
 from tests.unit.mismatch.made_fit import candidate
 
@@ -97,3 +100,26 @@ def test_two_effects_are_found_in_one_round():
     values = dict(zip(best.names, best.values, strict=True))
     assert values["steer_trim"] == pytest.approx(0.06, abs=0.01)
     assert values["drive_gain"] == pytest.approx(0.8, abs=0.08)
+
+
+def test_numbers_at_an_end_of_their_scatter_get_a_wider_one_and_it_is_said():
+    key, given = "drive.no_load_speed_rad_s", big_nigel().quantity("drive.no_load_speed_rad_s")
+    true = given.value + 6.0 * given.std
+    drive = driven(((key, true), ("steering.trim_rad", 0.06)), seconds=7.0)
+    many = by_windows(Context(np.ones(1), (candidate("steer_trim"),)), [drive], big_nigel())
+    first = select_many(many.context, many.retuned)
+    selected = Selected(
+        [drive.recording], [drive], big_nigel(), many.context, many.parts, first, ()
+    )
+    assert key in [one.key for one in numbers_at_ends(first.best)]
+    found = with_wider_numbers(selected).best
+    model = found.model
+    (own,) = [one for one in model.nominal if one.key == key]
+    assert own.std == 2.0 * given.std
+    assert found.names == ("steer_trim",)
+    assert found.numbers[key] == pytest.approx(true, rel=0.03)
+    (text,) = [text for text in widened_of(model, big_nigel()) if key in text]
+    assert "the recordings put the number at an end of what that allows" in text
+    inside = replace(first.best, z=0.5 * first.best.z)
+    within = replace(selected, selection=replace(first, best=inside))
+    assert with_wider_numbers(within) is None
