@@ -44,6 +44,7 @@ from scm.mismatch.validate.locate import locate, since_changes, strayed
 from scm.mismatch.validate.never_worse import (
     GIVEN,
     LIKE_OTHER_EQUATIONS,
+    NEARER,
     POSE,
     RETUNED,
     denied,
@@ -62,7 +63,7 @@ from scm.mismatch.validate.stages import Stage, shares_at
 from scm.mismatch.validate.witness import witness_of
 from scm.vehicles.car import Car
 
-FAR_NEARER = 0.7  # of the error without effects, which stay though innovations deny them
+FAR_NEARER = 0.7  # of the error without effects that innovations deny, or that may be nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,9 +265,10 @@ def _as_near_without(
 ) -> tuple[Hypothesis, list[Dropped]] | None:
     """Return a hypothesis without its weakest effect that need not be there.
 
-    If it brings the car no nearer. One need not be there that two simulators of one car may differ
-    by: other equations of the same parts change what sensors feel by more than noise, and hardly
-    where the car goes. Judged by residual windows, one whose intervals include no effect.
+    If it brings the car hardly nearer. One need not be there that two simulators of one car may
+    differ by: other equations of the same parts change what sensors feel by more than noise, and
+    hardly where the car goes. Judged by residual windows, it is one whose intervals include none;
+    the car must be far nearer with it.
 
     Args:
         selected: What was selected.
@@ -276,10 +278,11 @@ def _as_near_without(
         stages: Of its car.
         beside: Of the re-tuned car and this one.
     """
-    may_go = _may_be_an_equation
+    may_go, share = _may_be_an_equation, NEARER
     if selected.context.by_windows:
         each = zip(best.effects, effects, strict=True)
         unsure = {one.name for one, stated in each if includes_none(one, stated)}
+        share = FAR_NEARER
 
         def may_go(effect: Candidate) -> bool:
             return effect.name in unsure
@@ -289,7 +292,7 @@ def _as_near_without(
     fewer, lost = _with_fewer(selected, best, may_go)
     if fewer.effects:
         beside = _judged(selected, _written(selected, files, fewer)[1], stages)[0]
-    if beside is None or is_nearer(beside):
+    if beside is None or is_nearer(beside, share):
         return None
     return fewer, useless(lost, beside)
 

@@ -97,8 +97,8 @@ def useless(names: Sequence[str], beside: Fit) -> list[Dropped]:
         Dropped(
             name=one,
             text=f"{capital(title_of(one))} explains some of what the sensors measured, but brings "
-            f"the car no nearer {UNSEEN}: after {quantity(beside.horizon_s, 's')} it is {now} off "
-            f"in {title} with it, and {was} without.",
+            f"the car hardly nearer {UNSEEN}: after {quantity(beside.horizon_s, 's')} it is {now} "
+            f"off in {title} with it, and {was} without.",
         )
         for one in names
     ]
@@ -116,15 +116,15 @@ def unwritten(names: Sequence[str]) -> list[Dropped]:
     return [Dropped(name=one, text=f"{capital(title_of(one))} {why}") for one in names]
 
 
-def is_nearer(beside: Fit) -> bool:
+def is_nearer(beside: Fit, share: float = NEARER) -> bool:
     """Return whether a car follows better than another, by position or heading.
 
-    By five per cent, and by a quarter of what noise may change the square of an error.
+    To that share of the error, and by a quarter of what noise may change the square of an error.
     """
     part = beside.confirm
     for name in POSE:
         was, now, floor = (x.get(name, 0.0) for x in (part.before, part.after, part.noise_floor))
-        if now < NEARER * was and was**2 - now**2 > 0.25 * chance_of(part) * floor**2:
+        if now < share * was and was**2 - now**2 > 0.25 * chance_of(part) * floor**2:
             return True
     return False
 
