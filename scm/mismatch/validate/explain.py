@@ -140,17 +140,11 @@ def _noise_sentences(model: Likelihood) -> Iterator[str]:
 
 def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Effect:
     """Return what a report states of one effect of a hypothesis."""
-    own, place = len(best.z), best.place_of(candidate)
+    place = best.place_of(candidate)
     mine = upright(candidate, best.values[place].tolist())
-    std = np.sqrt(np.maximum(covariance_of(best).diagonal(), 0.0))[own:][place]
-    estimates, spreads = dict[str, Estimate](), list[float]()
-    for j, (parameter, value) in enumerate(zip(candidate.parameters, mine, strict=True)):
-        spread = NINETY * math.hypot(
-            WIDER * parameter.step * std[j],
-            _prior_std(best.model, parameter, value),
-            EQUATION_ERROR * _size(candidate, j, mine),
-        )
-        spreads.append(spread)
+    spreads = _spreads(best, candidate, mine)
+    estimates = dict[str, Estimate]()
+    for parameter, value, spread in zip(candidate.parameters, mine, spreads, strict=True):
         low, high = parameter.bounds if not _wraps(parameter) else (-math.inf, math.inf)
         estimates[parameter.name] = Estimate(
             value=value, low=max(value - spread, low), high=min(value + spread, high),
@@ -199,6 +193,21 @@ def effect_of(selected: Selected, best: Hypothesis, candidate: Candidate) -> Eff
         formula=_formula(best, candidate, mine),
         alternatives=alternatives,
     )  # fmt: skip
+
+
+def _spreads(best: Hypothesis, candidate: Candidate, values: Sequence[float]) -> list[float]:
+    """Return half of the 90 % interval of each of an effect's numbers."""
+    std = np.sqrt(np.maximum(covariance_of(best).diagonal(), 0.0))[len(best.z) :]
+    return [
+        NINETY * math.hypot(
+            WIDER * parameter.step * each,
+            _prior_std(best.model, parameter, value),
+            EQUATION_ERROR * _size(candidate, j, values),
+        )
+        for j, (parameter, value, each) in enumerate(
+            zip(candidate.parameters, values, std[best.place_of(candidate)], strict=True)
+        )
+    ]  # fmt: skip
 
 
 def _beyond_neutral(

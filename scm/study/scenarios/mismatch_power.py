@@ -55,6 +55,7 @@ STEP_S, POSE_EVERY, COMMAND_EVERY = 0.01, 3, 5  # poses at 33 Hz, commands at 20
 THROTTLE, THROTTLE_COMMANDS = (0.35, 0.95), 22  # the same for 1.1 s
 STEERING, STEERING_COMMANDS = (-0.8, 0.8), 34
 REST_S = 0.8  # without throttle before each launch: the car comes to rest
+RISE_S = 1.0  # in which throttle rises evenly at a launch: what hinders it shows as a later start
 YAW_RAD_PER_M = 0.0087 / 0.002  # heading noise of a camera that has 2 mm of noise
 
 
@@ -74,7 +75,7 @@ def run(
         length_s: Of the recording.
         pose_noise_m: Standard deviation of measured positions; headings have 0.25 deg a mm of it.
         strength: Of the effect, in multiples of its amount in `EFFECTS`.
-        launches: How often the car stops and starts anew, beside its first start.
+        launches: How often the car rests and then starts gently; without, it starts once, at once.
 
     Raises:
         StudyError: when there is no such effect, or no time for so many launches.
@@ -83,8 +84,8 @@ def run(
         known = [*EFFECTS, NONE]
         msg = f"effect: no {effect!r}{nearest(effect, known)}; expected one of {', '.join(known)}"
         raise StudyError(msg)
-    if not 0 <= launches <= length_s / (2.0 * REST_S):
-        most = int(length_s / (2.0 * REST_S))
+    most = int(length_s / (REST_S + RISE_S))
+    if not 0 <= launches <= most:
         msg = f"launches: {launches}; expected 0 to {most} in {length_s:g} s"
         raise StudyError(msg)
     plain = load_car(CAR)
@@ -157,8 +158,10 @@ def _commands(case: Case, length_s: float, launches: int) -> tuple[Floats, Float
     rng, k = case.generator("drive"), np.arange(round(length_s / (COMMAND_EVERY * STEP_S)))
     throttle = rng.uniform(*THROTTLE, len(k))[k // THROTTLE_COMMANDS]
     steering = rng.uniform(*STEERING, len(k))[k // STEERING_COMMANDS]
-    rest = round(REST_S / (COMMAND_EVERY * STEP_S))
+    rest, rise = (round(time_s / (COMMAND_EVERY * STEP_S)) for time_s in (REST_S, RISE_S))
     for launch in range(launches):
-        at = round((launch + 0.5) * len(k) / launches)
+        at = rest + round(launch * len(k) / launches)
         throttle[at - rest : at] = 0.0
+        begun = throttle[at : at + rise]
+        begun *= np.linspace(0.0, 1.0, rise)[: len(begun)]
     return throttle, steering

@@ -168,12 +168,16 @@ def test_a_car_comes_to_rest_before_each_launch(monkeypatch, tmp_path):
     throttle, x, y = (given[0].channel(name) for name in ("command.throttle", "pose.x", "pose.y"))
     launched = np.flatnonzero((throttle.values[:-1] == 0.0) & (throttle.values[1:] > 0.0))
     assert len(launched) == 4
+    rise = round(mismatch_power.RISE_S / 0.05)
+    for k in launched:
+        gently = np.linspace(0.0, mismatch_power.THROTTLE[1], rise)
+        assert (throttle.values[k : k + rise] <= gently + 1e-9).all()
     for t in throttle.t[launched]:
         resting = (x.t > t - 0.3) & (x.t <= t)
         assert np.hypot(np.ptp(x.values[resting]), np.ptp(y.values[resting])) < 0.01
 
 
 def test_more_launches_than_there_is_time_for_are_refused(tmp_path):
-    row = study("mismatch_power", tmp_path, {"launches": 13, "length_s": 20.0}).run(0)
+    row = study("mismatch_power", tmp_path, {"launches": 12, "length_s": 20.0}).run(0)
     assert row.outcome == "error"
-    assert "launches: 13; expected 0 to 12 in 20 s" in row.detail
+    assert "launches: 12; expected 0 to 11 in 20 s" in row.detail
