@@ -102,7 +102,7 @@ def test_two_effects_are_found_in_one_round():
     assert values["drive_gain"] == pytest.approx(0.8, abs=0.08)
 
 
-def test_numbers_at_an_end_of_their_scatter_get_a_wider_one_and_it_is_said():
+def test_numbers_at_an_end_of_their_scatter_get_a_wider_one_which_the_report_names():
     key, given = "drive.no_load_speed_rad_s", big_nigel().quantity("drive.no_load_speed_rad_s")
     true = given.value + 6.0 * given.std
     drive = driven(((key, true), ("steering.trim_rad", 0.06)), seconds=7.0)
