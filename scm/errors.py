@@ -7,6 +7,7 @@
     ├── MessageError  (ValueError)       a message, a key, or bytes that should have been one
     ├── RecordingError(ValueError)       a recording or its description
     ├── PlanError     (ValueError)       a signal plan or program card
+    ├── PathError     (ValueError)       a start, a goal, or a path between them that cannot be
     ├── DemandError   (ValueError)       a table of who wants to drive where, and when
     ├── StudyError    (ValueError)       a study file, a factor or a scenario
     ├── EyeError      (ValueError)       a camera or its calibration
@@ -53,6 +54,10 @@ class RecordingError(ScmError, ValueError):
 
 class PlanError(ScmError, ValueError):
     """A signal plan or a program card that is not safe or not complete."""
+
+
+class PathError(ScmError, ValueError):
+    """A start or a goal where no car can be, or no path between them."""
 
 
 class DemandError(ScmError, ValueError):
