@@ -37,8 +37,8 @@ from vehicle_agent.devkit.commands import CarCommand, Commands, ScriptCommand, S
 from vehicle_agent.devkit.cosim import CosimCar
 from vehicle_agent.devkit.deflate import Packet
 from vehicle_agent.devkit.heads import Heads
-from vehicle_agent.devkit.lease import CarLease
 from vehicle_agent.devkit.telemetry import CAMERAS, Telemetry, Version
+from vehicle_agent.lease import CarLease
 
 MISSING_AFTER_NS = 2 * NS_PER_S  # without a report a car is not in the city
 FIRST_PICTURE_TIMEOUT_NS = 10 * NS_PER_S  # a renderer loads its car before the first picture

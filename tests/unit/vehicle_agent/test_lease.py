@@ -7,7 +7,7 @@ from scm.v2x.message import Refused
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from vehicle_agent.devkit.commands import CarCommand
-from vehicle_agent.devkit.lease import RENEW_NS, CarLease
+from vehicle_agent.lease import RENEW_NS, CarLease
 
 WISH = CarCommand(0.5, -0.25, headlights="low", indicators="hazard")
 

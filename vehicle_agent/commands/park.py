@@ -1,0 +1,81 @@
+"""`vehicle-agent park`: drive a car to a parking place by its own sensors."""
+
+import argparse
+import threading
+
+from scm.command import Command, credentials_argument, credentials_of, place
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--vehicle", required=True, metavar="NAME", help="the car to park")
+    parser.add_argument(
+        "--goal", type=place, default="", metavar="PLACE",
+        help="a spawn place or bay of the map, any (bay), or X,Y,DEG (--goal=-0.7,0,90 if X is "
+        "below 0); default: wait for requests to park, until Ctrl-C",
+    )  # fmt: skip
+    parser.add_argument(
+        "--start", type=place, default="", metavar="PLACE",
+        help="where the car roughly stands; default: it finds that out from its scans",
+    )  # fmt: skip
+    parser.add_argument(
+        "--spawn", nargs="?", const="", type=place, metavar="PLACE",
+        help="put the car onto the map first, there or at any free place",
+    )  # fmt: skip
+    parser.add_argument("--car", default="nigel", help="its car file (%(default)s)")
+    parser.add_argument(
+        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT",
+        help="the city's router (%(default)s)",
+    )  # fmt: skip
+    credentials_argument(parser)
+    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
+    parser.add_argument("--name", help="of this agent, which holds the lease (park-VEHICLE)")
+    parser.add_argument("--seed", type=int, default=0, help="of the particles (%(default)s)")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.clock import WallClock
+    from scm.runtime.live import run, stop_on_signal
+    from scm.v2x.bus_zenoh import ZenohBus
+    from scm.v2x.key import check_name
+    from scm.vehicles.car import load_car
+    from vehicle_agent.autonomy.parking import Report, prepare
+    from vehicle_agent.autonomy.part import ENDED, ParkPart, Wanted
+    from vehicle_agent.leaving import Leaving
+
+    vehicle = check_name(arguments.vehicle, "--vehicle")
+    check_name(arguments.city, "--city")
+    credentials = credentials_of(arguments)
+    name = arguments.name or f"park-{vehicle}"
+    name = check_name(name if credentials is None else credentials.station, "--name")
+    wanted = Wanted(
+        vehicle, arguments.goal, arguments.start, arguments.spawn, arguments.car, arguments.seed
+    )
+    print("Preparing the planner (the first time this takes about a minute) ...", flush=True)
+    prepare(load_car(arguments.car))
+    stop_requested, done, clock = stop_on_signal(), threading.Event(), WallClock()
+    last = Report("localise")
+
+    def show(report: Report) -> None:
+        nonlocal last
+        last = report
+        why = f": {report.reason}" if report.reason else ""
+        print(f"{vehicle}: {report.state}{why}", flush=True)
+        if arguments.goal and report.state in ENDED:
+            stop_requested.set()
+
+    with ZenohBus(
+        arguments.city, name, arguments.connect, clock=clock, credentials=credentials
+    ) as bus:
+        part = ParkPart(name, wanted, bus.session, show)
+        run(Leaving(part, stop_requested, done), bus, clock, done, on_tick=True)
+    return 2 if last.state == "failed" else 0
+
+
+COMMAND = Command(
+    help="park a car by its own LIDAR, encoders and gyro",
+    example="vehicle-agent park --vehicle n1 --spawn start --goal goal",
+    arguments=_arguments,
+    run=_run,
+)
