@@ -4,6 +4,8 @@
     <car>/scan              sensor_msgs/LaserScan        as scanned
     <car>/imu               sensor_msgs/Imu              as measured, 50 Hz
     <car>/camera/compressed sensor_msgs/CompressedImage  15 Hz       front camera
+    <car>/map               nav_msgs/OccupancyGrid       1 Hz        while the car maps a room
+    <car>/goal_pose         geometry_msgs/PoseStamped    subscribed, for a car that parks itself
     <car>/cmd_vel           geometry_msgs/Twist          subscribed
     <car>/ackermann_cmd     ackermann_msgs/AckermannDrive  subscribed
 
@@ -20,10 +22,12 @@ from scm.ros2 import convert, frames
 from scm.ros2.pilot import Pilot
 from scm.ros2.wire import Endpoint, Graph, Topic
 from scm.runtime.part import Subscription
-from scm.v2x.exchange import Outgoing
+from scm.v2x.exchange import Call, Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.occupancy_map import OccupancyMap
+from scm.v2x.messages.park_request import ParkRequest
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import Car
@@ -31,12 +35,15 @@ from scm.vehicles.drivers.limits import limits_of
 
 ODOM_NS = 50 * NS_PER_MS
 FRONT = "front"
+GOAL, GOAL_TYPE = "goal_pose", "geometry_msgs/PoseStamped"
+PARK_TIMEOUT_S = 2.0
 COMMANDS = {"cmd_vel": "geometry_msgs/Twist", "ackermann_cmd": "ackermann_msgs/AckermannDrive"}
 _SHOWN = {
     "odom": "nav_msgs/Odometry",
     "scan": "sensor_msgs/LaserScan",
     "imu": "sensor_msgs/Imu",
     "camera/compressed": "sensor_msgs/CompressedImage",
+    "map": "nav_msgs/OccupancyGrid",
 }
 
 
@@ -60,8 +67,10 @@ class RosCar:
             topic: graph.publisher(f"/{name}/{topic}", kind) for topic, kind in _SHOWN.items()
         }
         self._ears: list[Endpoint] = [
-            graph.subscribe(f"/{name}/{topic}", kind) for topic, kind in COMMANDS.items()
+            graph.subscribe(f"/{name}/{topic}", kind)
+            for topic, kind in (*COMMANDS.items(), (GOAL, GOAL_TYPE))
         ]
+        self._goal: Call | None = None
         self._speed_mps = 0.0
         self._odom_ns = 0
         self._scan_ns: int | None = None
@@ -70,6 +79,7 @@ class RosCar:
             LidarScan: self._show_scan,
             VehicleSensors: self._show_sensors,
             CameraFrame: self._show_picture,
+            OccupancyMap: self._show_map,
         }
 
     def subscriptions(self, *, moves: bool) -> list[Subscription]:
@@ -85,6 +95,8 @@ class RosCar:
             out.append(Subscription(VehicleState, own))
         if "scan" in wanted:
             out.append(Subscription(LidarScan, own))
+        if "map" in wanted:
+            out.append(Subscription(OccupancyMap, own))
         if "imu" in wanted:
             out.append(Subscription(VehicleSensors, own))
         if "camera/compressed" in wanted:
@@ -124,8 +136,16 @@ class RosCar:
         self._topics["camera/compressed"].publish(convert.picture(self.name, frame), now_ns)
         return []
 
+    def _show_map(self, room: OccupancyMap, now_ns: int) -> list[Any]:
+        self._topics["map"].publish(convert.occupancy_grid(self.name, room), now_ns)
+        return []
+
     def command(self, topic: str, message: Any, now_ns: int) -> None:
-        """Accept the command of a ROS node on one of the topics `COMMANDS`."""
+        """Accept the command of a ROS node on one of the topics `COMMANDS`, or a goal."""
+        if topic == GOAL:
+            goal = convert.place_of(message)
+            self._goal = Call(ParkRequest(vehicle=self.vehicle, goal=goal), PARK_TIMEOUT_S)
+            return
         wheelbase = self._pilot.limits.wheelbase
         speed, angle = convert.speed_and_angle(COMMANDS[topic], message, wheelbase)
         self._pilot.set_command(speed, angle, now_ns)
@@ -136,8 +156,10 @@ class RosCar:
         return self._pilot
 
     def drive(self, now_ns: int) -> list[Outgoing]:
-        """Return the messages that its pilot sends now."""
-        return self._pilot.step(now_ns, self._speed_mps)
+        """Return the messages that its pilot sends now, and a goal that came for it."""
+        goal, self._goal = self._goal, None
+        out = self._pilot.step(now_ns, self._speed_mps)
+        return out if goal is None else [*out, goal]
 
     def close(self) -> None:
         """Remove its topics from the ROS graph."""

@@ -4,17 +4,24 @@ import math
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
 
 from scm.clock import NS_PER_S, seconds
+from scm.errors import MessageError
 from scm.geometry import TAU, Pose2
+from scm.maps.segments import wall_segments
+from scm.records.city_map import CityMap
 from scm.ros2.frames import header, pose, quaternion, time, vector
 from scm.ros2.types import ros
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 
 SCAN_BYTES = 4
+MAP_CELL_M, MAP_CELLS, OCCUPIED = 0.05, 1_000_000, 100
 _NOT_MEASURED = -1.0
 
 
@@ -41,6 +48,61 @@ def odometry(name: str, state: VehicleState, at: Pose2) -> Any:
         pose=ros("geometry_msgs/PoseWithCovariance", pose=pose(at), covariance=unknown),
         twist=ros("geometry_msgs/TwistWithCovariance", twist=twist, covariance=unknown),
     )
+
+
+def occupancy_grid(name: str, room: OccupancyMap) -> Any:
+    """Return `nav_msgs/OccupancyGrid`: the map that a car makes, in its frame `<name>/map`."""
+    cells = np.frombuffer(room.payload, np.int8).reshape(room.rows, room.columns)
+    corner = Pose2(room.x_m, room.y_m, 0.0)
+    return _grid(header(room.t_ns, f"{name}/map"), cells, room.cell_m, corner)
+
+
+def _grid(stamp: Any, cells: NDArray[np.int8], cell_m: float, corner: Pose2) -> Any:
+    info = ros(
+        "nav_msgs/MapMetaData",
+        map_load_time=stamp.stamp,
+        resolution=cell_m,
+        width=cells.shape[1],
+        height=cells.shape[0],
+        origin=pose(corner),
+    )
+    return ros("nav_msgs/OccupancyGrid", header=stamp, info=info, data=cells.ravel())
+
+
+def city_grid(city_map: CityMap, t_ns: int) -> Any:
+    """Return `nav_msgs/OccupancyGrid`: walls and mapped boxes of a city, free floor else.
+
+    Cells are `MAP_CELL_M` wide, wider where there would be more than `MAP_CELLS`. A cell is
+    occupied where a face of a wall or box comes within half a cell of its middle.
+    """
+    (left, right), (low, high) = city_map.floor.x_m, city_map.floor.y_m
+    cell = max(MAP_CELL_M, math.sqrt((right - left) * (high - low) / MAP_CELLS))
+    rows, columns = math.ceil((high - low) / cell), math.ceil((right - left) / cell)
+    cells = np.zeros((rows, columns), np.int8)
+    mapped = replace(city_map, boxes=tuple(box for box in city_map.boxes if box.mapped))
+    for x0, y0, x1, y1 in wall_segments(mapped):
+        count = math.ceil(2.0 * math.hypot(x1 - x0, y1 - y0) / cell) + 1
+        part = np.linspace(0.0, 1.0, count)
+        column = np.floor((x0 + part * (x1 - x0) - left) / cell).astype(int)
+        row = np.floor((y0 + part * (y1 - y0) - low) / cell).astype(int)
+        inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        cells[row[inside], column[inside]] = OCCUPIED
+    return _grid(header(t_ns, "map"), cells, cell, Pose2(left, low, 0.0))
+
+
+def place_of(goal: Any) -> str:
+    """Return a `geometry_msgs/PoseStamped` as a goal: `X,Y,DEG` of the city's map.
+
+    Raises:
+        MessageError: when it is in another frame than `map`, or no number.
+    """
+    frame, at, turn = goal.header.frame_id, goal.pose.position, goal.pose.orientation
+    if frame not in ("", "map"):
+        raise MessageError(f"goal_pose: expected the frame map, got {frame!r}")
+    yaw = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
+    if not all(map(math.isfinite, (at.x, at.y, yaw))):
+        raise MessageError(f"goal_pose: expected numbers, got {at.x}, {at.y}, {yaw}")
+    return f"{at.x:.4f},{at.y:.4f},{math.degrees(yaw):.3f}"
 
 
 def scan(name: str, turn: LidarScan, before_ns: int | None) -> Any:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from scm.clock import NS_PER_MS
-from scm.errors import CarError
+from scm.errors import CarError, MessageError
 from scm.log import event
 from scm.records.city_map import CityMap
 from scm.ros2 import convert, frames, markers
@@ -25,6 +25,7 @@ from scm.ros2.types import ros
 from scm.ros2.wire import Graph
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.message import Refused
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.world_snapshot import WorldSnapshot
@@ -55,6 +56,7 @@ class RosPart(BasePart):
         self._mounts = graph.publisher("/tf_static", _TF, latched=True)
         self._markers = graph.publisher("/city/markers", _MARKERS)
         self._roads = graph.publisher("/city/roads", _MARKERS, latched=True)
+        self._city_grid = graph.publisher("/map", "nav_msgs/OccupancyGrid", latched=True)
         self._cars: dict[str, RosCar] = {}
         self._unknown: set[str] = set()
         self._spats: dict[str, Spat] = {}
@@ -72,13 +74,20 @@ class RosPart(BasePart):
             name, _, command = topic.strip("/").partition("/")
             for car in self._cars.values():
                 if car.name == name:
-                    car.command(command, message, now_ns)
+                    self._command(car, command, message, now_ns)
         if self._check_ns is None:
             self._roads.publish(markers.roads(self._map, now_ns), now_ns)
+            self._city_grid.publish(convert.city_grid(self._map, now_ns), now_ns)
         if self._check_ns is None or now_ns >= self._check_ns:
             self._check_ns = now_ns + CHECK_NS
             self._update_subscriptions()
         return [item for car in self._cars.values() for item in car.drive(now_ns)]
+
+    def _command(self, car: RosCar, topic: str, message: Any, now_ns: int) -> None:
+        try:
+            car.command(topic, message, now_ns)
+        except MessageError as cause:
+            event(_log, "ros_refused", level=logging.WARNING, vehicle=car.vehicle, why=str(cause))
 
     def _process(self, item: Incoming, now_ns: int) -> list[Any]:
         """Publish one thing; return transforms."""
@@ -87,6 +96,8 @@ class RosPart(BasePart):
             request = item.call.request
             if isinstance(request, LeaseRequest) and request.vehicle in self._cars:
                 self._cars[request.vehicle].pilot.replied(request, message)
+            elif isinstance(message, Refused):
+                event(_log, "ros_refused", level=logging.WARNING, why=message.detail)
         elif isinstance(message, WorldSnapshot):
             self._process_snapshot(message, now_ns)
         elif isinstance(message, Spat):

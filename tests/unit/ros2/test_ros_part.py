@@ -4,12 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from numpy.testing import assert_allclose
 
+from scm.geometry import Pose2
+from scm.maps.coordinates import pose_at
 from scm.maps.load import load_map
 from scm.records.signals import SignalGroup
 from scm.ros2 import markers
-from scm.ros2.frames import vector
+from scm.ros2.frames import header, pose, vector
 from scm.ros2.part import RosPart
 from scm.ros2.types import ros, to_cdr
 from scm.runtime.part import Subscription
@@ -20,6 +23,7 @@ from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.stop_request import StopRequest
@@ -68,9 +72,12 @@ def test_every_car_has_its_topics(city):
     assert {t for t, noted in city.graph.topics.items() if noted.latched} == {
         "/tf_static",
         "/city/roads",
+        "/map",
     }
     assert set(city.graph.ears) == {
-        f"/{car}/{topic}" for car in ("n1", "n2") for topic in ("cmd_vel", "ackermann_cmd")
+        f"/{car}/{topic}"
+        for car in ("n1", "n2")
+        for topic in ("cmd_vel", "ackermann_cmd", "goal_pose")
     }
 
 
@@ -78,7 +85,7 @@ def test_a_car_that_leaves_takes_its_topics_along(city):
     city.lockstep.call(RemoveRequest(vehicle="n2"))
     city.lockstep.run_for(0.2)
     assert {t for t, noted in city.graph.topics.items() if noted.closed} == {
-        "/n2/odom", "/n2/scan", "/n2/imu", "/n2/camera/compressed",
+        "/n2/odom", "/n2/scan", "/n2/imu", "/n2/camera/compressed", "/n2/map",
     }  # fmt: skip
     assert all(city.graph.ears[f"/n2/{t}"].closed for t in ("cmd_vel", "ackermann_cmd"))
     frames = {m.header.frame_id for m in city.graph.sent("/tf_static")[-1].transforms}
@@ -150,6 +157,60 @@ def test_a_twist_drives_the_car_at_its_speed_and_rate(driven):
     assert car.speed_mps == pytest.approx(SPEED, rel=0.03)
     # Wheelbase 0.14154 m, 2 rad/m.
     assert car.steering_rad == pytest.approx(math.atan(0.14154 * 0.3 / SPEED), abs=0.01)
+
+
+def goal(x, y, yaw, frame="map"):
+    return ros(
+        "geometry_msgs/PoseStamped", header=header(0, frame), pose=pose(Pose2(x, y, yaw))
+    )  # fmt: skip
+
+
+def test_goal_pose_becomes_a_request_to_park(graph, caplog):
+    part = RosPart(load_map("driving_school"), graph)
+    part.step(0, [Incoming(snapshot(row("n1")), 0)])
+    graph.say("/n1/goal_pose", goal(0.5, -0.25, 1.0))
+    (call,) = part.step(1, [])
+    assert call.request.vehicle == "n1"
+    place = pose_at(call.request.goal)
+    assert tuple(place) == pytest.approx((0.5, -0.25, 1.0), abs=1e-4)
+    graph.say("/n1/goal_pose", goal(0.5, -0.25, 1.0, frame="n1/odom"))
+    assert part.step(2, []) == []
+    assert "expected the frame map, got 'n1/odom'" in caplog.text
+    part.step(3, [Incoming(Refused(code="offline", detail="nobody parks n1"), 0, call=call)])
+    assert "nobody parks n1" in caplog.text
+
+
+def test_map_of_the_city_shows_its_walls_and_mapped_boxes(graph):
+    city_map = load_map("parking_school_obstacles")
+    hidden = replace(city_map.boxes[0], mapped=False)
+    part = RosPart(replace(city_map, boxes=(hidden, city_map.boxes[1])), graph)
+    part.step(0, [])
+    (grid,) = graph.sent("/map")
+    cells = grid.data.reshape(grid.info.height, grid.info.width)
+
+    def cell(x, y):
+        at, size = grid.info.origin.position, grid.info.resolution
+        return cells[int((y - at.y) / size), int((x - at.x) / size)]
+
+    assert cell(-0.99, 0.1) == 100  # the left wall
+    assert cell(0.7, -0.31) == 100  # the front of the box on the right
+    assert cell(0.7, 0.31) == 0
+    assert cell(0.0, 0.0) == 0
+
+
+def test_map_that_a_car_makes_is_an_occupancy_grid(graph):
+    part = RosPart(load_map("driving_school"), graph)
+    part.step(0, [Incoming(snapshot(row("n1")), 0)])
+    cells = np.array([[0, 100, -1], [0, 0, 100]], np.int8)
+    room = OccupancyMap(
+        vehicle="n1", t_ns=7, rows=2, columns=3, cell_m=0.05, x_m=-1.0, y_m=2.0, car_x_m=0.0,
+        car_y_m=0.0, car_yaw_rad=0.0, state="map", payload=cells.tobytes(),
+    )  # fmt: skip
+    part.step(1, [Incoming(room, 0)])
+    (grid,) = graph.sent("/n1/map")
+    assert (grid.info.width, grid.info.height, grid.info.resolution) == (3, 2, 0.05)
+    assert (grid.info.origin.position.x, grid.info.origin.position.y) == (-1.0, 2.0)
+    assert grid.data.tolist() == cells.ravel().tolist()
 
 
 def test_it_drives_backwards(driven):
