@@ -13,7 +13,7 @@ from scm.maps.radio_check import radio_problems
 from scm.maps.route import LanePath
 from scm.maps.rules_check import rule_problems
 from scm.maps.vehicle_tags import LAST_TAG_ID
-from scm.records.city_map import CityMap, Conflict, Group, Junction, Segment
+from scm.records.city_map import ANY_BAY, CityMap, Conflict, Group, Junction, Segment
 
 MAX_GAP_M = 0.001  # between two lanes that follow one another
 MAX_KINK_RAD = math.radians(0.1)  # between their directions
@@ -35,7 +35,7 @@ def problems_of(city_map: CityMap) -> list[str]:
     Checks that need the lanes' geometry are made only if the numbers and segments are right.
     """
     found = [*_numbers(city_map, ""), *_segments(city_map)]
-    for check in (_unique, _outlines, floor_problems, radio_problems, _references, _spawns):
+    for check in (_unique, _outlines, floor_problems, radio_problems, _references, _spawns, _bays):
         found += check(city_map)
     if not any(".segments" in problem for problem in found):
         found += rule_problems(city_map)
@@ -99,7 +99,7 @@ def _unique(city_map: CityMap) -> Iterator[str]:
         (key, "name", getattr(city_map, key))
         for key in (
             "lanes", "areas", "junctions", "crossings", "stop_lines", "crosswalks", "boxes",
-            "spawns",
+            "spawns", "bays",
         )
     ]  # fmt: skip
     named += [
@@ -216,6 +216,19 @@ def _spawns(city_map: CityMap) -> Iterator[str]:
                 f"spawns[{index}] ({spawn.name}): expected lane and at_m, or pose alone; "
                 f"got {' and '.join(given) or 'none of them'}"
             )
+
+
+def _bays(city_map: CityMap) -> Iterator[str]:
+    """Doubt that a bay lies on the floor, and that its name means no other place."""
+    floor, spawns = city_map.floor, {spawn.name for spawn in city_map.spawns}
+    for index, bay in enumerate(city_map.bays):
+        where = f"bays[{index}] ({bay.name})"
+        if bay.name in spawns or bay.name == ANY_BAY:
+            expected = f"expected no spawn's name and not {ANY_BAY!r}"
+            yield f"{where}.name: {expected}, got {bay.name!r}"
+        for axis, value, (low, high) in zip("xy", bay.pose, (floor.x_m, floor.y_m), strict=False):
+            if not low <= value <= high:
+                yield f"{where}.pose: expected {axis} from {low} to {high}, got {value}"
 
 
 def _connections(city_map: CityMap, paths: dict[str, LanePath]) -> Iterator[str]:

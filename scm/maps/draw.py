@@ -1,7 +1,8 @@
 """The picture of a map: one SVG in map metres, for the dashboard, the docs and `scm show map`.
 
 Things that change have ids: `light-1` with its lamps `light-1-red`, `light-1-yellow` and
-`light-1-green`, `movement-<junction>-<group>`, `stop-<name>`, `lane-<name>`, `spawn-<name>`.
+`light-1-green`, `movement-<junction>-<group>`, `stop-<name>`, `lane-<name>`, `spawn-<name>`,
+`bay-<name>`.
 """
 
 import itertools
@@ -19,7 +20,7 @@ from scm.maps.route import LanePath, Roads
 from scm.maps.segments import box_outline, wall_outlines
 from scm.maps.signs import precedence_at
 from scm.maps.svg import element, label, lane_data, layer, number, outline, placed
-from scm.records.city_map import Approach, CityMap, Crosswalk, Wall
+from scm.records.city_map import Approach, Bay, CityMap, Crosswalk, Wall
 
 MARGIN_M = 0.06
 STRIP_M = 0.17
@@ -33,6 +34,7 @@ ASPHALT, PAINT, INK = "#474b53", "#f4f3ee", "#23272e"
 WALL, WALL_EDGE, BOX, BOX_EDGE = "#cfc6b4", "#9c9280", "#d9904a", "#8d5a28"
 
 CAR_OUTLINE = ((-0.07, -0.0875), (0.23, -0.0875), (0.23, 0.0875), (-0.07, 0.0875))
+CAR_MIDDLE_M = 0.08  # of that outline, ahead of the rear axle
 
 
 def draw_svg(
@@ -55,6 +57,7 @@ def draw_svg(
         _road(city_map),
         floor_layers(city_map),
         _paint(city_map, roads),
+        layer("bays", map(_bay, city_map.bays)),
         _walls(city_map, movable=movable),
         _tag(city_map),
         layer("spawns", _spawns(city_map, roads) if spawns else ()),
@@ -258,6 +261,24 @@ def _crosswalk(crossing: Crosswalk) -> str:
         fill=PAINT,
         class_="crosswalk",
     )
+
+
+def _bay(bay: Bay) -> str:
+    """Return a bay's marking, open where cars drive in, with its name."""
+    half, front = bay.width_m / 2.0, CAR_MIDDLE_M + bay.length_m / 2.0
+    rear = front - bay.length_m
+    sides = ((rear, half), (front, half), (front, -half), (rear, -half))
+    lines = element(
+        "path",
+        d=outline(sides, closed=False),
+        fill="none",
+        stroke=PAINT,
+        stroke_width=EDGE_M,
+        transform=placed(Pose2(*bay.pose)),
+    )
+    x, y = Pose2(*bay.pose).apply(CAR_MIDDLE_M, 0.0)
+    name = label(bay.name, x, y, SPAWN_NAME_M, fill=PAINT, fill_opacity=0.6, font_weight="600")
+    return element("g", lines, name, id=f"bay-{bay.name}", class_="bay")
 
 
 def _walls(city_map: CityMap, *, movable: bool) -> str:

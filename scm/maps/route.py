@@ -14,7 +14,7 @@ from scm.maps.coordinates import EXAMPLE, are_coordinates, pose_at
 from scm.maps.once_per_map import once_per_map
 from scm.maps.polyline import Polyline, advance, extent, join, sample
 from scm.maps.signs import SPEED_LIMIT, Held, allowed_next, is_obeyed, looks_along
-from scm.records.city_map import Approach, CityMap, Conflict, Lane, Spawn, StopLine
+from scm.records.city_map import Approach, Bay, CityMap, Conflict, Lane, Spawn, StopLine
 
 MAX_HEADING_ERROR_RAD = math.radians(60.0)  # between a car and its lane
 MAX_PASSES = 400  # lanes of one route: its path takes 0.1 ms a lane while the city waits
@@ -87,7 +87,8 @@ class Roads:
             lane.name: sum(extent(segment)[0] for segment in lane.segments)
             for lane in city_map.lanes
         }
-        self._spawns = {spawn.name: spawn for spawn in city_map.spawns}
+        self._spawns: dict[str, Spawn | Bay] = {spawn.name: spawn for spawn in city_map.spawns}
+        self._spawns |= {bay.name: bay for bay in city_map.bays}
         self._lines: dict[str, list[StopLine]] = {}
         for line in sorted(city_map.stop_lines, key=lambda line: line.at_m):
             self._lines.setdefault(line.lane, []).append(line)
@@ -178,7 +179,7 @@ class Roads:
         return limits
 
     def spawn_pose(self, name: str) -> Pose2:
-        """Return the pose of the rear axle of a car put to a spawn place, or to `X,Y,DEG`.
+        """Return the pose of the rear axle of a car at a spawn place, in a bay, or at `X,Y,DEG`.
 
         Raises:
             MapError: when there is no such place, or the coordinates lie off the floor.
@@ -291,8 +292,10 @@ class Roads:
         near = (left <= x) & (x <= right) & (low <= y) & (y <= high)
         return [self.lanes[self.city_map.lanes[k].name] for k in np.flatnonzero(near)]
 
-    def _pose_of(self, spawn: Spawn) -> Pose2:
+    def _pose_of(self, spawn: Spawn | Bay) -> Pose2:
         """Return the pose that a spawn's lane and distance, or its own pose, stands for."""
+        if isinstance(spawn, Bay):
+            return Pose2(*spawn.pose)
         if spawn.pose is not None:
             return Pose2(*spawn.pose)
         if spawn.lane is None or spawn.at_m is None:

@@ -37,6 +37,9 @@ from scm.records.floor import Floor, Record, Wind
 
 Point = tuple[float, float]
 
+ANY_BAY = "any"
+"""As a goal: whichever bay the parking manager gives."""
+
 
 class MapTag(Record, kw_only=True, frozen=True):
     """An AprilTag that lies on the floor and fixes the frame; `size_m` is the black edge.
@@ -289,6 +292,23 @@ class Spawn(Record, kw_only=True, frozen=True):
     ) = None
 
 
+class Bay(Record, kw_only=True, frozen=True):
+    """A marked place where one car parks.
+
+    Attributes:
+        pose: Of the rear axle of a car parked there.
+        length_m, width_m: Of the marking, which lies about the middle of a Nigel parked there.
+    """
+
+    name: Name
+    pose: Annotated[
+        tuple[float, float, float],
+        Meta(description="x [m], y [m], yaw [rad].", examples=[[-1.2, 1.45, 1.5708]]),
+    ]
+    length_m: LengthM = 0.45
+    width_m: WidthM = 0.45
+
+
 class Camera(Record, kw_only=True, frozen=True):
     """An overhead camera, looking down: a pinhole with OpenCV's distortion, or a fisheye.
 
@@ -373,6 +393,7 @@ class CityMap(Record, kw_only=True, frozen=True):
         junctions: Junctions.
         lights: Lamps that burn.
         boxes: Boxes that cars can push.
+        bays: Where cars park.
         cameras: Cameras.
         radio_range_m: Range of the radio between cars [m].
         speed_advice: Whether drivers come to red lights no sooner than SPATEM lets them pass.
@@ -400,6 +421,7 @@ class CityMap(Record, kw_only=True, frozen=True):
     walls: tuple[Wall, ...] = ()
     boxes: tuple[Box, ...] = ()
     spawns: tuple[Spawn, ...] = ()
+    bays: tuple[Bay, ...] = ()
     cameras: tuple[Camera, ...] = ()
     radio_range_m: float = 20.0
     radio: RadioChannel = RadioChannel()

@@ -207,6 +207,23 @@ class RouteBody(Body, kw_only=True, frozen=True):
     ] = "stop"
 
 
+class ParkBody(Body, kw_only=True, frozen=True):
+    """Where a car that parks itself is to park."""
+
+    goal: Annotated[
+        str,
+        Meta(
+            min_length=1,
+            max_length=64,
+            description=(
+                "a spawn place or bay of the map, `any` for any bay, or X,Y,DEG (metres, degrees, "
+                "map frame) of the rear axle's centre"
+            ),
+            examples=["n3", "any", "0.75,0,0"],
+        ),
+    ]
+
+
 class LightsBody(Body, kw_only=True, frozen=True):
     """How to switch headlights and indicators; what is left out stays as it is."""
 

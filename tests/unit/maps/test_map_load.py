@@ -131,3 +131,30 @@ def test_a_name_that_the_map_binds_or_the_city_gives_has_a_tag_of_its_own():
     names = ("red", "blue", "n1", "n3", "n12", "n586", "n587", "n0", "n01", "r1")
     bound = [bound_tag(city_map, name) for name in names]
     assert bound == [12, 3, 1, None, None, 586, None, None, None, None]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('name = "n2"', 'name = "n1"', "bays[2].name: 'n1' is already that of bays[0]"),
+        ('name = "n2"', 'name = "a"', "bays[2] (a).name: expected no spawn's name"),
+        (
+            'name = "n2"',
+            'name = "any"',
+            "bays[2] (any).name: expected no spawn's name and not 'any'",
+        ),
+        (
+            "pose = [-0.1, 1.7,",
+            "pose = [-0.1, 2.7,",
+            "pose: expected y from -2.05 to 2.05, got 2.7",
+        ),
+    ],
+)
+def test_a_bay_that_makes_no_sense_is_refused(tmp_path, old, new, words):
+    text = (MAPS_DIR / "parking_lot.toml").read_text(encoding="utf-8")
+    path = tmp_path / "bad.toml"
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(MapError) as caught:
+        load_map(path)
+    assert words in str(caught.value)

@@ -1,0 +1,1 @@
+"""The parking manager: which car gets which bay, and which one may drive."""
