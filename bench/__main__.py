@@ -4,6 +4,7 @@ import importlib
 import sys
 
 BENCHMARKS = (
+    "autonomy_mapping",
     "kernel",
     "driver",
     "world",
@@ -13,6 +14,7 @@ BENCHMARKS = (
     "study",
     "bus",
     "agents",
+    "autonomy_local_plan",
     "codec",
     "eye",
     "camera",
@@ -26,6 +28,8 @@ BENCHMARKS = (
 
 
 LONG = (
+    "autonomy_plan",
+    "autonomy_real",
     "dashboard",
     "devkit",
     "flow",

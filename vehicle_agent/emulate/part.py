@@ -20,6 +20,7 @@ from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 from vehicle_agent.emulate.device import Device
+from vehicle_agent.emulate.scanner import Scanner
 from vehicle_agent.emulate.wheels import Wheels
 
 STEP_NS = 5 * NS_PER_MS
@@ -62,7 +63,7 @@ class EmulatorPart(BasePart):
 
     def __init__(
         self, vehicle: str, device: Device, wheels: Wheels, spawn: str = "", car: str = "nigel",
-        tag_id: int | None = None,
+        tag_id: int | None = None, scanner: Scanner | None = None,
     ) -> None:  # fmt: skip
         """Prepare the car; it is placed when the city's map is known.
 
@@ -73,9 +74,11 @@ class EmulatorPart(BasePart):
             spawn: Spawn place or `X,Y,DEG`; empty: the first free one.
             car: Car file's name.
             tag_id: Of the tag on its roof; None: as the city assigns it.
+            scanner: Its LIDAR, behind a cable of its own; None: it has none.
         """
         self.name = station_of(vehicle)
         self._vehicle, self._device, self._wheels = vehicle, device, wheels
+        self._scanner = scanner
         self._spawn, self._car, self._tag_id = spawn, car, tag_id
         self.subscriptions: Sequence[Subscription] = (
             Subscription(WorldDefinition), Subscription(WorldSnapshot), Subscription(EmulatedPose),
@@ -102,15 +105,19 @@ class EmulatorPart(BasePart):
             self._put_down(now_ns)
             return []
         self._wheels.follow(self._device.firmware, now_ns)
+        if self._scanner is not None:
+            self._scanner.step(now_ns, self._wheels.motion().pose)
         if now_ns - self._published_ns < PUBLISH_NS - STEP_NS // 2:
             return []
         self._published_ns = now_ns
         return [self._pose(now_ns)]
 
     def finish(self, now_ns: int) -> list[Outgoing]:
-        """Remove the cable."""
+        """Remove the cables."""
         del now_ns
         self._device.close()
+        if self._scanner is not None:
+            self._scanner.close()
         return []
 
     def _learn(self, world: WorldDefinition) -> None:
@@ -119,6 +126,8 @@ class EmulatorPart(BasePart):
             return
         self._defined_ns, self._map = world.t_ns, world.map
         self._wheels.learn(world.map, world.seed)
+        if self._scanner is not None:
+            self._scanner.learn(world.map)
 
     def _put_down(self, now_ns: int) -> None:
         """Put the car at its place, or search for a free one."""
