@@ -9,7 +9,7 @@ v2x         messages, keys, rights, and the bus (Zenoh, or in memory)
 runtime     the contract of a part: step(now, inbox) -> outbox; live, in lockstep, whole cities
 vehicles    cars: physical effects as terms, assembled into one compiled kernel; drivers; guard
 world       the shared world: cars, walls, contacts, sensors, radio, leases
-traffic     signals and their monitor, demand, observation, misbehaviour
+traffic     signals and their monitor, demand, observation, misbehaviour, parking
 scenery     what the city looks like, for everything that draws it through a lens
 eye         overhead camera: tags in frames become poses
 camera      the cars' own cameras, rendered while somebody subscribes

@@ -40,6 +40,7 @@ from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.credentials import read_credentials
 from scm.v2x.exchange import Incoming
 from scm.v2x.message import Message, Refused, Request
+from scm.v2x.messages.park_request import ParkReply, ParkRequest
 from scm.v2x.messages.plan_request import PlanReply, PlanRequest
 from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
@@ -210,6 +211,16 @@ class FleetCar:
             then="stop" if then == "stop" else "circulate",
         )
         return self.city.send(request)
+
+    def park(self, goal: str) -> ParkReply:
+        """Send the car to park at a spawn place, in a bay or `any` bay, or at `X,Y,DEG`.
+
+        Returns at once. It finds its way itself, if `vehicle-agent park --vehicle NAME` runs.
+
+        Raises:
+            ScmError: without such an agent, or for a goal that is not on the map.
+        """
+        return self.city.request(ParkRequest(vehicle=self.name, goal=goal), ParkReply)
 
     def remove(self) -> None:
         """Remove the car from the map."""

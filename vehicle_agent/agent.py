@@ -66,7 +66,7 @@ class AgentPart:
         spawn: str = "",
         session: str = "",
         seed: int = 0,
-        body: str = "simulated",
+        body: str | BodyKind = "simulated",
         wiring: Wiring | None = None,
         tag_id: int | None = None,
     ) -> None:
@@ -78,15 +78,16 @@ class AgentPart:
             spawn: Spawn place or `X,Y,DEG`; empty: any free one.
             session: Of the agent's bus; empty: learned from its own presence on the bus.
             seed: Of the sensors' noise.
-            body: Kind of body: a file of `vehicle_agent/bodies`.
+            body: Kind of body, or the name of one: a file of `vehicle_agent/bodies`.
             wiring: How a real body is connected, and what it may do.
             tag_id: Of the tag on its roof; None: the city assigns one.
         """
         self.name = check_name(name, "vehicle")
-        kind = registry.load(BODIES, body, "BODY", BodyKind, RunError)
-        self._wiring, self._is_real = wiring or Wiring(), kind.kind == "real"
-        self._body = kind.open(car, seed, self._wiring)
-        self._link = Link(name, car, kind.kind, spawn, session, tag_id)
+        if isinstance(body, str):
+            body = registry.load(BODIES, body, "BODY", BodyKind, RunError)
+        self._wiring, self._is_real = wiring or Wiring(), body.kind == "real"
+        self._body = body.open(car, seed, self._wiring)
+        self._link = Link(name, car, body.kind, spawn, session, tag_id)
         self._car = car
         self._map: CityMap | None = None
         self._defined_ns: int | None = None
@@ -210,13 +211,9 @@ class AgentPart:
             from vehicle_agent.actuation import real_guard  # noqa: PLC0415
 
             real = real_guard(body.limits, city_map, self._wiring)
-        try:
-            session = CitySession(
-                self.name, self._car, body, city_map, self._link.epoch, now_ns, real
-            )
-        except MapError as error:
-            event(_log, "cannot_drive", level=logging.ERROR, reason=error)
-            raise
+        session = CitySession(self.name, self._car, body, city_map, self._link.epoch, now_ns, real)
+        if session.trips.off_lane:
+            event(_log, "cannot_drive", reason=session.trips.off_lane)
         session.guard.stop(self._stopped)
         for status in self._faults.values():
             session.signals.receive_monitor_status(status)
@@ -355,8 +352,9 @@ class AgentPart:
     def _detail(self) -> str:
         if self._session is None:
             return f"outside: {self._link.reason}" if self._map else "waits for the world"
-        if self._is_real and self._session.gate.why:
-            return f"{self._session.gate.why} ({self._session.gate.summary})"
+        gate = self._session.gate
+        if gate.why:
+            return f"{gate.why} ({gate.summary})" if self._is_real else gate.why
         if self._link.standing == "foreign":
             return "driven by somebody else"
         if self._link.standing == "regaining":

@@ -6,7 +6,6 @@ receive -> advance the body to now -> decide -> guard -> command the body -> rep
 import logging
 
 from scm.clock import NS_PER_MS, NS_PER_S
-from scm.errors import MapError
 from scm.log import event
 from scm.maps.route import roads_of
 from scm.records.city_map import CityMap
@@ -47,7 +46,6 @@ class CitySession:
         switches: State of its headlights and indicators.
         channel: Channel load, and how often the car may transmit.
         gate: Between the guard and the body.
-        off_lane: Why it cannot drive from where it was put; empty if it can.
     """
 
     def __init__(
@@ -60,11 +58,7 @@ class CitySession:
         now_ns: int,
         real: RealGuard | None = None,
     ) -> None:
-        """Begin with the body where the city placed it; `real` guards a real car.
-
-        Raises:
-            MapError: when it stands where no lane leads anywhere.
-        """
+        """Begin with the body where the city placed it; `real` guards a real car."""
         self._vehicle, self._car, self._body = vehicle, car, body
         self.signals = SignalTable(city_map)
         self.cars = CamTracker()
@@ -72,7 +66,6 @@ class CitySession:
         self._roads = roads_of(city_map)
         self.trips = TripDriver(vehicle, self._roads, body.limits, body.motion().pose, now_ns)
         self.gate = ActuationGate(body, real)
-        self.off_lane = ""
         self._tried_ns = now_ns
         self.switches = OFF
         radio = city_map.radio
@@ -127,22 +120,22 @@ class CitySession:
             throttle, steering = self._decide(now_ns)
             self.guard.drive(throttle, steering, epoch, self._seq, now_ns)
         self._body.show(self._lamp_switches(hazard=self.guard.lost))
-        guarded = self.gate.pass_on(self.guard.output(now_ns), self.off_lane, now_ns)
+        off_lane = "" if self._is_driven_by_other else self.trips.off_lane
+        guarded = self.gate.pass_on(self.guard.output(now_ns), off_lane, now_ns)
         self._last_command = guarded.throttle, guarded.steering
         return self._reports(guarded, previous_command, now_ns, sensed=sensed)
 
     def _replan_if_lifted(self, now_ns: int) -> None:
         """Search for a lane where the car was put down, until it stands on one."""
-        is_due = self.off_lane and now_ns - self._tried_ns >= NS_PER_S
-        if not (self._body.was_lifted() or is_due):
+        was_lifted, before = self._body.was_lifted(), self.trips.off_lane
+        is_due = before and not self._is_driven_by_other and now_ns - self._tried_ns >= NS_PER_S
+        if not (was_lifted or is_due):
             return
         self._tried_ns, pose = now_ns, self._body.motion().pose
-        try:
-            self.trips = TripDriver(self._vehicle, self._roads, self._body.limits, pose, now_ns)
-            self.off_lane = ""
-        except MapError as error:
-            self.off_lane = str(error)
-        event(_log, "put_down", x_m=round(pose.x, 3), y_m=round(pose.y, 3), trouble=self.off_lane)
+        self.trips = TripDriver(self._vehicle, self._roads, self._body.limits, pose, now_ns)
+        off_lane = self.trips.off_lane
+        if was_lifted or not off_lane:
+            event(_log, "put_down", x_m=round(pose.x, 3), y_m=round(pose.y, 3), trouble=off_lane)
 
     def _lamp_switches(self, *, hazard: bool) -> Switches:
         """Return the state for the body's own lamps."""

@@ -66,13 +66,19 @@ def _calibration(request: Facts) -> str:
     return f"put calibration {named} in force at {camera}" if named else f"calibrate {camera}"
 
 
+def _bay(request: Facts) -> str:
+    return f"give {request['vehicle']} {request.get('bay') or 'any bay'}"
+
+
 _REQUESTS: dict[str, Callable[[Facts], str]] = {
+    "BayRequest": _bay,
     "BoxesRequest": lambda _: "put the boxes back to their places",
     "CalibrationRequest": _calibration,
     "JoinRequest": _join,
     "LeaseRequest": lambda request: f"{_LEASES[request['verb']]} the wheel of {request['vehicle']}",
     "LightRequest": lambda request: f"set the lights of {request['vehicle']}",
     "MonitorReset": lambda request: f"reset the monitor of {_spaced(request['junction'])}",
+    "ParkRequest": lambda request: f"park {request['vehicle']} at {request['goal']}",
     "PlanRequest": _plan,
     "RemoveRequest": lambda request: f"take {request['vehicle']} off the map",
     "RouteRequest": _route,

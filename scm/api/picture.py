@@ -10,6 +10,8 @@ from scm.disturbances import Disturbances
 from scm.records.eye import Residual, TagSeen
 from scm.records.stations import StationRow
 from scm.v2x.message import Message
+from scm.v2x.messages.autonomy_plan import AutonomyPlan
+from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
@@ -64,7 +66,7 @@ class Picture:
 
     Attributes:
         spats, monitors, sites, signal_statuses: By junction.
-        trips: By vehicle.
+        trips, autonomy, autonomy_plans: By vehicle.
         traffic: The observer's newest counts; `violations` the last it reported, oldest first.
         frames, tags: By camera, the last few, oldest first; `eye_statuses` the newest.
         tags_seen: By (camera, tag id), all of the last minute.
@@ -83,6 +85,8 @@ class Picture:
     sites: dict[str, SignalSite] = field(default_factory=dict)
     signal_statuses: dict[str, Held[SignalStatus]] = field(default_factory=dict)
     trips: dict[str, Held[Trip]] = field(default_factory=dict)
+    autonomy: dict[str, Held[AutonomyStatus]] = field(default_factory=dict)
+    autonomy_plans: dict[str, Held[AutonomyPlan]] = field(default_factory=dict)
     traffic: Held[TrafficCounts] | None = None
     violations: tuple[Violation, ...] = ()
     frames: dict[str, tuple[Held[EyeFrame], ...]] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""What the view has received, by subject: the world, signals, traffic and the Eye.
+"""What the view has received, by subject: the world, signals, traffic, autonomy, the Eye.
 
 None of these is safe between threads by itself: `scm.api.view.CityView` holds the lock.
 """
@@ -11,6 +11,8 @@ from scm.api.signal_history import SignalHistory
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.eye.accuracy import EyeAccuracyPart
 from scm.runtime.part import Subscription
+from scm.v2x.messages.autonomy_plan import AutonomyPlan
+from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.eye_frame import EyeFrame
@@ -132,6 +134,29 @@ class ReceivedTraffic:
         self.reports[report.suspect] = report
         if len(self.reports) > MAX_REPORTS:
             self.reports.pop(next(iter(self.reports)))
+
+
+class ReceivedAutonomy:
+    """The newest status and plan of each car that parks itself."""
+
+    def __init__(self) -> None:
+        self.statuses: dict[str, Held[AutonomyStatus]] = {}
+        self.plans: dict[str, Held[AutonomyPlan]] = {}
+
+    def receive_status(self, status: AutonomyStatus, t_ns: int) -> None:
+        """Store what a car is doing."""
+        self.statuses[status.vehicle] = Held(status, t_ns)
+
+    def receive_plan(self, plan: AutonomyPlan, t_ns: int) -> None:
+        """Store how a car means to drive."""
+        self.plans[plan.vehicle] = Held(plan, t_ns)
+
+    def forget(self, oldest_ns: int) -> None:
+        """Drop what arrived before a time."""
+        for name in [n for n, held in self.statuses.items() if held.arrived_ns < oldest_ns]:
+            del self.statuses[name]
+        for name in [n for n, held in self.plans.items() if held.arrived_ns < oldest_ns]:
+            del self.plans[name]
 
 
 class ReceivedEye:

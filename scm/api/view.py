@@ -16,6 +16,7 @@ from scm.api.eye_tracks import TrackWatch
 from scm.api.picture import Held, Picture
 from scm.api.received import (
     CameraWatch,
+    ReceivedAutonomy,
     ReceivedEye,
     ReceivedSignals,
     ReceivedTraffic,
@@ -33,6 +34,8 @@ from scm.records.signal_history import ForecastScore, History, Verdict
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
+from scm.v2x.messages.autonomy_plan import AutonomyPlan
+from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
@@ -74,6 +77,7 @@ class CityView(BasePart):
         self._world = ReceivedWorld()
         self._signals = ReceivedSignals()
         self._traffic = ReceivedTraffic()
+        self._autonomy = ReceivedAutonomy()
         self._eye_accuracy = EyeAccuracyPart()
         self._eye = ReceivedEye(self._eye_accuracy)
         self._cameras = CameraWatch()
@@ -98,6 +102,8 @@ class CityView(BasePart):
             WorldDefinition: self._world.receive_definition,
             CityStop: self._world.receive_stop,
             Trip: self._world.receive_trip,
+            AutonomyStatus: self._autonomy.receive_status,
+            AutonomyPlan: self._autonomy.receive_plan,
             Spat: self._signals.receive_spat,
             SignalSite: self._signals.receive_site,
             SignalStatus: self._signals.receive_status,
@@ -156,6 +162,8 @@ class CityView(BasePart):
             sites=dict(self._signals.sites),
             signal_statuses=dict(self._signals.statuses),
             trips=dict(self._world.trips),
+            autonomy=dict(self._autonomy.statuses),
+            autonomy_plans=dict(self._autonomy.plans),
             traffic=self._traffic.counts,
             violations=tuple(self._traffic.violations),
             frames={camera: tuple(frames) for camera, frames in self._eye.frames.items()},
@@ -308,5 +316,6 @@ class CityView(BasePart):
         if self._tracks.forget(now_ns):
             self._update_subscriptions()
         self._world.forget(now_ns - FORGET_NS)
+        self._autonomy.forget(now_ns - FORGET_NS)
         self._eye.forget(now_ns - FORGET_NS)
         self._eye_accuracy.forget()

@@ -1,10 +1,10 @@
-"""Converts a run for Foxglove: frames, cars, roads, lights, pictures, scans, plots and the log.
+"""Converts a run for Foxglove: frames, cars, roads, lights, pictures, scans, plans, plots, the log.
 
 Foxglove can list the channels of the recorder's own file but not read their schemas.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, TypeVar
 
@@ -20,6 +20,7 @@ from scm.recorder.mcap_file import Recorded, SchemaTable
 from scm.recorder.run_index import RunIndex
 from scm.records.city_map import CityMap, Light
 from scm.v2x.message import Message
+from scm.v2x.messages.autonomy_plan import AutonomyPlan
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.eye_frame import EyeFrame
@@ -51,9 +52,12 @@ LIGHTS = {
     "yellow": fox.Colour(r=1.0, g=0.76, b=0.2),
     "green": fox.Colour(r=0.2, g=0.82, b=0.55),
 }
+PATH, OBSTACLE = fox.Colour(r=0.35, g=0.82, b=1.0), fox.Colour(r=1.0, g=0.69, b=0.0)
+PATH_THICK_M, TRAJECTORY_THICK_M, OBSTACLE_M = 0.006, 0.015, 0.02
 LETTERS = {"red": "R", "flashing_red": "F", "yellow": "Y", "green": "G"}
 _WANTED = (
     WorldDefinition, WorldSnapshot, VehicleState, Spat, CityEvent, EyeFrame, CameraFrame, LidarScan,
+    AutonomyPlan,
 )  # fmt: skip
 M = TypeVar("M", bound=Message)
 
@@ -141,6 +145,7 @@ class _Writing:
             EyeFrame: self._eye,
             CameraFrame: self._camera,
             LidarScan: self._scan,
+            AutonomyPlan: self._plan,
         }
 
     def write(self, t_ns: int, message: Message) -> None:
@@ -257,20 +262,54 @@ class _Writing:
         )
         self._add(f"/{message.vehicle}/scan", t_ns, cloud)
 
+    def _plan(self, t_ns: int, message: AutonomyPlan) -> None:
+        at = _time(message.t_ns)
+        entity = fox.Entity(
+            timestamp=at,
+            frame_id=MAP,
+            id=f"plan {message.vehicle}",
+            lines=(
+                _planned(message.path, PATH_THICK_M),
+                _planned(message.trajectory, TRAJECTORY_THICK_M),
+            ),
+            cubes=tuple(_obstacle(x, y) for x, y in message.obstacles),
+        )
+        self._add(f"/{message.vehicle}/plan", t_ns, fox.SceneUpdate(entities=(entity,)))
+        poses = tuple(
+            fox.Pose(position=fox.Vector(x=x, y=y), orientation=_turned(yaw))
+            for x, y, yaw in message.particles
+        )
+        particles = fox.PosesInFrame(timestamp=at, frame_id=MAP, poses=poses)
+        self._add(f"/{message.vehicle}/particles", t_ns, particles)
+
 
 def _time(t_ns: int) -> fox.Time:
     return fox.Time(sec=t_ns // NS_PER_S, nsec=t_ns % NS_PER_S)
 
 
 def _frame(at: fox.Time, car: SnapshotVehicle) -> fox.Transform:
-    half = 0.5 * car.yaw_rad
     return fox.Transform(
         timestamp=at,
         parent_frame_id=MAP,
         child_frame_id=car.vehicle,
         translation=fox.Vector(x=car.x_m, y=car.y_m),
-        rotation=fox.Quaternion(z=math.sin(half), w=math.cos(half)),
+        rotation=_turned(car.yaw_rad),
     )
+
+
+def _turned(yaw_rad: float) -> fox.Quaternion:
+    return fox.Quaternion(z=math.sin(0.5 * yaw_rad), w=math.cos(0.5 * yaw_rad))
+
+
+def _planned(poses: Sequence[tuple[float, float, float]], thick_m: float) -> fox.Line:
+    points = tuple(fox.Vector(x=x, y=y, z=0.01) for x, y, _ in poses)
+    return fox.Line(thickness=thick_m, points=points, color=PATH)
+
+
+def _obstacle(x_m: float, y_m: float) -> fox.Cube:
+    pose = fox.Pose(position=fox.Vector(x=x_m, y=y_m, z=0.5 * OBSTACLE_M))
+    size = fox.Vector(x=OBSTACLE_M, y=OBSTACLE_M, z=OBSTACLE_M)
+    return fox.Cube(pose=pose, size=size, color=OBSTACLE)
 
 
 def _car(at: fox.Time, car: SnapshotVehicle) -> fox.Entity:

@@ -40,6 +40,14 @@ class Pose(msgspec.Struct, kw_only=True, frozen=True):
     orientation: Quaternion = Quaternion()
 
 
+class PosesInFrame(msgspec.Struct, kw_only=True, frozen=True):
+    """Poses in a frame."""
+
+    timestamp: Time
+    frame_id: str
+    poses: tuple[Pose, ...]
+
+
 class Colour(msgspec.Struct, kw_only=True, frozen=True):
     """Red, green, blue and opacity, 0 to 1."""
 

@@ -105,6 +105,7 @@ class _Plan:
         port: One that is free.
         agents: The names of their cars.
         eyes: Cameras by the station that looks through each.
+        has_bays: Whether cars may request bays.
         scan: How a scanned map was read; empty: it is none.
     """
 
@@ -115,6 +116,7 @@ class _Plan:
     recording: Path
     state: str
     eyes: Mapping[str, str]
+    has_bays: bool
     scan: str
 
 
@@ -171,6 +173,7 @@ def _plan_of(options: CityOptions) -> _Plan:
         recording=recording,
         state=options.state or f"sqlite:{recording.with_suffix('.db')}",
         eyes=eyes,
+        has_bays=bool(city_map.bays),
         scan=city_map.source if is_scan(options.map_name) else "",
     )
 
@@ -295,6 +298,8 @@ def _parts(plan: _Plan) -> list[Job]:
         part("observer", "counts, delays, and who breaks the rules"),
         part("misbehaviour", "checks cars' messages for misbehaviour"),
     ]
+    if plan.has_bays:
+        jobs.append(part("parking", "gives bays to cars that park, and lets them drive in turn"))
     if plan.options.demand is not None:
         jobs.append(demand(plan.options.demand))
     if plan.options.ros2:

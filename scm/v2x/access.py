@@ -27,6 +27,7 @@ CITY_PARTS = (
     "monitor",
     "observer",
     "misbehaviour",
+    "parking",
     "demand",
     "record",
     "camera",

@@ -56,6 +56,8 @@ EVERY_REQUEST = (
     "v/*/lease",
     "v/*/cmd/*",
     "v/*/remove",
+    "v/*/park",
+    "parking/bay",
     "world/spawn",
     "world/boxes",
     "world/stop_request",
@@ -103,7 +105,12 @@ _OF_ROLE: dict[str, Rights] = {
     ),
     "viewer": _WATCHES,
     "operator": _WATCHES + Rights(requests=EVERY_REQUEST),
-    "driver": _WATCHES + Rights(publishes=("v/*/cmd/drive",), requests=EVERY_REQUEST),
+    "driver": _WATCHES
+    + Rights(
+        publishes=("v/*/cmd/drive", "v/*/autonomy", "v/*/autonomy/plan"),
+        requests=EVERY_REQUEST,
+        services=("v/*/park",),
+    ),
     "camera": Rights(publishes=("eye/{me}/@picture",)),
     # Not under the vehicle's name: the emulated car is another station with fewer rights.
     "emulator": Rights(
@@ -163,12 +170,17 @@ _OF_PART: dict[str, Rights] = {
         publishes=("misbehaviour/scores", "misbehaviour/*/report"),
         subscribes=("v2x/rx/*/*/*", "eye/pose/*"),
     ),
+    "parking": Rights(
+        publishes=("parking/status",),
+        subscribes=("v/*/autonomy", "v/*/state"),
+        services=("parking/bay",),
+    ),
     "demand": Rights(
         publishes=("demand/status",),
         subscribes=("v/*/trip",),
         requests=("world/spawn", "v/*/cmd/route", "v/*/remove"),
     ),
-    "ros2": _WATCHES + Rights(publishes=("v/*/cmd/drive",), requests=("v/*/lease",)),
+    "ros2": _WATCHES + Rights(publishes=("v/*/cmd/drive",), requests=("v/*/lease", "v/*/park")),
 }
 """By the part's name; `eye-<camera>` has the rights of `eye`."""
 

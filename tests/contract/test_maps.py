@@ -157,18 +157,19 @@ def test_every_group_has_a_light(city_map):
     assert {(j.name, g.name) for j in city_map.junctions for g in j.groups} == shown
 
 
-def test_cars_on_all_spawns_keep_clear_of_each_other(city_map, roads):
-    outlines = [car_outline(roads.spawn_pose(spawn.name)) for spawn in city_map.spawns]
+def test_cars_on_all_spawns_and_in_all_bays_keep_clear_of_each_other(city_map, roads):
+    places = (*city_map.spawns, *city_map.bays)
+    outlines = [car_outline(roads.spawn_pose(place.name)) for place in places]
     for one, other in itertools.combinations(outlines, 2):
         gap = np.linalg.norm(one[:, None, :] - other[None, :, :], axis=2).min()
         # 0.15 m along the lane; the inner edge of a bend is shorter.
         assert gap > 0.12
 
 
-def test_cars_on_spawns_keep_clear_of_walls_and_stand_on_the_floor(city_map, roads):
+def test_cars_on_spawns_and_in_bays_keep_clear_of_walls_and_stand_on_the_floor(city_map, roads):
     segments, floor = wall_segments(city_map), city_map.floor
-    for spawn in city_map.spawns:
-        outline = car_outline(roads.spawn_pose(spawn.name))
+    for place in (*city_map.spawns, *city_map.bays):
+        outline = car_outline(roads.spawn_pose(place.name))
         assert distance_to_segments(outline, segments) > 0.05
         assert floor.x_m[0] < outline[:, 0].min()
         assert outline[:, 0].max() < floor.x_m[1]
@@ -247,3 +248,4 @@ def test_its_picture_is_drawn(city_map):
     assert {f"stop-{line.name}" for line in city_map.stop_lines} <= found
     assert {f"light-{light.light_id}" for light in city_map.lights} <= found
     assert {f"spawn-{spawn.name}" for spawn in city_map.spawns} <= found
+    assert {f"bay-{bay.name}" for bay in city_map.bays} <= found

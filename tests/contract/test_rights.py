@@ -14,6 +14,7 @@ from scm.traffic.demand.table import load_demand
 from scm.traffic.misbehaviour.part import MisbehaviourPart
 from scm.traffic.monitor.part import MonitorPart
 from scm.traffic.observation.part import ObserverPart
+from scm.traffic.parking.part import ParkingPart
 from scm.traffic.signals.part import TrafficPart
 from scm.v2x.exchange import Call
 from scm.v2x.key import key_of, prefix, selector
@@ -94,6 +95,7 @@ def city(tmp_path_factory):
             CameraPart(city_map, 0, clock=StepClock()),
             ObserverPart(city_map),
             MisbehaviourPart(city_map),
+            ParkingPart(city_map),
             DemandPart(city_map, load_demand(table), 0.0),
             AgentPart("n2", session="s1"),
         )
@@ -108,7 +110,7 @@ def city(tmp_path_factory):
 
 NAMES = (
     *("world", "traffic", "monitor", "eye", "api", "record", "camera"),
-    *("observer", "misbehaviour", "demand", "n2"),
+    *("observer", "misbehaviour", "parking", "demand", "n2"),
 )
 
 
@@ -133,6 +135,7 @@ def test_the_city_of_this_test_really_did_something(city):
     assert any(key.startswith("eye/pose/") for key in city["eye"].said)
     assert "world/spawn" in city["demand"].asked
     assert "traffic/counts" in city["observer"].said
+    assert "parking/status" in city["parking"].said
     assert "misbehaviour/scores" in city["misbehaviour"].said
 
 

@@ -54,6 +54,7 @@ def test_the_same_script_gives_the_same_times_bit_for_bit() -> None:
         (lambda c: [c.spawn() for _ in range(40)], "no spawn place of map driving_school is free"),
         (lambda c: c.cars[0].drive("nolane"), "no lane 'nolane'"),
         (lambda c: c.cars[0].drive("east_loop", laps=0), "laps: expected at least 1, got 0"),
+        (lambda c: c.cars[0].park("north_1"), "the agent that parks first is not running"),
         (lambda c: c.cars[0].drive("east_loop", then="fly"), "then: got 'fly', expected"),
         (lambda c: c.cars[0].drive("east_loop", speed_mps=float("nan")), "speed_mps: got nan"),
     ],

@@ -25,6 +25,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="path for hosts, as /dev/ttyUSB0 would be (%(default)s)",
     )  # fmt: skip
     parser.add_argument(
+        "--lidar-link", type=Path, metavar="PATH",
+        help="path of its RPLIDAR A1 for hosts, in a city; default: it has none",
+    )  # fmt: skip
+    parser.add_argument(
         "--baud-of", choices=sorted(SKETCHES), default="2wd",
         help="whose firmware: 2wd at 57600 baud, 4wd at 115200 (%(default)s)",
     )  # fmt: skip
@@ -47,7 +51,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--faults", nargs="+", default=[], metavar="FAULT",
         help="what goes wrong: noise=HZ flip=P lose=P cut=P, reset=HZ or reset@T, brownout, unplug",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, help="of the faults (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of faults and LIDAR (%(default)s)")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -57,6 +61,8 @@ def _run(arguments: argparse.Namespace) -> int:
 
     if (arguments.connect is None) != (arguments.name is None):
         raise RunError("--connect and --name: expected both or none of them")
+    if arguments.lidar_link is not None and arguments.connect is None:
+        raise RunError("--lidar-link: expected --connect as well: it sees a city's map")
     if not 0.0 <= arguments.deadband < 1.0:
         raise RunError(f"--deadband: got {arguments.deadband}, expected 0 to 1")
     clock, sketch, stop = WallClock(), SKETCHES[arguments.baud_of], stop_on_signal()
@@ -105,15 +111,21 @@ def _join(
     from scm.runtime.live import run
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
+    from scm.vehicles.car import load_car
     from vehicle_agent.emulate.part import EmulatorPart, station_of
+    from vehicle_agent.emulate.pty import Cable
+    from vehicle_agent.emulate.scanner import Scanner
     from vehicle_agent.emulate.wheels import Wheels
 
     station = check_name(station_of(check_name(arguments.name, "--name")), "--name")
     check_name(arguments.city, "--city")
     credentials = credentials_of(arguments, station)
     wheels = Wheels(sketch.at_setup, arguments.car, arguments.deadband)
+    scanner = None
+    if arguments.lidar_link is not None:
+        scanner = Scanner(Cable(arguments.lidar_link), load_car(arguments.car), arguments.seed)
     part = EmulatorPart(
-        arguments.name, device, wheels, arguments.spawn, arguments.car, arguments.tag
+        arguments.name, device, wheels, arguments.spawn, arguments.car, arguments.tag, scanner
     )
     with ZenohBus(
         arguments.city, station, arguments.connect, clock=clock, credentials=credentials

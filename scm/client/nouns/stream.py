@@ -17,8 +17,8 @@ class StreamNoun(Noun):
         """What is live: a snapshot, then what changed, at 20 Hz.
 
         Args:
-            topics: comma-separated: pulse, stop, vehicles, signals, signal_status, boxes,
-                acknowledgements, eye, stations, events; none: all
+            topics: comma-separated: pulse, stop, vehicles, signals, signal_status, autonomy,
+                boxes, acknowledgements, eye, stations, events; none: all
         """
 
     @operation("GET", "/api/v1/vehicles.bin")

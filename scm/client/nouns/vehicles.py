@@ -9,7 +9,10 @@ from typing import Literal
 from scm.client.operation import Noun, operation
 from scm.client.stream import LiveEvent
 from scm.records.vehicles import LinkRow, PathRow, VehicleRow, VehiclesTopic
+from scm.v2x.messages.autonomy_plan import AutonomyPlan
+from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.light_request import LightReply
+from scm.v2x.messages.park_request import ParkReply
 from scm.v2x.messages.remove_request import RemoveReply
 from scm.v2x.messages.route_request import RouteReply
 from scm.v2x.messages.spawn_request import SpawnReply
@@ -17,6 +20,23 @@ from scm.v2x.messages.spawn_request import SpawnReply
 
 class VehiclesNoun(Noun):
     """Operations on vehicles."""
+
+    @operation("POST", "/api/v1/vehicles/{name}/goal")
+    def park(self, name: str, *, goal: str, idempotency_key: str = "") -> ParkReply:
+        """Send a car that parks itself to a goal.
+
+        Args:
+            goal: a spawn place or bay of the map, `any` for any bay, or X,Y,DEG (metres, degrees,
+                map frame) of the rear axle's centre
+        """
+
+    @operation("GET", "/api/v1/vehicles/{name}/goal")
+    def autonomy(self, name: str) -> AutonomyStatus:
+        """A parking car's goal, what it does, and where it thinks that it is."""
+
+    @operation("GET", "/api/v1/vehicles/{name}/plan")
+    def plan(self, name: str) -> AutonomyPlan:
+        """A parking car's path, particles, and obstacles that the map has not."""
 
     @operation("GET", "/api/v1/vehicles/{name}/reports")
     def reports(self, name: str, *, scan: bool = False) -> Iterator[LiveEvent]:

@@ -8,6 +8,7 @@ import zlib
 
 import numpy as np
 
+from scm.errors import MapError
 from scm.geometry import Pose2
 from scm.maps.route import Roads
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
@@ -80,20 +81,22 @@ class TripDriver:
 
     Attributes:
         driver: The driver of the present trip.
+        off_lane: Why it cannot drive from where it stands: beside all lanes, or on a lane that
+            leads nowhere. Empty if it can.
     """
 
     def __init__(
         self, vehicle: str, roads: Roads, limits: CarLimits, pose: Pose2, now_ns: int
     ) -> None:
-        """Start to circulate from where the car stands.
-
-        Raises:
-            MapError: when it stands beside all lanes, or on a lane that leads nowhere.
-        """
+        """Start to circulate from where the car stands."""
         self._vehicle = vehicle
         self.driver = SingleDriver(roads, limits, zlib.crc32(vehicle.encode()))
         self._trips = Trips(self.driver.batch)
-        self._trips.circulate(OWN, vehicle, pose, now_ns)
+        self.off_lane = ""
+        try:
+            self._trips.circulate(OWN, vehicle, pose, now_ns)
+        except MapError as error:
+            self.off_lane = str(error)
 
     def begin(self, request: RouteRequest, pose: Pose2, now_ns: int) -> RouteReply:
         """Send the car on a trip from where it is; a trip under way ends without arrival.
@@ -101,10 +104,14 @@ class TripDriver:
         Raises:
             MapError: when the lanes do not exist or cannot be reached.
         """
-        return self._trips.begin(OWN, self._vehicle, request, pose, now_ns)
+        reply = self._trips.begin(OWN, self._vehicle, request, pose, now_ns)
+        self.off_lane = ""
+        return reply
 
     def decide(self, view: RouteView) -> tuple[float, float]:
         """Return (throttle, steering); after arrival circulate if the request asked for it."""
+        if self.off_lane:
+            return 0.0, 0.0
         commands = self.driver.decide(view)
         self._trips.check_arrivals(view.now_ns)
         return commands

@@ -106,14 +106,19 @@ def test_the_map_is_zoomed_and_panned_by_mouse_and_keyboard(visit):
     assert visited.complaints == []
 
 
-def click_on(page, x_m, y_m):
-    """Click on a place of the whole map."""
+def pixel_of(page, x_m, y_m):
+    """Return where the page shows a place of the whole map."""
     box = page.locator(".sheet").bounding_box()
     left, top, width, height = (-0.376, -1.665, 3.52, 2.19)
     scale = min(box["width"] / width, box["height"] / height)
     x = box["width"] / 2 + scale * (x_m - left - width / 2)
     y = box["height"] / 2 - scale * (y_m + top + height / 2)
-    page.mouse.click(box["x"] + x, box["y"] + y)
+    return box["x"] + x, box["y"] + y
+
+
+def click_on(page, x_m, y_m):
+    """Click on a place of the whole map."""
+    page.mouse.click(*pixel_of(page, x_m, y_m))
     page.wait_for_timeout(100)
 
 

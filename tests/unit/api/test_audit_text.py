@@ -23,6 +23,8 @@ from scm.v2x.write_ahead import DirectWriter
 API = "/api/v1"
 REMOVAL = RemoveRequest(vehicle="n9", reason="battery empty")
 EXAMPLES = {
+    "BayRequest": ({"vehicle": "n9", "bay": "a3"}, "give n9 a3"),
+    "ParkRequest": ({"vehicle": "n9", "goal": "a3"}, "park n9 at a3"),
     "BoxesRequest": ({}, "put the boxes back to their places"),
     "CalibrationRequest": (
         {"camera": "ceiling", "verb": "use", "calibration": "june_lens"},

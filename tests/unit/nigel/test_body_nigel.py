@@ -346,7 +346,7 @@ def test_a_car_put_beside_the_lanes_stands_until_it_is_put_on_one(desk):
     desk.see_for(2.0)
     desk.at = Pose2(1.384 + 0.728, 0.655, 0.0)
     assert desk.see_for(1.0).throttle == 0.0
-    assert desk.part._session.off_lane
+    assert desk.part._session.trips.off_lane
     desk.at = desk.spawn
     assert desk.see_for(2.0).throttle > 0.05
 

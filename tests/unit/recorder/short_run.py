@@ -1,4 +1,4 @@
-"""A short run in a file: two cars, a junction that turns green, two events, map, picture, scan."""
+"""A short run: two cars, a junction that turns green, two events, map, picture, scan, plan."""
 
 import struct
 
@@ -11,6 +11,7 @@ from scm.records.boxes import SnapshotBox
 from scm.records.signals import SignalGroup
 from scm.v2x.exchange import RawSample
 from scm.v2x.key import prefix
+from scm.v2x.messages.autonomy_plan import AutonomyPlan
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_state import VehicleState
@@ -24,6 +25,11 @@ STUCK_S = 4.0  # from when on n1 is stuck against n10
 YAW_RAD = 0.5
 PICTURE = b"\xff\xd8 a picture \xff\xd9"
 RANGES_M = (1.0, 2.0, float("inf"), 0.5)  # ahead, left, a miss behind, right
+
+WAY = ((0.0, 0.0, 0.0), (1.0, 0.0, YAW_RAD))
+PLAN = AutonomyPlan(
+    vehicle="n1", t_ns=BEGIN_NS, path=WAY, trajectory=WAY, particles=WAY, obstacles=((0.5, 0.2),)
+)
 
 
 def write_run(
@@ -50,6 +56,7 @@ def write_run(
             file.write(_sample(at_s, "event/warning/world", _event("warning", "n1 hit a wall")))
             file.write(_picture(at_s, "eye/overhead/frame", picture, camera="overhead"))
             file.write(_scan(at_s))
+            file.write(_sample(at_s, "v/n1/autonomy/plan", PLAN))
         if of_n1 and at_s in of_n1:
             key = "v/n1/@camera/front"
             file.write(_picture(at_s, key, of_n1[at_s], vehicle="n1", camera="front"))

@@ -44,6 +44,8 @@ def test_cars_roads_signals_numbers_pictures_and_the_log_are_there(channels):
         "/events": "foxglove.Log",
         "/eye/overhead": "foxglove.CompressedImage",
         "/n1/scan": "foxglove.PointCloud",
+        "/n1/plan": "foxglove.SceneUpdate",
+        "/n1/particles": "foxglove.PosesInFrame",
         "/n1/state": "scm.CarState",
         "/n10/state": "scm.CarState",
     }
@@ -142,6 +144,20 @@ def test_a_scan_is_points_where_its_beams_hit_from_where_the_scanner_is(channels
         ("y", 4),
         ("z", 8),
     ]
+
+
+def test_a_plan_is_lines_and_obstacles_and_its_particles_are_poses(channels):
+    ((plan,),) = [row["entities"] for row in channels["/n1/plan"][1]]
+    assert [[(at["x"], at["y"]) for at in one["points"]] for one in plan["lines"]] == [
+        [(0.0, 0.0), (1.0, 0.0)],
+        [(0.0, 0.0), (1.0, 0.0)],
+    ]
+    (obstacle,) = plan["cubes"]
+    assert (obstacle["pose"]["position"]["x"], obstacle["pose"]["position"]["y"]) == (0.5, 0.2)
+    (particles,) = channels["/n1/particles"][1]
+    assert particles["frame_id"] == plan["frame_id"] == "map"
+    turned = particles["poses"][1]["orientation"]
+    assert 2.0 * math.atan2(turned["z"], turned["w"]) == pytest.approx(YAW_RAD)
 
 
 def test_the_layout_shows_topics_and_fields_that_there_are(channels):

@@ -101,6 +101,13 @@ def test_parts_may_be_left_out_and_the_server_knows_which_should_be_there(tmp_pa
     assert set(OPTIONAL) >= set(OPTIONAL_PARTS)
 
 
+def test_the_parking_manager_starts_where_the_map_has_bays(tmp_path):
+    words = ["--port", "0", "--listen", "tcp/127.0.0.1:0", "--record-dir", str(tmp_path)]
+    for name, has_bays in (("parking_lot", True), ("parking_school", False)):
+        jobs = _parts(_plan_of(options_of(parse(["up", name, "--hosted", "0", *words]))))
+        assert ("parking" in [job.name for job in jobs]) is has_bays
+
+
 @pytest.mark.parametrize(
     ("facts", "said"),
     [

@@ -309,9 +309,13 @@ def test_what_keeps_it_outside_is_told(desk, city_map):
     assert "no place is free" in one(desk.step(), PartStatus).detail
 
 
-def test_a_welcome_off_all_roads_is_our_fault_and_not_hidden(city_map):
-    with pytest.raises(ValueError, match="n7"):
-        Desk(city_map, Pose2(50.0, 50.0, 0.0)).join()
+def test_beside_all_lanes_it_stands_says_why_and_obeys_a_leaseholder(city_map):
+    desk = Desk(city_map, Pose2(50.0, 50.0, 0.0)).join()
+    sent = [item for _ in range(60) for item in desk.step()]
+    assert {item.throttle for item in sent if isinstance(item, VehicleState)} == {0.0}
+    assert "n7: no lane" in one(sent, PartStatus).detail
+    desk.step(command(EPOCH + 1, throttle=0.3))
+    assert one(desk.step(), VehicleState).throttle == 0.3
 
 
 @pytest.mark.parametrize(

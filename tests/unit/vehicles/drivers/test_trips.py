@@ -89,9 +89,10 @@ def test_an_impossible_trip_is_refused_and_changes_nothing(trips, start):
     assert (told.trip_id, told.route) == (before.trip_id, before.route)
 
 
-def test_a_car_beside_all_lanes_cannot_begin(roads):
-    with pytest.raises(MapError, match="n7"):
-        TripDriver("n7", roads, LIMITS, Pose2(50.0, 50.0, 0.0), 0)
+def test_a_car_beside_all_lanes_stands_and_says_why(roads, view):
+    driver = TripDriver("n7", roads, LIMITS, Pose2(50.0, 50.0, 0.0), 0)
+    assert "n7: no lane" in driver.off_lane
+    assert driver.decide(view) == (0.0, 0.0)
 
 
 def test_a_trip_reports_its_remaining_stops_so_that_it_can_continue(trips, roads, view, start):

@@ -1,5 +1,6 @@
 /** The chosen car in short: what it is and does, and what can be shown or done with it. */
 import { signal } from "@preact/signals";
+import { autonomyOf } from "scm/shared/autonomy.js";
 import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { age, fixed, UNKNOWN } from "scm/shared/format.js";
@@ -8,6 +9,7 @@ import { change } from "scm/shell/api.js";
 import { blind } from "scm/pages/map/close_up.js";
 import { carNamed, fleetTick } from "scm/pages/map/fleet.js";
 import { followed, layers, show } from "scm/pages/map/layers.js";
+import { Parking } from "scm/pages/map/park_at.js";
 import { SendTo } from "scm/pages/map/send_to.js";
 
 const DEGREES = 180 / Math.PI;
@@ -30,7 +32,7 @@ export function ChosenVehicle() {
         </h2>
         <button class="plain" aria-label="Let go of ${name}" title="Let go (Escape)" onClick=${leave}>✕</button>
       </div>
-      ${car ? html`<${Facts} car=${car} /><${Acts} name=${name} />` : html`<p class="empty">It is not on the map.</p>`}
+      ${car ? html`<${Facts} car=${car} /><${Parking} name=${name} /><${Acts} name=${name} />` : html`<p class="empty">It is not on the map.</p>`}
       ${removing.value && html`<${RemoveDialog} name=${removing.value} />`}
     </section>
   `;
@@ -67,7 +69,7 @@ function Acts({ name }) {
   return html`
     <div class="acts">
       <button class="small" aria-pressed=${followed.value === name} onClick=${follow}>Follow</button>
-      ${toggle("path", "Path")} ${lidar}
+      ${autonomyOf(name) ? toggle("autonomy", "Plan") : toggle("path", "Path")} ${lidar}
       <${SendTo} name=${name} />
       <a href="/vehicles/${name}">Open</a>
       <button class="small" onClick=${() => (removing.value = name)}>Remove</button>

@@ -7,10 +7,15 @@ const CLICK_PX = 5;
 const WHEEL = 0.0015;
 const LINE_PX = 16; // of a wheel that counts in lines
 
-/** Listen to an element's pointers; `onClick(x, y)` receives clicks. Returns the function that ends it. */
-export function gestures(element, view, onClick) {
+/**
+ * Listen to an element's pointers; `onClick(x, y)` receives clicks.
+ * @param onAim receives where a pointer was pressed and where it is; returns whether it takes that press, which then moves nothing.
+ * @returns the function that ends it.
+ */
+export function gestures(element, view, onClick, onAim) {
   const down = new Map();
   let moved = 0;
+  let pressed = null; // where the press began that gives a goal; null: it moves the map
   const at = (event) => {
     const { left, top } = element.getBoundingClientRect();
     return [event.clientX - left, event.clientY - top];
@@ -21,6 +26,7 @@ export function gestures(element, view, onClick) {
       element.setPointerCapture(event.pointerId);
       if (!down.size) moved = 0;
       down.set(event.pointerId, at(event));
+      pressed = down.size === 1 && onAim(at(event), at(event)) ? at(event) : null;
     },
     pointermove(event) {
       const before = down.get(event.pointerId);
@@ -29,11 +35,12 @@ export function gestures(element, view, onClick) {
       const others = [...down].filter(([id]) => id !== event.pointerId).map(([, place]) => place);
       moved += Math.hypot(here[0] - before[0], here[1] - before[1]);
       down.set(event.pointerId, here);
-      if (others.length) pinch(view, others[0], before, here);
+      if (pressed) onAim(pressed, here);
+      else if (others.length) pinch(view, others[0], before, here);
       else if (moved > CLICK_PX) drag(view, before, here);
     },
     pointerup(event) {
-      if (!down.delete(event.pointerId)) return;
+      if (!down.delete(event.pointerId) || pressed) return;
       if (!down.size && moved <= CLICK_PX) onClick(...at(event));
     },
     pointercancel: (event) => down.delete(event.pointerId),

@@ -24,6 +24,13 @@ export function moved({ x, y, yaw }, length, curvature) {
   return { x: x + chord * Math.cos(way), y: y + chord * Math.sin(way), yaw: yaw + turn };
 }
 
+/** The pose of a car's rear axle at a spawn place of a map. */
+export function spawnPose(map, { pose, lane, at_m }) {
+  if (!pose) return along(map.lanes.find(({ name }) => name === lane), at_m ?? 0);
+  const [x, y, yaw] = pose;
+  return { x, y, yaw };
+}
+
 /** The lane whose centre line is nearest to a place, within half its width or `reach` [m]; null: none is. */
 export function laneAt(lanes, x, y, reach) {
   let best = null;

@@ -11,11 +11,12 @@ export const LAYERS = {
   trails: "Trails",
   heat: "Heat map of speed",
   tracks: "Tracks of the Eye",
+  autonomy: "Plans of cars that park themselves",
   path: "Planned path of the chosen car",
   lidar: "LIDAR of the chosen car",
 };
 
-const FIRST = { names: true, roads: false, times: true, trails: false, heat: false, tracks: false, path: true, lidar: false };
+const FIRST = { names: true, roads: false, times: true, trails: false, heat: false, tracks: false, autonomy: true, path: true, lidar: false };
 
 /** Name to whether it is shown. */
 export const layers = signal({ ...FIRST, ...read() });

@@ -6,6 +6,8 @@ import { carNamed, fleet, fleetTick } from "scm/pages/map/fleet.js";
 import { readGround } from "scm/pages/map/ground.js";
 import { gestures } from "scm/pages/map/gestures.js";
 import { followed, layers } from "scm/pages/map/layers.js";
+import { pollPlans, PlanKey } from "scm/pages/map/autonomy.js";
+import { aim, isAiming, ParkChip, stopAiming } from "scm/pages/map/park_at.js";
 import { LayersMenu } from "scm/pages/map/layers_menu.js";
 import { subscribeCloseUp } from "scm/pages/map/close_up.js";
 import { pollTracks } from "scm/pages/map/tracks.js";
@@ -49,7 +51,9 @@ export function MapPanel() {
     const seen = new Viewport(ground.box);
     const scene = new Scene(canvas.current, ground, seen);
     setView(seen);
-    const ends = [scene.run(), gestures(sheet.current, seen, (x, y) => choose(scene.pick(x, y), seen, x, y)), subscribeCloseUp(), pollTracks()];
+    const aimed = (from, to) => isAiming() && (aim(seen, from, to), true);
+    const moves = gestures(sheet.current, seen, (x, y) => choose(scene.pick(x, y), seen, x, y), aimed);
+    const ends = [scene.run(), moves, subscribeCloseUp(), pollTracks(), pollPlans()];
     return () => ends.forEach((end) => end());
   }, [ground]);
   if (ground instanceof Error) {
@@ -61,6 +65,7 @@ export function MapPanel() {
         class="sheet"
         ref=${sheet}
         data-link=${linkState.value}
+        data-aiming=${isAiming()}
         tabindex="0"
         role="group"
         aria-label="Map: arrows move it, plus and minus zoom, 0 shows all, F follows the chosen car"
@@ -73,7 +78,7 @@ export function MapPanel() {
         ></canvas>
       </div>
       ${view && html`<${Controls} view=${view} />`}
-      <div class="corner"><${SendChip} /><${FollowChip} /><${HeatKey} /><${Kinds} />${view && html`<${ScaleBar} view=${view} />`}</div>
+      <div class="corner"><${ParkChip} /><${SendChip} /><${FollowChip} /><${HeatKey} /><${PlanKey} /><${Kinds} />${view && html`<${ScaleBar} view=${view} />`}</div>
     </section>
   `;
 }
@@ -144,6 +149,7 @@ const KEYS = {
   f: () => (followed.value = followed.value ? null : selected.value),
   l: () => (layers.value = { ...layers.value, lidar: !layers.value.lidar }),
   Escape: () => {
+    if (isAiming()) return stopAiming();
     withdraw();
     followed.value = selected.value = null;
   },

@@ -4,7 +4,7 @@
  * A lane's name lies along it, where it covers no other; a name without room waits until one zooms in.
  */
 import { city } from "scm/shell/store.js";
-import { along, lengthOf, moved } from "scm/pages/map/lane_shape.js";
+import { along, lengthOf, moved, spawnPose } from "scm/pages/map/lane_shape.js";
 
 const SHARES = [0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.15, 0.85]; // of a lane: where its name may stand
 const LONGER = 0.85; // the least length of a lane, of its name's
@@ -79,9 +79,8 @@ function namesOf(map, paper) {
       return { kind: "lane", name: lane.name, places: SHARES.map((share) => along(lane, share * length)), length };
     }),
     ...map.spawns.map((spawn) => {
-      const [x, y, yaw] = spawn.pose ?? [];
-      const pose = spawn.pose ? { x, y, yaw } : along(lanes.get(spawn.lane), spawn.at_m ?? 0);
-      return { kind: "spawn", name: spawn.name, places: [{ ...moved(pose, SPAWN_M, 0), yaw: 0 }], length: Infinity };
+      const place = { ...moved(spawnPose(map, spawn), SPAWN_M, 0), yaw: 0 };
+      return { kind: "spawn", name: spawn.name, places: [place], length: Infinity };
     }),
   ];
   return names.map((name) => ({ ...name, half: halfOf(paper, name) }));

@@ -1,4 +1,4 @@
-/** One frame of the map, from below to above: roads, heat, path, scan, trails, boxes, cars, tracks, names, signals. */
+/** One frame of the map, from below to above: roads, heat, path, scan, trails, boxes, plans, cars, tracks, names, signals. */
 import { drawBoxes } from "scm/shared/box_shape.js";
 import { drawCar, drawHalo, drawLabel, footprint } from "scm/shared/car_shape.js";
 import { coveredBy, drawLight } from "scm/shared/light_shape.js";
@@ -6,11 +6,13 @@ import { Glide } from "scm/shared/motion.js";
 import { selected } from "scm/shared/selection.js";
 import { boxes, city, signals, signalsAt } from "scm/shell/store.js";
 import { colours } from "scm/shell/theme.js";
+import { drawParticles, drawPlans } from "scm/pages/map/autonomy.js";
 import { closeUp, drawPath, drawScan } from "scm/pages/map/close_up.js";
 import { carAt, fleet } from "scm/pages/map/fleet.js";
 import { Ground } from "scm/pages/map/ground.js";
 import { Heat } from "scm/pages/map/heat.js";
 import { followed, layers } from "scm/pages/map/layers.js";
+import { drawAim } from "scm/pages/map/park_at.js";
 import { RoadNames } from "scm/pages/map/road_names.js";
 import { drawOffer } from "scm/pages/map/send_to.js";
 import { timeToChange } from "scm/pages/map/signal_times.js";
@@ -86,7 +88,10 @@ export class Scene {
       this.trails.draw(paper, view, this.ratio, now, fleet);
     }
     drawBoxes(paper, view, boxes.peek(), city.peek()?.boxes ?? []);
+    drawPlans(paper, view);
     this.#drawCars(on);
+    drawParticles(paper, view);
+    drawAim(paper, view);
     if (on.tracks) drawTracks(paper, view);
     drawn.road_names = on.roads ? this.roadNames.draw(paper, view, now) : 0;
     // Signals last: no car's name may hide a colour.

@@ -1,5 +1,6 @@
 /** What is known of a car: where it is, who drives it, how far away it is, and whether to believe it. */
 import { useEffect, useState } from "preact/hooks";
+import { autonomyOf, stateInWords } from "scm/shared/autonomy.js";
 import { stuckBy } from "scm/shared/condition.js";
 import { html } from "scm/shared/html.js";
 import { age, fixed, span, UNKNOWN } from "scm/shared/format.js";
@@ -18,6 +19,7 @@ export function FactsPanel({ car }) {
   useMisbehaviour();
   const link = useLink(car.vehicle);
   const { x_m: x, y_m: y, yaw_rad: yaw } = car;
+  const parking = autonomyOf(car.vehicle);
   const age_ms = car.age_ms + since_ms.value;
   return html`
     <section class="panel facts" aria-label="State">
@@ -29,6 +31,7 @@ export function FactsPanel({ car }) {
         <dt>Steering</dt><dd>${fixed(car.steering_rad * DEGREES, 1, "°")} <small>${side(car.steering_rad)}</small></dd>
         <dt>Battery</dt><dd data-fact="battery"><${Battery} car=${car} /></dd>
         <dt>Trip</dt><dd>${tripOf(car.trip)}</dd>
+        ${parking && html`<dt>Parking</dt><dd data-fact="parking">${stateInWords(parking)}</dd>`}
         <dt>Driven by</dt><dd class=${isAtHome(car) ? "" : "warn"}>${ownerOf(car)}</dd>
         <dt>Lease</dt><dd>${isAtHome(car) ? "at home" : `ends in ${span(car.lease_left_ms / 1000)}`}</dd>
         <dt>Epoch</dt><dd>${car.epoch}</dd>
