@@ -5,9 +5,10 @@ second from where its last trajectory said it would be; time is that of one core
 trajectories that were not free, or outside the car's limits.
 
 Ipopt (with casadi, where installed) gets the first plan of each problem: the same states and
-wishes, but limits and equations as constraints that hold exactly. It begins from the band's result:
-so both pass obstacles on the same side, the difference in cost is what the band left, and Ipopt's
-time is a lower bound. Problems with boxes are left out: the grid is not smooth enough for it.
+preferences, but limits and equations as constraints that hold exactly. It begins from the band's
+result: so both pass obstacles on the same side, the difference in cost is what the band left, and
+Ipopt's time is a lower bound. Problems with boxes are left out: the grid is not smooth enough for
+it.
 """
 
 import importlib.util

@@ -155,8 +155,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench autonomy_plan", description=__doc__)
     parser.add_argument("--problems", type=int, default=200, help="a map, for ours (200)")
     parser.add_argument("--peers", type=int, default=40, help="of these, for OMPL's (40)")
-    asked = parser.parse_args()
-    few = slice(asked.peers)
+    arguments = parser.parse_args()
+    few = slice(arguments.peers)
     limits = limits_of(load_car("nigel"))
     with suppress(ModuleNotFoundError):
         from ompl import util
@@ -165,7 +165,7 @@ def main() -> None:
     for name in MAPS:
         grid = grid_of_city(load_map(name))
         scene = scene_of(grid, limits)
-        pairs = problems(grid, scene, asked.problems)
+        pairs = problems(grid, scene, arguments.problems)
         result = ours(grid, limits, pairs)
         reference = np.array(result.lengths)
         print(f"\n{name}\nplanner                problems    found  ms p50   ms p99   length"

@@ -7,10 +7,10 @@ ds = (v0 + v1) / 2 dt at the mean steering angle, on an arc:
     chord, along the mean yaw       = ds (1 - (yaw1 - yaw0)^2 / 24)
     chord, across the mean yaw      = 0
 
-Everything is a residual: equations weigh most, a limit counts where it is passed, wishes (time,
-nearness to the path, slow steering) weigh least. A residual touches one state or two neighbours, so
-J'J has 12 diagonals beside the main one (durations of neighbouring intervals are compared, which
-ties the times of three states), and a step takes time in proportion to the states.
+Everything is a residual: equations weigh most, a limit counts where it is passed, preferences
+(time, nearness to the path, slow steering) weigh least. A residual touches one state or two
+neighbours, so J'J has 12 diagonals beside the main one (durations of neighbouring intervals are
+compared, which ties the times of three states), and a step takes time in proportion to the states.
 Method and source: see `elastic_band`.
 """
 
@@ -177,7 +177,7 @@ def _add_rate(
 def _add_preferences(
     states: Floats, gears: Gears, i: int, reference: Floats, terms: Terms, sums: Sums
 ) -> float:
-    """Add what is wished of an interval: short, even, with little steering, and near the path."""
+    """Add the preferences for an interval: short, even, little steering, near the path."""
     a, b, gear, s, cost = states[i], states[i + 1], gears[i], sums.slopes, 0.0
     if gear != 0:
         s[STEERING], s[STATES + STEERING] = -1.0, 1.0

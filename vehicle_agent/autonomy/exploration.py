@@ -67,6 +67,7 @@ class Exploration:
         self._steering_rad = 0.0
         self._visited: list[Floats] = []
         self._sweeps = 0
+        self._begun_ns: int | None = None
         self._scan_ns: int | None = None
         self._stands_ns: int | None = None
 
@@ -95,13 +96,25 @@ class Exploration:
     def step(self, now_ns: int) -> Command:
         """Return the command for now."""
         here, grid = self.here(), self.grid
+        self.check_scans(now_ns)
         if here is None or grid is None:
             return Command(0.0, 0.0)
-        if self._scan_ns is None or now_ns - self._scan_ns > SILENT_NS:
-            self.navigator.stop()
-        elif self.report.state == "map":
+        if self.report.state == "map":
             self._explore(now_ns, here, grid)
         return self.navigator.command(now_ns, here, self._steering_rad)
+
+    def check_scans(self, now_ns: int) -> None:
+        """Stand and say so where no scans come; go on when they do."""
+        if self._begun_ns is None:
+            self._begun_ns = now_ns
+        silent_ns = now_ns - (self._begun_ns if self._scan_ns is None else self._scan_ns)
+        if self.report.state == "idle":
+            return
+        if silent_ns > SILENT_NS:
+            self.report = Report("recover", f"no LIDAR scan for {silent_ns // NS_PER_S} s")
+            self.navigator.stop()
+        elif self.report.state == "recover":
+            self.report = Report("map", "looks round")
 
     def here(self) -> Whereabouts | None:
         """Return where the car is now on its own map; None before a sweep."""

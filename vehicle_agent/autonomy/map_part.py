@@ -78,6 +78,8 @@ class MapPart(BasePart):
             command = self.exploration.step(now_ns)
             over = self.is_over and command.throttle == 0.0
             out += self._lease.release() if over else self._lease.step(now_ns, command, now_ns)
+        else:
+            self.exploration.check_scans(now_ns)
         report = self.exploration.report
         if report != self._last_report:
             self._last_report = report

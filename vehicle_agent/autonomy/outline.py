@@ -127,7 +127,7 @@ def _clearance(scene: Scene, x: float, y: float, yaw: float) -> float:
 
 
 def room(scene: Scene, poses: Floats, margin_m: float) -> Floats:
-    """Return `room_at` of poses (n, 3): (n,), minus infinity where the margin is not kept."""
+    """Return `room_at` of poses (n, 3): (n,), minus infinity where it is below the margin."""
     return _are_free(scene, poses, margin_m)
 
 

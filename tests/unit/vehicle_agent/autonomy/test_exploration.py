@@ -65,3 +65,14 @@ def test_car_maps_a_room_that_it_does_not_know():
     free_m2 = (grid.cells == FREE).sum() * grid.cell_m**2
     assert 2.0 < free_m2 < 2.6  # of 2.15 x 1.25 m less two boxes, partly hidden
     assert len(sent.payload) == sent.rows * sent.columns
+
+
+@pytest.mark.parametrize("drives", [True, False])
+def test_car_without_scans_is_named_within_two_seconds(drives):
+    reports = []
+    part = MapPart("map-n9", "n9", drives=drives, on_report=reports.append)
+    with Lockstep([part]) as city:
+        city.run_for(1.9)
+    assert reports[-1].state == "recover"
+    assert reports[-1].reason.startswith("no LIDAR scan for 1 s")
+    assert not part.is_over

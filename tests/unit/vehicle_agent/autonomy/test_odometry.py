@@ -152,15 +152,15 @@ def test_older_messages_are_ignored():
 
 def test_question_changes_nothing():
     drive = driven("parking_school", MIDDLE)
-    asked, not_asked = OdometryFilter(NIGEL), OdometryFilter(NIGEL)
+    queried, undisturbed = OdometryFilter(NIGEL), OdometryFilter(NIGEL)
     for message in drive.messages[:400]:
-        for odometry in (asked, not_asked):
+        for odometry in (queried, undisturbed):
             if isinstance(message, LidarScan):
                 odometry.scan(message)
             else:
                 odometry.sensors(message)
-        asked.now()
-    assert asked.now().pose == not_asked.now().pose
+        queried.now()
+    assert queried.now().pose == undisturbed.now().pose
 
 
 def test_present_pose_is_ahead_of_the_last_sweep():
