@@ -136,10 +136,10 @@ def test_a_name_that_the_map_binds_or_the_city_gives_has_a_tag_of_its_own():
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('name = "n2"', 'name = "n1"', "bays[2].name: 'n1' is already that of bays[0]"),
-        ('name = "n2"', 'name = "a"', "bays[2] (a).name: expected no spawn's name"),
+        ('name = "a2"', 'name = "a1"', "bays[2].name: 'a1' is already that of bays[0]"),
+        ('name = "a2"', 'name = "a"', "bays[2] (a).name: expected no spawn's name"),
         (
-            'name = "n2"',
+            'name = "a2"',
             'name = "any"',
             "bays[2] (any).name: expected no spawn's name and not 'any'",
         ),

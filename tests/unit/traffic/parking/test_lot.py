@@ -83,9 +83,9 @@ def test_two_requests_at_once_get_two_bays_in_the_order_of_the_map(cars):
 
 
 def test_reply_has_the_pose_of_the_bay(cars):
-    reply = cars.ask("n1", "s3")
+    reply = cars.ask("n1", "b3")
     assert isinstance(reply, BayReply)
-    assert Pose2(reply.x_m, reply.y_m, reply.yaw_rad) == POSES["s3"]
+    assert Pose2(reply.x_m, reply.y_m, reply.yaw_rad) == POSES["b3"]
 
 
 def test_request_that_is_repeated_gets_the_same_bay(cars):
@@ -153,12 +153,12 @@ def test_full_lot_refuses_in_words_until_a_car_leaves(cars):
 
 
 def test_bay_is_occupied_by_a_car_without_an_agent_whichever_way_it_stands(cars):
-    cars.stand("n9", POSES["n1"] @ Pose2(0.16, 0.05, math.pi))
+    cars.stand("n9", POSES["a1"] @ Pose2(0.16, 0.05, math.pi))
     cars.run(0.2)
-    assert cars.bay("n1") == ("occupied", "n9")
-    refused = cars.ask("n1", "n1")
-    assert (refused.code, refused.detail) == ("occupied", "bay n1 is taken by n9")
-    assert cars.ask("n1").bay != "n1"
+    assert cars.bay("a1") == ("occupied", "n9")
+    refused = cars.ask("n1", "a1")
+    assert (refused.code, refused.detail) == ("occupied", "bay a1 is taken by n9")
+    assert cars.ask("n1").bay != "a1"
 
 
 def test_parked_car_keeps_its_bay_after_its_agent_has_left_and_until_it_is_gone(cars):
@@ -177,8 +177,8 @@ def test_parked_car_keeps_its_bay_after_its_agent_has_left_and_until_it_is_gone(
 def test_car_changes_its_bay_and_keeps_its_turn(cars):
     first, _ = cars.come("n1", "n2")
     cars.run(0.4)
-    assert cars.ask("n1", "s5").bay == "s5"
-    cars.report("n1", "drive", "s5")
+    assert cars.ask("n1", "b5").bay == "b5"
+    cars.report("n1", "drive", "b5")
     assert cars.run(1.0).driver == "n1"
     assert cars.bay(first) == ("free", "")
 
@@ -203,10 +203,10 @@ def test_nobody_drives_while_a_car_without_a_bay_does(cars):
 
 def test_new_manager_learns_who_has_which_bay_before_it_gives_one():
     cars = Cars()
-    cars.report("n2", "plan", "n2")
-    cars.report("n3", "plan", "s2", Pose2(0.0, 0.0, 0.0), attempts=1)
-    cars.report("n1", "parked", "n1", POSES["n1"])
-    cars.stand("n4", POSES["s1"])
+    cars.report("n2", "plan", "a2")
+    cars.report("n3", "plan", "b2", Pose2(0.0, 0.0, 0.0), attempts=1)
+    cars.report("n1", "parked", "a1", POSES["a1"])
+    cars.stand("n4", POSES["b1"])
     assert cars.run(1.0).driver == ""
     refused = cars.ask("n5")
     assert isinstance(refused, Refused)
@@ -215,15 +215,15 @@ def test_new_manager_learns_who_has_which_bay_before_it_gives_one():
     assert (status.driver, status.waiting) == ("n3", ("n2",))  # n3 stands in the way of others
     taken = {row.name: (row.state, row.vehicle) for row in status.bays if row.vehicle}
     assert taken == {
-        "n1": ("occupied", "n1"), "s1": ("occupied", "n4"),
-        "n2": ("reserved", "n2"), "s2": ("reserved", "n3"),
+        "a1": ("occupied", "n1"), "b1": ("occupied", "n4"),
+        "a2": ("reserved", "n2"), "b2": ("reserved", "n3"),
     }  # fmt: skip
-    assert cars.ask("n5").bay == "n3"
+    assert cars.ask("n5").bay == "a3"
 
 
 @pytest.mark.parametrize(
     ("name", "bay", "said"),
-    [("n1", "n77", "no bay 'n77' (did you mean"), ("", "", "expected a car's name")],
+    [("n1", "a77", "no bay 'a77' (did you mean"), ("", "", "expected a car's name")],
 )
 def test_request_that_makes_no_sense_is_refused_in_words(cars, name, bay, said):
     assert said in cars.ask(name, bay).detail

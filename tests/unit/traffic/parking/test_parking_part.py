@@ -27,8 +27,8 @@ def test_repeated_request_gets_its_answer_again_though_the_car_has_changed_its_b
         city.run_for(2.2)
         first = city.call(request)
         assert isinstance(first, BayReply)
-        other = city.call(BayRequest(vehicle="n1", request_id="r2", bay="s4"))
-        assert other.bay == "s4"
+        other = city.call(BayRequest(vehicle="n1", request_id="r2", bay="b4"))
+        assert other.bay == "b4"
         assert city.call(request) == first
         changed = city.call(replace(request, vehicle="n2"))
         assert isinstance(changed, Refused)

@@ -21,11 +21,11 @@ from vehicle_agent.autonomy.parking import Report
 from vehicle_agent.autonomy.part import ParkPart, Wanted
 
 LOT = load_map("parking_lot")
-GIVEN = BayReply(vehicle="n1", bay="n1", x_m=0.0, y_m=1.7, yaw_rad=1.57)
+GIVEN = BayReply(vehicle="n1", bay="a1", x_m=0.0, y_m=1.7, yaw_rad=1.57)
 
 
 def status(driver="", waiting=(), reason=""):
-    bays = (BayState(name="n1", state="reserved", vehicle="n1"),)
+    bays = (BayState(name="a1", state="reserved", vehicle="n1"),)
     return ParkingStatus(t_ns=0, bays=bays, driver=driver, waiting=waiting, reason=reason)
 
 
@@ -58,7 +58,7 @@ def given():
     return client
 
 
-@pytest.mark.parametrize(("goal", "bay"), [("any", ""), ("n3", "n3")])
+@pytest.mark.parametrize(("goal", "bay"), [("any", ""), ("a3", "a3")])
 def test_request_is_repeated_with_its_id_until_it_is_answered(goal, bay):
     client = Client(goal)
     (first,) = client.step()
@@ -103,7 +103,7 @@ def test_parked_car_needs_no_permission(given):
 
 
 def test_reply_to_an_older_request_is_ignored(given):
-    given.client.begin("n3")
+    given.client.begin("a3")
     (new,) = given.step()
     assert given.reply(BayRequest(request_id="park-n1-bay-s-1", vehicle="n1"), GIVEN) is None
     assert given.reply(new, GIVEN) == GIVEN
@@ -117,9 +117,9 @@ def test_goal_request_for_a_bay_is_answered_with_the_manager_s_reply():
     part = ParkPart("park-n1", Wanted("n1", spawn="a"))
     with city_of(part) as city:
         city.run_for(2.5)
-        reply = city.call(ParkRequest(vehicle="n1", goal="s1"))
+        reply = city.call(ParkRequest(vehicle="n1", goal="b1"))
         assert isinstance(reply, ParkReply)
-        assert (reply.x_m, reply.y_m, reply.yaw_rad) == tuple(roads_of(LOT).spawn_pose("s1"))
+        assert (reply.x_m, reply.y_m, reply.yaw_rad) == tuple(roads_of(LOT).spawn_pose("b1"))
 
 
 def test_full_lot_is_a_failure_in_words():
