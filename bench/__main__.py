@@ -15,6 +15,7 @@ BENCHMARKS = (
     "bus",
     "agents",
     "autonomy_local_plan",
+    "autonomy_times",
     "codec",
     "eye",
     "camera",

@@ -2,10 +2,15 @@
 
 Run with `python -m bench autonomy_mapping`. A car drives laps of a simulated room; its sweeps are
 those of `scm/vehicles/rays`, beam after beam, with Gaussian noise. The map begins where the car
-does, so it is compared after the rigid motion that fits the two trajectories best.
+does, so it is compared after the rigid motion that fits the two trajectories best. Where evo's
+`evo_ape` is on the path (`pip install evo`), it says the trajectory's error too.
 """
 
 import math
+import re
+import shutil
+import subprocess
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -129,9 +134,14 @@ def from_walls(points: Floats, walls: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Of a map and the trajectory it was made from, root mean squares [m] and times [s]."""
+    """Of a map and the trajectory it was made from, root mean squares [m] and times [s].
+
+    Attributes:
+        evo_m: Of the trajectory, as evo computes it; NaN without evo.
+    """
 
     trajectory_m: float
+    evo_m: float
     wall_m: float
     sweep_s: float
     longest_s: float
@@ -153,9 +163,9 @@ def mapped(
             x, y, yaw = true[-1].inverse() @ pose
             odometry @= Pose2(*((1.0 + drift) * part for part in (x, y, yaw)))
         true.append(pose)
-        start = time.perf_counter()
+        start = time.process_time()
         mapper.add(sweep, None if drift is None else odometry)
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     found, truth = np.array(mapper.trajectory), np.array(true)
     frame = fit(found[:, :2], truth[:, :2])
     placed = np.array([frame.apply(x, y) for x, y in found[:, :2]])
@@ -163,10 +173,30 @@ def mapped(
     middles = np.array([frame.apply(x, y) for x, y in 0.5 * (faces[:, :2] + faces[:, 2:])])
     return mapper, Errors(
         trajectory_m=_rms(np.hypot(*(placed - truth[:, :2]).T)),
+        evo_m=evo_error_m(found, truth),
         wall_m=_rms(from_walls(middles, walls)),
         sweep_s=float(np.median(times)),
         longest_s=max(times[3:]),
     )
+
+
+def evo_error_m(found: Floats, true: Floats) -> float:
+    """Return evo's absolute trajectory error, aligned, of poses (n, 3); NaN without evo."""
+    program = shutil.which("evo_ape")
+    if program is None:
+        return math.nan
+    with tempfile.TemporaryDirectory() as folder:
+        files = [Path(folder, name) for name in ("true.tum", "found.tum")]
+        for path, poses in zip(files, (true, found), strict=True):
+            x, y, yaw = poses.T
+            zero = np.zeros(len(poses))
+            half = 0.5 * yaw
+            lines = (np.arange(len(poses)), x, y, zero, zero, zero, np.sin(half), np.cos(half))
+            np.savetxt(path, np.column_stack(lines))
+        command = [program, "tum", *map(str, files), "--align"]
+        output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    rmse = re.search(r"rmse\s+([0-9.]+)", output)
+    return math.nan if rmse is None else float(rmse[1])
 
 
 def _rms(values: Floats) -> float:
@@ -333,16 +363,18 @@ def real(path: Path) -> Real:
 
 def main() -> None:
     """Print the tables."""
-    print("map                       noise  people  odometry   sweep  longest  trajectory  walls")
+    print(f"{'map':25} noise  people  odometry   sweep  longest  trajectory   by evo    walls")
     for name, noise_m, people, drift in DRIVES:
         walls = wall_segments(load_map(name))
         _, errors = mapped(walls, drive(walls, Lap(), noise_m, 28.0, people=people), drift)
         print(f"{name:25} {1e3 * noise_m:2.0f} mm {people:7d}  {drift or '-':>8}"
               f" {1e3 * errors.sweep_s:5.1f} ms {1e3 * errors.longest_s:5.0f} ms"
-              f" {1e3 * errors.trajectory_m:8.1f} mm {1e3 * errors.wall_m:4.1f} mm",
+              f" {1e3 * errors.trajectory_m:8.1f} mm {1e3 * errors.evo_m:5.1f} mm"
+              f" {1e3 * errors.wall_m:4.1f} mm",
               flush=True)  # fmt: skip
     _, errors = mapped(HALL, drive(HALL, HALL_LAP, 0.025, 60.0), 0.03)
-    print(f"hall of 14 x 10 m: trajectory {1e3 * errors.trajectory_m:.1f} mm, walls"
+    print(f"hall of 14 x 10 m: trajectory {1e3 * errors.trajectory_m:.1f} mm, by evo"
+          f" {1e3 * errors.evo_m:.1f} mm, walls"
           f" {1e3 * errors.wall_m:.1f} mm, longest {1e3 * errors.longest_s:.0f} ms")  # fmt: skip
     if not BAGS.is_dir():
         print(f"{BAGS} is not here: no real drives")

@@ -30,6 +30,7 @@ from vehicle_agent.autonomy.grid_map import FREE, GridMap, value_at
 
 FEWEST, MOST = 300, 3000  # particles
 BEAMS = 60
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # steps that spread evenly over [0, 1)
 KNOWN = (0.05, 0.05, 0.1)  # standard deviation of a start that is roughly known [m, m, rad]
 TRIED = 200  # poses round one that may fit
 STRAY = 0.05  # of an echo beside all faces, against one on a face
@@ -88,7 +89,7 @@ class ParticleFilter:
         self._particles = np.empty((0, 3))
         self._log_weights = np.empty(0)
         self._unexplained = 0
-        self._first = 0
+        self._offset = 0.0
         self._is_believed = False
         self.is_global = True
 
@@ -138,10 +139,16 @@ class ParticleFilter:
         return float((apart < OFF * self._sigma_m).mean(axis=1).max()) if len(beams) else 0.0
 
     def _chosen(self, echoes: Floats) -> Floats:
-        """Return about `BEAMS` of the echoes, others each time."""
-        every = max(1, len(echoes) // BEAMS)
-        self._first = (self._first + 1) % every
-        return echoes[self._first :: every]
+        """Return at most `BEAMS` of the echoes, others each time, evenly along what they meet.
+
+        The farther an echo, the longer the piece of wall that it stands for. Were they taken evenly
+        by bearing, the wall beside the car would outvote all others, wherever it really stands.
+        """
+        if len(echoes) <= BEAMS:
+            return echoes
+        ranges = np.hypot(*echoes.T)
+        self._offset = (self._offset + GOLDEN) % 1.0
+        return echoes[_systematic(ranges / ranges.sum(), BEAMS, self._offset)]
 
     def _move(self, moved: Pose2) -> None:
         way, turn = math.hypot(moved.x, moved.y), abs(moved.yaw)
