@@ -7,6 +7,7 @@ from typing import Generic, TypeVar
 
 from scm.clock import seconds
 from scm.disturbances import Disturbances
+from scm.geometry import Pose2
 from scm.records.eye import Residual, TagSeen
 from scm.records.stations import StationRow
 from scm.v2x.message import Message
@@ -18,6 +19,7 @@ from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.signal_site import SignalSite
 from scm.v2x.messages.signal_status import SignalStatus
 from scm.v2x.messages.spat import Spat
@@ -66,7 +68,8 @@ class Picture:
 
     Attributes:
         spats, monitors, sites, signal_statuses: By junction.
-        trips, autonomy, autonomy_plans: By vehicle.
+        trips, autonomy, autonomy_plans, room_maps: By vehicle.
+        map_origins: By vehicle, where the frame of its `room_maps` lies in the city.
         traffic: The observer's newest counts; `violations` the last it reported, oldest first.
         frames, tags: By camera, the last few, oldest first; `eye_statuses` the newest.
         tags_seen: By (camera, tag id), all of the last minute.
@@ -87,6 +90,8 @@ class Picture:
     trips: dict[str, Held[Trip]] = field(default_factory=dict)
     autonomy: dict[str, Held[AutonomyStatus]] = field(default_factory=dict)
     autonomy_plans: dict[str, Held[AutonomyPlan]] = field(default_factory=dict)
+    room_maps: dict[str, Held[OccupancyMap]] = field(default_factory=dict)
+    map_origins: dict[str, Pose2] = field(default_factory=dict)
     traffic: Held[TrafficCounts] | None = None
     violations: tuple[Violation, ...] = ()
     frames: dict[str, tuple[Held[EyeFrame], ...]] = field(default_factory=dict)

@@ -13,6 +13,7 @@ from scm.api.acknowledgements import Acknowledgements
 from scm.api.city import City
 from scm.api.eye_rows import camera_rows
 from scm.api.picture import Picture
+from scm.api.room_maps import room_maps_of
 from scm.api.routes.autonomy import autonomy_of
 from scm.api.routes.boxes import boxes_of
 from scm.api.routes.stop import stop_of
@@ -90,6 +91,7 @@ def topics_of(city: City, seen: Acknowledgements) -> dict[str, Topic]:
         ),
         "signal_status": Topic(status_rows, 4),
         "autonomy": Topic(autonomy_of, 4),
+        "room_maps": Topic(room_maps_of, 4),
         "boxes": Topic(boxes_of, 2),
         "acknowledgements": Topic(lambda _: seen.newest(ACKNOWLEDGED_SHOWN), 4),
         "eye": Topic(lambda picture: camera_rows(picture, floor), 2),

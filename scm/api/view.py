@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from scm.api.close_up import CloseUps
+from scm.api.costmap_watch import CostmapWatch
 from scm.api.event_log import EventLog
 from scm.api.eye_tracks import TrackWatch
 from scm.api.picture import Held, Picture
@@ -22,6 +23,7 @@ from scm.api.received import (
     ReceivedTraffic,
     ReceivedWorld,
 )
+from scm.api.room_maps import ReceivedMaps
 from scm.api.scan_watch import ScanWatch
 from scm.api.stations import StationTable
 from scm.clock import NS_PER_MS, NS_PER_S
@@ -39,6 +41,7 @@ from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
+from scm.v2x.messages.costmap import Costmap
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus
@@ -48,6 +51,7 @@ from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.signal_site import SignalSite
@@ -78,10 +82,12 @@ class CityView(BasePart):
         self._signals = ReceivedSignals()
         self._traffic = ReceivedTraffic()
         self._autonomy = ReceivedAutonomy()
+        self._room_maps = ReceivedMaps()
         self._eye_accuracy = EyeAccuracyPart()
         self._eye = ReceivedEye(self._eye_accuracy)
         self._cameras = CameraWatch()
         self._scans = ScanWatch()
+        self._costmaps = CostmapWatch()
         self._tracks = TrackWatch()
         self._close_ups = CloseUps()
         self._stations = StationTable()
@@ -91,6 +97,7 @@ class CityView(BasePart):
         self._always = tuple(Subscription(kind) for kind in self._receivers)
         self._receivers[CameraFrame] = self._cameras.receive
         self._receivers[LidarScan] = self._scans.receive
+        self._receivers[Costmap] = self._costmaps.receive
         self._receivers[EyeTrack] = self._tracks.receive
         self._receivers[VehicleState] = self._close_ups.receive
         self.subscriptions: Sequence[Subscription] = self._always
@@ -104,6 +111,7 @@ class CityView(BasePart):
             Trip: self._world.receive_trip,
             AutonomyStatus: self._autonomy.receive_status,
             AutonomyPlan: self._autonomy.receive_plan,
+            OccupancyMap: self._room_maps.receive,
             Spat: self._signals.receive_spat,
             SignalSite: self._signals.receive_site,
             SignalStatus: self._signals.receive_status,
@@ -132,6 +140,7 @@ class CityView(BasePart):
                 if receive is not None:
                     receive(incoming.message, incoming.t_ns)
                 self._disturbances.receive(incoming)
+            self._room_maps.place(self._eye_accuracy.truth_at)
             self._disturbances.check_silence(now_ns)
             if now_ns >= self._next_forget_ns:
                 self._next_forget_ns = now_ns + NS_PER_S
@@ -164,6 +173,8 @@ class CityView(BasePart):
             trips=dict(self._world.trips),
             autonomy=dict(self._autonomy.statuses),
             autonomy_plans=dict(self._autonomy.plans),
+            room_maps=dict(self._room_maps.newest),
+            map_origins=dict(self._room_maps.origins),
             traffic=self._traffic.counts,
             violations=tuple(self._traffic.violations),
             frames={camera: tuple(frames) for camera, frames in self._eye.frames.items()},
@@ -254,6 +265,13 @@ class CityView(BasePart):
                 return None
             return held, self._eye_accuracy.truth_at(vehicle, held.message.t_ns)
 
+    def costmap(self, vehicle: str) -> Costmap | None:
+        """Return a car's newest costmap, and subscribe to them for some seconds; thread-safe."""
+        with self._lock:
+            if self._costmaps.subscribe(vehicle, self._now_ns):
+                self._update_subscriptions()
+            return self._costmaps.newest(vehicle)
+
     def tracks(self) -> tuple[TrackRow, ...]:
         """Return the Eye's tracks, and subscribe to them for some seconds; safe from any thread."""
         with self._lock:
@@ -307,15 +325,16 @@ class CityView(BasePart):
             self._update_subscriptions()
 
     def _update_subscriptions(self) -> None:
-        watched = (self._cameras, self._scans, self._close_ups, self._tracks)
+        watched = (self._cameras, self._scans, self._costmaps, self._close_ups, self._tracks)
         requested = (each for one in watched for each in one.subscriptions())
         self.subscriptions = (*self._always, *requested)
 
     def _forget(self, now_ns: int) -> None:
         self._stations.forget(now_ns)
-        if self._tracks.forget(now_ns):
+        if self._tracks.forget(now_ns) | self._costmaps.forget(now_ns):
             self._update_subscriptions()
         self._world.forget(now_ns - FORGET_NS)
         self._autonomy.forget(now_ns - FORGET_NS)
+        self._room_maps.forget(now_ns - FORGET_NS)
         self._eye.forget(now_ns - FORGET_NS)
         self._eye_accuracy.forget()

@@ -1,8 +1,9 @@
-"""Converts a run for Foxglove: frames, cars, roads, lights, pictures, scans, plans, plots, the log.
+"""Converts a run for Foxglove: frames, cars, roads, lights, pictures, scans, plans, maps, the log.
 
 Foxglove can list the channels of the recorder's own file but not read their schemas.
 """
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
@@ -13,8 +14,10 @@ import numpy as np
 from mcap.writer import Writer
 
 from scm.clock import NS_PER_S
-from scm.errors import CarError
+from scm.errors import CarError, MessageError
+from scm.geometry import Pose2
 from scm.maps.route import Roads
+from scm.recorder import foxglove_grids as grids
 from scm.recorder import foxglove_messages as fox
 from scm.recorder.mcap_file import Recorded, SchemaTable
 from scm.recorder.run_index import RunIndex
@@ -23,8 +26,10 @@ from scm.v2x.message import Message
 from scm.v2x.messages.autonomy_plan import AutonomyPlan
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.costmap import Costmap
 from scm.v2x.messages.eye_frame import EyeFrame
 from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
@@ -53,11 +58,11 @@ LIGHTS = {
     "green": fox.Colour(r=0.2, g=0.82, b=0.55),
 }
 PATH, OBSTACLE = fox.Colour(r=0.35, g=0.82, b=1.0), fox.Colour(r=1.0, g=0.69, b=0.0)
-PATH_THICK_M, TRAJECTORY_THICK_M, OBSTACLE_M = 0.006, 0.015, 0.02
+PATH_THICK_M, TRAJECTORY_THICK_M, CANDIDATE_THICK_M, OBSTACLE_M = 0.006, 0.015, 0.003, 0.02
 LETTERS = {"red": "R", "flashing_red": "F", "yellow": "Y", "green": "G"}
 _WANTED = (
     WorldDefinition, WorldSnapshot, VehicleState, Spat, CityEvent, EyeFrame, CameraFrame, LidarScan,
-    AutonomyPlan,
+    AutonomyPlan, OccupancyMap, Costmap,
 )  # fmt: skip
 M = TypeVar("M", bound=Message)
 
@@ -136,6 +141,7 @@ class _Writing:
         self._colours: dict[tuple[str, str], str] = {}
         self._lights: tuple[Light, ...] = ()
         self._has_map = False
+        self._poses: dict[str, Pose2] = {}
         self._writers: dict[type[Message], Callable[[int, Any], None]] = {
             WorldDefinition: self._definition,
             WorldSnapshot: self._snapshot,
@@ -146,11 +152,14 @@ class _Writing:
             CameraFrame: self._camera,
             LidarScan: self._scan,
             AutonomyPlan: self._plan,
+            OccupancyMap: self._room_map,
+            Costmap: self._costmap,
         }
 
     def write(self, t_ns: int, message: Message) -> None:
-        """Write the conversion of a message."""
-        self._writers[type(message)](t_ns, message)
+        """Write the conversion of a message; one with a damaged payload is left out."""
+        with contextlib.suppress(MessageError):
+            self._writers[type(message)](t_ns, message)
 
     def close(self) -> None:
         """End the file with its index."""
@@ -190,6 +199,9 @@ class _Writing:
         at = _time(t_ns)
         frames = tuple(_frame(at, car) for car in message.vehicles)
         self._add("/tf", t_ns, fox.FrameTransforms(transforms=frames))
+        self._poses = {
+            car.vehicle: Pose2(car.x_m, car.y_m, car.yaw_rad) for car in message.vehicles
+        }
         cars = {car.vehicle: (car.car, car.kind, car.alive) for car in message.vehicles}
         if cars == self._cars and t_ns < self._cars_due_ns:
             return
@@ -271,16 +283,27 @@ class _Writing:
             lines=(
                 _planned(message.path, PATH_THICK_M),
                 _planned(message.trajectory, TRAJECTORY_THICK_M),
+                *(_planned(one, CANDIDATE_THICK_M, WHITE) for one in message.candidates),
             ),
             cubes=tuple(_obstacle(x, y) for x, y in message.obstacles),
         )
         self._add(f"/{message.vehicle}/plan", t_ns, fox.SceneUpdate(entities=(entity,)))
-        poses = tuple(
-            fox.Pose(position=fox.Vector(x=x, y=y), orientation=_turned(yaw))
-            for x, y, yaw in message.particles
-        )
-        particles = fox.PosesInFrame(timestamp=at, frame_id=MAP, poses=poses)
-        self._add(f"/{message.vehicle}/particles", t_ns, particles)
+        name = message.vehicle
+        self._add(f"/{name}/path", t_ns, grids.poses(at, MAP, message.path))
+        self._add(f"/{name}/particles", t_ns, grids.poses(at, MAP, message.particles))
+
+    def _room_map(self, t_ns: int, message: OccupancyMap) -> None:
+        name, at = message.vehicle, _time(message.t_ns)
+        self._add(f"/{name}/map", t_ns, grids.map_grid(message, at))
+        frame = grids.map_frame(name)
+        self._add(f"/{name}/path", t_ns, grids.poses(at, frame, message.path))
+        if name in self._poses:
+            origin = grids.origin_of(message, self._poses[name])
+            self._add("/tf", t_ns, fox.FrameTransforms(transforms=(_placed(at, frame, origin),)))
+
+    def _costmap(self, t_ns: int, message: Costmap) -> None:
+        grid = grids.costmap_grid(message, _time(message.t_ns), MAP)
+        self._add(f"/{message.vehicle}/costmap", t_ns, grid)
 
 
 def _time(t_ns: int) -> fox.Time:
@@ -288,22 +311,24 @@ def _time(t_ns: int) -> fox.Time:
 
 
 def _frame(at: fox.Time, car: SnapshotVehicle) -> fox.Transform:
+    return _placed(at, car.vehicle, Pose2(car.x_m, car.y_m, car.yaw_rad))
+
+
+def _placed(at: fox.Time, frame: str, pose: Pose2) -> fox.Transform:
     return fox.Transform(
         timestamp=at,
         parent_frame_id=MAP,
-        child_frame_id=car.vehicle,
-        translation=fox.Vector(x=car.x_m, y=car.y_m),
-        rotation=_turned(car.yaw_rad),
+        child_frame_id=frame,
+        translation=fox.Vector(x=pose.x, y=pose.y),
+        rotation=fox.turned(pose.yaw),
     )
 
 
-def _turned(yaw_rad: float) -> fox.Quaternion:
-    return fox.Quaternion(z=math.sin(0.5 * yaw_rad), w=math.cos(0.5 * yaw_rad))
-
-
-def _planned(poses: Sequence[tuple[float, float, float]], thick_m: float) -> fox.Line:
+def _planned(
+    poses: Sequence[tuple[float, float, float]], thick_m: float, colour: fox.Colour = PATH
+) -> fox.Line:
     points = tuple(fox.Vector(x=x, y=y, z=0.01) for x, y, _ in poses)
-    return fox.Line(thickness=thick_m, points=points, color=PATH)
+    return fox.Line(thickness=thick_m, points=points, color=colour)
 
 
 def _obstacle(x_m: float, y_m: float) -> fox.Cube:

@@ -4,6 +4,7 @@ Foxglove requires every object to be inline and every field to have one type. It
 messages' schemas, which have references and allow null.
 """
 
+import math
 from typing import Any
 
 import msgspec
@@ -31,6 +32,13 @@ class Quaternion(msgspec.Struct, kw_only=True, frozen=True):
     y: float = 0.0
     z: float = 0.0
     w: float = 1.0
+
+
+class Vector2(msgspec.Struct, kw_only=True, frozen=True):
+    """A size on the floor [m]."""
+
+    x: float
+    y: float
 
 
 class Pose(msgspec.Struct, kw_only=True, frozen=True):
@@ -144,7 +152,7 @@ class CompressedImage(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class PackedField(msgspec.Struct, kw_only=True, frozen=True):
-    """A number of each point; `type` 7: float32."""
+    """A number of each point or cell; `type` 1: uint8, 2: int8, 7: float32."""
 
     name: str
     offset: int
@@ -158,6 +166,20 @@ class PointCloud(msgspec.Struct, kw_only=True, frozen=True):
     frame_id: str
     pose: Pose
     point_stride: int
+    fields: tuple[PackedField, ...]
+    data: bytes
+
+
+class Grid(msgspec.Struct, kw_only=True, frozen=True):
+    """Cells, each `cell_stride` bytes of `data`, row by row; `pose` is the corner of the first."""
+
+    timestamp: Time
+    frame_id: str
+    pose: Pose
+    column_count: int
+    cell_size: Vector2
+    row_stride: int
+    cell_stride: int
     fields: tuple[PackedField, ...]
     data: bytes
 
@@ -189,6 +211,11 @@ class CarState(msgspec.Struct, kw_only=True, frozen=True):
     steering_rad: float
     mode: str
     owner_epoch: int
+
+
+def turned(yaw_rad: float) -> Quaternion:
+    """Return the rotation about z."""
+    return Quaternion(z=math.sin(0.5 * yaw_rad), w=math.cos(0.5 * yaw_rad))
 
 
 def schema_of(kind: type) -> dict[str, Any]:

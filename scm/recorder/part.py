@@ -13,6 +13,7 @@ from scm.v2x.message import Delivery, Message
 from scm.v2x.messages import message_classes
 from scm.v2x.messages.cam import CamRx, CamTx
 from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.costmap import Costmap
 from scm.v2x.messages.cpm import CpmRx
 from scm.v2x.messages.denm import DenmRx, DenmTx
 from scm.v2x.messages.eye_frame import EyeFrame
@@ -28,7 +29,7 @@ from scm.v2x.messages.vehicle_state import VehicleState
 FLUSH_NS = 250 * NS_PER_MS
 FRAMES_HZ = 1.0
 OF_EACH_CAR = (
-    *(VehicleState, VehicleSensors, LidarScan, CameraFrame),
+    *(VehicleState, VehicleSensors, LidarScan, CameraFrame, Costmap),
     *(CamTx, DenmTx, SremTx),
     *(CamRx, CpmRx, DenmRx, MapemRx, SpatemRx, SremRx, SsemRx),
 )

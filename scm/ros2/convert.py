@@ -52,7 +52,7 @@ def odometry(name: str, state: VehicleState, at: Pose2) -> Any:
 
 def occupancy_grid(name: str, room: OccupancyMap) -> Any:
     """Return `nav_msgs/OccupancyGrid`: the map that a car makes, in its frame `<name>/map`."""
-    cells = np.frombuffer(room.payload, np.int8).reshape(room.rows, room.columns)
+    cells = np.frombuffer(room.cells, np.int8).reshape(room.rows, room.columns)
     corner = Pose2(room.x_m, room.y_m, 0.0)
     return _grid(header(room.t_ns, f"{name}/map"), cells, room.cell_m, corner)
 

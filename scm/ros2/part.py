@@ -25,7 +25,7 @@ from scm.ros2.types import ros
 from scm.ros2.wire import Graph
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
-from scm.v2x.message import Refused
+from scm.v2x.message import Message, Refused
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.world_snapshot import WorldSnapshot
@@ -104,8 +104,15 @@ class RosPart(BasePart):
             self._spats[message.junction] = message
         else:
             car = self._cars.get(str(getattr(message, "vehicle", "")))
-            return [] if car is None else car.show(message, now_ns)
+            return [] if car is None else self._show(car, message, now_ns)
         return []
+
+    def _show(self, car: RosCar, message: Message, now_ns: int) -> list[Any]:
+        try:
+            return car.show(message, now_ns)
+        except MessageError as cause:
+            event(_log, "ros_refused", level=logging.WARNING, vehicle=car.vehicle, why=str(cause))
+            return []
 
     def _process_snapshot(self, snapshot: WorldSnapshot, now_ns: int) -> None:
         self._clock.publish(convert.clock(snapshot.t_ns), now_ns)

@@ -107,7 +107,13 @@ _OF_ROLE: dict[str, Rights] = {
     "operator": _WATCHES + Rights(requests=EVERY_REQUEST),
     "driver": _WATCHES
     + Rights(
-        publishes=("v/*/cmd/drive", "v/*/autonomy", "v/*/autonomy/plan"),
+        publishes=(
+            "v/*/cmd/drive",
+            "v/*/autonomy",
+            "v/*/autonomy/plan",
+            "v/*/costmap",
+            "v/*/map",
+        ),
         requests=EVERY_REQUEST,
         services=("v/*/park",),
     ),

@@ -80,6 +80,7 @@ PLAIN_NUMBERS = {
     "compute_share": "a share of time",
     "path": "mixed, see the docstring",
     "trajectory": "mixed, see the docstring",
+    "candidates": "mixed, see the docstring",
     "particles": "mixed, see the docstring",
     "obstacles": "mixed, see the docstring",
     "busy_mean": "a share of time",

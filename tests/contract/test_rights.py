@@ -20,6 +20,10 @@ from scm.v2x.exchange import Call
 from scm.v2x.key import key_of, prefix, selector
 from scm.v2x.message import Message, Request
 from scm.v2x.messages import message_classes
+from scm.v2x.messages.autonomy_plan import AutonomyPlan
+from scm.v2x.messages.autonomy_status import AutonomyStatus
+from scm.v2x.messages.costmap import Costmap
+from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.rights import EVERY_REQUEST, rights_of
@@ -137,6 +141,14 @@ def test_the_city_of_this_test_really_did_something(city):
     assert "traffic/counts" in city["observer"].said
     assert "parking/status" in city["parking"].said
     assert "misbehaviour/scores" in city["misbehaviour"].said
+
+
+def test_a_driver_may_publish_what_agents_that_park_and_map_do():
+    keys = [
+        selector("city", kind, {"vehicle": "n1"}).removeprefix(prefix("city"))
+        for kind in (AutonomyStatus, AutonomyPlan, Costmap, OccupancyMap)
+    ]
+    assert all(covers(key, rights_of("driver", "park-n1").publishes) for key in keys)
 
 
 def test_an_operator_may_ask_every_request_that_is_no_car_s_own():

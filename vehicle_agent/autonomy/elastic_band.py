@@ -88,7 +88,12 @@ class Task(NamedTuple):
 
 
 class ElasticBand:
-    """Plans again and again along a path, each time from the band before."""
+    """Plans again and again along a path, each time from the band before.
+
+    Attributes:
+        candidates: The bands of other classes that the last call of `plan` compared, as
+            trajectories; none where it went on with the band before.
+    """
 
     def __init__(
         self, limits: CarLimits, margin_m: float = MARGIN_M, horizon_m: float = HORIZON_M
@@ -106,6 +111,7 @@ class ElasticBand:
         self._pieces: list[Piece] = []  # of the path, without what the car has passed
         self._band: Band | None = None
         self._t_s = 0.0  # when it began
+        self.candidates: tuple[Trajectory, ...] = ()
 
     def plan(
         self,
@@ -144,9 +150,12 @@ class ElasticBand:
             band = _optimised(band, task, WARM)
         blocked = _blocked(guess, terms, self._margin_m)
         free = band is not None and self._is_free(grid, band, moving)
+        new: list[Band] = []
         if band is None or blocked.any() or not free:
-            bands = _candidates(task, band, guess, blocked, FOLLOWED - free)
+            new = _new_bands(task, guess, blocked)
+            bands = _followed(task, band, new[: FOLLOWED - free])
             band = self._first_free(grid, bands, moving)
+        self.candidates = tuple(trajectory_of(one) for one in new)
         self._band, self._t_s = band, t_s
         return trajectory_of(band)
 
@@ -233,15 +242,17 @@ def discs_of(limits: CarLimits) -> Floats:
     return np.column_stack((x, y))[edge]
 
 
-def _candidates(
-    task: Task, present: Band | None, guess: Band, blocked: Bools, count: int
-) -> Iterator[Band]:
-    """Yield the present and so many new bands, cheapest first; others must be clearly cheaper.
+def _new_bands(task: Task, guess: Band, blocked: Bools) -> list[Band]:
+    """Return a new band of each class, roughly optimised, cheapest first."""
+    new = [guess, *_variants(guess, blocked, task.terms)]
+    return sorted((_optimised(one, task, FIRST) for one in new), key=_cost)
+
+
+def _followed(task: Task, present: Band | None, new: Sequence[Band]) -> Iterator[Band]:
+    """Yield the present band and new ones, cheapest first; new ones must be clearly cheaper.
 
     Where none of them is taken, the best ones follow once more, optimised further.
     """
-    new = [guess, *_variants(guess, blocked, task.terms)]
-    new = sorted((_optimised(one, task, FIRST) for one in new), key=_cost)[:count]
     bands = [_optimised(one, task, THEN) for one in new]
     if present is not None:
         bands.append(replace(present, cost=KEEP * present.cost))

@@ -8,6 +8,8 @@ from scm.errors import ScmError
 from scm.log import event
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.grid_payload import packed
+from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.occupancy_map import OccupancyMap
@@ -16,9 +18,10 @@ from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.car import load_car
 from vehicle_agent.autonomy.exploration import Exploration
 from vehicle_agent.autonomy.parking import Report
+from vehicle_agent.autonomy.shown import shown
 from vehicle_agent.lease import CarLease
 
-MAP_NS = NS_PER_S
+MAP_NS, STATUS_NS = NS_PER_S, 200 * NS_PER_MS
 
 _log = logging.getLogger(__name__)
 
@@ -57,7 +60,7 @@ class MapPart(BasePart):
         self._lease = CarLease(vehicle, name)
         self._on_report = on_report
         self._last_report: Report | None = None
-        self._map_ns = -MAP_NS
+        self._map_ns, self._status_ns = -MAP_NS, -STATUS_NS
         own = {"vehicle": vehicle}
         self.subscriptions: Sequence[Subscription] = (
             Subscription(VehicleSensors, own),
@@ -80,11 +83,7 @@ class MapPart(BasePart):
             out += self._lease.release() if over else self._lease.step(now_ns, command, now_ns)
         else:
             self.exploration.check_scans(now_ns)
-        report = self.exploration.report
-        if report != self._last_report:
-            self._last_report = report
-            if self._on_report is not None:
-                self._on_report(report)
+        out += self._status(now_ns)
         if now_ns - self._map_ns >= MAP_NS:
             self._map_ns = now_ns
             out += self._map(now_ns)
@@ -109,6 +108,21 @@ class MapPart(BasePart):
         except ScmError as cause:
             event(_log, "map_message", level=logging.WARNING, why=repr(str(cause)))
 
+    def _status(self, now_ns: int) -> list[Outgoing]:
+        """Return the status if it is due; its pose is not known on the city's map."""
+        report, is_new = self.exploration.report, self.exploration.report != self._last_report
+        if is_new:
+            self._last_report = report
+            if self._on_report is not None:
+                self._on_report(report)
+        if not is_new and now_ns - self._status_ns < STATUS_NS:
+            return []
+        self._status_ns = now_ns
+        status = AutonomyStatus(
+            vehicle=self._vehicle, t_ns=now_ns, state=report.state, reason=report.reason
+        )
+        return [status]
+
     def _map(self, now_ns: int) -> list[Outgoing]:
         report, here = self.exploration.report, self.exploration.here()
         detail = f"{self._vehicle} {report.state}: {report.reason}"
@@ -116,6 +130,8 @@ class MapPart(BasePart):
         grid = self.exploration.grid
         if grid is None or here is None:
             return [status]
+        navigator = self.exploration.navigator
+        ahead = None if navigator.path is None or navigator.is_done else navigator.path.poses
         rows, columns = grid.cells.shape
         message = OccupancyMap(
             vehicle=self._vehicle,
@@ -130,6 +146,8 @@ class MapPart(BasePart):
             car_yaw_rad=here.pose.yaw,
             state=report.state,
             reason=report.reason,
-            payload=grid.cells.tobytes(),
+            path=shown(ahead),
+            compression="zlib",
+            payload=packed(grid.cells.tobytes()),
         )
         return [status, message]

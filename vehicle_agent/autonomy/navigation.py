@@ -98,6 +98,11 @@ class Navigator:
         return self._tracker.is_done
 
     @property
+    def candidates(self) -> tuple[Trajectory, ...]:
+        """Other ways to drive on that were compared when `way` was planned."""
+        return () if self.way is None else self._band.candidates
+
+    @property
     def _caution_m(self) -> float:
         return ROUNDED * max(0.0, self.noise_m - QUIET_M)
 

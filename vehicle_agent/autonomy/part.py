@@ -13,20 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec.structs import replace
 
-from scm.arrays import Floats
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RunError, ScmError
 from scm.geometry import Pose2
 from scm.log import event
 from scm.maps.route import roads_of
 from scm.records.city_map import CityMap
-from scm.runtime.part import BasePart, Service, Subscription
+from scm.runtime.part import BasePart, IsWanted, Service, Subscription
 from scm.v2x.exchange import Answer, Call, Incoming, Outgoing
 from scm.v2x.message import Message, Refused, Request
-from scm.v2x.messages.autonomy_plan import AutonomyPlan
 from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.bay_request import BayReply, BayRequest
 from scm.v2x.messages.cam import CamRx
+from scm.v2x.messages.costmap import Costmap
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.park_request import ParkReply, ParkRequest
@@ -41,11 +40,11 @@ from scm.vehicles.drivers.cam_tracker import CamTracker
 from vehicle_agent.autonomy.bay import BayClient, is_bay
 from vehicle_agent.autonomy.control import Command
 from vehicle_agent.autonomy.parking import Parking, Report
+from vehicle_agent.autonomy.shown import costmap_of, plan_of
 from vehicle_agent.lease import CarLease
 
 STATUS_NS, PLAN_NS = 200 * NS_PER_MS, 500 * NS_PER_MS
 WAITING_SCAN_NS = 500 * NS_PER_MS  # of a car that waits for its turn
-SHOWN = 100  # particles, and poses of a path
 SPAWN_TIMEOUT_S = 10.0
 ENDED = ("parked", "failed")
 STAND = Command(0.0, 0.0)
@@ -116,7 +115,8 @@ class ParkPart(BasePart):
         self._on_report, self._last_report = on_report, Report("localise", "has not begun")
         self._busy_ns = 0
         self._compute_share = 0.0
-        self._status_ns = self._plan_ns = self._second_ns = -NS_PER_S
+        self._status_ns = self._plan_ns = self._second_ns = self._costmap_ns = -NS_PER_S
+        self._is_wanted: IsWanted = lambda kind, where: False
         own = {"vehicle": wanted.vehicle}
         self.subscriptions: Sequence[Subscription] = (
             Subscription(WorldDefinition),
@@ -134,6 +134,10 @@ class ParkPart(BasePart):
     def is_over(self) -> bool:
         """Whether the car is parked, or the agent gave up."""
         return self._report().state in ENDED
+
+    def attach(self, is_wanted: IsWanted) -> None:
+        """Make costmaps only for subscribers."""
+        self._is_wanted = is_wanted
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Take what was measured; drive."""
@@ -322,7 +326,9 @@ class ParkPart(BasePart):
             out.append(self._status(parking, now_ns))
         if parking is not None and now_ns - self._plan_ns >= PLAN_NS:
             self._plan_ns = now_ns
-            out.append(self._plan(parking, now_ns))
+            out.append(plan_of(parking, self._wanted.vehicle, now_ns))
+        if parking is not None and now_ns - self._costmap_ns >= NS_PER_S:
+            out += self._costmap(parking, now_ns)
         return out
 
     def _report(self) -> Report:
@@ -363,18 +369,12 @@ class ParkPart(BasePart):
             explained=float(found.explained.mean()) if len(found.explained) else 0.0,
         )  # fmt: skip
 
-    def _plan(self, parking: Parking, now_ns: int) -> AutonomyPlan:
-        found = parking.perception.localised
-        return AutonomyPlan(
-            vehicle=self._wanted.vehicle,
-            t_ns=now_ns,
-            path=_shown(None if parking.navigator.path is None else parking.navigator.path.poses),
-            trajectory=_shown(
-                None if parking.navigator.way is None else parking.navigator.way.poses
-            ),
-            particles=_shown(None if found is None else found.particles),
-            obstacles=tuple(map(tuple, parking.perception.obstacles.points().tolist())),
-        )
+    def _costmap(self, parking: Parking, now_ns: int) -> list[Outgoing]:
+        vehicle = self._wanted.vehicle
+        if not self._is_wanted(Costmap, {"vehicle": vehicle}):
+            return []
+        self._costmap_ns = now_ns
+        return [costmap_of(parking, vehicle, now_ns)]
 
 
 def place_on(city_map: CityMap, text: str) -> Pose2:
@@ -392,11 +392,3 @@ def _has_answer(out: Sequence[Outgoing]) -> bool:
 
 def _is_goal(item: Incoming) -> bool:
     return isinstance(item.message, ParkRequest)
-
-
-def _shown(poses: Floats | None) -> tuple[tuple[float, float, float], ...]:
-    """Return at most about `SHOWN` poses, evenly taken, with the last."""
-    if poses is None or len(poses) == 0:
-        return ()
-    some = np.unique(np.linspace(0, len(poses) - 1, min(SHOWN, len(poses))).round().astype(int))
-    return tuple((x, y, yaw) for x, y, yaw in poses[some].round(4).tolist())

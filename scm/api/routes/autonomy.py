@@ -1,4 +1,6 @@
-"""Cars that park themselves: send one to a goal, see what it does and how it means to drive."""
+"""Cars that park themselves or map rooms: send one to a goal, see what it does, plans and knows."""
+
+import asyncio
 
 from fastapi import APIRouter, Response
 
@@ -7,13 +9,17 @@ from scm.api.inputs import Json
 from scm.api.picture import M, Picture
 from scm.api.problem import RefusedError
 from scm.api.roles import OPERATOR, VIEWER
+from scm.api.room_maps import room_maps_of
 from scm.api.schemas import answer
+from scm.records.room_maps import RoomMapRow
 from scm.records.vehicles import ParkBody
 from scm.v2x.messages.autonomy_plan import AutonomyPlan
 from scm.v2x.messages.autonomy_status import AutonomyStatus
+from scm.v2x.messages.costmap import Costmap
 from scm.v2x.messages.park_request import ParkReply, ParkRequest
 
 SHOWN_S = 5.0  # after the newest report; agents report 5 times a second
+LOOK_S, PATIENCE_S = 0.05, 3.0  # for a costmap: agents send one a second, once they have a goal
 
 
 def autonomy_of(picture: Picture) -> tuple[AutonomyStatus, ...]:
@@ -54,14 +60,44 @@ def router(city: City) -> APIRouter:
 
     @routes.get(
         "/{name}/plan",
-        summary="A parking car's path, particles, and obstacles that the map has not",
+        summary="A parking car's path, candidates, particles, and obstacles that the map has not",
         responses=answer(AutonomyPlan),
     )
     async def plan(name: Name) -> Response:
         held = city.view.picture().autonomy_plans.get(name)
         return json_response(_reported(None if held is None else held.message, name))
 
+    _add_maps(routes, city)
     return routes
+
+
+def _add_maps(routes: APIRouter, city: City) -> None:
+    @routes.get(
+        "/{name}/costmap",
+        summary="How far each place is from the nearest obstacle, as a parking car's planners see",
+        responses=answer(Costmap),
+    )
+    async def costmap(name: Name) -> Response:
+        for _ in range(round(PATIENCE_S / LOOK_S)):
+            found = city.view.costmap(name)
+            if found is not None:
+                return json_response(found)
+            await asyncio.sleep(LOOK_S)
+        return json_response(_reported(found, name))
+
+    @routes.get(
+        "/{name}/map",
+        summary="The map that a car makes of an unknown room",
+        responses=answer(RoomMapRow),
+    )
+    async def room_map(name: Name) -> Response:
+        rows = room_maps_of(city.view.picture())
+        found = next((row for row in rows if row.vehicle == name), None)
+        if found is None:
+            command = f"`vehicle-agent map --vehicle {name}`"
+            detail = f"no agent that maps with {name} has reported: expected {command} to run"
+            raise RefusedError.of("not_found", detail)
+        return json_response(found)
 
 
 def _reported(report: M | None, name: str) -> M:

@@ -8,9 +8,11 @@ from typing import Literal
 
 from scm.client.operation import Noun, operation
 from scm.client.stream import LiveEvent
+from scm.records.room_maps import RoomMapRow
 from scm.records.vehicles import LinkRow, PathRow, VehicleRow, VehiclesTopic
 from scm.v2x.messages.autonomy_plan import AutonomyPlan
 from scm.v2x.messages.autonomy_status import AutonomyStatus
+from scm.v2x.messages.costmap import Costmap
 from scm.v2x.messages.light_request import LightReply
 from scm.v2x.messages.park_request import ParkReply
 from scm.v2x.messages.remove_request import RemoveReply
@@ -36,7 +38,15 @@ class VehiclesNoun(Noun):
 
     @operation("GET", "/api/v1/vehicles/{name}/plan")
     def plan(self, name: str) -> AutonomyPlan:
-        """A parking car's path, particles, and obstacles that the map has not."""
+        """A parking car's path, candidates, particles, and obstacles that the map has not."""
+
+    @operation("GET", "/api/v1/vehicles/{name}/costmap")
+    def costmap(self, name: str) -> Costmap:
+        """How far each place is from the nearest obstacle, as a parking car's planners see."""
+
+    @operation("GET", "/api/v1/vehicles/{name}/map")
+    def room_map(self, name: str) -> RoomMapRow:
+        """The map that a car makes of an unknown room."""
 
     @operation("GET", "/api/v1/vehicles/{name}/reports")
     def reports(self, name: str, *, scan: bool = False) -> Iterator[LiveEvent]:

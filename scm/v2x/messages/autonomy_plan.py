@@ -16,6 +16,7 @@ class AutonomyPlan(Message, kw_only=True, frozen=True):
         trajectory: Likewise, the stretch that it follows now.
         particles: Poses at which the car may be, at most 100 of them, spread as the belief is.
         obstacles: Middles of what the map has not, x [m], y [m].
+        candidates: Other stretches that it tried instead of the trajectory, as that.
     """
 
     KEY: ClassVar[str] = "v/{vehicle}/autonomy/plan"
@@ -27,6 +28,7 @@ class AutonomyPlan(Message, kw_only=True, frozen=True):
     trajectory: tuple[PlannedPose, ...] = ()
     particles: tuple[PlannedPose, ...] = ()
     obstacles: tuple[tuple[float, float], ...] = ()
+    candidates: tuple[tuple[PlannedPose, ...], ...] = ()
 
 
 MESSAGE = AutonomyPlan

@@ -1,4 +1,4 @@
-"""A short run: two cars, a junction that turns green, two events, map, picture, scan, plan."""
+"""A short run: two cars, a junction that turns green, two events, picture, scan, plan, grids."""
 
 import struct
 
@@ -10,9 +10,13 @@ from scm.recorder.mcap_file import RunFile
 from scm.records.boxes import SnapshotBox
 from scm.records.signals import SignalGroup
 from scm.v2x.exchange import RawSample
+from scm.v2x.grid_payload import packed
 from scm.v2x.key import prefix
+from scm.v2x.message import encode
 from scm.v2x.messages.autonomy_plan import AutonomyPlan
 from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.costmap import Costmap
+from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
@@ -28,8 +32,18 @@ RANGES_M = (1.0, 2.0, float("inf"), 0.5)  # ahead, left, a miss behind, right
 
 WAY = ((0.0, 0.0, 0.0), (1.0, 0.0, YAW_RAD))
 PLAN = AutonomyPlan(
-    vehicle="n1", t_ns=BEGIN_NS, path=WAY, trajectory=WAY, particles=WAY, obstacles=((0.5, 0.2),)
-)
+    vehicle="n1", t_ns=BEGIN_NS, path=WAY, trajectory=WAY, particles=WAY, obstacles=((0.5, 0.2),),
+    candidates=(WAY,),
+)  # fmt: skip
+ROOM = OccupancyMap(
+    vehicle="n1", t_ns=BEGIN_NS, rows=2, columns=3, cell_m=0.05, x_m=-1.0, y_m=2.0, car_x_m=1.0,
+    car_y_m=0.0, car_yaw_rad=YAW_RAD, state="map", path=WAY, compression="zlib",
+    payload=packed(bytes((0, 100, 255, 0, 0, 100))),
+)  # fmt: skip
+COSTMAP = Costmap(
+    vehicle="n1", t_ns=BEGIN_NS, rows=1, columns=3, cell_m=0.02, x_m=0.5, y_m=0.0, step_m=0.01,
+    half_width_m=0.09, payload=packed(bytes((0, 9, 200))),
+)  # fmt: skip
 
 
 def write_run(
@@ -57,6 +71,8 @@ def write_run(
             file.write(_picture(at_s, "eye/overhead/frame", picture, camera="overhead"))
             file.write(_scan(at_s))
             file.write(_sample(at_s, "v/n1/autonomy/plan", PLAN))
+            file.write(_bulk(at_s, "v/n1/map", ROOM))
+            file.write(_bulk(at_s, "v/n1/costmap", COSTMAP))
         if of_n1 and at_s in of_n1:
             key = "v/n1/@camera/front"
             file.write(_picture(at_s, key, of_n1[at_s], vehicle="n1", camera="front"))
@@ -73,6 +89,10 @@ def write_run(
 def _sample(at_s, key, message):
     t_ns = BEGIN_NS + round(at_s * NS_PER_S)
     return RawSample(prefix("city") + key, msgspec.json.encode(message), None, t_ns)
+
+
+def _bulk(at_s, key, message):
+    return RawSample(prefix("city") + key, *encode(message), BEGIN_NS + round(at_s * NS_PER_S))
 
 
 def _picture(at_s, key, jpeg, **whose):

@@ -44,6 +44,9 @@ def test_cars_roads_signals_numbers_pictures_and_the_log_are_there(channels):
         "/events": "foxglove.Log",
         "/eye/overhead": "foxglove.CompressedImage",
         "/n1/scan": "foxglove.PointCloud",
+        "/n1/costmap": "foxglove.Grid",
+        "/n1/map": "foxglove.Grid",
+        "/n1/path": "foxglove.PosesInFrame",
         "/n1/plan": "foxglove.SceneUpdate",
         "/n1/particles": "foxglove.PosesInFrame",
         "/n1/state": "scm.CarState",
@@ -151,13 +154,58 @@ def test_a_plan_is_lines_and_obstacles_and_its_particles_are_poses(channels):
     assert [[(at["x"], at["y"]) for at in one["points"]] for one in plan["lines"]] == [
         [(0.0, 0.0), (1.0, 0.0)],
         [(0.0, 0.0), (1.0, 0.0)],
+        [(0.0, 0.0), (1.0, 0.0)],
     ]
+    assert plan["lines"][2]["thickness"] < plan["lines"][0]["thickness"]
     (obstacle,) = plan["cubes"]
     assert (obstacle["pose"]["position"]["x"], obstacle["pose"]["position"]["y"]) == (0.5, 0.2)
     (particles,) = channels["/n1/particles"][1]
     assert particles["frame_id"] == plan["frame_id"] == "map"
     turned = particles["poses"][1]["orientation"]
     assert 2.0 * math.atan2(turned["z"], turned["w"]) == pytest.approx(YAW_RAD)
+
+
+def cells_of(grid):
+    """Return rows of cells, each a dict of its fields as unsigned bytes."""
+    data, stride = base64.b64decode(grid["data"]), grid["cell_stride"]
+    rows = [data[i : i + grid["row_stride"]] for i in range(0, len(data), grid["row_stride"])]
+    return [
+        [
+            {field["name"]: row[i + field["offset"]] for field in grid["fields"]}
+            for i in range(0, grid["column_count"] * stride, stride)
+        ]
+        for row in rows
+    ]
+
+
+def test_a_map_is_a_grid_in_a_frame_that_lies_where_its_car_is(channels):
+    _, (grid,) = channels["/n1/map"]
+    assert (grid["frame_id"], grid["column_count"]) == ("n1/map", 3)
+    assert (grid["cell_size"], grid["row_stride"]) == ({"x": 0.05, "y": 0.05}, 15)
+    assert (grid["pose"]["position"]["x"], grid["pose"]["position"]["y"]) == (-1.0, 2.0)
+    cells = cells_of(grid)
+    assert [[cell["occupancy"] for cell in row] for row in cells] == [[0, 100, 255], [0, 0, 100]]
+    free, occupied, unknown = (cell["alpha"] for cell in cells[0])
+    assert 0 == unknown < free < occupied == 255
+    types = {field["name"]: field["type"] for field in grid["fields"]}
+    assert types == {"red": 1, "green": 1, "blue": 1, "alpha": 1, "occupancy": 2}
+    _, moves = channels["/tf"]
+    (frame,) = [
+        one for row in moves for one in row["transforms"] if one["child_frame_id"] == "n1/map"
+    ]
+    # The car stands at (3, 0.5), turned as on its map, where it is 1 m from the origin.
+    assert frame["translation"] == pytest.approx({"x": 2.0, "y": 0.5, "z": 0.0})
+    assert frame["rotation"]["w"] == pytest.approx(1.0)
+    assert [row["frame_id"] for row in channels["/n1/path"][1]] == ["map", "n1/map"]
+
+
+def test_a_costmap_is_hot_near_obstacles_and_clear_far_off(channels):
+    _, (grid,) = channels["/n1/costmap"]
+    ((obstacle, near, far),) = cells_of(grid)
+    assert (obstacle["clearance"], near["clearance"], far["clearance"]) == (0, 9, 200)
+    assert obstacle["alpha"] > near["alpha"] > far["alpha"] == 0
+    assert near["red"] > near["green"]
+    assert grid["frame_id"] == "map"
 
 
 def test_the_layout_shows_topics_and_fields_that_there_are(channels):

@@ -115,6 +115,17 @@ def test_box_on_the_path_is_passed(side):
     assert trajectory.poses[-1, 0] > 1.4
 
 
+def test_classes_that_were_compared_are_known_until_the_band_goes_on_alone():
+    grid, path, band = floor((1.15, 0.95, 1.25, 1.05)), path_of((1.6, 0.0)), ElasticBand(LIMITS)
+    planned(path, grid, band=band)
+    beside = [one.poses[:, 1] - 1.0 for one in band.candidates]
+    assert len(beside) == 3
+    assert max(one.max() for one in beside) > 0.1
+    assert min(one.min() for one in beside) < -0.1
+    band.plan(floor(), path, START, 0.0, 0.0, NOTHING, 0.1)
+    assert band.candidates == ()
+
+
 def test_blocked_corridor_gives_a_trajectory_that_is_refused():
     grid = floor((0.3, 0.7, 2.8, 0.8), (0.3, 1.2, 2.8, 1.3), (1.2, 0.8, 1.3, 1.2))
     assert not is_free(grid, LIMITS, planned(path_of((1.6, 0.0)), grid), NOTHING)

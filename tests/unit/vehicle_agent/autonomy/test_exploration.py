@@ -5,6 +5,7 @@ from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
+from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.vehicles.car import load_car
@@ -53,18 +54,29 @@ def test_car_maps_a_room_that_it_does_not_know():
     with Lockstep([world, part]) as city:
         contacts = city.subscribe(Subscription(Contact, {"vehicle": "n1"}))
         maps = city.subscribe(Subscription(OccupancyMap, {"vehicle": "n1"}))
+        reports = city.subscribe(Subscription(AutonomyStatus, {"vehicle": "n1"}))
         car = world.world.host("n1", "nigel", start, 0)
         city.run_until(lambda: part.is_over, 90.0, "the room is mapped")
         city.run_for(2.0)
         here = part.exploration.here()
-        sent = [incoming.message for incoming in maps.drain()][-1]
+        rooms = [incoming.message for incoming in maps.drain()]
+        statuses = [incoming.message for incoming in reports.drain()]
     assert contacts.drain() == []
     off = (start.inverse() @ car.pose).inverse() @ here.pose
     assert np.hypot(off.x, off.y) < 0.03
     grid = part.exploration.mapper.grid()
     free_m2 = (grid.cells == FREE).sum() * grid.cell_m**2
     assert 2.0 < free_m2 < 2.6  # of 2.15 x 1.25 m less two boxes, partly hidden
-    assert len(sent.payload) == sent.rows * sent.columns
+    last = rooms[-1]
+    cells = np.frombuffer(last.cells, np.int8).reshape(last.rows, last.columns)
+    assert (cells == part.exploration.grid.cells).all()
+    assert last.path == ()
+    ways = [room for room in rooms if room.path]
+    assert ways
+    assert all(room.state == "map" for room in ways)
+    assert [statuses[0].state, statuses[-1].state] == ["map", "idle"]
+    assert statuses[-1].reason.startswith("mapped all that can be reached")
+    assert {(one.x_m, one.goal_x_m) for one in statuses} == {(None, None)}
 
 
 @pytest.mark.parametrize("drives", [True, False])

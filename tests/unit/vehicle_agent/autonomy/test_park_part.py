@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RunError
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
@@ -8,12 +9,14 @@ from scm.runtime.part import Subscription
 from scm.v2x.message import Refused
 from scm.v2x.messages.autonomy_plan import AutonomyPlan
 from scm.v2x.messages.autonomy_status import AutonomyStatus
+from scm.v2x.messages.costmap import Costmap
 from scm.v2x.messages.drive_command import DriveCommand
 from scm.v2x.messages.lease_request import LeaseReply, LeaseRequest
 from scm.v2x.messages.park_request import ParkReply, ParkRequest
 from scm.world.part import WorldPart
 from vehicle_agent.agent import AgentPart
-from vehicle_agent.autonomy.part import SHOWN, ParkPart, Wanted
+from vehicle_agent.autonomy.part import ParkPart, Wanted
+from vehicle_agent.autonomy.shown import SHOWN
 
 OBSTACLES = load_map("parking_school_obstacles")
 
@@ -88,6 +91,17 @@ def test_status_and_plan_say_where_the_car_is_and_goes():
     assert 2 <= len(plan.trajectory) <= SHOWN
     assert 2 <= len(plan.particles) <= SHOWN
     assert 10 <= len(statuses) <= 20
+    later_ns = plan.t_ns + 2 * NS_PER_S
+    part.attach(lambda kind, where: False)
+    assert not any(isinstance(item, Costmap) for item in part.step(later_ns, []))
+    part.attach(lambda kind, where: (kind, where) == (Costmap, {"vehicle": "n1"}))
+    sent = [
+        [item for item in part.step(later_ns + t_ns, []) if isinstance(item, Costmap)]
+        for t_ns in (NS_PER_MS, 2 * NS_PER_MS)
+    ]
+    assert list(map(len, sent)) == [1, 0]
+    cells = np.frombuffer(sent[0][0].cells, np.uint8)
+    assert (cells.min(), cells.max() > 30) == (0, True)
 
 
 def test_same_seed_gives_equal_bits():

@@ -1,4 +1,4 @@
-/** What cars that park themselves plan, drawn on the map: goal, path, particles and obstacles. */
+/** What cars that park themselves plan, drawn on the map: goal, path, candidates, particles and obstacles. */
 import { computed, effect } from "@preact/signals";
 import { html } from "scm/shared/html.js";
 import { footprint } from "scm/shared/car_shape.js";
@@ -11,6 +11,7 @@ import { layers } from "scm/pages/map/layers.js";
 const POLL_MS = 500;
 const MOST_SHOWN = 3; // cars whose plans the map shows; of more it shows the chosen car's only
 const PATH = "#5ad1ff";
+const CANDIDATE = "rgba(255, 255, 255, 0.75)";
 const GOAL = "#7dffb0";
 const PARTICLE = "#ff7ad9";
 const OBSTACLE = "#ffb000";
@@ -60,10 +61,11 @@ export function drawPlans(paper, view) {
     if (!plan) continue;
     drawObstacles(paper, view, plan.obstacles);
     if (!HAS_PATH.includes(row.state)) continue;
-    line(paper, view, plan.path, 2, PATH);
+    drawLine(paper, view, plan.path, 2);
     if (row.state !== "drive") continue;
-    line(paper, view, plan.trajectory, 7, RIM);
-    line(paper, view, plan.trajectory, 4, PATH);
+    for (const poses of plan.candidates) drawLine(paper, view, poses, 1.5, CANDIDATE);
+    drawLine(paper, view, plan.trajectory, 7, RIM);
+    drawLine(paper, view, plan.trajectory, 4);
   }
 }
 
@@ -109,7 +111,8 @@ export function drawGoal(paper, view, { x, y, yaw }, { rear, front, half }, colo
   paper.restore();
 }
 
-function line(paper, view, poses, width, colour) {
+/** A line through poses, each x, y and more. */
+export function drawLine(paper, view, poses, width, colour = PATH) {
   paper.beginPath();
   for (const [x, y] of poses) paper.lineTo(view.x(x), view.y(y));
   paper.lineJoin = paper.lineCap = "round";
@@ -127,7 +130,7 @@ function drawObstacles(paper, view, obstacles) {
 /** What the signs mean, while there are any. */
 export function PlanKey() {
   if (!shownNames.value) return null;
-  const signs = { goal: "goal", path: "path", particle: "where it may be", obstacle: "not in the map" };
+  const signs = { goal: "goal", path: "path", candidate: "compared", particle: "where it may be", obstacle: "not in the map" };
   return html`
     <ul class="legend plan-key" aria-label="Plans of parking cars">
       ${Object.entries(signs).map(([sign, words]) => html`<li key=${sign}><i data-sign=${sign}></i>${words}</li>`)}

@@ -10,6 +10,7 @@ import { blind } from "scm/pages/map/close_up.js";
 import { carNamed, fleetTick } from "scm/pages/map/fleet.js";
 import { followed, layers, show } from "scm/pages/map/layers.js";
 import { Parking } from "scm/pages/map/park_at.js";
+import { isMapping, Mapping } from "scm/pages/map/room_maps.js";
 import { SendTo } from "scm/pages/map/send_to.js";
 
 const DEGREES = 180 / Math.PI;
@@ -32,7 +33,7 @@ export function ChosenVehicle() {
         </h2>
         <button class="plain" aria-label="Let go of ${name}" title="Let go (Escape)" onClick=${leave}>✕</button>
       </div>
-      ${car ? html`<${Facts} car=${car} /><${Parking} name=${name} /><${Acts} name=${name} />` : html`<p class="empty">It is not on the map.</p>`}
+      ${car ? html`<${Facts} car=${car} /><${Mapping} name=${name} /><${Parking} name=${name} /><${Acts} name=${name} />` : html`<p class="empty">It is not on the map.</p>`}
       ${removing.value && html`<${RemoveDialog} name=${removing.value} />`}
     </section>
   `;
@@ -69,12 +70,17 @@ function Acts({ name }) {
   return html`
     <div class="acts">
       <button class="small" aria-pressed=${followed.value === name} onClick=${follow}>Follow</button>
-      ${autonomyOf(name) ? toggle("autonomy", "Plan") : toggle("path", "Path")} ${lidar}
+      ${planToggle(autonomyOf(name), toggle)} ${lidar}
       <${SendTo} name=${name} />
       <a href="/vehicles/${name}">Open</a>
       <button class="small" onClick=${() => (removing.value = name)}>Remove</button>
     </div>
   `;
+}
+
+function planToggle(row, toggle) {
+  if (!row) return toggle("path", "Path");
+  return isMapping(row) ? toggle("rooms", "Map") : toggle("autonomy", "Plan");
 }
 
 function RemoveDialog({ name }) {

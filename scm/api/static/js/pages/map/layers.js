@@ -3,7 +3,7 @@ import { effect, signal } from "@preact/signals";
 
 const STORAGE_KEY = "scm-map-layers";
 
-/** Name to title, in the order of the menu; the last two are of the chosen car. */
+/** Name to title, in the order of the menu; the last three are of the chosen car. */
 export const LAYERS = {
   names: "Names of cars",
   roads: "Names of lanes, junctions, places",
@@ -12,11 +12,13 @@ export const LAYERS = {
   heat: "Heat map of speed",
   tracks: "Tracks of the Eye",
   autonomy: "Plans of cars that park themselves",
+  rooms: "Maps that cars make",
+  costmap: "Costmap of the chosen car",
   path: "Planned path of the chosen car",
   lidar: "LIDAR of the chosen car",
 };
 
-const FIRST = { names: true, roads: false, times: true, trails: false, heat: false, tracks: false, autonomy: true, path: true, lidar: false };
+const FIRST = { names: true, roads: false, times: true, trails: false, heat: false, tracks: false, autonomy: true, rooms: true, costmap: false, path: true, lidar: false };
 
 /** Name to whether it is shown. */
 export const layers = signal({ ...FIRST, ...read() });

@@ -11,6 +11,8 @@ import { aim, isAiming, ParkChip, stopAiming } from "scm/pages/map/park_at.js";
 import { LayersMenu } from "scm/pages/map/layers_menu.js";
 import { subscribeCloseUp } from "scm/pages/map/close_up.js";
 import { pollTracks } from "scm/pages/map/tracks.js";
+import { CostmapKey, pollCostmap } from "scm/pages/map/costmap.js";
+import { followRoomMaps, RoomMapKey } from "scm/pages/map/room_maps.js";
 import { HeatKey, Kinds, ScaleBar } from "scm/pages/map/legend.js";
 import { Scene } from "scm/pages/map/scene.js";
 import { offer, SendChip, withdraw } from "scm/pages/map/send_to.js";
@@ -53,7 +55,7 @@ export function MapPanel() {
     setView(seen);
     const aimed = (from, to) => isAiming() && (aim(seen, from, to), true);
     const moves = gestures(sheet.current, seen, (x, y) => choose(scene.pick(x, y), seen, x, y), aimed);
-    const ends = [scene.run(), moves, subscribeCloseUp(), pollTracks(), pollPlans()];
+    const ends = [scene.run(), moves, subscribeCloseUp(), pollTracks(), pollPlans(), pollCostmap(), followRoomMaps()];
     return () => ends.forEach((end) => end());
   }, [ground]);
   if (ground instanceof Error) {
@@ -78,7 +80,7 @@ export function MapPanel() {
         ></canvas>
       </div>
       ${view && html`<${Controls} view=${view} />`}
-      <div class="corner"><${ParkChip} /><${SendChip} /><${FollowChip} /><${HeatKey} /><${PlanKey} /><${Kinds} />${view && html`<${ScaleBar} view=${view} />`}</div>
+      <div class="corner"><${ParkChip} /><${SendChip} /><${FollowChip} /><${HeatKey} /><${CostmapKey} /><${RoomMapKey} /><${PlanKey} /><${Kinds} />${view && html`<${ScaleBar} view=${view} />`}</div>
     </section>
   `;
 }

@@ -10,7 +10,9 @@ import { change } from "scm/shell/api.js";
 import { city } from "scm/shell/store.js";
 import { drawGoal } from "scm/pages/map/autonomy.js";
 import { carNamed } from "scm/pages/map/fleet.js";
+import { layers, show } from "scm/pages/map/layers.js";
 import { spawnPose } from "scm/pages/map/lane_shape.js";
+import { isMapping } from "scm/pages/map/room_maps.js";
 
 const REACH_PX = 22;
 const REACH_M = 0.09; // half of a car's width
@@ -93,7 +95,7 @@ export function ParkChip() {
 /** What a car that parks itself does, and where to send it. */
 export function Parking({ name }) {
   const row = autonomyOf(name);
-  if (!row) return null;
+  if (!row || isMapping(row)) return null;
   const isOn = isAiming();
   const toggle = () => (isOn ? stopAiming() : (aiming.value = name));
   return html`
@@ -106,6 +108,7 @@ export function Parking({ name }) {
       <div class="acts">
         <button class="small" aria-pressed=${isOn} title="Choose a goal on the map" onClick=${toggle}>Park here</button>
         <button class="small" onClick=${() => (openFor.value = name)}>Park at…</button>
+        <button class="small" aria-pressed=${layers.value.costmap} title="How far each place is from the nearest obstacle" onClick=${() => show("costmap", !layers.value.costmap)}>Costmap</button>
       </div>
     </div>
     ${openFor.value === name && html`<${Question} name=${name} />`}

@@ -1,4 +1,4 @@
-/** One frame of the map, from below to above: roads, heat, path, scan, trails, boxes, plans, cars, tracks, names, signals. */
+/** One frame of the map, from below to above: roads, heat, path, scan, trails, costmap, boxes, maps, plans, cars, tracks, names, signals. */
 import { drawBoxes } from "scm/shared/box_shape.js";
 import { drawCar, drawHalo, drawLabel, footprint } from "scm/shared/car_shape.js";
 import { coveredBy, drawLight } from "scm/shared/light_shape.js";
@@ -8,12 +8,14 @@ import { boxes, city, signals, signalsAt } from "scm/shell/store.js";
 import { colours } from "scm/shell/theme.js";
 import { drawParticles, drawPlans } from "scm/pages/map/autonomy.js";
 import { closeUp, drawPath, drawScan } from "scm/pages/map/close_up.js";
+import { drawCostmap } from "scm/pages/map/costmap.js";
 import { carAt, fleet } from "scm/pages/map/fleet.js";
 import { Ground } from "scm/pages/map/ground.js";
 import { Heat } from "scm/pages/map/heat.js";
 import { followed, layers } from "scm/pages/map/layers.js";
 import { drawAim } from "scm/pages/map/park_at.js";
 import { RoadNames } from "scm/pages/map/road_names.js";
+import { drawRoomMaps } from "scm/pages/map/room_maps.js";
 import { drawOffer } from "scm/pages/map/send_to.js";
 import { timeToChange } from "scm/pages/map/signal_times.js";
 import { drawSprites } from "scm/pages/map/sprites.js";
@@ -87,7 +89,9 @@ export class Scene {
       this.trails.note(fleet); // above the planned path, which on a circuit lies on all of them
       this.trails.draw(paper, view, this.ratio, now, fleet);
     }
+    drawCostmap(paper, view);
     drawBoxes(paper, view, boxes.peek(), city.peek()?.boxes ?? []);
+    drawRoomMaps(paper, view);
     drawPlans(paper, view);
     this.#drawCars(on);
     drawParticles(paper, view);
