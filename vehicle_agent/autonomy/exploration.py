@@ -23,7 +23,7 @@ from vehicle_agent.autonomy.control import Command
 from vehicle_agent.autonomy.grid_map import FREE, UNKNOWN, GridMap
 from vehicle_agent.autonomy.mapping import Mapper
 from vehicle_agent.autonomy.navigation import Navigator
-from vehicle_agent.autonomy.odometry import OdometryFilter, mount_of
+from vehicle_agent.autonomy.odometry import CHECK_MOUNT, CONTRARY_WORDS, OdometryFilter, mount_of
 from vehicle_agent.autonomy.outline import room, scene_of
 from vehicle_agent.autonomy.parking import Report
 from vehicle_agent.autonomy.perception import Whereabouts
@@ -104,13 +104,16 @@ class Exploration:
         return self.navigator.command(now_ns, here, self._steering_rad)
 
     def check_scans(self, now_ns: int) -> None:
-        """Stand and say so where no scans come; go on when they do."""
+        """Stand and say so where no scans come; go on when they do. Give up on wrong ones."""
         if self._begun_ns is None:
             self._begun_ns = now_ns
         silent_ns = now_ns - (self._begun_ns if self._scan_ns is None else self._scan_ns)
         if self.report.state == "idle":
             return
-        if silent_ns > SILENT_NS:
+        if self._odometry.is_contrary:
+            self.report = Report("failed", f"{CONTRARY_WORDS}: {CHECK_MOUNT}")
+            self.navigator.stop()
+        elif silent_ns > SILENT_NS:
             self.report = Report("recover", f"no LIDAR scan for {silent_ns // NS_PER_S} s")
             self.navigator.stop()
         elif self.report.state == "recover":

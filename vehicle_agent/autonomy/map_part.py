@@ -69,8 +69,8 @@ class MapPart(BasePart):
 
     @property
     def is_over(self) -> bool:
-        """Whether all that can be reached is mapped."""
-        return self._drives and self.exploration.report.state == "idle"
+        """Whether all that can be reached is mapped, or the agent gave up."""
+        return self._drives and self.exploration.report.state in ("idle", "failed")
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Take what was measured; drive on to see more."""

@@ -41,8 +41,11 @@ FLOW_WIDER = 3.0  # of its std: beams beside each other see the same wall
 LIKELY = 16.3  # of a flow's squared distance with three numbers: 99.9 %
 CLEAR_M = 0.06  # residual of a flow between sweeps of the same surroundings
 NEXT_KEY_M, NEXT_KEY_RAD = 0.05, 0.1  # from a key sweep, before the next becomes one
+CONTRARY_M, CONTRARY = 0.025, (-2.0, -0.5)  # way of the wheels; a flow's part of it
 AT_REST_S = 0.2  # without a count, before a car is taken to stand
 LONGEST_S = 1.0  # without a sweep, before the filter goes on alone
+CHECK_MOUNT = "check how it is mounted, and the car file's [lidar]"
+CONTRARY_WORDS = "the scanner sees the car drive the other way than its wheels"
 X, Y, YAW, V, BIAS, LAST = 0, 1, 2, 3, 4, slice(5, 8)
 
 
@@ -85,6 +88,9 @@ class OdometryFilter:
     Args:
         car: With `lidar.position_m`, wheel radius and encoders in its file.
 
+    Attributes:
+        is_contrary: Two flows in a row had the car drive the other way than its wheels, or the Eye.
+
     Raises:
         CarError: when the file has no scanner.
     """
@@ -101,6 +107,9 @@ class OdometryFilter:
         self._before: VehicleSensors | Seen | None = None
         self._turned_ns = 0
         self._key: Sweep | None = None
+        self._way_m = 0.0  # of the wheels, since the key sweep
+        self._contraries = 0
+        self.is_contrary = False
 
     def sensors(self, measured: VehicleSensors | Seen) -> None:
         """Take what the car's other sensors measured, or the Eye; older is ignored."""
@@ -127,20 +136,48 @@ class OdometryFilter:
         if state is None or sweep.t_ns < state.t_ns:
             return None
         while self._waiting and self._waiting[0].t_ns <= sweep.t_ns:
-            state = self._on_to(state, self._waiting.popleft())
+            measured = self._waiting.popleft()
+            self._way_m += self._way(measured)
+            state = self._on_to(state, measured)
         state = _moved(state, sweep.t_ns, state.yaw_rate, self._gyro_noise)
         sweep = seen_at_end(sweep, self._of_scanner(state))
         flow = None
         if key is not None and len(key.ranges) == len(sweep.ranges):
             flow = range_flow(key, sweep, self._guess(state))
+            self._compare(flow)
             state, is_used = self._seen(state, flow)
             flow = flow if is_used else None
         moved = self._guess(state)
         far = math.hypot(moved.x, moved.y) > NEXT_KEY_M or abs(moved.yaw) > NEXT_KEY_RAD
         if key is None or far or flow is None:
-            self._key, state = sweep, _cloned(state)
+            self._key, state, self._way_m = sweep, _cloned(state), 0.0
         self._state = state
         return flow
+
+    def _way(self, measured: VehicleSensors | Seen) -> float:
+        """Return the way since the measurement before, by the wheels or the Eye, + forward [m]."""
+        before = self._before
+        if before is None or measured.t_ns <= before.t_ns:
+            return 0.0
+        if isinstance(measured, Seen):
+            return measured.speed_mps * (measured.t_ns - before.t_ns) / NS_PER_S
+        if self._per_count_m is None or not isinstance(before, VehicleSensors):
+            return 0.0
+        counts = measured.encoder_left - before.encoder_left
+        counts += measured.encoder_right - before.encoder_right
+        return 0.5 * counts * self._per_count_m
+
+    def _compare(self, flow: Flow) -> None:
+        """Notice a scanner that looks backward: it sees the car drive the other way."""
+        if abs(self._way_m) < CONTRARY_M:
+            return
+        seen = (self._mount @ flow.motion @ self._mount.inverse()).x
+        std = FLOW_WIDER * math.sqrt(flow.covariance[0, 0])
+        is_clear = flow.residual_m < CLEAR_M and abs(seen) > std
+        least, most = CONTRARY
+        is_contrary = is_clear and least < seen / self._way_m < most
+        self._contraries = self._contraries + 1 if is_contrary else 0
+        self.is_contrary |= self._contraries > 1
 
     def _of_scanner(self, state: _State) -> Twist:
         """Return the motion of the scanner, in its own frame."""
@@ -179,18 +216,17 @@ class OdometryFilter:
             return _corrected(state, left, _row(V), EYE_SPEED_STD**2 * np.eye(1))
         rate = measured.gyro_radps[2] - float(state.mean[BIAS])
         state = _moved(state, measured.t_ns, rate, self._gyro_noise)
+        way_m = self._way(measured)
         before, self._before = self._before, measured
         if self._per_count_m is None or not isinstance(before, VehicleSensors):
             return state
         if measured.t_ns <= before.t_ns:
             return state
         dt = (measured.t_ns - before.t_ns) / NS_PER_S
-        counts = measured.encoder_left - before.encoder_left
-        counts += measured.encoder_right - before.encoder_right
-        speed = 0.5 * counts * self._per_count_m / dt
+        speed = way_m / dt
         std = math.hypot(0.5 * self._per_count_m / dt, SLIP * speed)
         state = _corrected(state, np.array([speed - state.mean[V]]), _row(V), std**2 * np.eye(1))
-        if counts:
+        if way_m:
             self._turned_ns = measured.t_ns
         elif measured.t_ns - self._turned_ns > AT_REST_S * NS_PER_S:
             bias = np.array([measured.gyro_radps[2] - state.mean[BIAS]])

@@ -26,6 +26,7 @@ from scm.vehicles.car import Car
 from vehicle_agent.autonomy.control import Command
 from vehicle_agent.autonomy.grid_map import FREE, grid_of_cells, grid_of_city
 from vehicle_agent.autonomy.navigation import OWN, Navigator, Stack
+from vehicle_agent.autonomy.particle_filter import FOUND_SHARE, Localised
 from vehicle_agent.autonomy.perception import Perception, Whereabouts
 
 State = Literal["idle", "map", "localise", "plan", "drive", "recover", "parked", "failed"]
@@ -33,14 +34,11 @@ State = Literal["idle", "map", "localise", "plan", "drive", "recover", "parked",
 TOLERANCE_M, TOLERANCE_RAD = 0.03, 0.05
 """From the goal, within which the car stays: the published ones are 0.05 m and 0.0873 rad."""
 SILENT_NS = 1_000 * NS_PER_MS  # without a scan
-LOCALISE_NS = 2 * NS_PER_S  # until a pose must be known
+LOCALISE_NS = 1_500 * NS_PER_MS  # until a pose must be known
 PLAN_AGAIN_NS = 1 * NS_PER_S
 BLOCKED_NS = 20 * NS_PER_S  # until a blocked car gives up
 AMBIGUOUS_NS = 3 * NS_PER_S  # that two places may fit
-TURNED = (
-    "the scans fit the start only where the scanner looks backward: check how it is mounted, the "
-    "car file's [lidar], and --start"
-)
+UNFIT_NS = 20 * NS_PER_S  # that the scans may not fit the map, before it gives up
 SWEEP_NS = 140 * NS_PER_MS  # of the sweeps that `prepare` makes up
 ATTEMPTS = 40  # drives to a goal
 
@@ -122,16 +120,17 @@ class Parking:
         """Return the command for now."""
         if self._since_ns is None:
             self._since_ns = now_ns
-        here = self.perception.now()
-        silent_ns = now_ns - (self._scan_ns if self._scan_ns is not None else self._since_ns)
+        if self._scan_ns is None:
+            self._scan_ns = now_ns
+        here, silent_ns = self.perception.now(), now_ns - self._scan_ns
         if self.report.state in ("parked", "failed"):
             pass
         elif silent_ns > SILENT_NS:
             self._stand("recover", f"no LIDAR scan for {silent_ns // NS_PER_S} s", now_ns)
-        elif self.perception.is_turned:
-            self._stand("failed", TURNED, now_ns)
+        elif self.perception.mounting_problem:
+            self._stand("failed", self.perception.mounting_problem, now_ns)
         elif here is None or not here.is_known:
-            self._lose(now_ns)
+            self._lose(here, now_ns)
         elif self.report.state != "drive":
             self._plan(here, now_ns)
         else:
@@ -147,26 +146,31 @@ class Parking:
             self.report = Report(state, reason)
         self.navigator.stop()
 
-    def _lose(self, now_ns: int) -> None:
+    def _lose(self, here: Whereabouts | None, now_ns: int) -> None:
         """Stand until the pose is known again."""
-        found = self.perception.localised
+        found, jump_s = self.perception.localised, self.perception.clock_jump_s
         state: State = "localise" if self.report.state == "localise" else "recover"
         if self.report.state != state:
             self._since_ns = now_ns
         lost_ns = now_ns - (self._since_ns or 0)
         reason = "waits for a scan"
-        if found is not None and found.alternative is not None:
+        if found is None or here is None:
+            if jump_s is not None:
+                reason = f"the clock of its sensors jumped by {jump_s:+.0f} s: {reason}"
+        elif found.alternative is not None:
             one, other = sorted((found.pose, found.alternative))
             reason = f"two places fit the scans, {_words(one)} and {_words(other)}"
             if lost_ns > AMBIGUOUS_NS:
-                self._stand("failed", f"{reason}: give --start", now_ns)
+                self._stand("failed", f"{reason}: give --start, or --eye", now_ns)
                 return
-        elif found is not None:
-            std = math.sqrt(found.covariance[0, 0] + found.covariance[1, 1])
-            tenths = round(10.0 * found.explained.mean()) if len(found.explained) else 0
-            reason = f"about {10 * tenths} % of the echoes fit the map, place within {std:.1f} m"
+        else:
+            reason = _uncertainty(found)
         if lost_ns > LOCALISE_NS and state == "localise":
-            reason = f"does not know where it is: {reason}"
+            if found is not None and found.is_lost:
+                reason = f"the scans do not fit the map: {reason}; is it the map of this room?"
+                state = "failed" if lost_ns > UNFIT_NS else state
+            else:
+                reason = f"does not know where it is: {reason}"
         self._stand(state, reason, now_ns)
 
     def _plan(self, here: Whereabouts, now_ns: int) -> None:
@@ -223,6 +227,15 @@ class Parking:
     def _at_goal(self, here: Whereabouts) -> bool:
         off = self.goal.inverse() @ here.pose
         return math.hypot(off.x, off.y) < TOLERANCE_M and abs(wrap_angle(off.yaw)) < TOLERANCE_RAD
+
+
+def _uncertainty(found: Localised) -> str:
+    """Return why a place is not believed."""
+    if found.is_lost:
+        tenths = round(10.0 * found.explained.mean()) if len(found.explained) else 0
+        return f"about {10 * tenths} % of the echoes fit, {100 * FOUND_SHARE:.0f} % are expected"
+    std = math.sqrt(found.covariance[0, 0] + found.covariance[1, 1])
+    return f"the place is known within {std:.1f} m only"
 
 
 def _words(pose: Pose2) -> str:

@@ -2,7 +2,7 @@
 
 It drives a car that the world simulates, one with an agent of its own, and a real one alike: it
 subscribes to the map and to that car's sensors, never to where the world has it. Of a car's report
-of its state only motion that the Eye saw is used.
+of its state only motion that the Eye saw is used; with `use_eye`, the Eye's track of the car, too.
 """
 
 import logging
@@ -26,6 +26,7 @@ from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.bay_request import BayReply, BayRequest
 from scm.v2x.messages.cam import CamRx
 from scm.v2x.messages.costmap import Costmap
+from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.park_request import ParkReply, ParkRequest
@@ -63,6 +64,7 @@ class Wanted:
         spawn: Place at which it is put onto the map first, empty: any free one; None: it is there.
         car: Its car file.
         seed: Of all that is drawn.
+        use_eye: Whether it uses the Eye's poses of the car, too, where there are some.
     """
 
     vehicle: str
@@ -71,6 +73,7 @@ class Wanted:
     spawn: str | None = None
     car: str = "nigel"
     seed: int = 0
+    use_eye: bool = False
 
 
 class ParkPart(BasePart):
@@ -125,6 +128,7 @@ class ParkPart(BasePart):
             Subscription(LidarScan, own),
             Subscription(CamRx, {"receiver": wanted.vehicle}),
             Subscription(ParkingStatus),
+            *([Subscription(EyeTrack, own)] if wanted.use_eye else []),
         )
         self.services: Sequence[Service] = (Service(ParkRequest, own),)
         if city_map is not None:
@@ -193,6 +197,8 @@ class ParkPart(BasePart):
                 parking.sensors(message)
             elif isinstance(message, VehicleState):
                 parking.perception.state(message)
+            elif isinstance(message, EyeTrack):
+                parking.perception.eye.receive(message)
             elif isinstance(message, LidarScan) and not self._may_skip(now_ns):
                 self._scan_ns = now_ns
                 parking.scan(message, now_ns)
@@ -337,7 +343,8 @@ class ParkPart(BasePart):
         if self._refusal:
             return Report("failed", self._refusal)
         if self.parking is not None:
-            return self.parking.report
+            report = self.parking.report
+            return Report(report.state, report.reason or self.parking.perception.eye.problem)
         return Report("idle", f"no {'map' if self._map is None else 'goal'} yet")
 
     def _detail(self) -> str:

@@ -6,6 +6,7 @@ echoes, seen from it, lie on faces of the map (likelihood field):
     p(echo) = hit exp(-d^2 / (2 sigma^2)) + stray        d: from the echo to the nearest face
 
 Something that the map has not pulls no particle: away from all faces an echo is as likely anywhere.
+A pose that the Eye measured weighs particles likewise: one that is far from all of them pulls none.
 Echoes count less than they would if they were independent. Particles are drawn anew where few carry
 most of the weight, as many as keep the error of their distribution below a bound (KLD sampling).
 A car whose echoes do not fit the map any more is looked for everywhere: poses all over the floor
@@ -49,6 +50,18 @@ WIDTHS_M = (0.2, 0.1, 0.05)  # of faces, as a pose is looked for
 SEARCHED = 200  # poses on each square metre ...
 MOST_SEARCHED = 100_000
 TOGETHER_M, TOGETHER_RAD = 0.25, 0.4  # from the best particle: they mean the same place
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseMeasurement:
+    """A pose measured otherwise than by the scanner: rear axle, map frame.
+
+    Attributes:
+        covariance: Of x, y and yaw, (3, 3) [m, m, rad].
+    """
+
+    pose: Pose2
+    covariance: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,12 +120,15 @@ class ParticleFilter:
         """Look for the car on the whole floor at the next sweep."""
         self.is_global = True
 
-    def update(self, moved: Pose2, echoes: Floats) -> Localised:
+    def update(
+        self, moved: Pose2, echoes: Floats, seen: PoseMeasurement | None = None
+    ) -> Localised:
         """Return where the car is.
 
         Args:
             moved: From the last sweep to this one, in the car's frame at the last.
             echoes: (m, 2) of this sweep, car frame [m].
+            seen: The pose at this sweep, as somebody else measured it.
         """
         beams = self._chosen(echoes)
         if self.is_global and len(beams):
@@ -121,6 +137,8 @@ class ParticleFilter:
             self._move(moved)
         if len(beams):
             self._weigh(beams)
+        if seen is not None:
+            self._weigh_by(seen)
         weights = _normal(self._log_weights)
         found = self._localised(weights, echoes)
         self._unexplained = self._unexplained + 1 if found.is_lost else 0
@@ -166,6 +184,13 @@ class ParticleFilter:
         apart = _apart(self._particles, beams, grid.to_face_m, grid.cell_m, grid.x_m, grid.y_m)
         likelihood = np.log(np.exp(-0.5 * (apart / self._sigma_m) ** 2) + STRAY)
         self._log_weights = self._log_weights + INDEPENDENT * likelihood.sum(axis=1)
+
+    def _weigh_by(self, seen: PoseMeasurement) -> None:
+        """Weigh particles by a measured pose; one that is far from all of them pulls none."""
+        off = self._particles - np.array(seen.pose)
+        off[:, 2] = np.remainder(off[:, 2] + math.pi, TAU) - math.pi
+        squared = (off @ np.linalg.inv(seen.covariance) * off).sum(axis=1)
+        self._log_weights = self._log_weights + np.log(np.exp(-0.5 * squared) + STRAY)
 
     def _search(self, beams: Floats) -> None:
         """Set particles to the poses, of the whole floor, that fit the echoes best."""
@@ -223,6 +248,11 @@ class ParticleFilter:
         apart = _apart(np.array([pose]), echoes, grid.to_face_m, grid.cell_m, grid.x_m, grid.y_m)
         explained: Bools = apart[0] < OFF * self._sigma_m
         return explained
+
+
+def is_near(one: Pose2, other: Pose2) -> bool:
+    """Return whether two poses mean the same place."""
+    return bool(_near(np.array([one]), np.array(other))[0])
 
 
 def _near(particles: Floats, pose: Floats) -> Bools:

@@ -12,10 +12,23 @@ from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import Car
+from vehicle_agent.autonomy.eye_pose import EyePoses
 from vehicle_agent.autonomy.grid_map import GridMap
 from vehicle_agent.autonomy.obstacles import ObstacleLayer
-from vehicle_agent.autonomy.odometry import OdometryFilter, Seen, mount_of
-from vehicle_agent.autonomy.particle_filter import FOUND_SHARE, Localised, ParticleFilter
+from vehicle_agent.autonomy.odometry import (
+    CHECK_MOUNT,
+    CONTRARY_WORDS,
+    OdometryFilter,
+    Seen,
+    mount_of,
+)
+from vehicle_agent.autonomy.particle_filter import (
+    FOUND_SHARE,
+    Localised,
+    ParticleFilter,
+    PoseMeasurement,
+    is_near,
+)
 from vehicle_agent.autonomy.sweep import Sweep, deskewed, noise_of, sweep_of
 
 KNOWN_STD_M, KNOWN_STD_RAD = 0.05, 0.1
@@ -23,6 +36,7 @@ KNOWN_STD_M, KNOWN_STD_RAD = 0.05, 0.1
 JUMP_NS = NS_PER_S  # of a clock, in either direction
 NOISE_M = 0.025  # of a range, at first, where the car file has none
 NEWER = 0.2  # part of the noise measured in one sweep
+AS_WELL = 0.05  # of the echoes: scans that fit two places to within this fit both
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +69,8 @@ class Perception:
         noise_m: Standard deviation of a range, as it was measured.
         clock_jump_s: The last jump of the car's clock; None: none yet.
         steering_rad: Of the front wheels, as measured last.
-        is_turned: The first echoes fit the start only where the scanner looks backward.
+        mounting_problem: Why the scanner does not look ahead, in words; empty: nothing is known.
+        eye: Where the Eye sees the car, if somebody hands that over.
     """
 
     def __init__(self, car: Car, grid: GridMap, seed: int = 0) -> None:
@@ -72,11 +87,13 @@ class Perception:
         self.steering_rad = 0.0
         self._has_sensors = False
         self._start: Pose2 | None = None
-        self.is_turned = False
+        self._has_checked_mount = False
+        self.mounting_problem = ""
+        self.eye = EyePoses()
 
     def begin(self, pose: Pose2 | None) -> None:
         """Start at a pose that is roughly known; None: look for the car everywhere."""
-        self._start, self.is_turned = pose, False
+        self._start, self._has_checked_mount, self.mounting_problem = pose, False, ""
         if pose is None:
             self._filter.begin_anywhere()
         else:
@@ -104,8 +121,11 @@ class Perception:
         Raises:
             MessageError: when the message is damaged.
         """
-        self._check_clock(message.t_ns)
+        if self._check_clock(message.t_ns):
+            return None
         self._odometry.scan(message)
+        if self._odometry.is_contrary:
+            self.mounting_problem = f"{CONTRARY_WORDS}: {CHECK_MOUNT}"
         moved = self._odometry.at_sweep
         if moved is None or moved.t_ns != message.t_ns:
             return None
@@ -113,20 +133,47 @@ class Perception:
         sweep = sweep_of(message)
         self._measure_noise(sweep)
         echoes = deskewed(sweep, self._mount, moved.twist)
-        if self._start is not None and len(echoes):
-            self.is_turned = self._looks_backward(self._start, echoes)
-            self._start = None
-        found = self._filter.update(last.inverse() @ moved.pose, echoes)
+        seen = self.eye.at_sweep(moved)
+        self._check_mount(seen, echoes)
+        if seen is not None:
+            self._consult(seen, echoes)
+        found = self._filter.update(last.inverse() @ moved.pose, echoes, seen)
         self.localised = found
         if _is_known(found):
             self.obstacles.update(found.pose @ self._mount, _on_map(found.pose, echoes))
+            if seen is not None:
+                self.eye.compare(moved.t_ns, seen, found)
         return found
 
-    def _looks_backward(self, start: Pose2, echoes: Floats) -> bool:
-        """Return whether the echoes fit a start only with the scanner turned by half a circle."""
+    def _check_mount(self, seen: PoseMeasurement | None, echoes: Floats) -> None:
+        """Check once, where a pose is known otherwise, whether the scanner looks backward."""
+        pose, name = self._start, "the start"
+        if pose is None and seen is not None:
+            pose, name = seen.pose, "the pose by the Eye"
+        if pose is None or self._has_checked_mount or not len(echoes):
+            return
+        self._has_checked_mount = True
         backward = self._mount @ Pose2(0.0, 0.0, math.pi) @ self._mount.inverse()
-        turned = self._filter.fits(start @ backward, echoes)
-        return turned >= FOUND_SHARE > self._filter.fits(start, echoes)
+        turned = self._filter.fits(pose @ backward, echoes)
+        if turned >= FOUND_SHARE > self._filter.fits(pose, echoes):
+            problem = f"the scans fit {name} only where the scanner looks backward"
+            self.mounting_problem = f"{problem}: {CHECK_MOUNT}, and {name}"
+
+    def _consult(self, seen: PoseMeasurement, echoes: Floats) -> None:
+        """Begin where the Eye sees the car, if its place is not known and the scans fit there.
+
+        Likewise where the two disagree for long: scans that fit both places cannot decide.
+        """
+        found, least = self.localised, FOUND_SHARE
+        if not self._filter.is_global:
+            if found is None or is_near(found.pose, seen.pose):
+                return
+            if not found.is_lost:
+                least = max(least, float(found.explained.mean()) - AS_WELL)
+                if not self.eye.problem:
+                    return
+        if self._filter.fits(seen.pose, echoes) >= least:
+            self._filter.begin(seen.pose)
 
     def now(self) -> Whereabouts | None:
         """Return where the car is by the newest measurement; None before a sweep."""
@@ -146,12 +193,15 @@ class Perception:
             self._filter.set_noise(self.noise_m)
             self.obstacles.set_noise(self.noise_m)
 
-    def _check_clock(self, t_ns: int) -> None:
-        """Begin odometry anew where the car's clock jumped."""
+    def _check_clock(self, t_ns: int) -> bool:
+        """Begin odometry anew where the car's clock jumped; return whether it did."""
         newest, self._newest_ns = self._newest_ns, t_ns
-        if newest is not None and abs(t_ns - newest) > JUMP_NS:
-            self.clock_jump_s = (t_ns - newest) / NS_PER_S
-            self._odometry, self._last = OdometryFilter(self._car), None
+        if newest is None or abs(t_ns - newest) <= JUMP_NS:
+            return False
+        self.clock_jump_s = (t_ns - newest) / NS_PER_S
+        self._odometry, self._last = OdometryFilter(self._car), None
+        self.eye.begin_anew()
+        return True
 
 
 def _is_known(found: Localised) -> bool:

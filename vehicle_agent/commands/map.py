@@ -55,7 +55,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
     def show(report: Report) -> None:
         print(f"{vehicle}: {report.state}: {report.reason}", flush=True)
-        if report.state == "idle":
+        if report.state in ("idle", "failed"):
             stop_requested.set()
 
     with ZenohBus(
@@ -63,6 +63,8 @@ def _run(arguments: argparse.Namespace) -> int:
     ) as bus:
         part = MapPart(name, vehicle, arguments.car, drives=not arguments.watch, on_report=show)
         run(Leaving(part, stop_requested, done), bus, clock, done, on_tick=True)
+    if part.exploration.report.state == "failed":
+        raise RunError(part.exploration.report.reason)
     if part.exploration.grid is None:
         raise RunError(f"no LIDAR scan of {vehicle} came: no map was made")
     save_map(part.exploration.mapper.grid(), arguments.save)

@@ -23,6 +23,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--spawn", nargs="?", const="", type=place, metavar="PLACE",
         help="put the car onto the map first, there or at any free place",
     )  # fmt: skip
+    parser.add_argument(
+        "--eye", action="store_true", help="use the Eye's poses of the car, too, where it is seen"
+    )
     parser.add_argument("--car", default="nigel", help="its car file (%(default)s)")
     parser.add_argument(
         "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT",
@@ -50,8 +53,9 @@ def _run(arguments: argparse.Namespace) -> int:
     name = arguments.name or f"park-{vehicle}"
     name = check_name(name if credentials is None else credentials.station, "--name")
     wanted = Wanted(
-        vehicle, arguments.goal, arguments.start, arguments.spawn, arguments.car, arguments.seed
-    )
+        vehicle, arguments.goal, arguments.start, arguments.spawn, arguments.car, arguments.seed,
+        use_eye=arguments.eye,
+    )  # fmt: skip
     print("Preparing the planner (the first time this takes about a minute) ...", flush=True)
     prepare(load_car(arguments.car))
     stop_requested, done, clock = stop_on_signal(), threading.Event(), WallClock()

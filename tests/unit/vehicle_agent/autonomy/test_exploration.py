@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from scm.geometry import Pose2
 from scm.maps.load import load_map
@@ -7,14 +8,17 @@ from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
 from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.contact import Contact
+from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.vehicles.car import load_car
 from scm.world.part import WorldPart
-from vehicle_agent.autonomy.exploration import frontiers, next_view
+from tests.unit.vehicle_agent.autonomy.drives import driven
+from vehicle_agent.autonomy.exploration import Exploration, frontiers, next_view
 from vehicle_agent.autonomy.grid_map import FREE, OCCUPIED, UNKNOWN, grid_of_cells
 from vehicle_agent.autonomy.map_part import MapPart
 from vehicle_agent.autonomy.navigation import Navigator
 
+NIGEL = load_car("nigel")
 HERE = Pose2(0.5, 1.0, 0.0)
 
 
@@ -32,7 +36,7 @@ def test_frontier_lies_between_free_and_unknown():
 
 
 def test_next_view_is_near_the_frontier_on_free_floor():
-    path, middle = next_view(half_seen(), Navigator(load_car("nigel")), HERE, [])
+    path, middle = next_view(half_seen(), Navigator(NIGEL), HERE, [])
     x, y, _ = path.poses[-1]
     assert np.hypot(x - middle[0], y - middle[1]) < 0.6
     assert x < 1.0
@@ -40,12 +44,12 @@ def test_next_view_is_near_the_frontier_on_free_floor():
 
 def test_frontier_looked_at_before_is_left():
     grid = half_seen()
-    assert next_view(grid, Navigator(load_car("nigel")), HERE, frontiers(grid)) is None
+    assert next_view(grid, Navigator(NIGEL), HERE, frontiers(grid)) is None
 
 
 def test_nothing_is_left_in_a_room_that_is_known():
     grid = grid_of_cells(np.full((100, 100), FREE, np.int8), 0.02, 0.0, 0.0)
-    assert next_view(grid, Navigator(load_car("nigel")), HERE, []) is None
+    assert next_view(grid, Navigator(NIGEL), HERE, []) is None
 
 
 def test_car_maps_a_room_that_it_does_not_know():
@@ -77,6 +81,19 @@ def test_car_maps_a_room_that_it_does_not_know():
     assert [statuses[0].state, statuses[-1].state] == ["map", "idle"]
     assert statuses[-1].reason.startswith("mapped all that can be reached")
     assert {(one.x_m, one.goal_x_m) for one in statuses} == {(None, None)}
+
+
+def test_room_is_not_mapped_by_a_scanner_that_looks_backward():
+    drive, exploration = driven("parking_school", Pose2(-0.1, -0.35, 0.0)), Exploration(NIGEL)
+    for message in [m for m in drive.messages if m.t_ns < 3e9]:
+        if isinstance(message, LidarScan):
+            turned = replace(message, bearing_first_rad=np.pi)
+            exploration.scan(turned, message.t_ns)
+            exploration.check_scans(message.t_ns)
+        else:
+            exploration.sensors(message)
+    assert exploration.report.state == "failed"
+    assert "the other way than its wheels" in exploration.report.reason
 
 
 @pytest.mark.parametrize("drives", [True, False])

@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from scm.errors import CarError
 from scm.geometry import Pose2
@@ -135,6 +136,21 @@ def test_wheels_that_spin_at_a_wall_are_noticed():
     assert turned_m > 0.3
     assert way_m(drive) < 0.05
     assert drift(drive)[0] < 0.25 * turned_m
+    assert not replayed(drive.messages).is_contrary
+
+
+@pytest.mark.parametrize("by_the_eye", [False, True])
+def test_scanner_that_looks_backward_contradicts_the_wheels_or_the_eye(by_the_eye):
+    drive = driven("parking_school", MIDDLE)
+    messages = seen_by_the_eye(drive) if by_the_eye else drive.messages
+    turned = [
+        replace(m, bearing_first_rad=math.pi) if isinstance(m, LidarScan) else m
+        for m in messages
+        if m.t_ns < 3e9
+    ]
+    assert replayed(turned).is_contrary
+    assert not replayed([m for m in turned if m.t_ns < 1e9]).is_contrary  # it stood
+    assert not replayed(messages).is_contrary
 
 
 def test_older_messages_are_ignored():

@@ -3,7 +3,9 @@ import pytest
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RunError
+from scm.eye.part import EyePart
 from scm.maps.load import load_map
+from scm.maps.route import roads_of
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
 from scm.v2x.message import Refused
@@ -18,7 +20,7 @@ from vehicle_agent.agent import AgentPart
 from vehicle_agent.autonomy.part import ParkPart, Wanted
 from vehicle_agent.autonomy.shown import SHOWN
 
-OBSTACLES = load_map("parking_school_obstacles")
+SCHOOL, OBSTACLES = load_map("parking_school"), load_map("parking_school_obstacles")
 
 
 def drive(wanted, lasts_s, seed=1):
@@ -109,6 +111,17 @@ def test_same_seed_gives_equal_bits():
     assert len(runs[0]) > 20
     assert runs[0] == runs[1]
     assert any(command.throttle for command in runs[0])
+
+
+def test_eye_says_where_a_car_is_in_a_room_that_looks_the_same_from_two_places():
+    part, world = ParkPart("park-n1", Wanted("n1", "goal", use_eye=True)), WorldPart(SCHOOL, 1, ())
+    with Lockstep([world, part, EyePart(SCHOOL, seed=1)]) as city:
+        car = world.world.host("n1", "nigel", roads_of(SCHOOL).spawn_pose("d"), 0)
+        city.run_for(0.8)
+        here = part.parking.perception.now()
+        assert here.is_known
+        assert np.hypot(*(car.pose.inverse() @ here.pose)[:2]) < 0.02
+        assert part.parking.report.state == "drive"
 
 
 def test_car_with_an_agent_of_its_own_parks_where_there_are_no_lanes():

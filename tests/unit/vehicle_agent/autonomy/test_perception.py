@@ -94,11 +94,11 @@ def test_clock_that_jumps_costs_one_sweep(hours):
 def test_scanner_that_looks_backward_is_noticed_at_the_first_sweep():
     drive = driven("parking_school_obstacles", MIDDLE)
     first = drive.scans[0]
-    assert not replayed([first]).is_turned
+    assert replayed([first]).mounting_problem == ""
     turned = replace(first, bearing_first_rad=first.bearing_first_rad + math.pi)
-    assert replayed([turned]).is_turned
-    assert not replayed([turned], begun=None).is_turned
-    assert not replayed([first], begun=Pose2(0.3, 0.3, 2.0)).is_turned
+    assert "looks backward" in replayed([turned]).mounting_problem
+    assert replayed([turned], begun=None).mounting_problem == ""
+    assert replayed([first], begun=Pose2(0.3, 0.3, 2.0)).mounting_problem == ""
 
 
 @pytest.mark.parametrize(("source", "speed"), [("eye", 0.2), ("simulated", 0.0)])
