@@ -9,6 +9,10 @@ preferences, but limits and equations as constraints that hold exactly. It begin
 result: so both pass obstacles on the same side, the difference in cost is what the band left, and
 Ipopt's time is a lower bound. Problems with boxes are left out: the grid is not smooth enough for
 it.
+
+Then the band beside model predictive path integral control (MPPI): each car is where its last plan
+said, but it stands where the navigator would stop it. And what the rollouts cost: cars of
+`nigel.toml` on random commands, by horizon and substep, and how far they are off those of 1 ms.
 """
 
 import importlib.util
@@ -24,10 +28,16 @@ from vehicle_agent.autonomy import band_solver as solver
 from vehicle_agent.autonomy import elastic_band
 from vehicle_agent.autonomy.elastic_band import ElasticBand
 from vehicle_agent.autonomy.grid_map import FREE, OCCUPIED, grid_of_cells
+from vehicle_agent.autonomy.moving import comes_near
+from vehicle_agent.autonomy.mppi import STEP_S, ModelCars, PathIntegral
+from vehicle_agent.autonomy.navigation import LOOK_AHEAD_S, STOP_M
+from vehicle_agent.autonomy.outline import outline_clearance, room, scene_of
 from vehicle_agent.autonomy.plan import Path, limits_of
+from vehicle_agent.autonomy.response import response_of
 from vehicle_agent.autonomy.trajectory_check import is_free
 
-CAR = limits_of(load_car("nigel"))
+NIGEL = load_car("nigel")
+CAR, RESPONSE = limits_of(NIGEL), response_of(NIGEL)
 BEND = 1.0 / 0.26
 REPLAN_S, LONGEST_S = 0.1, 30.0
 RUNS = 3
@@ -207,8 +217,82 @@ def compared(problem: Problem) -> str:
             f" {1e3 * seconds:6.0f} ms")  # fmt: skip
 
 
+def followed(problem: Problem, local) -> tuple:
+    """Return times of plans [s], arrival [s], plans that stopped the car, least clearance [m]."""
+    grid, path, scene = grid_of(problem), path_of(problem), scene_of(grid_of(problem), CAR)
+    moving = np.array(problem.moving).reshape(-1, 5)
+    state, t, spent, stops, least = (problem.start, 0.0, 0.0), 0.0, [], 0, math.inf
+    while t < LONGEST_S:
+        now = moving.copy()
+        now[:, :2] += t * now[:, 2:4]
+        begin = time.process_time()
+        way = local.plan(grid, path, *state, now, t)
+        spent.append(time.process_time() - begin)
+        least = min(least, outline_clearance(scene, state[0]), *(gap(state[0], one) for one in now))
+        is_over = way.times_s[-1] < REPLAN_S or abs(state[1]) < 0.02
+        if is_over and math.dist(state[0][:2], path.poses[-1, :2]) < 0.02:
+            break
+        soon = way.times_s <= LOOK_AHEAD_S
+        poses, when = way.poses[soon], way.times_s[soon]
+        stops_now = comes_near(poses, when, now, CAR) or np.isinf(room(scene, poses, STOP_M)).any()
+        stops += bool(stops_now)
+        state = (state[0], 0.0, state[2]) if stops_now else at(way, REPLAN_S)
+        t += REPLAN_S
+    return spent, t, stops, least
+
+
+def gap(pose: Pose2, disc) -> float:
+    """Return how far the outline is from a moving disc [m]."""
+    ahead, beside = pose.inverse().apply(disc[0], disc[1])
+    beyond = max(CAR.rear_m - ahead, 0.0, ahead - CAR.front_m)
+    return math.hypot(beyond, max(CAR.right_m - beside, 0.0, beside - CAR.left_m)) - disc[4]
+
+
+def compare_planners() -> None:
+    """Print the band beside MPPI."""
+    print(f"\n{'problem':24} {'planner':7} median   p99 ms   arrived s   stops   clearance mm")
+    planners = {
+        "band": lambda: ElasticBand(CAR, margin_m=0.04),
+        "MPPI": lambda: PathIntegral(NIGEL, CAR, RESPONSE),
+    }
+    for name, problem in PROBLEMS.items():
+        for kind, made in planners.items():
+            spent, t, stops, least = followed(problem, made())
+            middle, high = np.percentile(1e3 * np.array(spent[1:]), (50, 99))
+            arrived = f"{t:9.1f}" if t < LONGEST_S else "    never"
+            print(f"{name:24} {kind:7} {middle:6.1f} {high:7.1f} {arrived} {stops:9d}"
+                  f" {1e3 * least:12.0f}", flush=True)  # fmt: skip
+
+
+def time_rollouts() -> None:
+    """Print what rollouts cost."""
+    rng, exact = np.random.default_rng(0), {}
+    print("\ncars   horizon s   substep ms   ms    rollouts a second   off 1 ms: median, most mm")
+    for cars, horizon, substep in ((127, 4.0, 0.001), (127, 4.0, 0.005), (127, 4.0, 0.01),
+                                   (127, 4.0, 0.02), (511, 1.5, 0.01), (1023, 1.5, 0.01),
+                                   (511, 4.0, 0.01)):  # fmt: skip
+        shape = (round(horizon / STEP_S), cars)
+        steady = rng.uniform(-0.7, 0.7, (1, cars)) + 0.1 * rng.standard_normal(shape)
+        commands = np.stack((steady, 0.5 * rng.standard_normal(shape)), axis=2)
+        model, spent = ModelCars(NIGEL, cars, substep), []
+        for _ in range(5):
+            model.begin(Pose2(0.0, 0.0, 0.0), 0.1, 0.0, 0.0)
+            begin = time.process_time()
+            states, _ = model.drive(commands)
+            spent.append(time.process_time() - begin)
+        error = ""
+        if (cars, horizon) == (127, 4.0):
+            exact.setdefault("commands", commands), exact.setdefault("states", states)
+            states, _ = model.drive(exact["commands"])
+            off = 1e3 * np.hypot(*(states - exact["states"])[:, :2].swapaxes(0, 1))
+            error = f"{np.median(off):10.2f} {off.max():6.2f}"
+        took = float(np.median(spent))
+        print(f"{cars:4d} {horizon:10.1f} {1e3 * substep:12.0f} {1e3 * took:7.1f}"
+              f" {cars / took:12.0f} {error}", flush=True)  # fmt: skip
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     drive(PROBLEMS["crossing obstacle"])  # compiles
     print(f"{'':24} first   replan ms      arrived         band: cost       Ipopt: cost")
     print(
@@ -220,6 +304,8 @@ def main() -> None:
         later = 1e3 * np.concatenate([run[1] for run in runs])
         print(f"{name:24} {first:5.1f} {np.median(later):6.2f} {np.percentile(later, 99):5.1f}"
               f" {runs[0][2]:7.1f} {runs[0][3]:7d} {compared(problem)}", flush=True)  # fmt: skip
+    compare_planners()
+    time_rollouts()
 
 
 if __name__ == "__main__":

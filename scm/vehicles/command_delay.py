@@ -42,8 +42,8 @@ class CommandHistory:
         self._newest[row] = 0
         self._before[row] = throttle, math.nan if steering is None else steering
 
-    def copy_row(self, source: int, row: int) -> None:
-        """Copy one car's history to another row."""
+    def copy_row(self, source: int, row: int | slice) -> None:
+        """Copy one car's history to another row, or to several."""
         for array in (self._knots, self._newest, self._before):
             array[row] = array[source]
 

@@ -210,8 +210,8 @@ class Fleet:
 
         Lags and servo start in steady state at `steer_angle` [rad] and `throttle`; a trim adds its
         angle to the servo's. Commands start at zero and the battery at its nominal voltage, so
-        write commands after placing. With `keep_actuators` lags and servo keep their state and
-        `steer_angle` and `throttle` are ignored.
+        write commands after placing. With `keep_actuators` lags keep their state, and so does the
+        servo where no `steer_angle` is given; `throttle` is ignored.
 
         Raises:
             RunError: when there is no such row.
@@ -238,7 +238,8 @@ class Fleet:
             self._set(row, name, at_rest.get(VARIABLES[name].starts_at) or initial)
         self._set(row, "steer_angle", steer_angle or 0.0)
         for name in actuators if keep_actuators else ():
-            self._set(row, name, actuators[name])
+            if steer_angle is None or VARIABLES[name].starts_at != "steer":
+                self._set(row, name, actuators[name])
         self._roll(row, shape, speed, yaw_rate)
         self.status[row] = VehicleStatus.OK
         if self._history is not None and not keep_actuators:
@@ -257,10 +258,10 @@ class Fleet:
         shares = np.array([front, front, 1.0 - front, 1.0 - front])
         car[offset : offset + 4] = 0.5 * shape.mass * GRAVITY * shares
 
-    def copy_row(self, source: int, row: int) -> None:
-        """Copy a car with its numbers and its whole state to another row."""
+    def copy_row(self, source: int, row: int | slice) -> None:
+        """Copy a car with its numbers and its whole state to another row, or to several."""
         for array in (self._block, self._numbers):
-            array[:, row] = array[:, source]
+            array.T[row] = array[:, source]
         self.alive[row], self.status[row] = self.alive[source], self.status[source]
         if self._history is not None:
             self._history.copy_row(source, row)

@@ -132,6 +132,9 @@ class Tracker:
     Args:
         limits: Of the car; `response`: how it answers to commands.
         controller: Of steering: a key of `CONTROLLERS`.
+
+    Attributes:
+        sent: The commands of the last second: when [ns], what, and for which speed [m/s].
     """
 
     def __init__(self, limits: CarLimits, response: Response, controller: str = "lqr") -> None:
@@ -143,7 +146,7 @@ class Tracker:
         self._ready_ns: int | None = None
         self._integral = self._trim_rad = self._wheel_rad = 0.0
         self._before_ns: int | None = None
-        self._sent = deque[tuple[int, Command, float]]()
+        self.sent = deque[tuple[int, Command, float]]()
         self._target = 0.0
 
     @property
@@ -192,10 +195,10 @@ class Tracker:
             self._learn_trim(now_ns, dt, speed_mps, yaw_rate_radps)
         self._target = 0.0
         wanted = self._wanted(now_ns, pose, speed_mps, steering_rad, min(max(dt, 0.0), 0.1))
-        self._sent.append((now_ns, wanted, self._target))
+        self.sent.append((now_ns, wanted, self._target))
         oldest_ns = now_ns - round(1.0 * NS_PER_S)
-        while self._sent and self._sent[0][0] < oldest_ns:
-            self._sent.popleft()
+        while self.sent and self.sent[0][0] < oldest_ns:
+            self.sent.popleft()
         return wanted
 
     def _wanted(
@@ -276,7 +279,7 @@ class Tracker:
 
     def _sent_at(self, t_ns: int, before: Command) -> tuple[Command, float]:
         """Return the command at a time, and the speed that it was for."""
-        for sent_ns, command, target in reversed(self._sent):
+        for sent_ns, command, target in reversed(self.sent):
             if sent_ns <= t_ns:
                 return command, target
         return before, 0.0

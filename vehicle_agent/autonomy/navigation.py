@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scm.clock import NS_PER_S
-from scm.errors import PathError
+from scm.errors import PathError, RunError
 from scm.geometry import Pose2
 from scm.vehicles.car import Car
 from scm.vehicles.driver import Other
@@ -19,10 +19,11 @@ from vehicle_agent.autonomy.control import Command, Tracker
 from vehicle_agent.autonomy.elastic_band import ElasticBand
 from vehicle_agent.autonomy.grid_map import GridMap
 from vehicle_agent.autonomy.moving import comes_near, discs_of
+from vehicle_agent.autonomy.mppi import PathIntegral
 from vehicle_agent.autonomy.outline import outline_clearance, room, scene_of
 from vehicle_agent.autonomy.perception import Whereabouts
 from vehicle_agent.autonomy.plan import CarLimits, Path, Trajectory, limits_of
-from vehicle_agent.autonomy.response import response_of
+from vehicle_agent.autonomy.response import Response, response_of
 
 MARGINS_M = (0.05, 0.03, 0.01)  # that paths leave, the first that there is a path with
 WANTED_M = 0.04  # of the band, where there is room
@@ -52,15 +53,19 @@ class Stack:
     Attributes:
         planner: Of paths.
         controller: A key of `scm`'s `CONTROLLERS`.
+        local: The local planner: `band` or `mppi`.
     """
 
     planner: Planner = _hybrid
     controller: str = "lqr"
+    local: str = "band"
 
 
 OWN = Stack()
 PUBLISHED = Stack(_points, "paper")
 """A* on a grid of 0.05 m and two constant gains, as the AutoDRIVE paper has them."""
+MPPI = Stack(local="mppi")
+"""The local planner drives the car file's own compiled cars ahead."""
 
 
 class Navigator:
@@ -79,6 +84,7 @@ class Navigator:
 
     Raises:
         CarError: when the car file lacks what is needed.
+        RunError: when the stack's local planner is unknown.
     """
 
     def __init__(self, car: Car, stack: Stack = OWN) -> None:
@@ -90,7 +96,14 @@ class Navigator:
         self.way: Trajectory | None = None
         self._tracker = Tracker(self.limits, response, stack.controller)
         self._stop_m = STOP_M
-        self._band = ElasticBand(self.limits, margin_m=WANTED_M)
+        self._local = self._local_planner(car, response, stack.local)
+
+    def _local_planner(self, car: Car, response: Response, name: str) -> ElasticBand | PathIntegral:
+        if name == "band":
+            return ElasticBand(self.limits, margin_m=WANTED_M)
+        if name == "mppi":
+            return PathIntegral(car, self.limits, response, self._tracker.sent)
+        raise RunError(f"local planner of a stack: expected 'band' or 'mppi', got {name!r}")
 
     @property
     def is_done(self) -> bool:
@@ -100,7 +113,7 @@ class Navigator:
     @property
     def candidates(self) -> tuple[Trajectory, ...]:
         """Other ways to drive on that were compared when `way` was planned."""
-        return () if self.way is None else self._band.candidates
+        return () if self.way is None else self._local.candidates
 
     @property
     def _caution_m(self) -> float:
@@ -130,7 +143,7 @@ class Navigator:
     def replan(self, grid: GridMap, here: Whereabouts, steering_rad: float) -> None:
         """Plan the next stretch of the path from where the car is, on the grid as it is now."""
         if self.path is not None:
-            self.way = self._band.plan(
+            self.way = self._local.plan(
                 grid, self.path, here.pose, here.speed_mps, steering_rad, discs_of(self.others),
                 here.t_ns / NS_PER_S,
             )  # fmt: skip

@@ -243,7 +243,7 @@ def _words(pose: Pose2) -> str:
     return f"{pose.x:.2f},{pose.y:.2f},{round(math.degrees(pose.yaw))}"
 
 
-def prepare(car: Car) -> None:
+def prepare(car: Car, stack: Stack = OWN) -> None:
     """Compile or load everything that a drive needs, so that no step of one takes long.
 
     Raises:
@@ -251,7 +251,7 @@ def prepare(car: Car) -> None:
     """
     start, goal = Pose2(1.0, 1.0, 0.0), Pose2(1.7, 1.3, 0.5)
     grid = grid_of_cells(np.full((250, 250), FREE, np.int8), 0.01, 0.0, 0.0)
-    navigator, here = Navigator(car), Whereabouts(0, start, 0.0, 0.0, is_known=True)
+    navigator, here = Navigator(car, stack), Whereabouts(0, start, 0.0, 0.0, is_known=True)
     navigator.follow(navigator.path_to(grid, start, goal), grid, here, 0.0)
     navigator.is_blocked(grid)
     perception = Perception(car, grid)

@@ -186,6 +186,22 @@ def test_a_row_restarts_elsewhere_with_its_actuators_as_they_were():
     assert fleet.speed[0] > fleet.speed[1]  # its throttle lag was already filled
 
 
+def test_a_row_restarts_with_a_measured_steering_angle_and_its_lags_as_they_were():
+    fleet = Fleet(load_car("dart"), 4)
+    rows = [fleet.add(Pose2(0.0, 0.0, 0.0), 1.0) for _ in range(2)]
+    fleet.throttle[:], fleet.steering[:] = 0.4, 0.8
+    fleet.advance(0.05)
+    fleet.place(rows[0], Pose2(0.0, 0.0, 0.0), 1.0, steer_angle=-0.1, keep_actuators=True)
+    fleet.place(rows[1], Pose2(0.0, 0.0, 0.0), 1.0, steer_angle=-0.1)
+    assert fleet.steer_angle[0] == fleet.steer_angle[1] == -0.1
+    fleet.throttle[:] = 0.4
+    fleet.advance(0.002)
+    assert fleet.speed[0] > fleet.speed[1]
+    fleet.copy_row(rows[0], slice(2, 4))
+    assert fleet.speed[2] == fleet.speed[3] == fleet.speed[0]
+    assert fleet.alive[2:].all()
+
+
 def test_a_rollout_in_steps_of_no_whole_substeps_is_refused_with_the_nearest_that_fit(fleet):
     words = r"steps of 0\.005 s .* substeps of 0\.002 s: .* steps of 0\.004 s or 0\.006 s, or"
     with pytest.raises(RunError, match=words + r" substeps of 0\.0025 s"):
