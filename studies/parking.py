@@ -18,7 +18,7 @@ from scm.clock import NS_PER_S
 from scm.errors import PathError
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.route import roads_of
-from scm.records.city_map import Box, CityMap, Wall
+from scm.records.city_map import Box, CityMap, Point, Wall
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Part, Subscription
 from scm.study.case import Case
@@ -44,7 +44,7 @@ RANGE_STD_M, DRIVE_STD_MPS, STEERING_STD_RAD = 0.025, 0.013, 0.018
 WALL_STD_M, WALL_STD_RAD = 0.01, 0.087
 """Perturbations of the AutoDRIVE paper, and the tolerances of its planner."""
 TOP_SPEED_MPS, FULL_STEERING_RAD = 0.267, 0.5236
-MODULE_M = 0.5  # length of a wall's module
+MODULE_M, BEHIND_M = 0.5, 0.02  # length of a wall's module; of a traced face, what is behind it
 KNOWN_STD = (0.05, 0.05, 0.1)  # of the start [m, m, rad]
 LASTS_S, STEP_S = 90.0, 0.02
 START_ROOM_M, BOX_M, BOX_ROOM_M = 0.04, (0.06, 0.16), 0.25
@@ -71,7 +71,7 @@ CONCEALED["all"] = (
 def run(
     case: Case, perturbation: float = 1.0, boxes: int = 0, crossing: bool = False,
     goal: str = "goal", concealed: str = "nothing", car_file: str = "nominal",
-    engine: str = "city",
+    engine: str = "city", stack: str = "own", room: str = "", start: str = "",
 ) -> dict[str, float]:  # fmt: skip
     """Return whether the car parked, and how well.
 
@@ -80,30 +80,45 @@ def run(
         perturbation: By how much the paper's perturbations are scaled.
         boxes: How many stand about that the map has not.
         crossing: Whether another car drives through the room, and stops at its other side.
-        goal: Place to park at.
+        goal: Place to park at; in a scanned room one beside a wall is drawn.
         concealed: What the car has that the nominal file lacks: a key of `CONCEALED`.
         engine: What moves the car: the city, or an engine of `tests/reality`.
         car_file: The agent's: `nominal`, or `true`, as identification of the car would return it.
+        stack: The agent's planner and controller: `own`, or `published`, as the AutoDRIVE paper's.
+        room: Instead of the study's map: `lot`, a random parking lot; a map by name or path; or a
+            scanned room's `.yaml`.
+        start: Place about which the car starts; empty: anywhere.
     """
     rng = case.generator("parking")
     nominal = load_car(CAR)
     car = with_effect(nominal, concealed)
-    limits, target = response_of(car).limited(limits_of(car)), roads_of(case.map).spawn_pose(goal)
-    start, world_map = _scene(case.map, perturbation, limits, target, boxes, rng)
-    wanted = Wanted(VEHICLE, goal=_text(target), start=_text(_off(start, rng)), seed=case.seed)
+    limits = response_of(car).limited(limits_of(car))
+    if room:
+        from studies.rooms import room_named  # noqa: PLC0415  needs a clone
+
+        city_map, target, draw = room_named(room, goal, limits, case.generator("room"))
+    else:
+        city_map, draw = case.map, partial(on_floor, case.map)
+        target = roads_of(city_map).spawn_pose(goal)
+    if start:
+        draw = partial(_off, roads_of(city_map).spawn_pose(start))
+    begin, world_map = _scene(city_map, perturbation, limits, target, boxes, rng, draw)
+    wanted = Wanted(
+        VEHICLE, goal=_text(target), start=_text(_off(begin, rng)), seed=case.seed, stack=stack
+    )
     with varied_cars({CAR: car if car_file == "true" else nominal}):
-        agent = ParkPart("park", wanted, city_map=case.map)
+        agent = ParkPart("park", wanted, city_map=city_map)
     noisy_agent = _Noisy(agent, perturbation, rng)
     with varied_cars({CAR: car.with_values({"lidar.noise_m": perturbation * RANGE_STD_M})}):
         world = WorldPart(world_map, case.seed)
-        cross = partial(_Crossing, world, start, target, rng) if crossing else None
+        cross = partial(_Crossing, world, begin, target, rng) if crossing else None
         if engine == "city":
-            put = partial(world.world.host, VEHICLE, CAR, start, 0)
+            put = partial(world.world.host, VEHICLE, CAR, begin, 0)
             return _park(case, [world, noisy_agent], agent, put, target, cross)
         from studies.reality_body import RealityBody  # noqa: PLC0415  needs a clone
 
         body = RealityBody(engine, concealed, LASTS_S, case.generator("reality"))
-        driven = AgentPart(VEHICLE, CAR, _text(start), body=BodyKind("remote", lambda *_: body))
+        driven = AgentPart(VEHICLE, CAR, _text(begin), body=BodyKind("remote", lambda *_: body))
         parts = [world, driven, noisy_agent]
         return _park(case, parts, agent, lambda: body, target, cross)
 
@@ -203,15 +218,17 @@ class _Crossing:
 
 def perturbed(city_map: CityMap, scale: float, rng: np.random.Generator) -> CityMap:
     """Return a map whose walls stand in modules, each a little off."""
-    walls = tuple(
-        _shifted(module, scale, rng) for wall in city_map.walls for module in _modules(wall)
-    )
-    return replace(city_map, walls=walls)
+    modules = (module for wall in city_map.walls for module in _modules(wall))
+    shifted = (_shifted(module, scale, rng) for module in modules)
+    return replace(city_map, walls=tuple(wall for one in shifted for wall in _solid(one)))
 
 
 def _modules(wall: Wall) -> Iterator[Wall]:
-    """Yield straight pieces of a wall."""
+    """Yield straight pieces of a wall; of one that was traced from a scan, pieces of its line."""
     points = [*wall.points, wall.points[0]] if wall.closed else list(wall.points)
+    if wall.thickness_m == 0.0:
+        yield from _traced(wall, points)
+        return
     for (x0, y0), (x1, y1) in itertools.pairwise(points):
         count = max(1, round(math.hypot(x1 - x0, y1 - y0) / MODULE_M))
         for k in range(count):
@@ -222,8 +239,21 @@ def _modules(wall: Wall) -> Iterator[Wall]:
             yield replace(wall, points=ends, closed=False)
 
 
+def _traced(wall: Wall, points: list[Point]) -> Iterator[Wall]:
+    """Yield pieces about as long as a module of a line through points; corners stay in them."""
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(np.array(points), axis=0).T)))
+    count = max(1, round(along[-1] / MODULE_M))
+    for low, high in itertools.pairwise(np.linspace(0.0, along[-1], count + 1)):
+        inner = [point for at, point in zip(along, points, strict=True) if low < at < high]
+        ends = [
+            tuple(float(np.interp(at, along, one)) for one in zip(*points, strict=True))
+            for at in (low, high)
+        ]
+        yield replace(wall, points=(ends[0], *inner, ends[1]), closed=False)
+
+
 def _shifted(module: Wall, scale: float, rng: np.random.Generator) -> Wall:
-    (x0, y0), (x1, y1) = module.points
+    (x0, y0), (x1, y1) = module.points[0], module.points[-1]
     middle = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
     shift = scale * WALL_STD_M * rng.standard_normal(2)
     turn = Pose2(0.0, 0.0, scale * WALL_STD_RAD * rng.standard_normal())
@@ -234,9 +264,24 @@ def _shifted(module: Wall, scale: float, rng: np.random.Generator) -> Wall:
     return replace(module, points=tuple(points))
 
 
+def _solid(wall: Wall) -> Iterator[Wall]:
+    """Yield a wall; of a traced face, which has the room on its left, what stands behind it.
+
+    Else nothing would be seen of its end, and the scanner would miss it where it looks along it.
+    """
+    if wall.thickness_m > 0.0:
+        yield wall
+        return
+    for (x0, y0), (x1, y1) in itertools.pairwise(wall.points):
+        half = 0.5 * BEHIND_M / max(math.hypot(x1 - x0, y1 - y0), 1e-9)
+        dx, dy = half * (y1 - y0), half * (x0 - x1)
+        ends = (x0 + dx, y0 + dy), (x1 + dx, y1 + dy)
+        yield replace(wall, points=ends, thickness_m=BEHIND_M)
+
+
 def _scene(
     city_map: CityMap, perturbation: float, limits: CarLimits, goal: Pose2, boxes: int,
-    rng: np.random.Generator,
+    rng: np.random.Generator, draw: Callable[[np.random.Generator], Pose2],
 ) -> tuple[Pose2, CityMap]:  # fmt: skip
     """Return a start from which the goal can be reached, and the room as it is."""
     floor = city_map.floor
@@ -258,10 +303,7 @@ def _scene(
             changed, boxes=tuple(replace(box, mapped=True) for box in changed.boxes)
         )
         grid = grid_of_city(all_mapped)
-        start = Pose2(
-            float(rng.uniform(*floor.x_m)), float(rng.uniform(*floor.y_m)),
-            float(rng.uniform(-math.pi, math.pi)),
-        )  # fmt: skip
+        start = draw(rng)
         if outline_clearance(scene_of(grid, limits), start) < START_ROOM_M:
             continue
         try:
@@ -272,7 +314,17 @@ def _scene(
     raise PathError(f"no start from which the goal can be reached in {TRIES} draws")
 
 
+def on_floor(city_map: CityMap, rng: np.random.Generator) -> Pose2:
+    """Draw a pose anywhere on a map's floor."""
+    floor = city_map.floor
+    return Pose2(
+        float(rng.uniform(*floor.x_m)), float(rng.uniform(*floor.y_m)),
+        float(rng.uniform(-math.pi, math.pi)),
+    )  # fmt: skip
+
+
 def _off(start: Pose2, rng: np.random.Generator) -> Pose2:
+    """Draw a pose about another, as well as it is known."""
     return Pose2(*(np.array(start) + KNOWN_STD * rng.standard_normal(3)).tolist())
 
 

@@ -13,7 +13,7 @@ of the way, psi the heading's error, d = +1 forward and -1 backward, kappa the w
 The LQR is that of e'' = kappa over distance, in closed form. A piece of the way between two cusps
 is driven to its end, then the wheels turn at rest to where the next piece begins.
 Source: Coulter, CMU-RI-TR-92-01 (pure pursuit); Hoffmann et al., ACC 2007 (Stanley); the paper's
-own law, throttle = v / 0.26 and steering = delta / 0.5236 without feedback, is "paper".
+own law, throttle = v / 0.26 and steering = delta / 0.5236 at 5 Hz, without feedback, is "paper".
 """
 
 import math
@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scm.arrays import Floats, Ints
-from scm.clock import NS_PER_S
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import Pose2, wrap_angle
 from scm.vehicles.lights import Headlights, Indicators
 from vehicle_agent.autonomy.plan import CarLimits, Trajectory
@@ -33,7 +33,7 @@ from vehicle_agent.autonomy.response import Response
 FADE_M = 0.15  # w: errors fade over some such distances
 AHEAD_M = 0.12
 STANLEY_GAIN, STANLEY_SOFT_MPS = 1.0, 0.05
-PAPER_SPEED_MPS = 0.26
+PAPER_SPEED_MPS, PAPER_STEERING_RAD, PAPER_PERIOD_NS = 0.26, 0.5236, 200 * NS_PER_MS
 END_M = 0.004  # from the end of a piece, where it is done
 CREEP_MPS = 0.03
 STOPPING_MPS2 = 0.1  # towards the end of a piece
@@ -189,6 +189,10 @@ class Tracker:
             steering_rad: Of the front wheels, now, + = left.
             yaw_rate_radps: Now; with it the controller learns how far the wheels are off.
         """
+        if self._has_constant_gains and self.sent and not self.is_done:
+            sent_ns, last, _ = self.sent[-1]
+            if 0 <= now_ns - sent_ns < PAPER_PERIOD_NS:
+                return last
         dt = 0.0 if self._before_ns is None else (now_ns - self._before_ns) / NS_PER_S
         self._before_ns = now_ns
         if yaw_rate_radps is not None:
@@ -225,9 +229,10 @@ class Tracker:
         curvature = self._steer(way, self._at, place, predicted, speed, self._limits)
         angle = math.atan(self._limits.wheelbase_m * curvature)
         angle = max(-self._limits.steering_rad, min(self._limits.steering_rad, angle))
-        if self._turns_at_rest(now_ns, angle - wheel, speed):
+        turn = 0.0 if self._has_constant_gains else angle - wheel
+        if self._turns_at_rest(now_ns, turn, speed):
             return Command(0.0, self._steering_for(angle))
-        target = self._speed(way, left, angle - wheel)
+        target = self._speed(way, left, turn)
         self._target = gear * target
         throttle = self._throttle(now_ns, speed, then, dt)
         return Command(throttle, self._steering_for(angle))
@@ -237,7 +242,7 @@ class Tracker:
     ) -> tuple[Pose2, float, float]:
         """Return pose, speed and wheel angle when a command of now begins to act."""
         delay_s = max(self._response.drive_delay_s, self._response.steer_delay_s)
-        if delay_s < 1e-3:
+        if delay_s < 1e-3 or self._has_constant_gains:
             return pose, speed, steering
         steps = max(1, round(delay_s / 0.01))
         dt, rate = delay_s / steps, self._limits.steering_rate_radps
@@ -257,6 +262,8 @@ class Tracker:
 
     def _steering_for(self, angle_rad: float) -> float:
         """Return the command that brings the front wheels to an angle."""
+        if self._has_constant_gains:
+            return max(-1.0, min(1.0, angle_rad / PAPER_STEERING_RAD))
         return self._response.steering_for(angle_rad - self._trim_rad)
 
     def _learn_trim(self, now_ns: int, dt: float, speed: float, yaw_rate: float) -> None:

@@ -5,7 +5,7 @@ The same for parking and for looking round an unknown room. Planner and controll
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,8 @@ SLACK_M = 0.005  # less than where the path begins, which it may leave
 ROUNDED, QUIET_M = 0.4, 0.025  # part of a range's noise by which corners recede, above so much
 LOOK_AHEAD_S = 1.5
 LATEST_S = 0.2  # for which a pose is extrapolated
+TOLERANCE_M, TOLERANCE_RAD = 0.03, 0.05
+"""From the goal, within which the car stays: the published ones are 0.05 m and 0.0873 rad."""
 
 Planner = Callable[[GridMap, CarLimits, Pose2, Pose2, float], Path]
 """From a grid, the car's limits, start, goal and margin [m] to a path; raises PathError."""
@@ -54,18 +56,35 @@ class Stack:
         planner: Of paths.
         controller: A key of `scm`'s `CONTROLLERS`.
         local: The local planner: `band` or `mppi`.
+        tolerance_m, tolerance_rad: From the goal, within which the car stays.
+        steering_share: Of the steering angle, to plan with: the rest is for control.
     """
 
     planner: Planner = _hybrid
     controller: str = "lqr"
     local: str = "band"
+    tolerance_m: float = TOLERANCE_M
+    tolerance_rad: float = TOLERANCE_RAD
+    steering_share: float = 0.95
 
 
 OWN = Stack()
-PUBLISHED = Stack(_points, "paper")
-"""A* on a grid of 0.05 m and two constant gains, as the AutoDRIVE paper has them."""
 MPPI = Stack(local="mppi")
 """The local planner drives the car file's own compiled cars ahead."""
+PUBLISHED = Stack(_points, "paper", tolerance_m=0.05, tolerance_rad=0.0873, steering_share=1.0)
+"""A* on a grid of 0.05 m and two constant gains at 5 Hz, as the AutoDRIVE paper has them."""
+STACKS = {"own": OWN, "mppi": MPPI, "published": PUBLISHED}
+
+
+def stack_named(name: str) -> Stack:
+    """Return a stack of `STACKS`.
+
+    Raises:
+        RunError: when there is none of this name.
+    """
+    if name not in STACKS:
+        raise RunError(f"stack: expected one of {', '.join(STACKS)}, got {name!r}")
+    return STACKS[name]
 
 
 class Navigator:
@@ -76,7 +95,7 @@ class Navigator:
         stack: Planner and controller.
 
     Attributes:
-        limits: Of the car.
+        limits: Of the car, as it plans with them.
         others: Other cars by their own reports, now.
         noise_m: Standard deviation of a range: noise rounds the corners of what is seen.
         path: The last one found; None: none yet.
@@ -89,12 +108,13 @@ class Navigator:
 
     def __init__(self, car: Car, stack: Stack = OWN) -> None:
         response = response_of(car)
-        self.limits, self._planner = response.limited(limits_of(car)), stack.planner
+        limits, self._planner = response.limited(limits_of(car)), stack.planner
+        self.limits = replace(limits, steering_rad=stack.steering_share * limits.steering_rad)
         self.others: tuple[Other, ...] = ()
         self.noise_m = 0.0
         self.path: Path | None = None
         self.way: Trajectory | None = None
-        self._tracker = Tracker(self.limits, response, stack.controller)
+        self._tracker = Tracker(limits, response, stack.controller)
         self._stop_m = STOP_M
         self._local = self._local_planner(car, response, stack.local)
 

@@ -31,8 +31,6 @@ from vehicle_agent.autonomy.perception import Perception, Whereabouts
 
 State = Literal["idle", "map", "localise", "plan", "drive", "recover", "parked", "failed"]
 
-TOLERANCE_M, TOLERANCE_RAD = 0.03, 0.05
-"""From the goal, within which the car stays: the published ones are 0.05 m and 0.0873 rad."""
 SILENT_NS = 1_000 * NS_PER_MS  # without a scan
 LOCALISE_NS = 1_500 * NS_PER_MS  # until a pose must be known
 PLAN_AGAIN_NS = 1 * NS_PER_S
@@ -83,7 +81,7 @@ class Parking:
         seed: int = 0,
         stack: Stack = OWN,
     ) -> None:
-        self.navigator = Navigator(car, stack)
+        self.navigator, self._stack = Navigator(car, stack), stack
         self._map = grid_of_city(city_map)
         self.perception = Perception(car, self._map, seed)
         self.perception.begin(start)
@@ -226,7 +224,8 @@ class Parking:
 
     def _at_goal(self, here: Whereabouts) -> bool:
         off = self.goal.inverse() @ here.pose
-        return math.hypot(off.x, off.y) < TOLERANCE_M and abs(wrap_angle(off.yaw)) < TOLERANCE_RAD
+        is_near = math.hypot(off.x, off.y) < self._stack.tolerance_m
+        return is_near and abs(wrap_angle(off.yaw)) < self._stack.tolerance_rad
 
 
 def _uncertainty(found: Localised) -> str:

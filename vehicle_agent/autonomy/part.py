@@ -40,6 +40,7 @@ from scm.vehicles.car import load_car
 from scm.vehicles.drivers.cam_tracker import CamTracker
 from vehicle_agent.autonomy.bay import BayClient, is_bay
 from vehicle_agent.autonomy.control import Command
+from vehicle_agent.autonomy.navigation import stack_named
 from vehicle_agent.autonomy.parking import Parking, Report
 from vehicle_agent.autonomy.shown import costmap_of, plan_of
 from vehicle_agent.lease import CarLease
@@ -65,6 +66,7 @@ class Wanted:
         car: Its car file.
         seed: Of all that is drawn.
         use_eye: Whether it uses the Eye's poses of the car, too, where there are some.
+        stack: Planner and controller: a key of `STACKS`.
     """
 
     vehicle: str
@@ -74,6 +76,7 @@ class Wanted:
     car: str = "nigel"
     seed: int = 0
     use_eye: bool = False
+    stack: str = "own"
 
 
 class ParkPart(BasePart):
@@ -88,6 +91,9 @@ class ParkPart(BasePart):
 
     Attributes:
         parking: The drive to the goal; None without a goal or a map.
+
+    Raises:
+        RunError: when there is no such stack.
     """
 
     role = "client"
@@ -102,7 +108,7 @@ class ParkPart(BasePart):
         city_map: CityMap | None = None,
     ) -> None:
         self.name, self._wanted, self._run = name, wanted, session
-        self._car = load_car(wanted.car)
+        self._car, self._stack = load_car(wanted.car), stack_named(wanted.stack)
         self._map, self._has_own_map = city_map, city_map is not None
         self._goal = wanted.goal
         self.parking: Parking | None = None
@@ -258,7 +264,8 @@ class ParkPart(BasePart):
         """Set out for a goal."""
         self._refusal = ""
         if self.parking is None:
-            self.parking = Parking(self._car, city_map, goal, self._start, self._wanted.seed)
+            seed = self._wanted.seed
+            self.parking = Parking(self._car, city_map, goal, self._start, seed, self._stack)
         else:
             self.parking.turn_to(goal)
 

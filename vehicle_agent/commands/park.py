@@ -35,6 +35,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
     parser.add_argument("--name", help="of this agent, which holds the lease (park-VEHICLE)")
     parser.add_argument("--seed", type=int, default=0, help="of the particles (%(default)s)")
+    parser.add_argument(
+        "--stack", default="own", metavar="NAME",
+        help="planners and controller: own; mppi, with another local planner; or published: A* and "
+        "the AutoDRIVE paper's gains (%(default)s)",
+    )  # fmt: skip
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -43,6 +48,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
     from scm.vehicles.car import load_car
+    from vehicle_agent.autonomy.navigation import stack_named
     from vehicle_agent.autonomy.parking import Report, prepare
     from vehicle_agent.autonomy.part import ENDED, ParkPart, Wanted
     from vehicle_agent.leaving import Leaving
@@ -54,10 +60,10 @@ def _run(arguments: argparse.Namespace) -> int:
     name = check_name(name if credentials is None else credentials.station, "--name")
     wanted = Wanted(
         vehicle, arguments.goal, arguments.start, arguments.spawn, arguments.car, arguments.seed,
-        use_eye=arguments.eye,
+        use_eye=arguments.eye, stack=arguments.stack,
     )  # fmt: skip
     print("Preparing the planner (the first time this takes about a minute) ...", flush=True)
-    prepare(load_car(arguments.car))
+    prepare(load_car(arguments.car), stack_named(arguments.stack))
     stop_requested, done, clock = stop_on_signal(), threading.Event(), WallClock()
     last = Report("localise")
 

@@ -170,6 +170,28 @@ def test_published_controller_follows_the_way_without_feedback():
     assert command.throttle == pytest.approx(0.2 / 0.26, abs=0.01)
 
 
+def test_published_controller_commands_five_times_a_second_and_stops_at_once():
+    tracker = Tracker(CAR, response(), "paper")
+    tracker.follow(way((0.3, 0.6, 1)))
+    poses = [Pose2(*pose) for pose in tracker.ahead(10.0)[0]]
+    sent = [tracker.command(k * STEP_NS, poses[0 if k < 1 else 5], 0.2, 0.0) for k in range(11)]
+    assert len(set(sent)) == 2
+    assert sent[9] == sent[0] != sent[10]
+    tracker.stop()
+    assert tracker.command(11 * STEP_NS, poses[5], 0.2, 0.0).throttle == 0.0
+
+
+def test_published_controller_commands_the_angle_of_the_way_over_its_constant():
+    weak = replace(response(), angles_rad=0.8 * response().angles_rad)
+    tracker = Tracker(CAR, weak, "paper")
+    tracker.follow(way((2.0, 2.0, 1)))
+    on = Pose2(*tracker.ahead(3.0)[0][-1])
+    for step in range(100):  # whatever the wheels do
+        command = tracker.command(step * STEP_NS, on, 0.2, -0.2, yaw_rate_radps=0.5)
+    assert command.steering == pytest.approx(math.atan(2.0 * CAR.wheelbase_m) / 0.5236, abs=0.005)
+    assert command.throttle == pytest.approx(0.2 / 0.26, abs=0.01)
+
+
 @pytest.mark.parametrize("gear", [1, -1])
 def test_trim_of_the_wheels_is_learned_from_the_curvature_driven(gear):
     """Each stretch begins where the car is, so its place beside the way never shows the trim."""

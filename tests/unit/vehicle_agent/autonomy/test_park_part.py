@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -104,6 +106,25 @@ def test_status_and_plan_say_where_the_car_is_and_goes():
     assert list(map(len, sent)) == [1, 0]
     cells = np.frombuffer(sent[0][0].cells, np.uint8)
     assert (cells.min(), cells.max() > 30) == (0, True)
+
+
+def test_published_stack_plans_over_cells_forward_only_and_commands_at_5_hz():
+    wanted = Wanted("n1", "goal", spawn="start", stack="published")
+    _, commands, _, plans = drive(wanted, 3.0)
+    inner = np.array(plans[-1].path)[1:-1]
+    cells = (inner[:, 0] - inner[0, 0]) / 0.05
+    np.testing.assert_allclose(cells, cells.round(), atol=0.01)
+    changes = [
+        after.t_ns for before, after in itertools.pairwise(commands)
+        if (before.throttle, before.steering) != (after.throttle, after.steering)
+    ]  # fmt: skip
+    assert len(changes) > 5
+    assert min(np.diff(changes)) >= 0.2 * NS_PER_S
+
+
+def test_stack_that_does_not_exist_is_refused():
+    with pytest.raises(RunError, match="expected one of own, mppi, published, got 'teb'"):
+        ParkPart("park-n1", Wanted("n1", stack="teb"))
 
 
 def test_same_seed_gives_equal_bits():

@@ -18,7 +18,17 @@ from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.car import load_car
 from scm.world.part import WorldPart
-from vehicle_agent.autonomy.parking import TOLERANCE_M, TOLERANCE_RAD, Parking
+from vehicle_agent.autonomy.grid_map import grid_of_city
+from vehicle_agent.autonomy.navigation import (
+    OWN,
+    PUBLISHED,
+    TOLERANCE_M,
+    TOLERANCE_RAD,
+    Navigator,
+)
+from vehicle_agent.autonomy.parking import Parking
+from vehicle_agent.autonomy.perception import Whereabouts
+from vehicle_agent.autonomy.plan import limits_of
 
 NIGEL = load_car("nigel")
 SCHOOL, OBSTACLES = load_map("parking_school"), load_map("parking_school_obstacles")
@@ -214,3 +224,24 @@ def test_new_goal_begins_anew():
     run.parking.turn_to(GOAL)
     run.parking.step(10**10)
     assert run.parking.report.state != "failed"
+
+
+def test_paths_leave_some_steering_for_control():
+    paths = [
+        Navigator(NIGEL).path_to(
+            grid_of_city(OBSTACLES), Pose2(x, 0.0, 0.0), Pose2(x, 0.0, math.pi)
+        )
+        for x in (-0.3, 0.0)
+    ]
+    sharpest = max(np.abs(path.curvatures).max() for path in paths)
+    limits = limits_of(NIGEL)
+    angle = math.atan(sharpest * limits.wheelbase_m)
+    assert angle == pytest.approx(0.95 * limits.steering_rad, rel=0.01)
+
+
+@pytest.mark.parametrize(("stack", "stays"), [(OWN, False), (PUBLISHED, True)])
+def test_published_stack_stays_within_the_published_tolerances(stack, stays):
+    parking = Parking(NIGEL, OBSTACLES, GOAL, stack=stack)
+    for off, is_near in ((0.045, stays), (0.055, False)):
+        here = Whereabouts(0, GOAL @ Pose2(off, 0.0, 0.08), 0.0, 0.0, is_known=True)
+        assert parking._at_goal(here) is is_near
