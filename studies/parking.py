@@ -9,13 +9,14 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from msgspec.structs import replace
 
 from scm.clock import NS_PER_S
-from scm.errors import PathError
+from scm.errors import CarError, PathError
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.route import roads_of
 from scm.records.city_map import Box, CityMap, Point, Wall
@@ -66,6 +67,7 @@ CONCEALED["all"] = (
     {key: value for _, values in CONCEALED.values() for key, value in values.items()},
 )
 """Effects that a car may have and its file not, by name: terms, and numbers by key."""
+FOUND = Path("runs/found_car")  # a folder each, with the file that `scm mismatch` wrote
 
 
 def run(
@@ -83,15 +85,14 @@ def run(
         goal: Place to park at; in a scanned room one beside a wall is drawn.
         concealed: What the car has that the nominal file lacks: a key of `CONCEALED`.
         engine: What moves the car: the city, or an engine of `tests/reality`.
-        car_file: The agent's: `nominal`, or `true`, as identification of the car would return it.
+        car_file: The agent's: `nominal`, `true`, or `found`, by `found_car.py` from a recording.
         stack: The agent's planner and controller: `own`, or `published`, as the AutoDRIVE paper's.
         room: Instead of the study's map: `lot`, a random parking lot; a map by name or path; or a
             scanned room's `.yaml`.
         start: Place about which the car starts; empty: anywhere.
     """
     rng = case.generator("parking")
-    nominal = load_car(CAR)
-    car = with_effect(nominal, concealed)
+    car = with_effect(load_car(CAR), concealed)
     limits = response_of(car).limited(limits_of(car))
     if room:
         from studies.rooms import room_named  # noqa: PLC0415  needs a clone
@@ -106,9 +107,9 @@ def run(
     wanted = Wanted(
         VEHICLE, goal=_text(target), start=_text(_off(begin, rng)), seed=case.seed, stack=stack
     )
-    with varied_cars({CAR: car if car_file == "true" else nominal}):
+    with varied_cars({CAR: known_car(car_file, concealed)}):
         agent = ParkPart("park", wanted, city_map=city_map)
-    noisy_agent = _Noisy(agent, perturbation, rng)
+    noisy_agent = Noisy(agent, perturbation, rng)
     with varied_cars({CAR: car.with_values({"lidar.noise_m": perturbation * RANGE_STD_M})}):
         world = WorldPart(world_map, case.seed)
         cross = partial(_Crossing, world, begin, target, rng) if crossing else None
@@ -332,29 +333,56 @@ def _text(pose: Pose2) -> str:
     return f"{pose.x:.4f},{pose.y:.4f},{math.degrees(pose.yaw):.3f}"
 
 
-class _Noisy:
-    """An agent whose commands are not quite obeyed: by an offset that stays, and by white noise."""
+def known_car(car_file: str, concealed: str) -> Car:
+    """Return the car that the agent takes its own for."""
+    nominal = load_car(CAR)
+    if car_file != "found":
+        return with_effect(nominal, concealed) if car_file == "true" else nominal
+    path = FOUND / concealed / "car.toml"
+    if not path.is_file():
+        msg = f"{path}: there is no such file; expected one by `python -m studies.found_car`"
+        raise CarError(msg)
+    return load_car(path)
 
-    def __init__(self, part: ParkPart, scale: float, rng: np.random.Generator) -> None:
-        self.name, self.role, self.period_ns = part.name, part.role, part.period_ns
-        self.services, self.attach, self.finish = part.services, part.attach, part.finish
-        self._part, self._rng = part, rng
+
+class Disturbed:
+    """Commands that are not quite obeyed: by an offset that stays, and by white noise."""
+
+    def __init__(self, scale: float, rng: np.random.Generator) -> None:
+        self._rng = rng
         self._std = scale * np.array(
             (DRIVE_STD_MPS / TOP_SPEED_MPS, STEERING_STD_RAD / FULL_STEERING_RAD)
         )
         self._offset = self._std * rng.standard_normal(2)
 
+    def __call__(self, throttle: float, steering: float) -> tuple[float, float]:
+        """Return what is obeyed instead; a car that shall stand does."""
+        if throttle == 0.0:
+            return throttle, steering
+        off = self._offset + self._std * self._rng.standard_normal(2)
+        throttle, steering = np.clip(np.array((throttle, steering)) + off, -1.0, 1.0)
+        return float(throttle), float(steering)
+
+
+class Noisy:
+    """An agent whose commands are not quite obeyed."""
+
+    def __init__(self, part: ParkPart, scale: float, rng: np.random.Generator) -> None:
+        self.name, self.role, self.period_ns = part.name, part.role, part.period_ns
+        self.services, self.attach, self.finish = part.services, part.attach, part.finish
+        self._part, self._obeyed = part, Disturbed(scale, rng)
+
     @property
     def subscriptions(self) -> Sequence[Subscription]:
+        """The agent's."""
         return self._part.subscriptions
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Return what the agent sends, with other commands."""
         return [self._disturbed(message) for message in self._part.step(now_ns, inbox)]
 
     def _disturbed(self, message: Outgoing) -> Outgoing:
-        if not isinstance(message, DriveCommand) or message.throttle == 0.0:
+        if not isinstance(message, DriveCommand):
             return message
-        off = self._offset + self._std * self._rng.standard_normal(2)
-        command = np.array((message.throttle, message.steering)) + off
-        throttle, steering = np.clip(command, -1.0, 1.0)
-        return replace(message, throttle=float(throttle), steering=float(steering))
+        throttle, steering = self._obeyed(message.throttle, message.steering)
+        return replace(message, throttle=throttle, steering=steering)

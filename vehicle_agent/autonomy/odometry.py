@@ -40,6 +40,7 @@ EYE_SPEED_STD, EYE_YAW_RATE_STD = 0.03, 0.15  # it averages over 0.15 s [m/s], [
 FLOW_WIDER = 3.0  # of its std: beams beside each other see the same wall
 LIKELY = 16.3  # of a flow's squared distance with three numbers: 99.9 %
 CLEAR_M = 0.06  # residual of a flow between sweeps of the same surroundings
+LIFTED_M, LIFTED_RAD = 0.15, 0.3  # by which a flow contradicts the rest: no car slips so far
 NEXT_KEY_M, NEXT_KEY_RAD = 0.05, 0.1  # from a key sweep, before the next becomes one
 CONTRARY_M, CONTRARY = 0.025, (-2.0, -0.5)  # way of the wheels; a flow's part of it
 AT_REST_S = 0.2  # without a count, before a car is taken to stand
@@ -90,6 +91,7 @@ class OdometryFilter:
 
     Attributes:
         is_contrary: Two flows in a row had the car drive the other way than its wheels, or the Eye.
+        was_lifted: Whether the last sweep was from a place where the car cannot have driven.
 
     Raises:
         CarError: when the file has no scanner.
@@ -110,6 +112,7 @@ class OdometryFilter:
         self._way_m = 0.0  # of the wheels, since the key sweep
         self._contraries = 0
         self.is_contrary = False
+        self.was_lifted = False
 
     def sensors(self, measured: VehicleSensors | Seen) -> None:
         """Take what the car's other sensors measured, or the Eye; older is ignored."""
@@ -132,7 +135,7 @@ class OdometryFilter:
         sweep = sweep_of(message)
         if self._state is None:
             self._begin(sweep.t_ns)
-        state, key = self._state, self._key
+        state, key, self.was_lifted = self._state, self._key, False
         if state is None or sweep.t_ns < state.t_ns:
             return None
         while self._waiting and self._waiting[0].t_ns <= sweep.t_ns:
@@ -258,6 +261,7 @@ class OdometryFilter:
         if distance > LIKELY:
             if flow.residual_m > CLEAR_M:
                 return state, False
+            self.was_lifted = math.hypot(*left[:2]) > LIFTED_M or abs(left[2]) > LIFTED_RAD
             slip = np.zeros(8)
             slip[[X, Y]] = left[:2] @ left[:2]
             slip[YAW] = left[2] ** 2

@@ -13,8 +13,9 @@ A car whose echoes do not fit the map any more is looked for everywhere: poses a
 are compared with the echoes, first with wide faces, then with ever narrower ones.
 
 In a room that looks the same from two places, a scanner alone cannot tell which it is: the filter
-keeps both and says so (`alternative`). Before a place is believed, more of the echoes must fit than
-later: a map of another room fits half of them somewhere.
+keeps both and says so (`alternative`), until clearly fewer of the echoes fit one of them: by chance
+all particles of a place may go as they are drawn anew. Before a place is believed, more of the
+echoes must fit than later: a map of another room fits half of them somewhere.
 Source: Fox, "KLD-sampling: adaptive particle filters", NIPS 2001; likelihood field: Thrun, Burgard,
 Fox, "Probabilistic Robotics", 2005, 6.4. The order of widths and the rule for lost cars are ours.
 """
@@ -46,6 +47,7 @@ OFF = 3.0  # spreads from a face, beyond which an echo is not of it
 LOST_SHARE, LOST_AFTER = 0.5, 4  # of echoes on faces; so many sweeps in a row
 FOUND_SHARE = 0.75  # of echoes on faces, before a place is believed
 ALTERNATIVE_SHARE = 0.05  # of the weight: less is not another place
+AS_WELL = 0.025  # of the echoes: places that differ by less in what fits there fit alike
 WIDTHS_M = (0.2, 0.1, 0.05)  # of faces, as a pose is looked for
 SEARCHED = 200  # poses on each square metre ...
 MOST_SEARCHED = 100_000
@@ -104,6 +106,7 @@ class ParticleFilter:
         self._unexplained = 0
         self._offset = 0.0
         self._is_believed = False
+        self._places: list[Pose2] = []
         self.is_global = True
 
     def set_noise(self, noise_m: float) -> None:
@@ -114,7 +117,7 @@ class ParticleFilter:
         """Start at a pose that is known within `KNOWN`."""
         self._particles = np.array(pose) + self._random.standard_normal((MOST, 3)) * KNOWN
         self._log_weights, self.is_global = np.zeros(MOST), False
-        self._is_believed = False
+        self._is_believed, self._places = False, []
 
     def begin_anywhere(self) -> None:
         """Look for the car on the whole floor at the next sweep."""
@@ -135,6 +138,7 @@ class ParticleFilter:
             self._search(beams)
         else:
             self._move(moved)
+            self._places = [place @ moved for place in self._places]
         if len(beams):
             self._weigh(beams)
         if seen is not None:
@@ -166,7 +170,8 @@ class ParticleFilter:
             return echoes
         ranges = np.hypot(*echoes.T)
         self._offset = (self._offset + GOLDEN) % 1.0
-        return echoes[_systematic(ranges / ranges.sum(), BEAMS, self._offset)]
+        chosen: Floats = echoes[_systematic(ranges / ranges.sum(), BEAMS, self._offset)]
+        return chosen
 
     def _move(self, moved: Pose2) -> None:
         way, turn = math.hypot(moved.x, moved.y), abs(moved.yaw)
@@ -186,7 +191,11 @@ class ParticleFilter:
         self._log_weights = self._log_weights + INDEPENDENT * likelihood.sum(axis=1)
 
     def _weigh_by(self, seen: PoseMeasurement) -> None:
-        """Weigh particles by a measured pose; one that is far from all of them pulls none."""
+        """Weigh particles by a measured pose; one that is far from all of them pulls none.
+
+        Of several places that may be the car's, the one of that pose is left.
+        """
+        self._places = [one for one in self._places if is_near(one, seen.pose)] or self._places
         off = self._particles - np.array(seen.pose)
         off[:, 2] = np.remainder(off[:, 2] + math.pi, TAU) - math.pi
         squared = (off @ np.linalg.inv(seen.covariance) * off).sum(axis=1)
@@ -213,7 +222,7 @@ class ParticleFilter:
             spread = np.array((0.3 * width, 0.3 * width, 0.4 * width))
             particles = particles[drawn] + spread * self._random.standard_normal((MOST, 3))
         self._particles, self._log_weights, self.is_global = particles, np.zeros(MOST), False
-        self._is_believed = False
+        self._is_believed, self._places = False, _places(particles)
 
     def _draw_anew(self, weights: Floats) -> None:
         """Draw particles by their weights, as many as the places that they occupy need."""
@@ -239,8 +248,18 @@ class ParticleFilter:
         explained = self._explained(pose, echoes)
         share = float(explained.mean()) if len(echoes) else 0.0
         self._is_believed |= share >= FOUND_SHARE
+        if alternative is None and self._places and len(echoes):
+            alternative = self._as_well(pose, share, echoes)
         is_lost = share < LOST_SHARE or not self._is_believed
         return Localised(pose, covariance, particles, weights, explained, is_lost, alternative)
+
+    def _as_well(self, pose: Pose2, share: float, echoes: Floats) -> Pose2 | None:
+        """Return a place of the last search that fits as well as a pose with a share of echoes."""
+        others = [place for place in self._places if not _near(np.array([place]), np.array(pose))]
+        least = share - AS_WELL
+        fitting = [place for place in others if self._explained(place, echoes).mean() > least]
+        self._places = [pose, *fitting] if fitting else []
+        return fitting[0] if fitting else None
 
     def _explained(self, pose: Pose2, echoes: Floats) -> Bools:
         """Return which echoes lie on faces of the map, seen from a pose."""
@@ -260,6 +279,17 @@ def _near(particles: Floats, pose: Floats) -> Bools:
     turned = np.remainder(particles[:, 2] - pose[2] + math.pi, TAU) - math.pi
     near = np.hypot(*(particles[:, :2] - pose[:2]).T) < TOGETHER_M
     return np.asarray(near & (np.abs(turned) < TOGETHER_RAD))
+
+
+def _places(particles: Floats) -> list[Pose2]:
+    """Return the places that more than a few of the particles mean."""
+    found, left = [], particles
+    while len(left) > ALTERNATIVE_SHARE * len(particles):
+        near = _near(left, left[0])
+        if near.sum() > ALTERNATIVE_SHARE * len(particles):
+            found.append(_mean(left[near], np.ones(near.sum()), left[0])[0])
+        left = left[~near]
+    return found
 
 
 def _mean(particles: Floats, weights: Floats, about: Floats) -> tuple[Pose2, Floats]:

@@ -135,6 +135,8 @@ class Perception:
         echoes = deskewed(sweep, self._mount, moved.twist)
         seen = self.eye.at_sweep(moved)
         self._check_mount(seen, echoes)
+        if self._was_lifted(echoes):
+            self._filter.begin_anywhere()
         if seen is not None:
             self._consult(seen, echoes)
         found = self._filter.update(last.inverse() @ moved.pose, echoes, seen)
@@ -144,6 +146,16 @@ class Perception:
             if seen is not None:
                 self.eye.compare(moved.t_ns, seen, found)
         return found
+
+    def _was_lifted(self, echoes: Floats) -> bool:
+        """Return whether the car was put elsewhere, so that the echoes do not fit its last pose.
+
+        Which way it was carried, scans alone do not say: in a room that looks alike from two places
+        they fit both.
+        """
+        if not self._odometry.was_lifted or self.localised is None:
+            return False
+        return self._filter.fits(self.localised.pose, echoes) < FOUND_SHARE
 
     def _check_mount(self, seen: PoseMeasurement | None, echoes: Floats) -> None:
         """Check once, where a pose is known otherwise, whether the scanner looks backward."""

@@ -8,7 +8,7 @@ from scm.maps.load import load_map
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.vehicles.car import load_car
 from tests.unit.vehicle_agent.autonomy.drives import driven
-from tests.unit.vehicle_agent.autonomy.rooms import ranges_from
+from tests.unit.vehicle_agent.autonomy.rooms import BEAMS, outline, ranges_from
 from vehicle_agent.autonomy.grid_map import grid_of_city
 from vehicle_agent.autonomy.odometry import OdometryFilter, mount_of
 from vehicle_agent.autonomy.particle_filter import MOST, ParticleFilter
@@ -94,6 +94,17 @@ def test_room_that_looks_the_same_from_two_places_has_an_alternative():
         places = sorted([one.pose, one.alternative])
         assert off(places[0], pose)[0] < 0.03
         assert off(places[1], Pose2(0.2, 0.0, math.pi) @ pose)[0] < 0.03
+
+
+def test_chance_does_not_decide_between_two_places():
+    room = outline((-0.975, -0.625), (1.175, -0.625), (1.175, 0.625), (-0.975, 0.625))
+    bearings, rng = np.arange(BEAMS) * math.tau / BEAMS, np.random.default_rng(1)
+    ranges = ranges_from(room, Pose2(-0.7, 0.3, 0.4), bearings)
+    particles = started(SCHOOL, None, seed=21)  # one place begins with a sixth of the particles
+    for _ in range(8 * SECOND):
+        seen = ranges + NOISE_M * rng.standard_normal(BEAMS)
+        echoes = np.column_stack((seen * np.cos(bearings), seen * np.sin(bearings)))
+        assert particles.update(NONE, echoes).alternative is not None
 
 
 def test_car_that_was_put_elsewhere_is_found_again_within_5_s():

@@ -101,6 +101,22 @@ def test_scanner_that_looks_backward_is_noticed_at_the_first_sweep():
     assert replayed([first], begun=Pose2(0.3, 0.3, 2.0)).mounting_problem == ""
 
 
+@pytest.mark.parametrize(
+    ("name", "has_alternative"), [("parking_school", True), ("parking_school_obstacles", False)]
+)
+def test_lifted_car_knows_its_place_unless_the_scans_fit_two(name, has_alternative):
+    here, there, stood = Pose2(0.0, -0.2, 1.4), Pose2(-0.5, -0.1, 0.1), ((1.0, 0.0, 0.0),)
+    before, after = (driven(name, pose, stood).messages for pose in (here, there))
+    perception = replayed(before, load_map(name), here)
+    assert perception.now().is_known
+    take(perception, [replace(m, t_ns=m.t_ns + 10**9) for m in after])
+    assert (perception.localised.alternative is not None) is has_alternative
+    assert perception.now().is_known is not has_alternative
+    if not has_alternative:
+        error = there.inverse() @ perception.now().pose
+        assert math.hypot(error.x, error.y) < 0.02
+
+
 @pytest.mark.parametrize(("source", "speed"), [("eye", 0.2), ("simulated", 0.0)])
 def test_of_a_state_report_only_what_the_eye_saw_counts(source, speed):
     drive = driven("parking_school_obstacles", MIDDLE)
