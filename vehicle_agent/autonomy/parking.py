@@ -35,6 +35,7 @@ SILENT_NS = 1_000 * NS_PER_MS  # without a scan
 LOCALISE_NS = 1_500 * NS_PER_MS  # until a pose must be known
 PLAN_AGAIN_NS = 1 * NS_PER_S
 BLOCKED_NS = 20 * NS_PER_S  # until a blocked car gives up
+ANOTHER_ROOM = "is it the map of this room, and does nothing hide its walls?"
 AMBIGUOUS_NS = 3 * NS_PER_S  # that two places may fit
 UNFIT_NS = 20 * NS_PER_S  # that the scans may not fit the map, before it gives up
 SWEEP_NS = 140 * NS_PER_MS  # of the sweeps that `prepare` makes up
@@ -165,7 +166,7 @@ class Parking:
             reason = _uncertainty(found)
         if lost_ns > LOCALISE_NS and state == "localise":
             if found is not None and found.is_lost:
-                reason = f"the scans do not fit the map: {reason}; is it the map of this room?"
+                reason = f"the scans do not fit the map: {reason}; {ANOTHER_ROOM}"
                 state = "failed" if lost_ns > UNFIT_NS else state
             else:
                 reason = f"does not know where it is: {reason}"

@@ -167,8 +167,8 @@ BACKWARD = "looks backward"
     ("room", "city_map", "goal", "start", "seen", "state", "words"),
     [
         (OBSTACLES, OBSTACLES, GOAL, START, mute, "recover", "no LIDAR scan for 1 s"),
-        (OBSTACLES, OTHER_ROOM, GOAL, START, None, "localise", "is it the map of this room?"),
-        (OBSTACLES, OTHER_ROOM, GOAL, None, None, "localise", "is it the map of this room?"),
+        (OBSTACLES, OTHER_ROOM, GOAL, START, None, "localise", "is it the map of this room"),
+        (OBSTACLES, OTHER_ROOM, GOAL, None, None, "localise", "is it the map of this room"),
         (OBSTACLES, UNMAPPED, Pose2(0.75, 0.62, 0.0), START, None, "failed", "goal (0.750 m"),
         (walled_off(), walled_off(), GOAL, START, None, "failed", "no path found"),
         (OBSTACLES, OBSTACLES, GOAL, START, turned, "failed", BACKWARD),
@@ -206,7 +206,7 @@ def test_map_of_another_room_is_given_up_after_a_while(monkeypatch):
     monkeypatch.setattr("vehicle_agent.autonomy.parking.UNFIT_NS", 2 * NS_PER_S)
     run = Run(OBSTACLES, START, GOAL, city_map=OTHER_ROOM, start=START, lasts_s=3.0)
     assert run.state == "failed"
-    assert "is it the map of this room?" in run.reason
+    assert "is it the map of this room" in run.reason
 
 
 def test_two_places_that_look_the_same_are_named():
