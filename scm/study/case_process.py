@@ -66,6 +66,7 @@ class CaseProcess:
 
     def __init__(self, study: LoadedStudy, folder: Path) -> None:
         self._study, self.folder = study, folder
+        self._closing = threading.Lock()  # the thread of a case that was killed closes, too
         self._start()
 
     def run(self, task: Task) -> Row:
@@ -100,11 +101,12 @@ class CaseProcess:
 
     def close(self) -> None:
         """End the process."""
-        self._process.kill()
-        self._process.wait()
-        for end in (self._to, self._from):
-            if not end.closed:
-                end.close()
+        with self._closing:
+            self._process.kill()
+            self._process.wait()
+            for end in (self._to, self._from):
+                if not end.closed:
+                    end.close()
 
     def _start(self) -> None:
         down_read, down_write = os.pipe()

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import threading
 
 import psutil
 import pytest
@@ -111,3 +112,23 @@ def test_it_ends_when_its_owner_is_killed(tmp_path):
     owner.stdout.close()
     psutil.wait_procs([child], 10.0)
     assert not child.is_running()
+
+
+def test_a_process_may_be_closed_by_several_threads_at_once(tmp_path):
+    study = loaded(tmp_path, scenario=SCENARIO, name="study", factors='how = "well"')
+    running, failed = CaseProcess(study, tmp_path), []
+    all_ready = threading.Barrier(16)
+
+    def close():
+        all_ready.wait()
+        try:
+            running.close()
+        except OSError as cause:
+            failed.append(cause)
+
+    threads = [threading.Thread(target=close) for _ in range(16)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failed
