@@ -24,6 +24,7 @@ from vehicle_agent.autonomy.outline import outline_clearance, room, scene_of
 from vehicle_agent.autonomy.perception import Whereabouts
 from vehicle_agent.autonomy.plan import CarLimits, Path, Trajectory, limits_of
 from vehicle_agent.autonomy.response import Response, response_of
+from vehicle_agent.autonomy.trajectory_check import sampled
 
 MARGINS_M = (0.05, 0.03, 0.01)  # that paths leave, the first that there is a path with
 WANTED_M = 0.04  # of the band, where there is room
@@ -176,7 +177,7 @@ class Navigator:
 
     def is_blocked(self, grid: GridMap) -> bool:
         """Return whether something stands or will be in the way of the next `LOOK_AHEAD_S`."""
-        ahead, when_s = self._tracker.ahead(LOOK_AHEAD_S)
+        ahead, when_s = sampled(self.limits, *self._tracker.ahead(LOOK_AHEAD_S))
         if len(ahead) == 0:
             return False
         if comes_near(ahead, when_s, discs_of(self.others), self.limits):

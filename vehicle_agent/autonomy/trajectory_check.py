@@ -9,12 +9,13 @@ import math
 import numpy as np
 
 from scm.arrays import Floats
+from scm.geometry import TAU
 from scm.vehicles.jit import array_kernel, kernel_function
 from vehicle_agent.autonomy.grid_map import GridMap
 from vehicle_agent.autonomy.outline import Scene, room_at, scene_of
 from vehicle_agent.autonomy.plan import CarLimits, Trajectory
 
-SAMPLE_M = 0.005
+SAMPLE_M, STEP_M, TURN_LEAST_RAD = 0.005, 0.01, 1e-6
 TOLERANCE = 0.02  # of each limit,
 SPEED_TOLERANCE_MPS, STEERING_TOLERANCE_RAD = 0.002, 0.002  # and at least so much
 PLACE_TOLERANCE_M, TURN_TOLERANCE_RAD = 0.002, 0.01  # of one interval's motion
@@ -73,6 +74,33 @@ def motion_errors(limits: CarLimits, trajectory: Trajectory) -> tuple[Floats, Fl
 def _follows(limits: CarLimits, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     place, turn = motion_errors(limits, trajectory)
     return place <= PLACE_TOLERANCE_M, turn <= TURN_TOLERANCE_RAD
+
+
+def sampled(limits: CarLimits, poses: Floats, times_s: Floats) -> tuple[Floats, Floats]:
+    """Return poses (m, 3) and times (m,) with more between them: no corner moves `STEP_M` at once.
+
+    Args:
+        limits: Of the car.
+        poses: (n, 3), between which the car is on arcs.
+        times_s: (n,) of each; evenly spread between them.
+    """
+    if len(poses) < 2:
+        return poses, times_s
+    reach = math.hypot(max(limits.front_m, -limits.rear_m), max(limits.left_m, -limits.right_m))
+    steps = np.diff(poses, axis=0)
+    steps[:, 2] = np.remainder(steps[:, 2] + math.pi, TAU) - math.pi
+    furthest = np.hypot(*steps[:, :2].T) + reach * np.abs(steps[:, 2])
+    counts = np.maximum(np.ceil(furthest / STEP_M), 1.0).astype(np.int64)
+    begin = np.repeat(np.arange(len(steps)), counts)
+    number = np.arange(len(begin)) - np.repeat(np.cumsum(counts) - counts, counts)
+    part = number / counts[begin]
+    dx, dy, turn = steps[begin].T
+    half = np.where(np.abs(turn) > TURN_LEAST_RAD, 0.5 * turn, TURN_LEAST_RAD)
+    share, angle = np.sin(part * half) / np.sin(half), 0.5 * (part - 1.0) * turn
+    c, s = share * np.cos(angle), share * np.sin(angle)
+    moved = np.column_stack((c * dx - s * dy, s * dx + c * dy, part * turn))
+    times = times_s[begin] + part * np.diff(times_s)[begin]
+    return np.vstack((poses[begin] + moved, poses[-1:])), np.append(times, times_s[-1])
 
 
 @kernel_function
