@@ -11,7 +11,7 @@ Ipopt's time is a lower bound. Problems with boxes are left out: the grid is not
 it.
 
 Then the band beside model predictive path integral control (MPPI): each car is where its last plan
-said, but it stands where the navigator would stop it. And what the rollouts cost: cars of
+has it, but it stands where the navigator would stop it. And what the rollouts cost: cars of
 `nigel.toml` on random commands, by horizon and substep, and how far they are off those of 1 ms.
 """
 

@@ -3,7 +3,7 @@
     localise    it stands until the scans say where it is
     plan        a path is looked for
     drive       it follows the path; a path that is blocked is planned anew
-    recover     it stands: it lost its place, hears nothing, or its way is blocked
+    recover     it stands: it lost its place, gets no scans, or its way is blocked
     parked      it stands within the tolerances of the goal
     failed      it stands and says why; a new goal begins anew
 

@@ -1,4 +1,3 @@
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -6,11 +5,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from scm.geometry import Pose2
+from tests.unit.vehicle_agent.autonomy.bends import START, floor, path_of
 from vehicle_agent.autonomy import elastic_band
 from vehicle_agent.autonomy.band_solver import optimise
 from vehicle_agent.autonomy.elastic_band import ElasticBand
-from vehicle_agent.autonomy.grid_map import FREE, OCCUPIED, grid_of_cells
-from vehicle_agent.autonomy.plan import CarLimits, Path
+from vehicle_agent.autonomy.plan import CarLimits
 from vehicle_agent.autonomy.trajectory_check import is_free, motion_errors
 
 LIMITS = CarLimits(
@@ -18,36 +17,7 @@ LIMITS = CarLimits(
     rear_m=-0.07, front_m=0.23, right_m=-0.0875, left_m=0.0875,
 )  # fmt: skip
 NOTHING = np.empty((0, 5))
-START = Pose2(0.5, 1.0, 0.0)
 BEND = 1.0 / 0.26
-
-
-def floor(*boxes):
-    """Return a floor of 3 by 2 m with boxes (left, low, right, high) [m]."""
-    cells = np.full((200, 300), FREE, np.int8)
-    for left, low, right, high in boxes:
-        cells[round(100 * low) : round(100 * high), round(100 * left) : round(100 * right)] = (
-            OCCUPIED
-        )
-    return grid_of_cells(cells, 0.01, 0.0, 0.0)
-
-
-def path_of(*parts):
-    """Return a path from START of parts (length, negative backward [m], curvature [1/m])."""
-    poses, gears, curvatures = [START], [], []
-    for length, bend in parts:
-        count = round(abs(length) / 0.02)
-        for _ in range(count):
-            step, (x, y, yaw) = length / count, poses[-1]
-            middle = yaw + 0.5 * step * bend
-            poses.append(
-                Pose2(x + step * math.cos(middle), y + step * math.sin(middle), yaw + step * bend)
-            )
-            gears.append(math.copysign(1.0, length))
-            curvatures.append(bend)
-    return Path(
-        np.array(poses), np.array([gears[0], *gears]), np.array([curvatures[0], *curvatures])
-    )
 
 
 STRAIGHT = path_of((1.2, 0.0))

@@ -10,14 +10,14 @@ from scm.clock import NS_PER_S
 from scm.errors import PathError, RunError
 from scm.geometry import Pose2
 from scm.vehicles.car import load_car
+from tests.unit.vehicle_agent.autonomy.bends import START, floor, path_of
 from vehicle_agent.autonomy.control import Command
-from vehicle_agent.autonomy.grid_map import FREE, OCCUPIED, grid_of_cells
 from vehicle_agent.autonomy.moving import comes_near
 from vehicle_agent.autonomy.mppi import PathIntegral, Settings
 from vehicle_agent.autonomy.navigation import MPPI, Navigator, Stack
 from vehicle_agent.autonomy.outline import room, scene_of
 from vehicle_agent.autonomy.perception import Whereabouts
-from vehicle_agent.autonomy.plan import Path, limits_of
+from vehicle_agent.autonomy.plan import limits_of
 from vehicle_agent.autonomy.response import response_of
 
 NIGEL = load_car("nigel")
@@ -25,34 +25,7 @@ RESPONSE = response_of(NIGEL)
 LIMITS = RESPONSE.limited(limits_of(NIGEL))
 FEW = Settings(cars=63, rounds=3)
 NOTHING = np.empty((0, 5))
-START = Pose2(0.5, 1.0, 0.0)
 BEND = 1.0 / 0.3
-
-
-def floor(*boxes):
-    """Return a floor of 3 by 2 m with boxes (left, low, right, high) [m]."""
-    cells = np.full((200, 300), FREE, np.int8)
-    for left, low, right, high in boxes:
-        cells[round(100 * low) : round(100 * high), round(100 * left) : round(100 * right)] = (
-            OCCUPIED
-        )
-    return grid_of_cells(cells, 0.01, 0.0, 0.0)
-
-
-def path_of(*parts):
-    """Return a path from START of parts (length, negative backward [m], curvature [1/m])."""
-    poses, gears, bends = [START], [], []
-    for length, bend in parts:
-        count = round(abs(length) / 0.02)
-        for _ in range(count):
-            step, (x, y, yaw) = length / count, poses[-1]
-            middle = yaw + 0.5 * step * bend
-            poses.append(
-                Pose2(x + step * math.cos(middle), y + step * math.sin(middle), yaw + step * bend)
-            )
-            gears.append(math.copysign(1.0, length))
-            bends.append(bend)
-    return Path(np.array(poses), np.array([gears[0], *gears]), np.array([bends[0], *bends]))
 
 
 STRAIGHT = path_of((0.5, 0.0))
@@ -70,7 +43,7 @@ def at(trajectory, t):
 
 
 def driven(path, grid, lasts_s, every_s=0.2):
-    """Return states (n, 5) of a car that is where each plan said that it would be."""
+    """Return states (n, 5) of a car that is where each plan has it."""
     plans, state, rows = planner(), (START, 0.0, 0.0), []
     for number in range(round(lasts_s / every_s)):
         trajectory = plans.plan(grid, path, *state, NOTHING, number * every_s)
