@@ -4,7 +4,9 @@ Every cell near the car stores how far it is from the nearest face that beams th
 on their side (truncated signed distance), as a running mean: the map's faces first, then what is
 measured. So the noise of single echoes averages out, a wall that stands elsewhere than on the map
 moves there, and what is not on the map appears. A measurement that contradicts the mean is a
-change: it counts as much as all before it.
+change: it counts as much as all before it. Something nearer is a matter of safety, and noise
+averages out over cells side by side as well: where they agree that it has appeared, their mean is
+taken at once.
 
     distance = range of the beam through the cell - distance of the cell, cut at +- some sigma
 
@@ -30,6 +32,8 @@ EDGE_M = 0.6  # more than any car needs beside it
 SPREADS, LEAST_CUT_M, MOST_CUT_M = 2.0, 0.05, 0.1  # of a range's noise, at which distances are cut
 UNMAPPED_M = 0.12  # from all that the map has
 CHANGED = 3.0  # of a range's noise, from the mean: something else stands there now
+APPEARED = 1.5  # the same for something nearer, as the mean over the cells about one
+AROUND, LEAST_SEEN = (5, 5), 0.5  # of them, for a full vote
 MAP_WEIGHT = 2.0  # of the map, in sweeps
 LEAST_WEIGHT, MOST_WEIGHT, AVERAGE_STD_M = 4.0, 24.0, 0.012  # of a mean; its scatter
 BEARINGS = 720
@@ -61,6 +65,7 @@ class ObstacleLayer:
         """Set the standard deviation of a range."""
         self._cut_m = float(np.clip(SPREADS * noise_m, LEAST_CUT_M, MOST_CUT_M))
         self._changed_m = CHANGED * noise_m
+        self._appeared_m = float(np.clip(APPEARED * noise_m, CELL_M, self._cut_m))
         self._most = float(np.clip((noise_m / AVERAGE_STD_M) ** 2, LEAST_WEIGHT, MOST_WEIGHT))
 
     def update(self, scanner: Pose2, echoes: Floats) -> None:
@@ -78,12 +83,36 @@ class ObstacleLayer:
         far = np.hypot(*off.T)
         order = np.argsort(-far)
         ranges[number[order]] = far[order]  # the nearest of those in one direction
-        place = (scanner.x - grid.x_m) / cell_m, (scanner.y - grid.y_m) / cell_m
-        _average(
-            self._mean, self._weight, *place, cell_m, ranges, self._cut_m, self._changed_m,
-            self._most,
-        )  # fmt: skip
-        self._redraw(*place, REACH_M / cell_m)
+        x, y = (scanner.x - grid.x_m) / cell_m, (scanner.y - grid.y_m) / cell_m
+        window = self._window(x, y, REACH_M / cell_m)
+        mean = self._mean[window]
+        if mean.size == 0:
+            return
+        seen = np.full(mean.shape, np.nan)
+        _look(seen, x - window[1].start, y - window[0].start, cell_m, ranges, self._cut_m)
+        self._average(mean, self._weight[window], seen)
+        self._redraw(x, y, REACH_M / cell_m)
+
+    def _average(self, mean: Floats, weight: Floats, seen: Floats) -> None:
+        """Bring means and weights up to date with the distances of a sweep; NaN: none is known."""
+        known = ~np.isnan(seen)
+        more = np.where(known, seen - mean, 0.0)
+        share = cv2.blur(known.astype(np.float64), AROUND)
+        around = cv2.blur(more, AROUND) / np.maximum(share, LEAST_SEEN)
+        appeared = known & (around < -self._appeared_m)
+        changed = (more < -self._changed_m) | ((mean < 0.0) & (more > self._changed_m))
+        np.minimum(weight, 1.0, out=weight, where=appeared | changed)
+        step = more / (weight + 1.0)
+        mean += np.where(appeared, np.minimum(step, around), step)
+        np.minimum(weight + known, self._most, out=weight)
+
+    def _window(self, x: float, y: float, reach: float) -> tuple[slice, slice]:
+        """Return the rows and columns about a place; all in cells of the layer."""
+        rows, columns = (
+            slice(max(0, math.floor(at - reach)), max(0, min(count, math.ceil(at + reach))))
+            for at, count in zip((y, x), self._mean.shape, strict=True)
+        )
+        return rows, columns
 
     def points(self) -> Floats:
         """Return middles of cells that are occupied now and free on the map (n, 2) [m]."""
@@ -97,12 +126,9 @@ class ObstacleLayer:
 
         Clearances beyond `EDGE_M` are not needed exactly: faces outside the window count for none.
         """
-        block, edge = self._block, EDGE_M / (self._block * self._map.cell_m)
-        wide = [
-            slice(max(0, math.floor(at - reach - edge)), min(count, math.ceil(at + reach + edge)))
-            for at, count in zip((y, x), self._mean.shape, strict=True)
-        ]
-        mean = self._mean[wide[0], wide[1]]
+        block = self._block
+        wide = self._window(x, y, reach + EDGE_M / (block * self._map.cell_m))
+        mean = self._mean[wide]
         if mean.size == 0:
             return
         size = mean.shape[1] * block, mean.shape[0] * block
@@ -139,20 +165,16 @@ def _clearance(solid: Bools, cell_m: float) -> Floats:
 
 
 @array_kernel
-def _average(
-    mean: Floats, weight: Floats, x: float, y: float, cell_m: float, ranges: Floats, cut: float,
-    changed: float, most: float,
-) -> None:  # fmt: skip
-    """Bring all cells that a sweep sees up to date; x and y of the scanner in cells.
+def _look(seen: Floats, x: float, y: float, cell_m: float, ranges: Floats, cut: float) -> None:
+    """Write every cell's distance that a sweep shows; x and y of the scanner in cells.
 
     Where a direction has no echo, the nearest one beside it counts, if that is not farther than the
     directions of a scanner of 360 beams are from each other.
     """
-    rows, columns = mean.shape
+    rows, columns = seen.shape
     count = len(ranges)
-    reach = REACH_M / cell_m
-    for i in range(max(0, math.floor(y - reach)), min(rows, math.ceil(y + reach))):
-        for j in range(max(0, math.floor(x - reach)), min(columns, math.ceil(x + reach))):
+    for i in range(rows):
+        for j in range(columns):
             dx, dy = (j + 0.5 - x) * cell_m, (i + 0.5 - y) * cell_m
             far = math.hypot(dx, dy)
             if far > REACH_M:
@@ -162,12 +184,5 @@ def _average(
             if math.isnan(met):
                 before, after = ranges[(k - 1) % count], ranges[(k + 1) % count]
                 met = after if math.isnan(before) or after < before else before
-            seen = met - far
-            if math.isnan(seen) or seen < -cut:
-                continue
-            more = seen - mean[i, j]
-            if more < -changed or (mean[i, j] < 0.0 and more > changed):
-                weight[i, j] = min(weight[i, j], 1.0)
-            seen = min(seen, cut)
-            mean[i, j] = (weight[i, j] * mean[i, j] + seen) / (weight[i, j] + 1.0)
-            weight[i, j] = min(weight[i, j] + 1.0, most)
+            if met - far >= -cut:
+                seen[i, j] = min(met - far, cut)

@@ -26,7 +26,7 @@ from scm.vehicles.car import Car
 from vehicle_agent.autonomy.control import Command
 from vehicle_agent.autonomy.grid_map import FREE, grid_of_cells, grid_of_city
 from vehicle_agent.autonomy.navigation import OWN, Navigator, Stack
-from vehicle_agent.autonomy.particle_filter import FOUND_SHARE, Localised
+from vehicle_agent.autonomy.particle_filter import Localised
 from vehicle_agent.autonomy.perception import Perception, Whereabouts
 
 State = Literal["idle", "map", "localise", "plan", "drive", "recover", "parked", "failed"]
@@ -196,9 +196,13 @@ class Parking:
         self.navigator.follow(path, grid, here, self.perception.steering_rad)
 
     def _blocked(self, here: Whereabouts, problem: str, now_ns: int) -> None:
-        """Wait for what blocks the way to leave; give up at once where the map alone blocks it."""
+        """Wait for what blocks the way to leave; give up where the map alone blocks it.
+
+        Not the first time: sweeps may still tell that a wall stands elsewhere.
+        """
         if self._blocked_ns is None:
             self._blocked_ns = now_ns
+        else:
             try:
                 self.navigator.path_to(self._map, here.pose, self.goal)
             except PathError as cause:
@@ -233,7 +237,8 @@ def _uncertainty(found: Localised) -> str:
     """Return why a place is not believed."""
     if found.is_lost:
         tenths = round(10.0 * found.explained.mean()) if len(found.explained) else 0
-        return f"about {10 * tenths} % of the echoes fit, {100 * FOUND_SHARE:.0f} % are expected"
+        expected = f"{100 * found.expected_share:.0f} % are expected"
+        return f"about {10 * tenths} % of the echoes fit, {expected}"
     std = math.sqrt(found.covariance[0, 0] + found.covariance[1, 1])
     return f"the place is known within {std:.1f} m only"
 

@@ -45,7 +45,8 @@ BIN = (0.05, 0.05, 0.1)  # that a particle occupies
 KLD_ERROR, KLD_QUANTILE = 0.05, 2.33  # bound with 99 %
 OFF = 3.0  # spreads from a face, beyond which an echo is not of it
 LOST_SHARE, LOST_AFTER = 0.5, 4  # of echoes on faces; so many sweeps in a row
-FOUND_SHARE = 0.75  # of echoes on faces, before a place is believed
+FOUND_SHARE = 0.75  # of echoes on faces, before a place that was looked for is believed
+START_SHARE = 0.65  # the same, where the start was known: things about may hide that many faces
 ALTERNATIVE_SHARE = 0.05  # of the weight: less is not another place
 AS_WELL = 0.025  # of the echoes: places that differ by less in what fits there fit alike
 WIDTHS_M = (0.2, 0.1, 0.05)  # of faces, as a pose is looked for
@@ -76,6 +77,7 @@ class Localised:
         particles: (n, 3), all of them; `weights`: (n,), their sum is 1.
         explained: (m,) which of the echoes lie on faces of the map, seen from `pose`.
         is_lost: The map does not explain the echoes: the pose is a guess.
+        expected_share: Of echoes on faces, before the place is believed.
         alternative: Another place where the car may be as well; None: there is none.
     """
 
@@ -85,6 +87,7 @@ class Localised:
     weights: Floats
     explained: Bools
     is_lost: bool
+    expected_share: float
     alternative: Pose2 | None
 
 
@@ -105,7 +108,7 @@ class ParticleFilter:
         self._log_weights = np.empty(0)
         self._unexplained = 0
         self._offset = 0.0
-        self._is_believed = False
+        self._is_believed, self._expected_share = False, FOUND_SHARE
         self._places: list[Pose2] = []
         self.is_global = True
 
@@ -118,6 +121,7 @@ class ParticleFilter:
         self._particles = np.array(pose) + self._random.standard_normal((MOST, 3)) * KNOWN
         self._log_weights, self.is_global = np.zeros(MOST), False
         self._is_believed, self._places = False, []
+        self._expected_share = START_SHARE
 
     def begin_anywhere(self) -> None:
         """Look for the car on the whole floor at the next sweep."""
@@ -223,6 +227,7 @@ class ParticleFilter:
             particles = particles[drawn] + spread * self._random.standard_normal((MOST, 3))
         self._particles, self._log_weights, self.is_global = particles, np.zeros(MOST), False
         self._is_believed, self._places = False, _places(particles)
+        self._expected_share = FOUND_SHARE
 
     def _draw_anew(self, weights: Floats) -> None:
         """Draw particles by their weights, as many as the places that they occupy need."""
@@ -247,11 +252,14 @@ class ParticleFilter:
             alternative, _ = _mean(others[same], theirs[same], other)
         explained = self._explained(pose, echoes)
         share = float(explained.mean()) if len(echoes) else 0.0
-        self._is_believed |= share >= FOUND_SHARE
+        self._is_believed |= share >= self._expected_share
         if alternative is None and self._places and len(echoes):
             alternative = self._as_well(pose, share, echoes)
         is_lost = share < LOST_SHARE or not self._is_believed
-        return Localised(pose, covariance, particles, weights, explained, is_lost, alternative)
+        return Localised(
+            pose, covariance, particles, weights, explained, is_lost, self._expected_share,
+            alternative,
+        )  # fmt: skip
 
     def _as_well(self, pose: Pose2, share: float, echoes: Floats) -> Pose2 | None:
         """Return a place of the last search that fits as well as a pose with a share of echoes."""

@@ -58,6 +58,18 @@ def test_obstacle_appears_within_three_sweeps(layer):
     assert clearance_at(layer, 0.2, 0.0) == pytest.approx(0.1, abs=0.03)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_car_that_drives_up_is_followed(layer, seed):
+    random = np.random.default_rng(seed)
+    for _ in range(8):
+        sweep(layer, room(), noise_m=NOISE_M, random=random)
+    for x in np.arange(0.8, 0.49, -0.2 / 7):  # 0.2 m/s, seven sweeps a second
+        car = outline((x, -0.1), (x + 0.4, -0.1), (x + 0.4, 0.1), (x, 0.1))
+        sweep(layer, room(), car, noise_m=NOISE_M, random=random)
+    before = [clearance_at(layer, x - 0.1, y) for y in (-0.05, 0.0, 0.05)]
+    assert np.array(before) == pytest.approx(0.1, abs=0.045)
+
+
 def test_obstacle_vanishes_when_it_is_seen_through(layer):
     for _ in range(20):
         sweep(layer, room(), BOX)

@@ -128,6 +128,21 @@ def test_map_of_another_room_is_not_believed():
         assert all(one.is_lost for one in found)
 
 
+def test_start_that_was_given_is_believed_though_things_hide_a_third_of_the_walls():
+    rng, bearings = np.random.default_rng(1), np.arange(BEAMS) * math.tau / BEAMS
+    room = outline((-0.975, -0.625), (1.175, -0.625), (1.175, 0.625), (-0.975, 0.625))
+    start = Pose2(-0.7, 0.3, 0.4)
+    ranges = ranges_from(room, start, bearings)
+    ranges[:108] *= 0.5  # 30 % of them
+    for begun, is_believed in ((start, True), (None, False)):
+        particles = started(SCHOOL, begun)
+        for _ in range(2 * SECOND):
+            seen = ranges + NOISE_M * rng.standard_normal(BEAMS)
+            echoes = np.column_stack((seen * np.cos(bearings), seen * np.sin(bearings)))
+            found = particles.update(NONE, echoes)
+            assert found.is_lost != is_believed
+
+
 def test_things_that_the_map_has_not_do_not_pull_the_car():
     drive, rng = driven("parking_school", Pose2(-0.7, 0.3, 0.0), STOOD), np.random.default_rng(1)
     particles, wrong = started(SCHOOL, Pose2(-0.7, 0.3, 0.0)), []
