@@ -68,6 +68,10 @@ class StudyError(ScmError, ValueError):
     """A study file, what its factors name, or a scenario that cannot be."""
 
 
+class LearningError(ScmError, ValueError):
+    """A demonstration, a trained network, or a car that one cannot drive."""
+
+
 class EyeError(ScmError, ValueError):
     """A camera model or its calibration."""
 

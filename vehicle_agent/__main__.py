@@ -31,7 +31,7 @@ def build_parser() -> argparse.ArgumentParser:
     for name in names(COMMANDS):
         command = load(COMMANDS, name, "COMMAND", Command)
         sub = commands.add_parser(
-            name,
+            name.replace("_", "-"),
             help=command.help,
             description=f"{command.help[0].upper()}{command.help[1:]}.",
             epilog=f"example: {command.example}",

@@ -1,0 +1,135 @@
+import dataclasses
+import shutil
+
+import msgspec
+import numpy as np
+import onnx
+import pytest
+from onnx import numpy_helper
+
+from scm.errors import LearningError
+from tests.unit.vehicle_agent.cloning.examples import SMALL, demonstration, line
+from vehicle_agent.cloning.augmentation import Augmentation
+from vehicle_agent.cloning.demonstration import Demonstration
+from vehicle_agent.cloning.learning import learn
+from vehicle_agent.cloning.model_file import KEY, Model
+from vehicle_agent.cloning.training import Recipe, balanced
+
+PLAIN = Augmentation(offset_std_m=0.0, heading_std_rad=0.0, mirrored=0.5, shadow=0.0)
+RECIPE = Recipe(epochs=12, copies=4, batch=32, rate=5e-3, how=PLAIN)
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory):
+    path = tmp_path_factory.mktemp("learned")
+    history = []
+    demo = demonstration(path / "demo")
+    metadata = learn([demo], SMALL, RECIPE, path / "model.onnx", history.append)
+    return path, metadata, history
+
+
+def test_network_learns_to_steer_by_a_line(learned):
+    path, metadata, history = learned
+    assert history[0].held_out_error > 2 * history[-1].held_out_error
+    assert history[-1].held_out_error < 0.08
+    assert metadata.held_out_error == history[-1].held_out_error
+    model = Model(path / "model.onnx")
+    for steering in (-0.7, -0.2, 0.0, 0.5):
+        (command,) = model(SMALL.view(line(steering)))
+        assert command == pytest.approx(steering, abs=0.15)
+
+
+def test_metadata_say_what_the_network_is(learned):
+    path, metadata, _ = learned
+    assert Model(path / "model.onnx").metadata == metadata
+    assert (metadata.car, metadata.map, metadata.laps, metadata.throttle) == (
+        "nigel",
+        "driving_school",
+        2,
+        0.4,
+    )
+    assert 100 <= metadata.frames <= 120
+    assert len(metadata.data_sha256) == 64
+
+
+def test_same_seed_same_network(learned, tmp_path):
+    path, metadata, _ = learned
+    again = learn([path / "demo"], SMALL, RECIPE, tmp_path / "again.onnx")
+    assert again.held_out_error == pytest.approx(metadata.held_out_error, abs=1e-6)
+    other = learn([path / "demo"], SMALL, dataclasses.replace(RECIPE, seed=1), tmp_path / "b.onnx")
+    assert other.held_out_error != pytest.approx(metadata.held_out_error, abs=1e-6)
+
+
+def damaged(model, how):
+    """Return the bytes of a network that cannot be used."""
+    whole = model.read_bytes()
+    if how == "truncated":
+        return whole[: len(whole) // 2]
+    graph = onnx.load_from_string(whole)
+    if how == "nan":
+        numbers = graph.graph.initializer[-1]
+        values = np.full_like(numpy_helper.to_array(numbers), np.nan)
+        numbers.CopyFrom(numpy_helper.from_array(values, numbers.name))
+    elif how == "no metadata":
+        del graph.metadata_props[:]
+    elif how == "other metadata":
+        metadata = msgspec.json.decode(graph.metadata_props[0].value)
+        graph.metadata_props[0].value = msgspec.json.encode(
+            {**metadata, "outputs": ["gear"]}
+        ).decode()
+    elif how == "other input":
+        graph.graph.input[0].type.tensor_type.shape.dim[3].dim_value = 4
+    return graph.SerializeToString()
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("truncated", "expected a trained network"),
+        ("nan", "are its weights NaN?"),
+        ("no metadata", f"without metadata ({KEY})"),
+        ("other metadata", "its metadata: expected model 1 and outputs"),
+        ("other input", "expected"),
+    ],
+)
+def test_network_that_cannot_be_used_is_refused_in_words(learned, tmp_path, how, words):
+    path = tmp_path / "bad.onnx"
+    path.write_bytes(damaged(learned[0] / "model.onnx", how))
+    with pytest.raises(LearningError) as raised:
+        Model(path)
+    assert str(raised.value).startswith(f"{path}: ")
+    assert words in str(raised.value)
+
+
+def test_network_that_is_missing_is_named(tmp_path):
+    with pytest.raises(LearningError, match="got no such file"):
+        Model(tmp_path / "none.onnx")
+
+
+def test_damaged_demonstration_is_named(learned, tmp_path):
+    with pytest.raises(LearningError, match=r"demonstration\.json: there is no such file"):
+        Demonstration(tmp_path)
+    shutil.copytree(learned[0] / "demo", tmp_path / "demo")
+    demo = Demonstration(tmp_path / "demo")
+    (tmp_path / "demo" / "frames" / "000003.jpg").unlink()
+    with pytest.raises(LearningError, match=r"000003\.jpg: expected a frame, got no such file"):
+        demo.frame(demo.samples[3])
+    (tmp_path / "demo" / "samples.parquet").write_bytes(b"none")
+    with pytest.raises(LearningError, match=r"samples\.parquet"):
+        Demonstration(tmp_path / "demo")
+
+
+def test_too_few_frames_and_two_cars_are_refused(learned, tmp_path):
+    few = demonstration(tmp_path / "few", count=60)
+    with pytest.raises(LearningError, match=r"expected 100 frames or more .* drive more laps"):
+        learn([few], SMALL, RECIPE, tmp_path / "few.onnx")
+    other = demonstration(tmp_path / "other", car="f1tenth")
+    with pytest.raises(LearningError, match="of one car, got f1tenth and nigel"):
+        learn([few, other], SMALL, RECIPE, tmp_path / "other.onnx")
+
+
+def test_most_frames_that_go_straight_are_left_out():
+    steering = np.concatenate((np.zeros(1000), np.full(50, 0.3)))
+    stays = balanced(steering, np.random.default_rng(0))
+    assert stays[1000:].all()
+    assert 150 < stays[:1000].sum() < 250

@@ -1,0 +1,167 @@
+"""The part that drives one car by a trained network: frames come in, commands go out.
+
+It sees the front camera and nothing else. A car whose frames stop coming stands: its lease repeats
+no command that is older than a second.
+"""
+
+import logging
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import RunError
+from scm.log import event
+from scm.runtime.part import BasePart, Subscription
+from scm.v2x.exchange import Call, Incoming, Outgoing
+from scm.v2x.message import Message, Refused, Request
+from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.lease_request import LeaseRequest
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
+from scm.v2x.messages.vehicle_state import VehicleState
+from vehicle_agent.autonomy.control import Command
+from vehicle_agent.cloning.model_file import Model
+from vehicle_agent.cloning.network import network_named
+from vehicle_agent.lease import CarLease
+
+SPAWN_TIMEOUT_S = 10.0
+TURN_FIRST_NS = NS_PER_S  # a car that stands turns its wheels before it sets out
+STAND = Command(0.0, 0.0)
+
+_log = logging.getLogger(__name__)
+
+
+class NetworkPart(BasePart):
+    """A network that drives one car.
+
+    Args:
+        name: Its station, which owns the lease.
+        vehicle: The car.
+        model: Path of the network.
+        throttle: Instead of the network's, or of the demonstration's; None: theirs.
+        speed: Times that throttle.
+        spawn: Place at which the car is put onto the map first, empty: any free one; None: it is
+            there.
+        session: Of its bus.
+
+    Attributes:
+        frames: How many it drove by.
+        infer_s: What the last one took, decoding included.
+        problem: Why it does not drive, in words; empty: it does.
+
+    Raises:
+        LearningError: when the network cannot be used.
+    """
+
+    role = "client"
+    period_ns = 20 * NS_PER_MS
+
+    def __init__(
+        self, name: str, vehicle: str, model: Path, throttle: float | None = None,
+        speed: float = 1.0, spawn: str | None = None, session: str = "",
+    ) -> None:  # fmt: skip
+        self.name, self._vehicle, self._spawn, self._run = name, vehicle, spawn, session
+        self.model = Model(model)
+        self._view = network_named(self.model.metadata.network).view
+        self._throttle, self._speed = throttle, speed
+        self._lease = CarLease(vehicle, name)
+        self._command, self._commanded_ns = STAND, -NS_PER_S
+        self._has_spawned, self._spawn_ns = spawn is None, -NS_PER_S
+        self._began_ns: int | None = None
+        self._status_ns = -NS_PER_S
+        self.frames, self.infer_s, self.problem = 0, 0.0, ""
+        own = {"vehicle": vehicle}
+        self.subscriptions: Sequence[Subscription] = (
+            Subscription(CameraFrame, {**own, "camera": "front"}),
+            Subscription(VehicleState, own),
+        )
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Look at the newest frame; drive."""
+        frame: CameraFrame | None = None
+        for item in inbox:
+            if item.call is not None:
+                self._replied(item.call.request, item.message)
+            elif isinstance(item.message, VehicleState):
+                self._check(item.message)
+            elif isinstance(item.message, CameraFrame):
+                frame = item.message
+        out: list[Outgoing] = []
+        if not self._has_spawned:
+            out += self._put(now_ns)
+        elif frame is not None and not self.problem:
+            self._look(frame, now_ns)
+        if self._has_spawned and self.frames:
+            command = STAND if self.problem else self._command
+            out += self._lease.step(now_ns, command, self._commanded_ns)
+        return out + self._status(now_ns)
+
+    def finish(self, now_ns: int) -> list[Outgoing]:
+        """Release the lease: the car stands."""
+        del now_ns
+        return self._lease.release()
+
+    def _look(self, frame: CameraFrame, now_ns: int) -> None:
+        """Steer by a frame; a damaged one is logged."""
+        began_s = time.perf_counter()
+        image = cv2.imdecode(np.frombuffer(frame.payload, np.uint8), cv2.IMREAD_COLOR)
+        if image is None:
+            why = repr(f"expected a JPEG, got {len(frame.payload)} bytes that are none")
+            event(_log, "frame", level=logging.WARNING, vehicle=self._vehicle, why=why)
+            return
+        commands = self.model(self._view(np.asarray(image, dtype=np.uint8)))
+        throttle = commands[1] if len(commands) > 1 else self.model.metadata.throttle
+        if self._throttle is not None:
+            throttle = self._throttle
+        throttle = min(1.0, self._speed * throttle)
+        if self._began_ns is None:
+            self._began_ns = now_ns
+        if now_ns - self._began_ns < TURN_FIRST_NS:
+            throttle = 0.0
+        self._command, self._commanded_ns = Command(throttle, commands[0]), now_ns
+        self.infer_s, self.frames = time.perf_counter() - began_s, self.frames + 1
+
+    def _check(self, state: VehicleState) -> None:
+        """Do not drive another car than the one that the network learned on."""
+        expected = self.model.metadata.car
+        if state.car != expected and not self.problem:
+            self.problem = (
+                f"the network was trained on a {expected}, {self._vehicle} is a {state.car}"
+            )
+            event(_log, "network", level=logging.WARNING, why=repr(self.problem))
+
+    def _put(self, now_ns: int) -> list[Outgoing]:
+        if now_ns - self._spawn_ns < NS_PER_S:
+            return []
+        self._spawn_ns = now_ns
+        request = SpawnRequest(
+            request_id=f"{self.name}-spawn-{self._vehicle}-{self._run}", vehicle=self._vehicle,
+            car=self.model.metadata.car, spawn=self._spawn or "",
+        )  # fmt: skip
+        return [Call(request, SPAWN_TIMEOUT_S)]
+
+    def _replied(self, request: Request, reply: Message) -> None:
+        """Process a reply.
+
+        Raises:
+            RunError: when the car cannot be spawned.
+        """
+        if isinstance(request, LeaseRequest):
+            self._lease.replied(request, reply)
+        elif isinstance(reply, SpawnReply):
+            self._has_spawned = True
+        elif isinstance(reply, Refused) and reply.code not in ("timeout", "offline"):
+            raise RunError(reply.detail)
+
+    def _status(self, now_ns: int) -> list[Outgoing]:
+        if now_ns - self._status_ns < NS_PER_S:
+            return []
+        self._status_ns = now_ns
+        detail = self.problem or f"{self.frames} frames, {1e3 * self.infer_s:.1f} ms a frame"
+        if not self.frames and not self.problem:
+            detail = f"waits for frames of {self._vehicle}'s front camera"
+        return [PartStatus(station=self.name, t_ns=now_ns, detail=detail)]

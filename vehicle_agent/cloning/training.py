@@ -1,0 +1,284 @@
+"""Training: a network learns what somebody did, from frames that are changed anew in every epoch.
+
+Most frames of a drive steer hardly at all, so most of those are left out (balancing). The last lap
+is held out: its loss shows what the network makes of frames that it has not seen.
+Loss: mean squared error of the commands, -1 to 1. Optimiser: Adam, its rate falls as a cosine.
+"""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+
+from scm.arrays import Bools, Floats, Image, Ints
+from scm.camera.optics import optics_of
+from scm.errors import LearningError
+from scm.vehicles.car import Car
+from vehicle_agent.autonomy.plan import limits_of
+from vehicle_agent.cloning.augmentation import Augmentation, Augmenter
+from vehicle_agent.cloning.demonstration import Demonstration
+from vehicle_agent.cloning.network import Convolution, Network
+
+jax.config.update("jax_platforms", "cpu")  # networks this small learn no faster elsewhere
+
+MOVING_MPS = 0.05  # slower frames teach nothing about steering
+STRAIGHT, STRAIGHT_SHARE = 0.05, 0.2  # commands below; share of those that stays
+FEWEST = 100  # frames
+PARTS = 8  # of an epoch's frames, changed side by side
+HELD_OUT = 0.2  # of the frames, where there is but one lap
+
+Weights = list[tuple[jax.Array, jax.Array]]
+"""Kernel and bias of each layer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """How a network is trained.
+
+    Attributes:
+        copies: How often each frame is changed in an epoch.
+        rate: Of Adam, at first.
+        dropout: Share of the units of dense layers that are silent in a step. The paper has 0.25:
+            changed frames make that needless, and it keeps a small network from steering enough.
+        outputs: `steering`, or `steering` and `throttle`.
+        how: Of changing frames.
+    """
+
+    epochs: int = 10
+    copies: int = 8
+    batch: int = 256
+    rate: float = 2e-3
+    dropout: float = 0.0
+    seed: int = 0
+    outputs: tuple[str, ...] = ("steering",)
+    how: Augmentation = field(default_factory=Augmentation)
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """One epoch: root mean squares of the commands' errors, on changed and on held-out frames."""
+
+    epoch: int
+    error: float
+    held_out_error: float
+    spent_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Trained:
+    """A network that was trained.
+
+    Attributes:
+        weights: Kernel and bias of each layer, as `Network.shapes` says.
+        history: Of the epochs.
+        frames: How many were learned from, after balancing.
+    """
+
+    network: Network
+    recipe: Recipe
+    weights: list[tuple[Floats, Floats]]
+    history: tuple[Progress, ...]
+    frames: int
+
+
+def balanced(steering: Floats, rng: np.random.Generator) -> Bools:
+    """Return which frames stay (n,): all that steer, and some of the others."""
+    stays: Bools = (np.abs(steering) >= STRAIGHT) | (rng.random(len(steering)) < STRAIGHT_SHARE)
+    return stays
+
+
+def train(
+    demonstrations: list[Demonstration], network: Network, car: Car, recipe: Recipe,
+    on_epoch: Callable[[Progress], None] | None = None,
+) -> Trained:  # fmt: skip
+    """Train a network.
+
+    Args:
+        demonstrations: Of one kind of car.
+        network: What is trained.
+        recipe: How.
+        on_epoch: Called after each.
+        car: The file of that car: its camera and its wheels say how changed frames look.
+
+    Raises:
+        LearningError: when there is too little to learn from.
+        CarError: when the car file lacks a camera.
+    """
+    began_s = time.monotonic()
+    rng = np.random.default_rng(recipe.seed)
+    frames, commands, is_held = _read(demonstrations, recipe)
+    is_used = ~is_held & balanced(commands[:, 0], rng)
+    if is_used.sum() < FEWEST:
+        msg = f"expected {FEWEST} frames or more to learn from, got {is_used.sum()}"
+        raise LearningError(f"{msg}, after balancing: drive more laps")
+    used = np.flatnonzero(is_used)
+    size = frames[0].shape[1], frames[0].shape[0]
+    optics, limits = optics_of(car, "front"), limits_of(car)
+    augmenters = [Augmenter(optics, limits, size, recipe.how, one) for one in rng.spawn(PARTS)]
+    held = np.array([network.view(frames[one]) for one in np.flatnonzero(is_held)])
+    fit = _Fit(network, recipe, len(used) * recipe.copies)
+    history = []
+    for epoch in range(recipe.epochs):
+        images, targets = _changed(network, augmenters, frames, commands, used, recipe.copies)
+        error = fit.epoch(images, targets, rng)
+        held_error = fit.error(held, commands[is_held])
+        history.append(Progress(epoch, error, held_error, time.monotonic() - began_s))
+        if on_epoch is not None:
+            on_epoch(history[-1])
+    return Trained(network, recipe, fit.numbers(), tuple(history), len(used))
+
+
+def _read(demonstrations: list[Demonstration], recipe: Recipe) -> tuple[list[Image], Floats, Bools]:
+    """Return the frames of moving cars, their commands (n, outputs), and which are held out (n,).
+
+    Raises:
+        LearningError: when a frame is missing, or has another size than the others.
+    """
+    frames: list[Image] = []
+    commands, is_held = list[list[float]](), list[bool]()
+    for one in demonstrations:
+        moving = [sample for sample in one.samples if abs(sample.speed_mps) > MOVING_MPS]
+        last = max((sample.lap for sample in moving), default=0)
+        first_held = len(moving) - round(HELD_OUT * len(moving))
+        for number, sample in enumerate(moving):
+            frames.append(one.frame(sample))
+            commands.append([getattr(sample, name) for name in recipe.outputs])
+            is_held.append(sample.lap == last if last else number >= first_held)
+            if frames[-1].shape != frames[0].shape:
+                expected, got = frames[0].shape[1::-1], frames[-1].shape[1::-1]
+                msg = f"{one.path}: {sample.frame}: expected a frame of {expected} px, got {got}"
+                raise LearningError(msg)
+    return frames, np.array(commands).reshape(len(frames), -1), np.array(is_held, dtype=np.bool_)
+
+
+def _changed(
+    network: Network, augmenters: list[Augmenter], frames: list[Image], commands: Floats,
+    used: Ints, copies: int,
+) -> tuple[Image, Floats]:  # fmt: skip
+    """Return inputs (n, h, w, 3) and commands (n, outputs), each frame changed anew."""
+    chosen = np.tile(used, copies)
+    images = np.empty((len(chosen), network.height_px, network.width_px, 3), np.uint8)
+    targets = commands[chosen]
+
+    def change(augment: Augmenter, rows: Ints) -> None:
+        for row in rows:
+            changed, targets[row, 0] = augment(frames[chosen[row]], float(targets[row, 0]))
+            images[row] = network.view(changed)
+
+    with ThreadPoolExecutor() as pool:  # OpenCV works outside Python's lock
+        parts = np.array_split(np.arange(len(chosen)), len(augmenters))
+        list(pool.map(change, augmenters, parts))
+    return images, targets
+
+
+class _Fit:
+    """The weights while they are learned."""
+
+    def __init__(self, network: Network, recipe: Recipe, samples: int) -> None:
+        self._recipe = recipe
+        steps = max(1, samples // recipe.batch) * recipe.epochs
+        self._optimiser = optax.adam(optax.cosine_decay_schedule(recipe.rate, steps))
+        key = jax.random.key(recipe.seed)
+        self._key, first = jax.random.split(key)
+        self._weights = initial(network, len(recipe.outputs), first)
+        self._state = self._optimiser.init(self._weights)
+
+        def loss(
+            weights: Weights, images: jax.Array, targets: jax.Array, key: jax.Array
+        ) -> jax.Array:
+            return jnp.mean(
+                (outputs_of(network, weights, images, recipe.dropout, key) - targets) ** 2
+            )
+
+        def step(
+            weights: Weights, state: optax.OptState, images: jax.Array, targets: jax.Array,
+            key: jax.Array,
+        ) -> tuple[Weights, optax.OptState, jax.Array]:  # fmt: skip
+            value, slope = jax.value_and_grad(loss)(weights, images, targets, key)
+            change, state = self._optimiser.update(slope, state)
+            return optax.apply_updates(weights, change), state, value
+
+        self._step = jax.jit(step)
+        self._outputs = jax.jit(lambda weights, images: outputs_of(network, weights, images))
+
+    def epoch(self, images: Image, targets: Floats, rng: np.random.Generator) -> float:
+        """Learn from all samples once; return the root mean square of the error.
+
+        Raises:
+            LearningError: when it is no number any more.
+        """
+        size = min(self._recipe.batch, len(images))
+        order = rng.permutation(len(images))[: len(images) // size * size]
+        squares = []
+        for batch in order.reshape(-1, size):
+            self._key, key = jax.random.split(self._key)
+            self._weights, self._state, value = self._step(
+                self._weights, self._state, images[batch], targets[batch], key
+            )
+            squares.append(value)
+        error = float(np.sqrt(np.mean(np.array(squares))))
+        if not np.isfinite(error):
+            raise LearningError(
+                f"the loss is {error}: try a lower --rate than {self._recipe.rate:g}"
+            )
+        return error
+
+    def error(self, images: Image, targets: Floats) -> float:
+        """Return the root mean square of the error on frames as they are; NaN without any."""
+        if not len(images):
+            return float("nan")
+        size = self._recipe.batch
+        parts = [
+            np.asarray(self._outputs(self._weights, images[first : first + size]))
+            for first in range(0, len(images), size)
+        ]
+        return float(np.sqrt(np.mean((np.concatenate(parts) - targets) ** 2)))
+
+    def numbers(self) -> list[tuple[Floats, Floats]]:
+        """Return the weights as arrays of NumPy."""
+        return [(np.asarray(kernel), np.asarray(bias)) for kernel, bias in self._weights]
+
+
+def initial(network: Network, outputs: int, key: jax.Array) -> Weights:
+    """Return random weights by He's rule."""
+    shapes = network.shapes(outputs)
+    keys = jax.random.split(key, len(shapes))
+    return [
+        (jax.random.normal(one, shape) * (2.0 / np.prod(shape[:-1])) ** 0.5, jnp.zeros(shape[-1]))
+        for one, shape in zip(keys, shapes, strict=True)
+    ]
+
+
+def outputs_of(
+    network: Network,
+    weights: Weights,
+    images: jax.Array,
+    dropout: float = 0.0,
+    key: jax.Array | None = None,
+) -> jax.Array:
+    """Return commands (n, outputs) for inputs (n, h, w, 3), 0 to 255; a key silences units."""
+    values = images.astype(jnp.float32) / 255.0 - 0.5
+    layers = [*network.layers, None]
+    for number, ((kernel, bias), layer) in enumerate(zip(weights, layers, strict=True)):
+        if isinstance(layer, Convolution):
+            step = (layer.step_px, layer.step_px)
+            values = jax.lax.conv_general_dilated(
+                values, kernel, step, "VALID", dimension_numbers=("NHWC", "HWIO", "NHWC")
+            )
+            values = jax.nn.relu(values + bias)
+            continue
+        values = values.reshape(len(values), -1) @ kernel + bias
+        if layer is None:
+            continue
+        values = jax.nn.relu(values)
+        if key is not None and dropout:
+            stays = jax.random.bernoulli(
+                jax.random.fold_in(key, number), 1.0 - dropout, values.shape
+            )
+            values = jnp.where(stays, values / (1.0 - dropout), 0.0)
+    return values

@@ -1,0 +1,75 @@
+"""`vehicle-agent drive`: let a trained network drive a car by its front camera."""
+
+import argparse
+import threading
+from pathlib import Path
+
+from scm.command import Command, credentials_argument, credentials_of, place
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("model", type=Path, metavar="FILE", help="the network, by train")
+    parser.add_argument("--vehicle", required=True, metavar="NAME", help="the car to drive")
+    parser.add_argument(
+        "--throttle", type=float, metavar="SHARE",
+        help="0 to 1; default: the network's, or the demonstration's",
+    )  # fmt: skip
+    parser.add_argument(
+        "--spawn", nargs="?", const="", type=place, metavar="PLACE",
+        help="put the car onto the map first, there or at any free place",
+    )  # fmt: skip
+    parser.add_argument(
+        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT",
+        help="the city's router (%(default)s)",
+    )  # fmt: skip
+    credentials_argument(parser)
+    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
+    parser.add_argument("--name", help="of this agent, which holds the lease (drive-VEHICLE)")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.clock import WallClock
+    from scm.errors import LearningError, RunError
+    from scm.runtime.live import run, stop_on_signal
+    from scm.v2x.bus_zenoh import ZenohBus
+    from scm.v2x.key import check_name
+    from vehicle_agent.leaving import Leaving
+
+    try:
+        from vehicle_agent.cloning.driving import NetworkPart
+    except ModuleNotFoundError as cause:
+        msg = f"{cause.name} is not installed: pip install onnxruntime, or 'scm[learn]'"
+        raise RunError(msg) from cause
+    vehicle = check_name(arguments.vehicle, "--vehicle")
+    check_name(arguments.city, "--city")
+    throttle = arguments.throttle
+    if throttle is not None and not 0.0 <= throttle <= 1.0:
+        raise LearningError(f"--throttle: expected 0 to 1, got {throttle:g}")
+    credentials = credentials_of(arguments)
+    name = arguments.name or f"drive-{vehicle}"
+    name = check_name(name if credentials is None else credentials.station, "--name")
+    stop_requested, done, clock = stop_on_signal(), threading.Event(), WallClock()
+    part = NetworkPart(name, vehicle, arguments.model, throttle, spawn=arguments.spawn)
+    metadata = part.model.metadata
+    print(
+        f"{vehicle} is driven by {metadata.network}, learned on {metadata.map}, until Ctrl-C",
+        flush=True,
+    )
+    with ZenohBus(
+        arguments.city, name, arguments.connect, clock=clock, credentials=credentials
+    ) as bus:
+        run(Leaving(part, stop_requested, done), bus, clock, done, on_tick=True)
+    if part.problem:
+        raise LearningError(part.problem)
+    print(f"{part.frames} frames")
+    return 0
+
+
+COMMAND = Command(
+    help="let a trained network drive a car by its front camera",
+    example="vehicle-agent drive model.onnx --vehicle n1",
+    arguments=_arguments,
+    run=_run,
+)
