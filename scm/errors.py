@@ -10,6 +10,7 @@
     ├── PathError     (ValueError)       a start, a goal, or a path between them that cannot be
     ├── DemandError   (ValueError)       a table of who wants to drive where, and when
     ├── StudyError    (ValueError)       a study file, a factor or a scenario
+    ├── LearningError (ValueError)       a demonstration, or a trained network
     ├── EyeError      (ValueError)       a camera or its calibration
     ├── LinkError     (ConnectionError)  the bus, a serial line, a peer that is not there
     ├── StoreError    (OSError)          state that must survive, and cannot be read or written
