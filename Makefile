@@ -43,7 +43,7 @@ $(RUNS): pyproject.toml | $(VENV)/bin/python
 	@touch $@
 
 $(TESTS): pyproject.toml | $(VENV)/bin/python
-	@echo "installing into $(VENV) with the tests' tools, 2 GB (once; half a minute to some minutes)"
+	@echo "installing into $(VENV) with the tests' tools, 3 GB (once; half a minute to some minutes)"
 	@$(INSTALL) -e '.[dev]'
 	@$(COMPILE)
 	@$(KERNELS)
