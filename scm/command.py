@@ -94,6 +94,17 @@ def part_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="of all randomness (%(default)s)")
 
 
+def agent_arguments(parser: argparse.ArgumentParser, name_help: str) -> None:
+    """Add what every program of a car needs to know: where the bus is, and its name there."""
+    parser.add_argument(
+        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT",
+        help="the city's router (%(default)s)",
+    )  # fmt: skip
+    credentials_argument(parser)
+    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
+    parser.add_argument("--name", help=name_help)
+
+
 def state_argument(parser: argparse.ArgumentParser) -> None:
     """Add where a part stores what must outlive it."""
     parser.add_argument(

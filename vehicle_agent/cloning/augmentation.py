@@ -2,7 +2,7 @@
 
 A car that only ever saw its way from the middle does not know how to come back to it. The floor is
 a plane, so the picture from another place on it is the frame under a homography; what stands on the
-floor leans a little. The command that belongs to such a picture leads back:
+floor is distorted a little. The command that belongs to such a picture leads back:
 
     curvature = that of the demonstration - 2 offset / way^2 - 2 heading / way
 

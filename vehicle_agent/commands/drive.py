@@ -4,9 +4,7 @@ import argparse
 import threading
 from pathlib import Path
 
-from scm.command import Command, credentials_argument, credentials_of, place
-
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+from scm.command import Command, agent_arguments, credentials_of, place
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,13 +18,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--spawn", nargs="?", const="", type=place, metavar="PLACE",
         help="put the car onto the map first, there or at any free place",
     )  # fmt: skip
-    parser.add_argument(
-        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT",
-        help="the city's router (%(default)s)",
-    )  # fmt: skip
-    credentials_argument(parser)
-    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
-    parser.add_argument("--name", help="of this agent, which holds the lease (drive-VEHICLE)")
+    agent_arguments(parser, "of this agent, which holds the lease (drive-VEHICLE)")
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -4,9 +4,7 @@ import argparse
 import threading
 from pathlib import Path
 
-from scm.command import Command, credentials_argument, credentials_of
-
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+from scm.command import Command, agent_arguments, credentials_of
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,13 +19,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "nothing is left to see",
     )  # fmt: skip
     parser.add_argument("--car", default="nigel", help="its car file (%(default)s)")
-    parser.add_argument(
-        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT",
-        help="the city's router (%(default)s)",
-    )  # fmt: skip
-    credentials_argument(parser)
-    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
-    parser.add_argument("--name", help="of this agent, which holds the lease (map-VEHICLE)")
+    agent_arguments(parser, "of this agent, which holds the lease (map-VEHICLE)")
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -3,9 +3,7 @@
 import argparse
 import threading
 
-from scm.command import Command, credentials_argument, credentials_of, place
-
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+from scm.command import Command, agent_arguments, credentials_of, place
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,13 +25,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--eye", action="store_true", help="use the Eye's poses of the car, too, where it is seen"
     )
     parser.add_argument("--car", default="nigel", help="its car file (%(default)s)")
-    parser.add_argument(
-        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT",
-        help="the city's router (%(default)s)",
-    )  # fmt: skip
-    credentials_argument(parser)
-    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
-    parser.add_argument("--name", help="of this agent, which holds the lease (park-VEHICLE)")
+    agent_arguments(parser, "of this agent, which holds the lease (park-VEHICLE)")
     parser.add_argument("--seed", type=int, default=0, help="of the particles (%(default)s)")
     parser.add_argument(
         "--stack", default="own", metavar="NAME",

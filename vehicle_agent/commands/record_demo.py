@@ -4,9 +4,7 @@ import argparse
 import threading
 from pathlib import Path
 
-from scm.command import Command, credentials_argument, credentials_of
-
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+from scm.command import Command, agent_arguments, credentials_of
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,13 +13,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--out", required=True, type=Path, metavar="DIR", help="folder of the demonstration"
     )
     parser.add_argument("--laps", type=int, default=5, help="how many (%(default)s)")
-    parser.add_argument(
-        "--connect", default=DEFAULT_ENDPOINT, metavar="ENDPOINT",
-        help="the city's router (%(default)s)",
-    )  # fmt: skip
-    credentials_argument(parser)
-    parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
-    parser.add_argument("--name", help="of this agent (demo-VEHICLE)")
+    agent_arguments(parser, "of this agent (demo-VEHICLE)")
 
 
 def _run(arguments: argparse.Namespace) -> int:

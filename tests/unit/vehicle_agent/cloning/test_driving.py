@@ -83,6 +83,12 @@ def test_network_drives_by_frames_after_its_wheels_have_turned(network):
     assert 0.0 < part.infer_s < 0.5
 
 
+def test_car_that_stands_turns_its_wheels_first(network):
+    off, part = driven(NetworkPart("net", "n1", network), lasts_s=1.1)
+    assert part.frames > 10
+    assert abs(off.x) < 0.005
+
+
 def test_network_of_another_car_stands_and_says_so(network):
     off, part = driven(NetworkPart("net", "n1", network), car="f1tenth")
     assert part.problem == "the network was trained on a nigel, n1 is a f1tenth"
