@@ -8,6 +8,7 @@ import contextlib
 import gc
 import logging
 import multiprocessing
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -33,7 +34,7 @@ def compile_together(jobs: Mapping[str, Job]) -> None:
     """Do jobs that compile or load, by what they compile; the first one is the longest.
 
     On a first start a fork compiles the first one meanwhile, if this process has one thread: a fork
-    of more threads could wait for locks of those that it does not have.
+    of more threads could wait for locks of those that it does not have. JAX's threads count too.
     """
     if not is_first_start():
         for job in jobs.values():
@@ -42,7 +43,7 @@ def compile_together(jobs: Mapping[str, Job]) -> None:
     event(_LOG, "first_start", compiling=", ".join(jobs), only_once=True, takes_about_s=_TYPICAL_S)
     (_, longest), *others = jobs.items()
     with _no_garbage_collection():
-        process = _fork(longest) if threading.active_count() == 1 else None
+        process = _fork(longest) if _has_one_thread() else None
         for _, job in others:
             job()
         if process is not None:
@@ -54,6 +55,11 @@ def compile_together(jobs: Mapping[str, Job]) -> None:
 
 def _marker() -> Path:
     return version_folder(Path(controller.__file__).parent) / "complete"
+
+
+def _has_one_thread() -> bool:
+    """Return whether no other thread can hold a lock; Python does not see those of JAX."""
+    return threading.active_count() == 1 and "jax" not in sys.modules
 
 
 def _fork(job: Job) -> Any:

@@ -1,13 +1,18 @@
 """A first start compiles in two processes; later starts only load."""
 
 import os
+import sys
 import threading
 
 import pytest
 
 from scm.vehicles import cold_start
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes are copied here")
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes are copied here"),
+    # JAX warns where another test loaded it; the forks here only write a line
+    pytest.mark.filterwarnings("ignore:os.fork:RuntimeWarning"),
+]
 
 
 class Log:
@@ -35,6 +40,7 @@ class Log:
 def log(tmp_path, monkeypatch):
     monkeypatch.setattr(cold_start, "_marker", lambda: tmp_path / "complete")
     monkeypatch.setattr(threading, "active_count", lambda: 1)
+    monkeypatch.delitem(sys.modules, "jax", raising=False)
     return Log(tmp_path / "log")
 
 
@@ -52,6 +58,12 @@ def test_a_second_start_needs_no_fork(log):
 
 def test_a_process_with_threads_is_not_forked(log, monkeypatch):
     monkeypatch.setattr(threading, "active_count", lambda: 2)
+    cold_start.compile_together({"a": log.job("a")})
+    assert log.lines() == ["a here"]
+
+
+def test_a_process_that_has_loaded_jax_is_not_forked(log, monkeypatch):
+    monkeypatch.setitem(sys.modules, "jax", object())
     cold_start.compile_together({"a": log.job("a")})
     assert log.lines() == ["a here"]
 
