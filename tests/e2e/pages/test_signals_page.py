@@ -134,7 +134,7 @@ def test_a_plan_is_made_proven_saved_asked_for_and_deleted(visit, running):
     stages = [{"groups": ["south_east"], "green_s": 14}, {"groups": ["south_west"], "green_s": 8.7}]
     rival, new = {"stages": stages, "by": "bob", "about": "his"}, {"If-None-Match": "*"}
     running.web.put(f"{AT}/plans/rush", json=rival, headers=new).raise_for_status()
-    page.wait_for_selector('.choices [data-plan="rush"]')  # its row moves the button down
+    page.wait_for_selector(proven)  # the words move the button
     save.click()  # somebody was faster: nothing is lost, and nobody's work goes unseen
     page.wait_for_selector(".editor .fault >> text=bob saved rush (his)")
     assert "412" in visited.complaints.pop()
