@@ -1,42 +1,62 @@
 """A network that learned from five laps drives by its camera: does it stay in its lane?
 
 It drives a Nigel from anywhere on the lane. Light (`daylight.intensity`, `daylight.azimuth`),
-start, speed and the car may differ from those of the demonstration. Signals are off: it knows none.
+start, speed, way and the car may differ from those of the demonstration. Signals are off.
 
-    python -m studies.cloning demos/five        five laps by the built-in driver, in lockstep
+    python -m studies.cloning record demos/five     five laps by the built-in driver, in lockstep
     vehicle-agent train demos/five --epochs 20
     scm study run studies/cloning.toml
+    python -m studies.cloning label demos/more model.onnx    laps by it, for its next training
 """
 
+import argparse
 import math
 import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace as replaced
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from msgspec.structs import replace
 
+from scm.camera.optics import fitted
 from scm.camera.part import CameraPart
 from scm.clock import NS_PER_S
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.load import load_map
+from scm.maps.polyline import advance, extent
 from scm.maps.route import Path as LanePath
 from scm.maps.route import roads_of
-from scm.records.city_map import CityMap
+from scm.records.city_map import CityMap, Lane, Segment
 from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Part
 from scm.study.case import Case
-from scm.vehicles.car import load_car, varied_cars
+from scm.vehicles.car import Car, load_car, varied_cars
 from scm.world.part import WorldPart
-from studies.parking import with_effect
+from scm.world.world import generator
+from studies.kidnap import put
+from studies.parking import HasPose, as_text, with_effect
+from studies.tracks import track
+from vehicle_agent.agent import AgentPart
+from vehicle_agent.body import BodyKind
 from vehicle_agent.cloning.driving import NetworkPart
 from vehicle_agent.cloning.recording import RecordDemoPart
 
 MAP, CAR, VEHICLE = "driving_school", "nigel", "n1"
+LIMIT_MPS = 0.2  # of the lanes while laps are recorded: a fifth faster is possible
 STEP_S, SLOWEST_MPS, STARTS_S = 0.1, 0.05, 5.0
+LABELLED = 1.5  # times the room to either side: as far out as labels help
+WIDTH_PX = 640  # of rendered frames: half of a Nigel's, in less than half the time
+
+Put = Callable[[], HasPose]
 
 
 def run(
-    case: Case, model: str = "model.onnx", laps: int = 5, start_deg: float = 0.0,
-    start_m: float = 0.0, speed: float = 1.0, concealed: str = "nothing",
+    case: Case, model: str = "model.onnx", laps: int = 1, start_deg: float = 0.0,
+    start_m: float = 0.0, speed: float = 1.0, concealed: str = "nothing", engine: str = "city",
+    way: str = "there", on: int = 0, width_px: int = WIDTH_PX,
 ) -> dict[str, float]:  # fmt: skip
     """Return how far the car drove before a wheel left its lane, and how near the middle.
 
@@ -47,32 +67,55 @@ def run(
         start_deg: Standard deviation of the start, off the lane's direction.
         start_m: Likewise, off its middle.
         speed: Times the throttle of the demonstration.
-        concealed: What the car has that the demonstration's had not: of `parking.CONCEALED`.
+        concealed: What the car has that the demonstration's had not: of `parking.CONCEALED`, or
+            of `reality_body.CONCEALED` if an engine moves it.
+        engine: What moves the car: the city, or an engine of `tests/reality`.
+        way: Round the lane: `there`, as recorded, or `back`.
+        on: Number of a track of `tracks.py`; 0: the study's map.
+        width_px: Of rendered frames.
     """
     rng = case.generator("cloning")
-    city_map = without_signals(case.map)
+    city_map = lanes_only(track(on) if on else case.map, back=way == "back")
     lane = LanePath.circulation(roads_of(city_map), city_map.lanes[0].name)
     at_m = float(rng.uniform(0.0, lane.length_m))
     off_m, off_deg = rng.standard_normal(2) * (start_m, start_deg)
     begin = lane.at(at_m) @ Pose2(0.0, float(off_m), math.radians(off_deg))
-    car = with_effect(load_car(CAR), concealed)
-    with varied_cars({CAR: car}):
+    car = load_car(CAR) if engine != "city" else with_effect(load_car(CAR), concealed)
+    with _seen(smaller(car, width_px)):
         world = WorldPart(city_map, case.seed)
-        driver = NetworkPart("network", VEHICLE, Path(model), speed=speed)
         cameras = CameraPart(city_map, case.seed, case.daylight)
-        room_m = 0.5 * (city_map.lanes[0].width_m - car.value("body.track_m"))
-        beside, s = list[float](), at_m
-        with case.lockstep([world, cameras, driver]) as city:
-            hosted = world.world.host(VEHICLE, CAR, begin, 0)
-            while s - at_m < laps * lane.length_m:
-                city.run_for(STEP_S)
-                pose = hosted.pose
-                s, off = lane.project(pose.x, pose.y, s)
-                beside.append(off)
-                is_gone = abs(off) > room_m or abs(wrap_angle(pose.yaw - lane.at(s).yaw)) > 1.0
-                time_s = city.now_ns / NS_PER_S
-                if is_gone or s - at_m < SLOWEST_MPS * (time_s - STARTS_S):
-                    break
+        driver = NetworkPart("network", VEHICLE, Path(model), speed=speed)
+        parts: list[Part] = [world, cameras, driver]
+        place: Put = partial(world.world.host, VEHICLE, CAR, begin, 0)
+        if engine != "city":
+            from studies.reality_body import RealityBody  # noqa: PLC0415  needs a clone
+
+            lasts_s = STARTS_S + laps * lane.length_m / SLOWEST_MPS
+            body = RealityBody(engine, concealed, lasts_s, case.generator("reality"))
+            remote = BodyKind("remote", lambda *_: body)
+            parts = [world, AgentPart(VEHICLE, CAR, as_text(begin), body=remote), *parts[1:]]
+            place = lambda: body  # noqa: E731
+        with case.lockstep(parts) as city:
+            room_m = 0.5 * (city_map.lanes[0].width_m - car.value("body.track_m"))
+            return _drive(city, place(), begin, lane, at_m, laps, room_m)
+
+
+def _drive(
+    city: Lockstep, car: HasPose, begin: Pose2, lane: LanePath, at_m: float, laps: int,
+    room_m: float,
+) -> dict[str, float]:  # fmt: skip
+    """Let the car drive until a wheel leaves the lane, it stands, or all laps are done."""
+    beside, s, time_s = list[float](), at_m, 0.0
+    while s - at_m < laps * lane.length_m:
+        city.run_for(STEP_S)
+        time_s = city.now_ns / NS_PER_S
+        if time_s < STARTS_S and car.pose == Pose2(0.0, 0.0, 0.0) != begin:
+            continue  # the city has not placed it yet
+        s, off = lane.project(car.pose.x, car.pose.y, s)
+        beside.append(off)
+        is_gone = abs(off) > room_m or abs(wrap_angle(car.pose.yaw - lane.at(s).yaw)) > 1.0
+        if is_gone or s - at_m < SLOWEST_MPS * (time_s - STARTS_S):
+            break
     done = (s - at_m) / lane.length_m
     return {
         "stayed": float(done >= laps),
@@ -83,14 +126,47 @@ def run(
     }
 
 
-def without_signals(city_map: CityMap) -> CityMap:
-    """Return a map whose crossings anybody may pass."""
-    return replace(city_map, junctions=(), stop_lines=(), lights=())
+def lanes_only(city_map: CityMap, *, back: bool = False) -> CityMap:
+    """Return a map whose crossings anybody may pass; `back`: its lanes lead the other way."""
+    lanes = tuple(map(partial(_turned, city_map.lanes), city_map.lanes)) if back else city_map.lanes
+    return replace(city_map, lanes=lanes, junctions=(), stop_lines=(), lights=(), crosswalks=())
 
 
-def record(path: Path, laps: int = 5, seed: int = 1) -> int:
+def _turned(lanes: Sequence[Lane], lane: Lane) -> Lane:
+    end = Pose2(*lane.start)
+    for segment in lane.segments:
+        end = advance(end, *extent(segment))
+    turned = [
+        one if one.angle_rad is None else Segment(radius_m=one.radius_m, angle_rad=-one.angle_rad)
+        for one in reversed(lane.segments)
+    ]
+    start = end.x, end.y, wrap_angle(end.yaw + math.pi)
+    after = tuple(one.name for one in lanes if lane.name in one.next)
+    return replace(lane, start=start, segments=tuple(turned), next=after)
+
+
+def smaller(car: Car, width_px: int) -> Car:
+    """Return a car whose cameras have so many columns."""
+    width, height = car.vector("camera.resolution_px")
+    size = (float(width_px), float(round(height * width_px / width)))
+    resolution = replaced(car.values["camera.resolution_px"], value=size)
+    return replaced(car, values={**car.values, "camera.resolution_px": resolution})
+
+
+@contextmanager
+def _seen(car: Car) -> Iterator[None]:
+    """Let a car be what its name means, its cameras included."""
+    with varied_cars({CAR: car}):
+        fitted.cache_clear()
+        yield
+    fitted.cache_clear()
+
+
+def record(path: Path, laps: int = 5, seed: int = 1, limit_mps: float = LIMIT_MPS) -> int:
     """Let the built-in driver drive some laps, and record them; return the number of frames."""
-    city_map = without_signals(load_map(MAP))
+    city_map = lanes_only(load_map(MAP))
+    lanes = tuple(replace(lane, speed_limit_mps=limit_mps) for lane in city_map.lanes)
+    city_map = replace(city_map, lanes=lanes)
     part = RecordDemoPart("demo", VEHICLE, path, laps)
     world = WorldPart(city_map, seed, ((VEHICLE, CAR),))
     with Lockstep([world, CameraPart(city_map, seed), part]) as city:
@@ -99,5 +175,54 @@ def record(path: Path, laps: int = 5, seed: int = 1) -> int:
     return len(part.samples)
 
 
+def label(
+    path: Path, model: Path, laps: int = 5, seed: int = 1, start_deg: float = 5.0,
+    start_m: float = 0.02,
+) -> int:  # fmt: skip
+    """Let a network drive, and record what the built-in driver would do (DAgger).
+
+    Each lap begins somewhere on the lane and beside its middle, and ends early beyond the lane.
+    """
+    rng = generator(seed, "label")
+    city_map = lanes_only(load_map(MAP))
+    lane = LanePath.circulation(roads_of(city_map), city_map.lanes[0].name)
+    room_m = 0.5 * (city_map.lanes[0].width_m - load_car(CAR).value("body.track_m"))
+    world = WorldPart(city_map, seed)
+    driver = NetworkPart("network", VEHICLE, model)
+    part = RecordDemoPart("demo", VEHICLE, path, laps, dagger=True)
+    with Lockstep([world, CameraPart(city_map, seed), driver, part]) as city:
+        car, done_m = None, 0.0
+        while done_m < laps * lane.length_m:
+            at_m = float(rng.uniform(0.0, lane.length_m))
+            off_m, off_deg = rng.standard_normal(2) * (start_m, start_deg)
+            begin = lane.at(at_m) @ Pose2(0.0, float(off_m), math.radians(off_deg))
+            if car is None:
+                car = world.world.host(VEHICLE, CAR, begin, 0)
+            put(car, begin)
+            s, off = at_m, 0.0
+            while abs(off) < LABELLED * room_m and s - at_m < lane.length_m:
+                city.run_for(STEP_S)
+                s, off = lane.project(car.pose.x, car.pose.y, s)
+            done_m += s - at_m
+    return len(part.samples)
+
+
+def _main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=("record", "label"))
+    parser.add_argument("path", type=Path, metavar="DIR")
+    parser.add_argument("model", type=Path, nargs="?", help="the network that drives, to label")
+    parser.add_argument("--laps", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    if given.what == "record":
+        count = record(given.path, given.laps, given.seed)
+    elif given.model is None:
+        parser.error("label: expected the network that drives")
+    else:
+        count = label(given.path, given.model, given.laps, given.seed)
+    sys.stdout.write(f"{count} frames in {given.path}\n")
+
+
 if __name__ == "__main__":
-    sys.stdout.write(f"{record(Path(sys.argv[1]))} frames in {sys.argv[1]}\n")
+    _main()

@@ -32,6 +32,7 @@ from studies.parking import (
     TRIES,
     VEHICLE,
     Noisy,
+    as_text,
     perturbed,
 )
 from vehicle_agent.autonomy.grid_map import grid_of_city
@@ -64,7 +65,7 @@ def run(case: Case, perturbation: float = 1.0, goal: str = "goal") -> dict[str, 
     room = perturbed(case.map, perturbation, rng)
     start = _free_place(room, limits, target, target, rng)
     known = Pose2(*(np.array(start) + KNOWN_STD * rng.standard_normal(3)).tolist())
-    wanted = Wanted(VEHICLE, goal=_text(target), start=_text(known), seed=case.seed)
+    wanted = Wanted(VEHICLE, goal=as_text(target), start=as_text(known), seed=case.seed)
     agent = ParkPart("park", wanted, city_map=case.map)
     with varied_cars({CAR: model.with_values({"lidar.noise_m": perturbation * RANGE_STD_M})}):
         world = WorldPart(room, case.seed)
@@ -151,7 +152,3 @@ def measures(steps: Sequence[Step]) -> dict[str, float]:
         "wrong_m": float(moved_m[known & ~right].sum()),
         "unknown_m": float(moved_m[~known].sum()),
     }
-
-
-def _text(pose: Pose2) -> str:
-    return f"{pose.x:.4f},{pose.y:.4f},{math.degrees(pose.yaw):.3f}"

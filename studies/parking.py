@@ -105,7 +105,7 @@ def run(
         draw = partial(_off, roads_of(city_map).spawn_pose(start))
     begin, world_map = _scene(city_map, perturbation, limits, target, boxes, rng, draw)
     wanted = Wanted(
-        VEHICLE, goal=_text(target), start=_text(_off(begin, rng)), seed=case.seed, stack=stack
+        VEHICLE, goal=as_text(target), start=as_text(_off(begin, rng)), seed=case.seed, stack=stack
     )
     with varied_cars({CAR: known_car(car_file, concealed)}):
         agent = ParkPart("park", wanted, city_map=city_map)
@@ -119,17 +119,19 @@ def run(
         from studies.reality_body import RealityBody  # noqa: PLC0415  needs a clone
 
         body = RealityBody(engine, concealed, LASTS_S, case.generator("reality"))
-        driven = AgentPart(VEHICLE, CAR, _text(begin), body=BodyKind("remote", lambda *_: body))
+        driven = AgentPart(VEHICLE, CAR, as_text(begin), body=BodyKind("remote", lambda *_: body))
         parts = [world, driven, noisy_agent]
         return _park(case, parts, agent, lambda: body, target, cross)
 
 
-class _HasPose(Protocol):
+class HasPose(Protocol):
+    """Whatever is somewhere."""
+
     pose: Pose2
 
 
 def _park(
-    case: Case, parts: Sequence[Part], agent: ParkPart, put: Callable[[], _HasPose], target: Pose2,
+    case: Case, parts: Sequence[Part], agent: ParkPart, put: Callable[[], HasPose], target: Pose2,
     cross: Callable[[Lockstep], "_Crossing"] | None,
 ) -> dict[str, float]:  # fmt: skip
     """Let an agent park; `put` puts its car there and returns it, `cross` another one."""
@@ -329,7 +331,8 @@ def _off(start: Pose2, rng: np.random.Generator) -> Pose2:
     return Pose2(*(np.array(start) + KNOWN_STD * rng.standard_normal(3)).tolist())
 
 
-def _text(pose: Pose2) -> str:
+def as_text(pose: Pose2) -> str:
+    """Return a pose as commands take it: X,Y,DEG."""
     return f"{pose.x:.4f},{pose.y:.4f},{math.degrees(pose.yaw):.3f}"
 
 

@@ -13,6 +13,7 @@ command by pure pursuit are ours.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -67,19 +68,18 @@ class Augmenter:
         self._rng = rng
         self._to_floor = np.linalg.inv(self._from_floor(0.0, 0.0))
 
-    def __call__(self, frame: Image, steering: float) -> tuple[Image, float]:
-        """Return a frame (h, w, 3), changed, and the steering command that belongs to it."""
+    def __call__(self, frames: Sequence[Image], steering: float) -> tuple[list[Image], float]:
+        """Return frames (h, w, 3), changed alike, and the steering command that belongs to them."""
         how, rng = self._how, self._rng
         offset_m, heading_rad = rng.standard_normal(2) * (how.offset_std_m, how.heading_std_rad)
-        changed = self.seen_from(frame, offset_m, heading_rad)
+        changed = [self.seen_from(frame, offset_m, heading_rad) for frame in frames]
         steering = self.steering_back(steering, offset_m, heading_rad)
         if rng.random() < how.mirrored:
-            changed, steering = changed[:, ::-1], -steering
-        if rng.random() < how.shadow:
-            changed = self._shaded(changed)
+            changed, steering = [frame[:, ::-1] for frame in changed], -steering
+        shade = self._shade() if rng.random() < how.shadow else np.ones(1)
         factors = rng.uniform(*how.light) * (1.0 + how.tint * rng.standard_normal(3))
-        lit = np.clip(changed * factors.astype(np.float32), 0.0, 255.0)
-        return lit.astype(np.uint8), steering
+        light = (shade * factors).astype(np.float32)
+        return [np.clip(one * light, 0.0, 255.0).astype(np.uint8) for one in changed], steering
 
     def seen_from(self, frame: Image, offset_m: float, heading_rad: float) -> Image:
         """Return a frame as seen from so far to the left, turned so far to the left."""
@@ -116,12 +116,12 @@ class Augmenter:
         floor: Floats = camera @ pitched @ TO_CAMERA @ seen @ body
         return floor
 
-    def _shaded(self, frame: Image) -> Image:
-        """Return a frame with a shadow between two lines from its top to its bottom."""
-        height, width = frame.shape[:2]
+    def _shade(self) -> Floats:
+        """Return a factor (h, w, 1): a shadow between two lines from the top to the bottom."""
+        width, height = self._size
         ends = np.sort(self._rng.uniform(-0.2, 1.2, (2, 2)), axis=1) * width
         corners = ((ends[0, 0], 0), (ends[0, 1], 0), (ends[1, 1], height), (ends[1, 0], height))
         mask = np.ones((height, width), np.float32)
         shade = float(self._rng.uniform(*SHADE))
         cv2.fillConvexPoly(mask, np.round(corners).astype(np.int32), shade)
-        return np.asarray(frame * mask[:, :, None]).astype(np.uint8)
+        return np.asarray(mask[:, :, None], dtype=np.float64)

@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from scm.arrays import Image
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RunError
 from scm.log import event
@@ -25,7 +26,7 @@ from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
 from scm.v2x.messages.vehicle_state import VehicleState
 from vehicle_agent.autonomy.control import Command
 from vehicle_agent.cloning.model_file import Model
-from vehicle_agent.cloning.network import network_named
+from vehicle_agent.cloning.network import FrameStack, network_named
 from vehicle_agent.lease import CarLease
 
 SPAWN_TIMEOUT_S = 10.0
@@ -67,6 +68,7 @@ class NetworkPart(BasePart):
         self.name, self._vehicle, self._spawn, self._run = name, vehicle, spawn, session
         self.model = Model(model)
         self._view = network_named(self.model.metadata.network).view
+        self._stack = FrameStack[Image](self.model.metadata.stack)
         self._throttle, self._speed = throttle, speed
         self._lease = CarLease(vehicle, name)
         self._command, self._commanded_ns = STAND, -NS_PER_S
@@ -113,7 +115,8 @@ class NetworkPart(BasePart):
             why = repr(f"expected a JPEG, got {len(frame.payload)} bytes that are none")
             event(_log, "frame", level=logging.WARNING, vehicle=self._vehicle, why=why)
             return
-        commands = self.model(self._view(np.asarray(image, dtype=np.uint8)))
+        seen = self._stack.add(frame.t_ns, np.asarray(image, dtype=np.uint8))
+        commands = self.model(self._view(seen))
         throttle = commands[1] if len(commands) > 1 else self.model.metadata.throttle
         if self._throttle is not None:
             throttle = self._throttle

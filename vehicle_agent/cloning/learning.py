@@ -16,7 +16,7 @@ from scm.errors import LearningError
 from scm.vehicles.car import load_car
 from vehicle_agent.cloning.demonstration import SAMPLES, Demonstration
 from vehicle_agent.cloning.model_file import INPUT, KEY, OUTPUT, Metadata
-from vehicle_agent.cloning.network import CHANNELS, Convolution, Network
+from vehicle_agent.cloning.network import Convolution, Network
 from vehicle_agent.cloning.training import MOVING_MPS, Progress, Recipe, train
 
 OPSET, IR_VERSION = 17, 9  # old enough for the runtimes of small computers
@@ -50,7 +50,8 @@ def learn(
         frames=trained.frames, laps=sum(one.about.laps for one in demonstrations),
         epochs=recipe.epochs, seed=recipe.seed, error=last.error,
         held_out_error=None if np.isnan(last.held_out_error) else last.held_out_error,
-        data_sha256=_hash(paths), scm=__version__,
+        data_sha256=_hash(paths), scm=__version__, stack=network.stack,
+        steering_delay_s=recipe.delay_s, steering_gain=recipe.gain,
     )  # fmt: skip
     _write(out, network, trained.weights, metadata)
     return metadata
@@ -75,7 +76,7 @@ def _write(
     graph = _Graph()
     output = graph.layers(network, weights)
     graph.nodes.append(helper.make_node("Identity", [output], [OUTPUT]))
-    size = [1, network.height_px, network.width_px, CHANNELS]
+    size = [1, network.height_px, network.width_px, network.channels]
     made = helper.make_graph(
         graph.nodes, network.name,
         [helper.make_tensor_value_info(INPUT, TensorProto.UINT8, size)],

@@ -1,6 +1,6 @@
 """A trained network as an ONNX file, with metadata: what it was trained on, and how well it fits.
 
-    input   frame      uint8 (1, height, width, 3), red first
+    input   frame      uint8 (1, height, width, 3 a frame), newest frame first, red first
     output  commands   float32 (1, n): steering, and throttle if the metadata say so, -1 to 1
 
 Scaling is part of the file, so any program with an ONNX runtime can use it. It is written with
@@ -38,6 +38,8 @@ class Metadata(msgspec.Struct, kw_only=True, frozen=True):
         error, held_out_error: Root mean squares, on changed and on held-out frames; None: none was
             held out.
         data_sha256: Of the demonstrations' samples.
+        stack: How many frames it sees at once.
+        steering_delay_s, steering_gain: Of the car that it was trained for.
     """
 
     model: int
@@ -55,6 +57,9 @@ class Metadata(msgspec.Struct, kw_only=True, frozen=True):
     held_out_error: float | None
     data_sha256: str
     scm: str
+    stack: int = 1
+    steering_delay_s: float = 0.0
+    steering_gain: float = 1.0
 
 
 class Model:
@@ -66,6 +71,7 @@ class Model:
     Attributes:
         metadata: What it is.
         size_px: Width and height of its input.
+        channels: Of its input: three for each frame.
 
     Raises:
         LearningError: naming the file, what was expected and what was found.
@@ -85,11 +91,12 @@ class Model:
             detail = str(cause).strip().splitlines()[-1]
             raise LearningError(f"{path}: expected a trained network (.onnx): {detail}") from cause
         self.metadata = _metadata_of(path, self._session.get_modelmeta().custom_metadata_map)
-        self.size_px = _size_of(path, self._session)
+        self.channels = CHANNELS * self.metadata.stack
+        self.size_px = _size_of(path, self._session, self.channels)
         self._check(path)
 
     def __call__(self, view: Image) -> tuple[float, ...]:
-        """Return the commands for an input (height, width, 3), red first; each -1 to 1."""
+        """Return the commands for an input (height, width, channels), red first; each -1 to 1."""
         (commands,) = self._session.run([OUTPUT], {INPUT: view[None]})
         return tuple(np.clip(commands[0], -1.0, 1.0).tolist())
 
@@ -102,7 +109,7 @@ class Model:
         width, height = self.size_px
         rng = np.random.default_rng(0)
         for _ in range(TRIED):
-            view = rng.integers(0, 256, (height, width, CHANNELS)).astype(np.uint8)
+            view = rng.integers(0, 256, (height, width, self.channels)).astype(np.uint8)
             commands = self(view)
             if len(commands) != len(self.metadata.outputs):
                 expected = " and ".join(self.metadata.outputs)
@@ -129,16 +136,18 @@ def _metadata_of(path: Path, entries: dict[str, str]) -> Metadata:
     return metadata
 
 
-def _size_of(path: Path, session: onnxruntime.InferenceSession) -> tuple[int, int]:
+def _size_of(path: Path, session: onnxruntime.InferenceSession, channels: int) -> tuple[int, int]:
     """Return width and height of the input.
 
     Raises:
-        LearningError: when it is not one picture of three colours.
+        LearningError: when it is not one picture of so many channels.
     """
     inputs = session.get_inputs()
     names, shape = [one.name for one in inputs], list(inputs[0].shape)
-    is_picture = len(shape) == 4 and shape[0] == 1 and shape[3] == CHANNELS
+    is_picture = len(shape) == 4 and shape[0] == 1 and shape[3] == channels
     if names != [INPUT] or inputs[0].type != "tensor(uint8)" or not is_picture:
         got = f"{names} of {inputs[0].type} {shape}"
-        raise LearningError(f"{path}: expected {INPUT} of uint8 (1, height, width, 3), got {got}")
+        raise LearningError(
+            f"{path}: expected {INPUT} of uint8 (1, height, width, {channels}), got {got}"
+        )
     return int(shape[2]), int(shape[1])

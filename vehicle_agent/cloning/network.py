@@ -1,7 +1,10 @@
 """The networks, as lists of layers: training and the ONNX file are both made from the same list."""
 
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Generic, TypeVar
 
 import cv2
 import numpy as np
@@ -10,7 +13,10 @@ from scm.arrays import Image
 from scm.errors import LearningError, nearest
 
 CHANNELS = 3  # red, green, blue
+GAP_NS = 200_000_000  # between the frames of a stack: a Nigel drives 5 cm
 SKY = 0.3  # of a frame's rows, above the horizon of a Nigel's camera: left out
+
+Frame = TypeVar("Frame")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,16 +45,23 @@ class Network:
     Attributes:
         height_px, width_px: Of its input.
         layers: Without the last.
+        stack: How many frames it sees at once, `GAP_NS` apart.
     """
 
     name: str
     height_px: int
     width_px: int
     layers: tuple[Layer, ...]
+    stack: int = 1
+
+    @property
+    def channels(self) -> int:
+        """Of its input."""
+        return CHANNELS * self.stack
 
     def shapes(self, outputs: int) -> list[tuple[int, ...]]:
         """Return each layer's weights' shape: (kernel, kernel, in, out) or (in, out)."""
-        height, width, channels = self.height_px, self.width_px, CHANNELS
+        height, width, channels = self.height_px, self.width_px, self.channels
         shapes: list[tuple[int, ...]] = []
         for layer in self.layers:
             if isinstance(layer, Convolution):
@@ -65,16 +78,42 @@ class Network:
         """Return how many numbers are learned."""
         return sum(int(np.prod(shape)) + shape[-1] for shape in self.shapes(outputs))
 
-    def view(self, frame: Image) -> Image:
-        """Return a frame (h, w, 3), blue first as OpenCV has it, as the network's input.
+    def view(self, frames: Sequence[Image]) -> Image:
+        """Return frames (h, w, 3), blue first as OpenCV has it, newest first, as its input.
 
         Returns:
-            (height_px, width_px, 3), red first; of the whole width, whatever its proportions.
+            (height_px, width_px, channels), red first; of the whole width, whatever its
+            proportions.
         """
         size = self.width_px, self.height_px
-        below = frame[round(SKY * len(frame)) :]
-        smaller = cv2.resize(below, size, interpolation=cv2.INTER_AREA)
-        return np.ascontiguousarray(smaller[:, :, ::-1])
+        below = [frame[round(SKY * len(frame)) :] for frame in frames]
+        smaller = [cv2.resize(one, size, interpolation=cv2.INTER_AREA)[:, :, ::-1] for one in below]
+        return np.concatenate(smaller, axis=2)
+
+
+class FrameStack(Generic[Frame]):
+    """The newest frame and those before it that a network sees with it.
+
+    Args:
+        count: How many.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._past: deque[tuple[int, Frame]] = deque()
+
+    def add(self, t_ns: int, frame: Frame) -> list[Frame]:
+        """Take a frame; return it and those before it, newest first; the oldest one repeats."""
+        past = self._past
+        if past and t_ns <= past[-1][0]:
+            past.clear()  # another clock
+        past.append((t_ns, frame))
+        while past[0][0] < t_ns - self._count * GAP_NS:
+            past.popleft()
+        return [self._nearest(t_ns - number * GAP_NS) for number in range(self._count)]
+
+    def _nearest(self, t_ns: int) -> Frame:
+        return min(self._past, key=lambda one: abs(one[0] - t_ns))[1]
 
 
 NETWORKS = {

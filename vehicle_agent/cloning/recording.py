@@ -12,10 +12,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import LearningError
 from scm.geometry import Pose2
+from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.camera_frame import CameraFrame
@@ -23,6 +25,7 @@ from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
 from vehicle_agent.cloning.demonstration import ABOUT, FRAMES, About, Sample, write
+from vehicle_agent.cloning.demonstrator import Demonstrator
 
 WIDTH_PX, JPEG_QUALITY = 320, 90  # of a stored frame
 AT_START_M, AT_START_RAD, AWAY_M = 0.25, 0.8, 1.0
@@ -62,6 +65,7 @@ class RecordDemoPart(BasePart):
         path: Folder of the demonstration, which is made.
         laps: After which it is over.
         on_lap: Called with the number of laps done.
+        dagger: Record what the built-in driver would do instead of what is done.
 
     Attributes:
         samples: Recorded so far.
@@ -75,13 +79,14 @@ class RecordDemoPart(BasePart):
 
     def __init__(
         self, name: str, vehicle: str, path: Path, laps: int,
-        on_lap: Callable[[int], None] | None = None,
+        on_lap: Callable[[int], None] | None = None, *, dagger: bool = False,
     ) -> None:  # fmt: skip
         if (path / ABOUT).exists():
             raise LearningError(f"{path}: has a demonstration already: name another folder")
         (path / FRAMES).mkdir(parents=True, exist_ok=True)
         self.name, self._vehicle, self._path, self._wanted = name, vehicle, path, laps
-        self._on_lap = on_lap
+        self._on_lap, self._is_dagger = on_lap, dagger
+        self._demonstrator: Demonstrator | None = None
         self._laps = Laps()
         self.samples: list[Sample] = []
         self._waiting: list[tuple[CameraFrame, int]] = []
@@ -108,7 +113,7 @@ class RecordDemoPart(BasePart):
             if isinstance(message, CameraFrame):
                 self._waiting.append((message, item.t_ns))
             elif isinstance(message, WorldDefinition):
-                self._map = message.map.name
+                self._defined(message.map)
             elif isinstance(message, VehicleState) and not self.is_over:
                 self._drove(message, item.t_ns)
         if now_ns - self._status_ns < NS_PER_S:
@@ -123,23 +128,41 @@ class RecordDemoPart(BasePart):
         self._write()
         return []
 
+    def _defined(self, city_map: CityMap) -> None:
+        if self._is_dagger and (self._demonstrator is None or self._map != city_map.name):
+            city_map = replace(city_map, junctions=(), stop_lines=(), lights=())
+            self._demonstrator = Demonstrator(city_map)
+        self._map = city_map.name
+
+    def _commands(self, state: VehicleState) -> tuple[float, float] | None:
+        """Return the throttle and steering to store; None: there is nothing to learn from."""
+        if self._demonstrator is not None:
+            return self._demonstrator.commands(state)
+        if self._is_dagger or state.throttle is None or state.steering is None:
+            return None
+        return state.throttle, state.steering
+
     def _drove(self, state: VehicleState, arrived_ns: int) -> None:
-        """Store the frames that arrived before a report, with the commands that it has."""
+        """Store the frames that arrived before a report, with the commands that go with it."""
+        commands = self._commands(state)
         before, self._state = self._laps.done, state
         self._laps.add(Pose2(state.x_m, state.y_m, state.yaw_rad), state.speed_mps)
         due = [one for one in self._waiting if one[1] <= arrived_ns]
         self._waiting = [one for one in self._waiting if one[1] > arrived_ns]
         for frame, frame_ns in due:
-            if state.steering is not None:
-                self._store(frame, frame_ns, state, before)
+            if commands is not None:
+                self._store(frame, frame_ns, state, commands, before)
         if self._laps.done > before:
             self._write()
             if self._on_lap is not None:
                 self._on_lap(self._laps.done)
 
-    def _store(self, frame: CameraFrame, arrived_ns: int, state: VehicleState, lap: int) -> None:
+    def _store(
+        self, frame: CameraFrame, arrived_ns: int, state: VehicleState,
+        commands: tuple[float, float], lap: int,
+    ) -> None:  # fmt: skip
         image = cv2.imdecode(np.frombuffer(frame.payload, np.uint8), cv2.IMREAD_COLOR)
-        if image is None or state.steering is None:
+        if image is None:
             return
         self._size = frame.width_px, frame.height_px
         height = round(WIDTH_PX * image.shape[0] / image.shape[1])
@@ -150,8 +173,8 @@ class RecordDemoPart(BasePart):
             raise LearningError(f"{self._path / FRAMES / name}: cannot be written")
         self.samples.append(
             Sample(
-                frame=name, t_ns=frame.t_ns, arrived_ns=arrived_ns, steering=state.steering,
-                throttle=state.throttle, speed_mps=state.speed_mps, lap=lap,
+                frame=name, t_ns=frame.t_ns, arrived_ns=arrived_ns, steering=commands[1],
+                throttle=commands[0], speed_mps=state.speed_mps, lap=lap,
             )
         )  # fmt: skip
 

@@ -8,7 +8,7 @@ Loss: mean squared error of the commands, -1 to 1. Optimiser: Adam, its rate fal
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import jax
 import jax.numpy as jnp
@@ -17,12 +17,13 @@ import optax
 
 from scm.arrays import Bools, Floats, Image, Ints
 from scm.camera.optics import optics_of
+from scm.clock import NS_PER_S
 from scm.errors import LearningError
 from scm.vehicles.car import Car
 from vehicle_agent.autonomy.plan import limits_of
 from vehicle_agent.cloning.augmentation import Augmentation, Augmenter
-from vehicle_agent.cloning.demonstration import Demonstration
-from vehicle_agent.cloning.network import Convolution, Network
+from vehicle_agent.cloning.demonstration import Demonstration, Sample
+from vehicle_agent.cloning.network import Convolution, FrameStack, Network
 
 jax.config.update("jax_platforms", "cpu")  # networks this small learn no faster elsewhere
 
@@ -47,6 +48,8 @@ class Recipe:
             changed frames make that needless, and it keeps a small network from steering enough.
         outputs: `steering`, or `steering` and `throttle`.
         how: Of changing frames.
+        delay_s: Of the servo that will obey: commands are learned from so much later.
+        gain: Of the steering that will obey: commands are learned divided by it.
     """
 
     epochs: int = 10
@@ -57,6 +60,14 @@ class Recipe:
     seed: int = 0
     outputs: tuple[str, ...] = ("steering",)
     how: Augmentation = field(default_factory=Augmentation)
+    delay_s: float = 0.0
+    gain: float = 1.0
+
+    def fitted_to(self, car: Car) -> "Recipe":
+        """Return this recipe for the delay and the gain of a car file's steering."""
+        delay_s = car.value("steering.delay_s") if car.has("steering.delay_s") else 0.0
+        gain = car.value("steering.gain") if car.has("steering.gain") else 1.0
+        return replace(self, delay_s=delay_s, gain=gain)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +122,7 @@ def train(
     """
     began_s = time.monotonic()
     rng = np.random.default_rng(recipe.seed)
-    frames, commands, is_held = _read(demonstrations, recipe)
+    frames, stacks, commands, is_held = _read(demonstrations, network.stack, recipe)
     is_used = ~is_held & balanced(commands[:, 0], rng)
     if is_used.sum() < FEWEST:
         msg = f"expected {FEWEST} frames or more to learn from, got {is_used.sum()}"
@@ -120,58 +131,83 @@ def train(
     size = frames[0].shape[1], frames[0].shape[0]
     optics, limits = optics_of(car, "front"), limits_of(car)
     augmenters = [Augmenter(optics, limits, size, recipe.how, one) for one in rng.spawn(PARTS)]
-    held = np.array([network.view(frames[one]) for one in np.flatnonzero(is_held)])
+    held = [network.view([frames[at] for at in stacks[one]]) for one in np.flatnonzero(is_held)]
     fit = _Fit(network, recipe, len(used) * recipe.copies)
     history = []
     for epoch in range(recipe.epochs):
-        images, targets = _changed(network, augmenters, frames, commands, used, recipe.copies)
-        error = fit.epoch(images, targets, rng)
-        held_error = fit.error(held, commands[is_held])
+        chosen = np.tile(used, recipe.copies)
+        seen = [[frames[at] for at in stacks[one]] for one in chosen]
+        images, targets = _changed(network, augmenters, seen, commands[chosen])
+        error = fit.epoch(images, _for_car(targets, recipe), rng)
+        held_error = fit.error(np.array(held), _for_car(commands[is_held], recipe))
         history.append(Progress(epoch, error, held_error, time.monotonic() - began_s))
         if on_epoch is not None:
             on_epoch(history[-1])
     return Trained(network, recipe, fit.numbers(), tuple(history), len(used))
 
 
-def _read(demonstrations: list[Demonstration], recipe: Recipe) -> tuple[list[Image], Floats, Bools]:
-    """Return the frames of moving cars, their commands (n, outputs), and which are held out (n,).
+def _read(
+    demonstrations: list[Demonstration], stack: int, recipe: Recipe
+) -> tuple[list[Image], list[list[int]], Floats, Bools]:
+    """Read the frames of moving cars.
+
+    Returns:
+        The frames; for each the numbers of those that are seen with it, newest first; the
+        commands (n, outputs); which frames are held out (n,).
 
     Raises:
         LearningError: when a frame is missing, or has another size than the others.
     """
     frames: list[Image] = []
-    commands, is_held = list[list[float]](), list[bool]()
+    stacks, commands, is_held = list[list[int]](), list[Floats](), list[bool]()
     for one in demonstrations:
+        seen = FrameStack[int](stack)
         moving = [sample for sample in one.samples if abs(sample.speed_mps) > MOVING_MPS]
         last = max((sample.lap for sample in moving), default=0)
         first_held = len(moving) - round(HELD_OUT * len(moving))
         for number, sample in enumerate(moving):
+            stacks.append(seen.add(sample.t_ns, len(frames)))
             frames.append(one.frame(sample))
-            commands.append([getattr(sample, name) for name in recipe.outputs])
             is_held.append(sample.lap == last if last else number >= first_held)
             if frames[-1].shape != frames[0].shape:
                 expected, got = frames[0].shape[1::-1], frames[-1].shape[1::-1]
                 msg = f"{one.path}: {sample.frame}: expected a frame of {expected} px, got {got}"
                 raise LearningError(msg)
-    return frames, np.array(commands).reshape(len(frames), -1), np.array(is_held, dtype=np.bool_)
+        commands.append(_commands(one, moving, recipe))
+    return frames, stacks, np.concatenate(commands), np.array(is_held, dtype=np.bool_)
+
+
+def _commands(one: Demonstration, moving: list[Sample], recipe: Recipe) -> Floats:
+    """Return the commands of frames (n, outputs); a servo that obeys late gets later steering."""
+    at_s = one.column("arrived_ns") / NS_PER_S
+    wanted_s = np.array([sample.arrived_ns for sample in moving]) / NS_PER_S
+    delays_s = {"steering": recipe.delay_s, "throttle": 0.0}
+    return np.column_stack([
+        np.interp(wanted_s + delays_s[name], at_s, one.column(name)) for name in recipe.outputs
+    ])  # fmt: skip
+
+
+def _for_car(commands: Floats, recipe: Recipe) -> Floats:
+    """Return commands (n, outputs) for the car that will obey."""
+    gains = np.array([recipe.gain, 1.0])[: commands.shape[1]]
+    clipped: Floats = np.clip(commands / gains, -1.0, 1.0)
+    return clipped
 
 
 def _changed(
-    network: Network, augmenters: list[Augmenter], frames: list[Image], commands: Floats,
-    used: Ints, copies: int,
-) -> tuple[Image, Floats]:  # fmt: skip
-    """Return inputs (n, h, w, 3) and commands (n, outputs), each frame changed anew."""
-    chosen = np.tile(used, copies)
-    images = np.empty((len(chosen), network.height_px, network.width_px, 3), np.uint8)
-    targets = commands[chosen]
+    network: Network, augmenters: list[Augmenter], seen: list[list[Image]], commands: Floats
+) -> tuple[Image, Floats]:
+    """Return inputs (n, h, w, channels) and commands (n, outputs), each frame changed anew."""
+    size = network.height_px, network.width_px, network.channels
+    images, targets = np.empty((len(seen), *size), np.uint8), commands.copy()
 
     def change(augment: Augmenter, rows: Ints) -> None:
         for row in rows:
-            changed, targets[row, 0] = augment(frames[chosen[row]], float(targets[row, 0]))
+            changed, targets[row, 0] = augment(seen[row], float(targets[row, 0]))
             images[row] = network.view(changed)
 
     with ThreadPoolExecutor() as pool:  # OpenCV works outside Python's lock
-        parts = np.array_split(np.arange(len(chosen)), len(augmenters))
+        parts = np.array_split(np.arange(len(seen)), len(augmenters))
         list(pool.map(change, augmenters, parts))
     return images, targets
 

@@ -13,6 +13,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--out", required=True, type=Path, metavar="DIR", help="folder of the demonstration"
     )
     parser.add_argument("--laps", type=int, default=5, help="how many (%(default)s)")
+    parser.add_argument(
+        "--dagger", action="store_true",
+        help="record what the built-in driver would do, while a network drives",
+    )  # fmt: skip
     agent_arguments(parser, "of this agent (demo-VEHICLE)")
 
 
@@ -39,7 +43,9 @@ def _run(arguments: argparse.Namespace) -> int:
         if laps >= arguments.laps:
             stop_requested.set()
 
-    part = RecordDemoPart(name, vehicle, arguments.out, arguments.laps, show)
+    part = RecordDemoPart(
+        name, vehicle, arguments.out, arguments.laps, show, dagger=arguments.dagger
+    )
     print(f"Recording {vehicle} until it has driven {arguments.laps} laps, or Ctrl-C", flush=True)
     with ZenohBus(
         arguments.city, name, arguments.connect, clock=clock, credentials=credentials

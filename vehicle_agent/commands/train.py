@@ -1,6 +1,7 @@
 """`vehicle-agent train`: let a network learn from demonstrations."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from scm.command import Command
@@ -19,6 +20,14 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="the trained network (%(default)s)",
     )  # fmt: skip
     parser.add_argument("--throttle", action="store_true", help="learn the throttle as well")
+    parser.add_argument(
+        "--frames", type=int, default=1,
+        help="how many it sees at once, 0.2 s apart (%(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--for", dest="car", metavar="CAR",
+        help="the car that will drive, by name or file: its steering's delay and gain count",
+    )  # fmt: skip
     parser.add_argument("--epochs", type=int, default=10, help="(%(default)s)")
     parser.add_argument("--rate", type=float, default=2e-3, help="of learning (%(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of all that is drawn (%(default)s)")
@@ -26,10 +35,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.errors import LearningError, RunError
+    from scm.vehicles.car import load_car
     from vehicle_agent.cloning.network import network_named
 
-    network = network_named(arguments.model)
-    for name in ("epochs", "rate"):
+    network = replace(network_named(arguments.model), stack=arguments.frames)
+    for name in ("epochs", "rate", "frames"):
         if getattr(arguments, name) <= 0:
             raise LearningError(f"--{name}: expected more than 0, got {getattr(arguments, name)}")
     if not arguments.out.absolute().parent.is_dir():
@@ -53,6 +63,8 @@ def _run(arguments: argparse.Namespace) -> int:
     recipe = Recipe(
         epochs=arguments.epochs, rate=arguments.rate, seed=arguments.seed, outputs=outputs
     )
+    if arguments.car is not None:
+        recipe = recipe.fitted_to(load_car(arguments.car))
     metadata = learn(arguments.demonstrations, network, recipe, arguments.out, show)
     print(
         f"{arguments.out}: {network.parameters(len(outputs))} parameters, learned from "

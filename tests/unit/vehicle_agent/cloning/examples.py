@@ -8,6 +8,7 @@ from vehicle_agent.cloning.network import Convolution, Dense, Network
 
 SMALL = Network("small", 24, 32, (Convolution(6, 5, 3), Dense(12)))
 WIDTH, HEIGHT = 64, 40
+PERIOD_NS = 100_000_000
 
 
 def line(steering):
@@ -18,18 +19,18 @@ def line(steering):
     return image
 
 
-def demonstration(path, *, count=240, seed=0, car="nigel"):
-    """Write a demonstration of two laps."""
+def demonstration(path, *, count=240, seed=0, car="nigel", late=0):
+    """Write a demonstration of two laps; commands come so many frames late."""
     (path / FRAMES).mkdir(parents=True)
-    rng, samples = np.random.default_rng(seed), []
-    for number in range(count):
-        steering = float(rng.uniform(-0.9, 0.9))
+    shown, samples = np.random.default_rng(seed).uniform(-0.9, 0.9, count), []
+    for number, steering in enumerate(shown.tolist()):
         name = f"{number:06d}.jpg"
         cv2.imwrite(str(path / FRAMES / name), line(steering))
         samples.append(
             Sample(
-                frame=name, t_ns=number, arrived_ns=number + 10, steering=steering, throttle=0.4,
-                speed_mps=0.2, lap=2 * number // count,
+                frame=name, t_ns=number * PERIOD_NS, arrived_ns=number * PERIOD_NS + 10,
+                steering=float(shown[max(0, number - late)]), throttle=0.4, speed_mps=0.2,
+                lap=2 * number // count,
             )
         )  # fmt: skip
     about = About(

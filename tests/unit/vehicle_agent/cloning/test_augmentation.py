@@ -67,10 +67,10 @@ def test_mirrored_frame_steers_the_other_way():
     rng = np.random.default_rng(2)
     frame = rng.integers(0, 256, (SIZE[1], SIZE[0], 3)).astype(np.uint8)
     still = {"offset_std_m": 0.0, "heading_std_rad": 0.0, "light": (1.0, 1.0), "tint": 0.0}
-    changed, steering = augmenter(mirrored=1.0, shadow=0.0, **still)(frame, 0.4)
+    (changed,), steering = augmenter(mirrored=1.0, shadow=0.0, **still)([frame], 0.4)
     assert steering == pytest.approx(-0.4)
     assert np.abs(changed[:, ::-1].astype(int) - frame).max() <= 1
-    unchanged, same = augmenter(mirrored=0.0, shadow=0.0, **still)(frame, 0.4)
+    (unchanged,), same = augmenter(mirrored=0.0, shadow=0.0, **still)([frame], 0.4)
     assert same == pytest.approx(0.4)
     assert np.abs(unchanged.astype(int) - frame).max() <= 1
 
@@ -78,7 +78,8 @@ def test_mirrored_frame_steers_the_other_way():
 def test_shadow_darkens_a_part():
     frame = np.full((SIZE[1], SIZE[0], 3), 200, np.uint8)
     still = {"offset_std_m": 0.0, "heading_std_rad": 0.0, "light": (1.0, 1.0), "tint": 0.0}
-    changed, _ = augmenter(mirrored=0.0, shadow=1.0, **still)(frame, 0.0)
+    (changed, other), _ = augmenter(mirrored=0.0, shadow=1.0, **still)([frame, frame], 0.0)
+    assert (other == changed).all()  # frames that are seen together are changed alike
     assert len(np.unique(changed)) == 2
     assert changed.min() < 185
     assert changed.max() >= 199

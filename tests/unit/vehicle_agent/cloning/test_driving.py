@@ -6,8 +6,10 @@ from scm.errors import LearningError
 from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.runtime.lockstep import Lockstep
+from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.part import WorldPart
 from vehicle_agent.cloning.demonstration import Demonstration
+from vehicle_agent.cloning.demonstrator import Demonstrator
 from vehicle_agent.cloning.driving import NetworkPart
 from vehicle_agent.cloning.learning import learn
 from vehicle_agent.cloning.network import NETWORKS
@@ -22,11 +24,13 @@ START = Pose2(1.747806, 0.291194, -0.785398)
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """Return what the built-in driver drove in 12 s, and what was sent and seen meanwhile."""
-    path = tmp_path_factory.mktemp("demo") / "mine"
-    part = RecordDemoPart("demo", "n1", path, laps=5)
-    with Lockstep([WorldPart(OPEN, 1, (("n1", "nigel"),)), CameraPart(OPEN, 1), part]) as city:
+    path = tmp_path_factory.mktemp("demo")
+    part = RecordDemoPart("demo", "n1", path / "mine", laps=5)
+    beside = RecordDemoPart("beside", "n1", path / "dagger", laps=5, dagger=True)
+    world = WorldPart(OPEN, 1, (("n1", "nigel"),))
+    with Lockstep([world, CameraPart(OPEN, 1), part, beside]) as city:
         city.run_for(12.0)
-    return Demonstration(path)
+    return Demonstration(path / "mine")
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +50,34 @@ def test_demonstration_has_frames_with_the_commands_in_force_as_they_arrived(rec
     assert all(0 <= one.arrived_ns - one.t_ns < 60e6 for one in later)
     assert min(one.speed_mps for one in later) > 0.2
     assert max(abs(one.steering) for one in later) > 0.45  # in a loop
+
+
+def test_demonstrator_would_do_what_the_built_in_driver_does(recorded):
+    beside = Demonstration(recorded.path.parent / "dagger")
+    same = {one.t_ns: one.steering for one in beside.samples if one.t_ns > 4e9}
+    done = {one.t_ns: one.steering for one in recorded.samples if one.t_ns in same}
+    assert len(done) > 100
+    assert max(abs(same[t_ns] - done[t_ns]) for t_ns in done) < 0.03
+    assert max(same.values()) - min(same.values()) > 0.4
+
+
+def state(pose, t_ns=0):
+    return VehicleState(
+        vehicle="n1", t_ns=t_ns, seq=1, x_m=pose.x, y_m=pose.y, yaw_rad=pose.yaw, speed_mps=0.2,
+        yaw_rate_radps=0.0, steering_rad=0.0, throttle=0.5, source="simulated",
+    )  # fmt: skip
+
+
+def test_demonstrator_leads_back_to_the_lane_and_gives_up_beside_all():
+    demonstrator = Demonstrator(OPEN)
+    (_, inside), (_, left), (_, right) = (
+        demonstrator.commands(state(START @ Pose2(0.0, beside_m, 0.0), n * 10**9))
+        for n, beside_m in enumerate((0.0, 0.03, -0.03))
+    )
+    assert left < inside - 0.05
+    assert right > inside + 0.05
+    assert demonstrator.commands(state(Pose2(9.0, 9.0, 0.0))) is None
+    assert demonstrator.commands(state(START)) is not None
 
 
 def test_demonstration_is_not_overwritten(recorded):

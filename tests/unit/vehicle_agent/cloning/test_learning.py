@@ -8,6 +8,7 @@ import pytest
 from onnx import numpy_helper
 
 from scm.errors import LearningError
+from scm.vehicles.car import load_car
 from tests.unit.vehicle_agent.cloning.examples import SMALL, demonstration, line
 from vehicle_agent.cloning.augmentation import Augmentation
 from vehicle_agent.cloning.demonstration import Demonstration
@@ -35,7 +36,7 @@ def test_network_learns_to_steer_by_a_line(learned):
     assert metadata.held_out_error == history[-1].held_out_error
     model = Model(path / "model.onnx")
     for steering in (-0.7, -0.2, 0.0, 0.5):
-        (command,) = model(SMALL.view(line(steering)))
+        (command,) = model(SMALL.view([line(steering)]))
         assert command == pytest.approx(steering, abs=0.15)
 
 
@@ -50,6 +51,35 @@ def test_metadata_say_what_the_network_is(learned):
     )
     assert 100 <= metadata.frames <= 120
     assert len(metadata.data_sha256) == 64
+
+
+@pytest.fixture(scope="module")
+def late(tmp_path_factory):
+    """Return a demonstration whose commands come 0.2 s after the frames that demand them."""
+    return demonstration(tmp_path_factory.mktemp("late") / "demo", late=2)
+
+
+def test_network_that_sees_earlier_frames_learns_what_they_demand(late, tmp_path):
+    network = dataclasses.replace(SMALL, stack=2)
+    metadata = learn([late], network, RECIPE, tmp_path / "model.onnx")
+    assert metadata.stack == 2
+    assert metadata.held_out_error < 0.15
+    model = Model(tmp_path / "model.onnx")
+    (command,) = model(network.view([line(-0.7), line(0.6)]))  # newest first
+    assert command == pytest.approx(0.6, abs=0.25)
+
+
+def test_car_with_a_late_weak_servo_gets_earlier_stronger_commands(late, tmp_path):
+    car = load_car("nigel").with_terms(
+        ("steer_delay", "steer_gain"), {"steering.delay_s": 0.2, "steering.gain": 0.6}
+    )
+    metadata = learn([late], SMALL, RECIPE.fitted_to(car), tmp_path / "model.onnx")
+    assert (metadata.steering_delay_s, metadata.steering_gain) == (0.2, 0.6)
+    model = Model(tmp_path / "model.onnx")
+    for steering in (-0.4, 0.3):
+        (command,) = model(SMALL.view([line(steering)]))
+        assert command == pytest.approx(steering / 0.6, abs=0.15)
+    assert RECIPE.fitted_to(load_car("nigel")) == RECIPE
 
 
 def test_same_seed_same_network(learned, tmp_path):
