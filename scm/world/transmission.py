@@ -1,7 +1,8 @@
 """Radio transmission: each sent frame is delivered to the stations that receive it.
 
-Drivers of hosted cars get it directly, all other subscribers on the bus. Bodies are not read here,
-except the CAMs, SPATEMs and DENMs that drivers use.
+Drivers of hosted cars get it directly, all other subscribers on the bus: also the program that
+holds a hosted car's lease. Bodies are not read here, except the CAMs, SPATEMs and DENMs that
+drivers use.
 """
 
 from collections.abc import Sequence
@@ -27,6 +28,7 @@ from scm.v2x.messages.spatem import SpatemRx, SpatemTx
 from scm.v2x.messages.srem import SremRx, SremTx
 from scm.v2x.messages.ssem import SsemRx, SsemTx
 from scm.v2x.messages.vehicle_state import VehicleState
+from scm.world.cars import AnyCar
 from scm.world.publish import states_of
 from scm.world.radio import Burst, Receivers
 from scm.world.warnings import due_denms, log_warning, note_hard_braking
@@ -124,11 +126,12 @@ def _reached(world: World, burst: Burst, kind: type[ReceivedFrame], receivers: R
 
 
 def receivers_of(world: World) -> Receivers:
-    """Return all stations that frames are brought to, except the hosted cars."""
-    if not world.cars.remote:
+    """Return all stations that frames are brought to, except hosted cars with their own driver."""
+    if not (world.cars.remote or world.cars.leased):
         return world.radio.units
-    cars = {car.name: (car.pose.x, car.pose.y) for car in world.cars.remote.values()}
-    return Receivers({**world.radio.roadside, **cars})
+    cars: list[AnyCar] = [*world.cars.remote.values(), *world.cars.leased.values()]
+    places = {car.name: (car.pose.x, car.pose.y) for car in cars}
+    return Receivers({**world.radio.roadside, **places})
 
 
 def antenna_of(world: World, station: str) -> Point | None:
@@ -155,7 +158,9 @@ def status(world: World, now_ns: int) -> RadioStatus:
     late_ns, _ = new.pop("late_ns"), new.pop("lost")
     busy = world.radio.load
     others = {name: busy.ratio_of(name) for name in receivers_of(world).names}
-    all_of_them = np.array([*busy.ratio[world.cars.arrays.hosted], *others.values(), 0.0])
+    with_driver = world.cars.arrays.hosted.copy()
+    with_driver[[car.index for car in world.cars.leased.values()]] = False
+    all_of_them = np.array([*busy.ratio[with_driver], *others.values(), 0.0])
     stations = max(1, len(all_of_them) - 1)
     return RadioStatus(
         t_ns=now_ns,

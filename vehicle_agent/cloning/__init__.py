@@ -8,6 +8,7 @@
     model_file       it as an ONNX file, with its metadata
     learning         from the files of the one to that of the other
     driving          the network behind the guard, as an agent that sees only its front camera
+    signal_rule      above it: how much throttle the signals allow
 
 Training needs the extra scm[learn]; driving needs onnxruntime of it alone.
 Source: Samak, Samak and Kandhasamy, "Robust behavioral cloning for autonomous vehicles using

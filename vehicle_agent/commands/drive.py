@@ -18,6 +18,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--spawn", nargs="?", const="", type=place, metavar="PLACE",
         help="put the car onto the map first, there or at any free place",
     )  # fmt: skip
+    parser.add_argument(
+        "--ignore-signals", action="store_true", help="drive on whatever the signals show"
+    )
     agent_arguments(parser, "of this agent, which holds the lease (drive-VEHICLE)")
 
 
@@ -43,7 +46,10 @@ def _run(arguments: argparse.Namespace) -> int:
     name = arguments.name or f"drive-{vehicle}"
     name = check_name(name if credentials is None else credentials.station, "--name")
     stop_requested, done, clock = stop_on_signal(), threading.Event(), WallClock()
-    part = NetworkPart(name, vehicle, arguments.model, throttle, spawn=arguments.spawn)
+    part = NetworkPart(
+        name, vehicle, arguments.model, throttle, spawn=arguments.spawn,
+        ignore_signals=arguments.ignore_signals,
+    )  # fmt: skip
     metadata = part.model.metadata
     print(
         f"{vehicle} is driven by {metadata.network}, learned on {metadata.map}, until Ctrl-C",

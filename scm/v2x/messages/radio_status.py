@@ -6,7 +6,7 @@ from scm.v2x.message import Message
 
 
 class RadioStatus(Message, kw_only=True, frozen=True):
-    """The last second of radio traffic, to all stations but hosted cars.
+    """The last second of radio traffic, to all stations but hosted cars that drive themselves.
 
     Attributes:
         sent: Frames; one that two stations receive counts once here and twice in `delivered`.
@@ -21,7 +21,7 @@ class RadioStatus(Message, kw_only=True, frozen=True):
         waiting: On their way now.
         busy_mean: Share of time that the channel is busy, mean of all stations; 0: not measured.
         busy_most: Of the station that receives most.
-        stations: Those that are not hosted cars; `busy` of each.
+        stations: Those that are not hosted cars that drive themselves; `busy` of each.
     """
 
     KEY: ClassVar[str] = "world/radio"

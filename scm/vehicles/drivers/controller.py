@@ -16,6 +16,7 @@ from scm.vehicles.drivers.cars_ahead import (
 )
 from scm.vehicles.drivers.driver_state import (
     ARRIVED,
+    AT_SIGNALS,
     DECEL,
     FREE,
     FRONT,
@@ -157,6 +158,7 @@ def limit_for_line(
 ) -> tuple[float, int]:
     """Return the target speed limited by the next line [m/s], and what the car waits for there."""
     floats, lane_window, front = state.floats[car], state.lane_window[car], kind[FRONT]
+    state.ints[car, AT_SIGNALS] = FREE
     near = front + LOOK_AHEAD + 2.0 * braking(max(0.0, speed), kind[DECEL], REACTION)
     line, at, distance = next_line(
         lanes.length, lanes.line_first, lanes.line_at, lane_window, floats[S], front,
@@ -175,6 +177,8 @@ def limit_for_line(
         lanes, state, received, signals, scratch, kind, car, found, line, at, distance, speed,
         passed, now_ns, seed,
     )  # fmt: skip
+    if lanes.rules.kind[line] == LIT:
+        state.ints[car, AT_SIGNALS] = held
     before_line = stopping_speed(distance - SHORT_OF_LINE - front, kind[DECEL])
     if held != FREE and before_line < target:
         return before_line, held

@@ -135,6 +135,11 @@ class DriverBatch:
         return self._state.ints[:, col.WAITING]
 
     @property
+    def at_signals(self) -> Ints:
+        """What each car, moving or not, waits for at the signals ahead; see `waiting`."""
+        return self._state.ints[:, col.AT_SIGNALS]
+
+    @property
     def turn(self) -> Ints:
         """Direction of each car's next turn: 1 left, -1 right, 0 neither."""
         return self._state.ints[:, col.TURN]

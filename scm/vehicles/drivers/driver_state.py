@@ -27,12 +27,13 @@ S, BESIDE, DONE, REQUESTED_SPEED, ANGLE, STEER, SPEED_SETPOINT, INTEGRAL = range
 # and that line's lane on the route; time of the last decision; what it waits for; direction of the
 # next turn; whether it has arrived. Of the line without signals ahead: its number and lane on the
 # route; since when the car rests there; when moving cars last blocked it; when one was last in the
-# junction; whether the way was free at the last decision.
+# junction; whether the way was free at the last decision. Moving or at rest: what it waits for at
+# the signals ahead.
 (
     KIND, INDEX, ROUTE, COUNT, AFTER, GOAL, SEED, GOING_LINE, GOING_INDEX, LAST_NS, WAITING, TURN,
-    ARRIVED, RULE_LINE, RULE_INDEX, REST_NS, LAST_BLOCKED_NS, LAST_BUSY_NS, WAS_FREE,
-) = range(19)  # fmt: skip
-INTS = 19
+    ARRIVED, RULE_LINE, RULE_INDEX, REST_NS, LAST_BLOCKED_NS, LAST_BUSY_NS, WAS_FREE, AT_SIGNALS,
+) = range(20)  # fmt: skip
+INTS = 20
 NEVER_NS = -(2**62)
 NO_GOAL = 2**62
 
@@ -52,7 +53,7 @@ class DriverState(ArrayStruct):
 
     Attributes:
         kinds: (k, 32) limits of each kind of car.
-        floats: (capacity, 8); `ints` (capacity, 19).
+        floats: (capacity, 8); `ints` (capacity, 20).
         lane_window: (capacity, 8) lane numbers around each car on its route.
         routes: All routes, concatenated.
         stood: (capacity,) since when each station's CAMs report standstill; NEVER_NS: it moves.

@@ -52,6 +52,11 @@ class SingleDriver:
         return WAITING_FOR[self.batch.waiting[OWN]]
 
     @property
+    def at_signals(self) -> str | None:
+        """What keeps it from passing the signals ahead, moving or at rest; see `waiting_for`."""
+        return WAITING_FOR[self.batch.at_signals[OWN]]
+
+    @property
     def arrived(self) -> bool:
         """Whether the route is done."""
         return bool(self.batch.arrived[OWN])

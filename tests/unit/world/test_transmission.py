@@ -28,7 +28,7 @@ from scm.v2x.messages.stop_request import StopRequest
 from scm.vehicles.drivers.channel import channel_of, has_arrived
 from scm.world.channel_load import ChannelLoad
 from scm.world.remote import missed_between
-from scm.world.transmission import OF_ROADSIDE, RECEIVED, transmit
+from scm.world.transmission import OF_ROADSIDE, RECEIVED, status, transmit
 from scm.world.world import World
 
 MAP = load_map("driving_school")
@@ -239,3 +239,22 @@ def test_a_cam_tells_that_its_sender_touches_something(make_city):
     lately = [out.touches for out in city.heard(CamRx) if touched_ns <= out.t_ns]
     assert lately[0]
     assert not lately[-1], "half a second later it touches nothing any more"
+
+
+def test_hosted_car_that_a_program_drives_receives_frames_while_it_is_leased(make_city):
+    city = make_city(hosted=(("n1", "nigel"), ("n2", "nigel")))
+
+    def receivers():
+        before = len(city.heard(CamRx))
+        city.run_for(2.0)
+        return {out.receiver for out in city.heard(CamRx)[before:]}
+
+    assert receivers() == {RSU}
+    city.lease("n1")
+    load = city.world.radio.load
+    load.ratio[:2], load._others = (0.6, 0.3), {"n1": (0.6, 0.6)}
+    now = status(city.world, city.now)
+    assert now.stations == ("n1", RSU)
+    assert now.busy_mean == pytest.approx(0.3), "n1 counts once"
+    assert receivers() == {RSU, "n1"}
+    assert receivers() == {RSU}, "the lease is lost: it was not renewed"

@@ -1,12 +1,24 @@
+import math
+
+import cv2
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
 from scm.camera.part import CameraPart
+from scm.clock import NS_PER_MS
 from scm.errors import LearningError
 from scm.geometry import Pose2
 from scm.maps.load import load_map
+from scm.maps.route import Path, roads_of
 from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import BasePart, Subscription
+from scm.traffic.signals.part import TrafficPart
+from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState
+from scm.vehicles.car import load_car
+from scm.vehicles.drivers.limits import limits_of
 from scm.world.part import WorldPart
 from vehicle_agent.cloning.demonstration import Demonstration
 from vehicle_agent.cloning.demonstrator import Demonstrator
@@ -18,6 +30,7 @@ from vehicle_agent.cloning.training import Recipe
 
 SCHOOL = load_map("driving_school")
 OPEN = replace(SCHOOL, junctions=(), stop_lines=(), lights=())
+NIGEL = limits_of(load_car("nigel"))
 START = Pose2(1.747806, 0.291194, -0.785398)
 
 
@@ -144,3 +157,68 @@ def test_car_stands_when_its_frames_stop(network):
         before = hosted.pose
         city.run_for(1.0)
         assert hosted.pose.x == pytest.approx(before.x, abs=1e-3)
+
+
+class Follower:
+    """Stands for a network that has learned to steer: it follows the lanes by the true pose."""
+
+    def __init__(self, model, hosted):
+        self.metadata, self._hosted = model.metadata, hosted
+        self._lanes, self._s = Path.circulation(roads_of(SCHOOL), "crossing_south_east"), 0.0
+
+    def __call__(self, frame):
+        pose = self._hosted.pose
+        self._s, _ = self._lanes.project(pose.x, pose.y, self._s)
+        goal = pose.inverse() @ self._lanes.at(self._s + 0.2)
+        curvature = 2.0 * goal.y / (goal.x**2 + goal.y**2)
+        return [math.atan(NIGEL.wheelbase * curvature) / NIGEL.steer_limit]
+
+
+class BlankFrames(BasePart):
+    """A front camera that renders nothing."""
+
+    name, role, period_ns, subscriptions = "camera", "client", 60 * NS_PER_MS, ()
+    jpeg = cv2.imencode(".jpg", np.zeros((180, 320, 3), np.uint8))[1].tobytes()
+
+    def step(self, now_ns, inbox):
+        frame = CameraFrame(
+            vehicle="n1", camera="front", t_ns=now_ns, width_px=320, height_px=180,
+            payload=self.jpeg,
+        )  # fmt: skip
+        return [frame]
+
+
+def beyond_line(network, **options):
+    """Let a car drive towards an all-red crossing for 4.6 s, and for 6 s more.
+
+    Returns how far its front was beyond the line then [m], and what the part said of itself.
+    """
+    world, part = WorldPart(SCHOOL, 1), NetworkPart("net", "n1", network, **options)
+    line = SCHOOL.stop_lines[0]
+    lane = roads_of(SCHOOL).lane(line.lane)
+    with Lockstep([world, TrafficPart(SCHOOL), BlankFrames(), part]) as city:
+        statuses = city.subscribe(Subscription(PartStatus, {"station": "net"}))
+        start = lane.at(line.at_m - NIGEL.front - 0.35)
+        hosted = world.world.host("n1", "nigel", start, 0)
+        part.model = Follower(part.model, hosted)
+        beyond, modes = [], []
+        for lasts_s in (4.6, 6.0):
+            city.run_for(lasts_s)
+            s, _ = lane.project(hosted.pose.x, hosted.pose.y)
+            beyond.append(s + NIGEL.front - line.at_m)
+            modes.append(hosted.mode)
+        assert modes == ["drive", "drive"], "its commands never stop, at red either"
+        return beyond, [item.message.detail for item in statuses.drain()]
+
+
+def test_network_stands_at_red_and_goes_on_at_green(network):
+    (at_red, later), details = beyond_line(network)
+    assert -0.08 < at_red < 0.0
+    assert details[4] == "waits for green at south_east of crossing"
+    assert later > 0.2
+    assert details[-1].endswith("ms a frame")
+
+
+def test_network_may_ignore_signals(network):
+    (at_red, _), _ = beyond_line(network, ignore_signals=True)
+    assert at_red > 0.1
