@@ -64,7 +64,7 @@ def run(
         case: The case.
         model: The trained network.
         laps: To drive.
-        start_deg: Standard deviation of the start, off the lane's direction.
+        start_deg: How far the start may be off the lane's direction, evenly to either side.
         start_m: Likewise, off its middle.
         speed: Times the throttle of the demonstration.
         concealed: What the car has that the demonstration's had not: of `parking.CONCEALED`, or
@@ -78,7 +78,7 @@ def run(
     city_map = lanes_only(track(on) if on else case.map, back=way == "back")
     lane = LanePath.circulation(roads_of(city_map), city_map.lanes[0].name)
     at_m = float(rng.uniform(0.0, lane.length_m))
-    off_m, off_deg = rng.standard_normal(2) * (start_m, start_deg)
+    off_m, off_deg = rng.uniform(-1.0, 1.0, 2) * (start_m, start_deg)
     begin = lane.at(at_m) @ Pose2(0.0, float(off_m), math.radians(off_deg))
     car = load_car(CAR) if engine != "city" else with_effect(load_car(CAR), concealed)
     with _seen(smaller(car, width_px)):

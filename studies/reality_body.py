@@ -36,7 +36,11 @@ CONCEALED = {
     "servo_rate": {"rate": 0.21},
 }
 CONCEALED["all"] = {name: value for one in CONCEALED.values() for name, value in one.items()}
-"""Effects by the names of `parking.py`, as that reality's numbers."""
+CONCEALED |= {
+    "late_throttle_weak_steering": {"drive_delay": 0.2, "steer_gain": 0.85},
+    "late_weak_steering": {"steer_delay": 0.2, "steer_gain": 0.85},
+}
+"""Effects by the names of `parking.py`, and what `cloning.py` tries, as that reality's numbers."""
 
 
 class RealityBody:
