@@ -1,7 +1,5 @@
-"""LIDAR scans of the cars that somebody watches: cars scan only while somebody subscribes."""
+"""LIDAR scans as pages show them."""
 
-from collections import Counter
-from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -9,40 +7,11 @@ import numpy as np
 from scm.api.picture import Held
 from scm.geometry import Pose2
 from scm.records.scans import ScanRow
-from scm.runtime.part import Subscription
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.vehicles.car import car_names, load_car
 
 FULL_CIRCLE_RAD = 2.0 * np.pi
 DEFAULT_CAR = "nigel"
-
-
-class ScanWatch:
-    """Who watches whose scans, and the newest of each; not safe between threads by itself."""
-
-    def __init__(self) -> None:
-        self._watched: Counter[str] = Counter()
-        self._newest: dict[str, Held[LidarScan]] = {}
-
-    def watch(self, vehicle: str, more: int) -> None:
-        """Count `more` watchers of a car; without any its scans are forgotten."""
-        self._watched[vehicle] += more
-        if self._watched[vehicle] <= 0:
-            del self._watched[vehicle]
-            self._newest.pop(vehicle, None)
-
-    def receive(self, scan: LidarScan, t_ns: int) -> None:
-        """Keep a scan of a watched car."""
-        if scan.vehicle in self._watched:
-            self._newest[scan.vehicle] = Held(scan, t_ns)
-
-    def newest(self, vehicle: str) -> Held[LidarScan] | None:
-        """Return the newest scan of a watched car; None: none yet."""
-        return self._newest.get(vehicle)
-
-    def subscriptions(self) -> Iterator[Subscription]:
-        """Yield the subscriptions that present viewers need."""
-        return (Subscription(LidarScan, {"vehicle": vehicle}) for vehicle in self._watched)
 
 
 @lru_cache(maxsize=64)

@@ -57,13 +57,15 @@ class _Impatient(H11Protocol):
     def data_received(self, data: bytes) -> None:
         """Wait while a head comes in pieces; again for each piece of a body."""
         super().data_received(data)
-        if self.conn.their_state is h11.IDLE:
+        # A WebSocket has limits of its own; for h11 its body is still to come.
+        is_websocket = self.transport.get_protocol() is not self
+        if self.conn.their_state is h11.IDLE and not is_websocket:
             self._wait()
             return
         if self._waits is not None:
             self._waits.cancel()
             self._waits = None
-        if self.conn.their_state is h11.SEND_BODY:
+        if self.conn.their_state is h11.SEND_BODY and not is_websocket:
             self._wait()
 
     def _wait(self) -> None:

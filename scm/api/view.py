@@ -24,8 +24,8 @@ from scm.api.received import (
     ReceivedWorld,
 )
 from scm.api.room_maps import ReceivedMaps
-from scm.api.scan_watch import ScanWatch
 from scm.api.stations import StationTable
+from scm.api.vehicle_watch import VehicleWatch
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.disturbances import Disturbances
 from scm.eye.accuracy import EyeAccuracyPart
@@ -51,6 +51,7 @@ from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.network_view import NetworkView
 from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
@@ -86,7 +87,8 @@ class CityView(BasePart):
         self._eye_accuracy = EyeAccuracyPart()
         self._eye = ReceivedEye(self._eye_accuracy)
         self._cameras = CameraWatch()
-        self._scans = ScanWatch()
+        self._scans = VehicleWatch(LidarScan)
+        self._networks = VehicleWatch(NetworkView)
         self._costmaps = CostmapWatch()
         self._tracks = TrackWatch()
         self._close_ups = CloseUps()
@@ -97,6 +99,7 @@ class CityView(BasePart):
         self._always = tuple(Subscription(kind) for kind in self._receivers)
         self._receivers[CameraFrame] = self._cameras.receive
         self._receivers[LidarScan] = self._scans.receive
+        self._receivers[NetworkView] = self._networks.receive
         self._receivers[Costmap] = self._costmaps.receive
         self._receivers[EyeTrack] = self._tracks.receive
         self._receivers[VehicleState] = self._close_ups.receive
@@ -265,6 +268,21 @@ class CityView(BasePart):
                 return None
             return held, self._eye_accuracy.truth_at(vehicle, held.message.t_ns)
 
+    @contextmanager
+    def watching_network(self, vehicle: str) -> Iterator[None]:
+        """Subscribe to what a network makes of a car's frames; safe from any thread."""
+        self._watch_network(vehicle, 1)
+        try:
+            yield
+        finally:
+            self._watch_network(vehicle, -1)
+
+    def network(self, vehicle: str) -> NetworkView | None:
+        """Return what a network made of a watched car's newest frame; safe from any thread."""
+        with self._lock:
+            held = self._networks.newest(vehicle)
+            return None if held is None else held.message
+
     def costmap(self, vehicle: str) -> Costmap | None:
         """Return a car's newest costmap, and subscribe to them for some seconds; thread-safe."""
         with self._lock:
@@ -319,13 +337,21 @@ class CityView(BasePart):
             self._scans.watch(vehicle, more)
             self._update_subscriptions()
 
+    def _watch_network(self, vehicle: str, more: int) -> None:
+        with self._lock:
+            self._networks.watch(vehicle, more)
+            self._update_subscriptions()
+
     def _watch_camera(self, vehicle: str, camera: str, more: int) -> None:
         with self._lock:
             self._cameras.watch(vehicle, camera, more)
             self._update_subscriptions()
 
     def _update_subscriptions(self) -> None:
-        watched = (self._cameras, self._scans, self._costmaps, self._close_ups, self._tracks)
+        watched = (
+            self._cameras, self._scans, self._networks, self._costmaps, self._close_ups,
+            self._tracks,
+        )  # fmt: skip
         requested = (each for one in watched for each in one.subscriptions())
         self.subscriptions = (*self._always, *requested)
 

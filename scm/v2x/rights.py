@@ -51,7 +51,7 @@ class Rights:
 
 
 # `**` does not match chunks that begin with @: pictures have to be named.
-EVERYTHING = ("**", "v/*/@camera/*", "eye/*/@preview", "eye/*/@picture")
+EVERYTHING = ("**", "v/*/@camera/*", "v/*/@network", "eye/*/@preview", "eye/*/@picture")
 EVERY_REQUEST = (
     "v/*/lease",
     "v/*/cmd/*",
@@ -113,6 +113,7 @@ _OF_ROLE: dict[str, Rights] = {
             "v/*/autonomy/plan",
             "v/*/costmap",
             "v/*/map",
+            "v/*/@network",
         ),
         requests=EVERY_REQUEST,
         services=("v/*/park",),

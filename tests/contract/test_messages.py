@@ -86,6 +86,8 @@ PLAIN_NUMBERS = {
     "busy_mean": "a share of time",
     "busy_most": "a share of time",
     "start": "a pose of the map, see its docstring",
+    "top": "a share of the frame's height",
+    "saliency": "of the steering command, see its docstring",
 }
 UNITS = tuple(
     f"_{unit}"

@@ -23,6 +23,7 @@ from scm.v2x.messages import message_classes
 from scm.v2x.messages.autonomy_plan import AutonomyPlan
 from scm.v2x.messages.autonomy_status import AutonomyStatus
 from scm.v2x.messages.costmap import Costmap
+from scm.v2x.messages.network_view import NetworkView
 from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
@@ -143,10 +144,10 @@ def test_the_city_of_this_test_really_did_something(city):
     assert "misbehaviour/scores" in city["misbehaviour"].said
 
 
-def test_a_driver_may_publish_what_agents_that_park_and_map_do():
+def test_a_driver_may_publish_what_agents_that_park_map_and_drive_by_a_network_do():
     keys = [
         selector("city", kind, {"vehicle": "n1"}).removeprefix(prefix("city"))
-        for kind in (AutonomyStatus, AutonomyPlan, Costmap, OccupancyMap)
+        for kind in (AutonomyStatus, AutonomyPlan, Costmap, OccupancyMap, NetworkView)
     ]
     assert all(covers(key, rights_of("driver", "park-n1").publishes) for key in keys)
 

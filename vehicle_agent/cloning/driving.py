@@ -18,7 +18,7 @@ from scm.arrays import Image
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RunError
 from scm.log import event
-from scm.runtime.part import BasePart, Subscription
+from scm.runtime.part import BasePart, IsWanted, Subscription
 from scm.v2x.exchange import Call, Incoming, Outgoing
 from scm.v2x.message import Message, Refused, Request
 from scm.v2x.messages.cam import CamRx
@@ -33,6 +33,7 @@ from scm.v2x.messages.world_definition import WorldDefinition
 from vehicle_agent.autonomy.control import Command
 from vehicle_agent.cloning.model_file import Model
 from vehicle_agent.cloning.network import FrameStack, network_named
+from vehicle_agent.cloning.saliency import NetworkWatch
 from vehicle_agent.lease import CarLease
 
 if TYPE_CHECKING:  # it needs the compiler; a map without signals does not
@@ -79,6 +80,7 @@ class NetworkPart(BasePart):
         self.name, self._vehicle, self._spawn, self._run = name, vehicle, spawn, session
         self.model = Model(model)
         self._view = network_named(self.model.metadata.network).view
+        self._watch = NetworkWatch(vehicle, self.model.metadata.network, model.name, self.model)
         self._stack = FrameStack[Image](self.model.metadata.stack)
         self._throttle, self._speed = throttle, speed
         self._lease = CarLease(vehicle, name)
@@ -99,6 +101,10 @@ class NetworkPart(BasePart):
             Subscription(CamRx, here),
             Subscription(MonitorStatus),
         )
+
+    def attach(self, is_wanted: IsWanted) -> None:
+        """Receive what reports whether somebody watches the network drive."""
+        self._watch.attach(is_wanted)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Look at the newest frame; drive."""
@@ -121,7 +127,7 @@ class NetworkPart(BasePart):
             self._look(frame, now_ns)
         if self._has_spawned and self.frames:
             out += self._lease.step(now_ns, self._allowed(now_ns), self._commanded_ns)
-        return out + self._status(now_ns)
+        return out + self._watch.step(is_idle=frame is None) + self._status(now_ns)
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """Release the lease: the car stands."""
@@ -137,7 +143,8 @@ class NetworkPart(BasePart):
             event(_log, "frame", level=logging.WARNING, vehicle=self._vehicle, why=why)
             return
         seen = self._stack.add(frame.t_ns, np.asarray(image, dtype=np.uint8))
-        commands = self.model(self._view(seen))
+        view = self._view(seen)
+        commands = self.model(view)
         throttle = commands[1] if len(commands) > 1 else self.model.metadata.throttle
         if self._throttle is not None:
             throttle = self._throttle
@@ -148,6 +155,7 @@ class NetworkPart(BasePart):
             throttle = 0.0
         self._command, self._commanded_ns = Command(throttle, commands[0]), now_ns
         self.infer_s, self.frames = time.perf_counter() - began_s, self.frames + 1
+        self._watch.begin(frame, view, self._allowed(now_ns), now_ns, self.infer_s)
 
     def _learn(self, world: WorldDefinition) -> None:
         """Prepare for the signals of another map."""

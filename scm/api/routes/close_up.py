@@ -1,8 +1,8 @@
 """One car from near: everything it reports, at full rate, and how long the way to it is."""
 
 import asyncio
-from collections.abc import AsyncIterator
-from contextlib import nullcontext
+from collections.abc import AsyncIterator, Sequence
+from contextlib import ExitStack
 from typing import Annotated
 
 import msgspec
@@ -22,6 +22,8 @@ from scm.clock import NS_PER_MS, WallClock
 from scm.records.vehicles import LinkRow
 from scm.v2x.message import Refused
 from scm.v2x.messages.echo_request import EchoReply, EchoRequest
+from scm.v2x.messages.network_view import NetworkView
+from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_snapshot import SnapshotVehicle
 
 PERIOD_S = 0.05
@@ -63,10 +65,18 @@ def router(city: City, stream: Stream) -> APIRouter:
                 examples=[True],
             ),
         ] = False,
+        network: Annotated[
+            bool,
+            Query(
+                description="what a network that drives it makes of a frame too, as `network`",
+                examples=[True],
+            ),
+        ] = False,
     ) -> Response:
         scanner = scanner_of(_find(city, name).car)
+        turns = Turns(city, name, scanner) if scan else None
         return StreamingResponse(
-            _reports(city, stream, name, Turns(city, name, scanner) if scan else None),
+            _reports(city, stream, name, turns, with_network=network),
             media_type="text/event-stream",
             headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
         )
@@ -83,29 +93,45 @@ def router(city: City, stream: Stream) -> APIRouter:
 
 
 async def _reports(
-    city: City, stream: Stream, name: str, turns: Turns | None
+    city: City, stream: Stream, name: str, turns: Turns | None = None, *, with_network: bool = False
 ) -> AsyncIterator[bytes]:
     """Yield what a car reports until the page goes away or the server ends."""
     number = quiet = 0
-    scans = nullcontext() if turns is None else city.view.watching_scan(name)
-    with city.view.watching_closely(name), scans:
+    shown: NetworkView | None = None
+    with ExitStack() as watches:
+        watches.enter_context(city.view.watching_closely(name))
+        if turns is not None:
+            watches.enter_context(city.view.watching_scan(name))
+        if with_network:
+            watches.enter_context(city.view.watching_network(name))
         yield b"retry: 1000\n\n"
         while not stream.is_closed:
             number, states = city.view.reports_after(name, number)
             quiet = 0 if states else quiet + 1
             if states:
-                frame = CloseUpFrame(
-                    vehicle=name,
-                    samples=tuple(map(sample_of, states)),
-                    source=states[-1].source,
-                    seq=states[-1].seq,
-                )
-                yield b"event: reports\ndata: " + encode(frame) + b"\n\n"
+                yield _event("reports", _frame_of(name, states))
             elif quiet % SILENT_PERIODS == 0:
                 yield b": silent\n\n"
             if turns is not None and (turn := turns.news()):
                 yield turn
+            view = city.view.network(name) if with_network else None
+            if view is not None and view is not shown:
+                shown = view
+                yield _event("network", view)
             await asyncio.sleep(PERIOD_S)
+
+
+def _frame_of(name: str, states: Sequence[VehicleState]) -> CloseUpFrame:
+    return CloseUpFrame(
+        vehicle=name,
+        samples=tuple(map(sample_of, states)),
+        source=states[-1].source,
+        seq=states[-1].seq,
+    )
+
+
+def _event(name: str, body: msgspec.Struct) -> bytes:
+    return f"event: {name}\ndata: ".encode() + encode(body) + b"\n\n"
 
 
 def _measured(city: City, car: SnapshotVehicle) -> LinkRow:

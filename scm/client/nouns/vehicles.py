@@ -49,11 +49,14 @@ class VehiclesNoun(Noun):
         """The map that a car makes of an unknown room."""
 
     @operation("GET", "/api/v1/vehicles/{name}/reports")
-    def reports(self, name: str, *, scan: bool = False) -> Iterator[LiveEvent]:
+    def reports(
+        self, name: str, *, scan: bool = False, network: bool = False
+    ) -> Iterator[LiveEvent]:
         """All that a car reports, as server-sent events `reports`.
 
         Args:
             scan: each turn of its LIDAR too, as `scan`; null: it has none
+            network: what a network that drives it makes of a frame too, as `network`
         """
 
     @operation("GET", "/api/v1/vehicles/{name}/link")

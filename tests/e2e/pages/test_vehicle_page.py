@@ -7,9 +7,11 @@ import pytest
 from scm.clock import NS_PER_MS
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.v2x.exchange import Answer, Call
+from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.echo_request import EchoReply, EchoRequest
 from scm.v2x.messages.join_request import JoinReply, JoinRequest
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
+from scm.v2x.messages.network_view import NetworkView
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.remove_request import RemoveRequest
 from scm.v2x.messages.vehicle_state import VehicleState
@@ -79,6 +81,23 @@ class Tired(BasePart):
         return [Call(RemoveRequest(vehicle=TIRED))]
 
 
+class Network(BasePart):
+    """As if a network drove: it steers to the left because of the first cell of its second row."""
+
+    name, role, period_ns = "drive-n1", "client", 50 * NS_PER_MS
+    subscriptions = (Subscription(CameraFrame, {"vehicle": CAR, "camera": "front"}),)
+
+    def step(self, now_ns, inbox):
+        return [
+            NetworkView(
+                vehicle=CAR, camera="front", t_ns=item.message.t_ns, network="paper",
+                file="model.onnx", steering=0.5, throttle=0.9, delay_s=0.0312, inference_s=0.0042,
+                top=0.3, rows=3, columns=4, saliency=(0.0, 0.02, 0.0, 0.0, -0.2, *7 * (0.0,)),
+            )
+            for item in inbox[-1:]
+        ]  # fmt: skip
+
+
 def cars(running):
     return len(running.get("/vehicles")["vehicles"])
 
@@ -118,6 +137,32 @@ def test_one_vehicle_looks_right(visit, look, size, theme):
     ready = '.film[data-seen="true"]'
     visited = look(f"/vehicles/{CAR}", "vehicle", size, theme, ready=ready)
     visited.page.wait_for_selector(".lidar canvas")
+
+
+def test_a_network_that_drives_shows_commands_delay_and_the_saliency_of_a_frame(
+    visit, running, look_around
+):
+    visited = visit(f"/vehicles/{CAR}")
+    page = visited.page
+    assert page.locator(".network").count() == 0
+    with running.joined(Network()):
+        page.wait_for_selector('[data-fact="delay"] >> text=31 ms')
+        page.wait_for_selector('[data-fact="inference"] >> text=4.2 ms')
+        page.wait_for_selector(".commands >> text=0.50 left")
+        needle = page.get_attribute(".commands .needle", "transform")
+        assert needle == "rotate(-30)"  # of the clock: to the left
+        page.click("text=saliency")
+        page.wait_for_selector('[data-fact="saliency"] >> text=up to 0.20')
+        pixel = """() => {
+            const canvas = document.querySelector(".film canvas"), { width, height } = canvas;
+            const at = [width / 8, (0.3 + 0.7 / 2) * height];
+            const [red, , blue] = canvas.getContext("2d").getImageData(...at, 1, 1).data;
+            return blue - red;
+        }"""
+        page.wait_for_function(f"() => ({pixel})() > 60")
+        look_around(visited, ".camera", "network")
+        page.click("text=saliency")
+    page.wait_for_selector(".network", state="detached")
 
 
 def test_the_held_wheel_looks_right_under_keys_and_under_pads(visit, running):
@@ -284,6 +329,7 @@ def test_a_gamepad_drives_only_while_its_trigger_is_pulled(visit, running):
     visited.page.evaluate(pad, 1)
     visited.until(lambda: speed(running) > 0.05, "it drives while the trigger is pulled")
     visited.until(lambda: row(running)["steering_rad"] > 0.0, "a stick to the left steers left")
+    visited.page.wait_for_selector('.now[data-why="driving"] >> text=You drive, by gamepad')
     visited.page.evaluate(pad, 0)
     visited.until(lambda: abs(speed(running)) < 0.01, "it stands, whatever the stick says")
     give_back(visited, running)

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from scm.api.city import City
 from scm.api.close_up import DEPTH, sample_of
@@ -13,6 +14,7 @@ from scm.api.routes.scan import Turns
 from scm.api.stream import Stream
 from scm.runtime.part import Subscription
 from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.network_view import NetworkView
 from scm.v2x.messages.vehicle_state import VehicleState
 
 
@@ -87,6 +89,38 @@ def test_scans_come_with_the_reports_for_who_asks_and_null_where_there_is_no_lid
     assert json.loads(turn.split(b"data: ")[1])["ranges_m"] == [1.0, 2.0]
     assert asyncio.run(heard(None))[1] == b"event: scan\ndata: null\n\n"
     assert not any(wish.kind is LidarScan for wish in view.subscriptions)
+
+
+def test_what_a_network_sees_comes_with_the_reports_for_who_requests_it(
+    view, hear, snapshot, fake_city, city_map, seen, report
+):
+    city = City(view, fake_city.ask, city_map)
+    stream = Stream(city, "run", seen)
+    made = NetworkView(
+        vehicle="n1", camera="front", t_ns=10**9, network="paper", file="model.onnx", steering=0.2,
+        throttle=0.9, delay_s=0.03, inference_s=0.004, top=0.3, rows=1, columns=2,
+        saliency=(0.0, -0.1),
+    )  # fmt: skip
+    wanted = Subscription(NetworkView, {"vehicle": "n1"})
+
+    async def events(*, with_network):
+        stream_of_n1 = _reports(city, stream, "n1", with_network=with_network)
+        await anext(stream_of_n1)
+        is_subscribed = wanted in view.subscriptions
+        hear(1.1, report(1), made, replace(made, vehicle="n2"))
+        both = [await anext(stream_of_n1), await anext(stream_of_n1)]
+        await stream_of_n1.aclose()
+        return is_subscribed, both
+
+    hear(1.0, snapshot(1.0, n1=(0.0, 0.0, 0.0)))
+    is_subscribed, (_, event) = asyncio.run(events(with_network=True))
+    assert is_subscribed
+    assert event.startswith(b"event: network\n")
+    assert json.loads(event.split(b"data: ")[1])["saliency"] == [0.0, -0.1]
+    assert wanted not in view.subscriptions
+    is_subscribed, both = asyncio.run(events(with_network=False))
+    assert not is_subscribed
+    assert not any(event.startswith(b"event: network") for event in both)
 
 
 def test_a_car_that_is_not_there_has_no_reports(client):

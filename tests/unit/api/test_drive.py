@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from scm.api.app import create_app
 from scm.api.city import Link
 from scm.api.keys import KeyRing
-from scm.api.server import serve
+from scm.api.server import _Impatient, serve
 from scm.api.teleop import NOT_YOURS
 from scm.client import Client, ProblemError, connection
 from scm.client import teleop as client_side
@@ -167,6 +167,18 @@ def test_silence_sends_zeros_while_the_connection_lasts(connect, wire):
         told = until(socket, "told", why="silent")
         assert told["throttle"] == wire.commands[-1].throttle == 0.0
         assert told["steering"] == 0.1
+
+
+def test_the_limit_for_requests_does_not_end_a_drive(connect, monkeypatch):
+    monkeypatch.setattr(_Impatient, "patience_s", 0.2)
+    with connect() as socket:
+        say(socket, TAKE)
+        until(socket, "taken")
+        began_s, seq = monotonic(), 0
+        while monotonic() < began_s + 0.6:
+            seq += 1
+            say(socket, drive(seq))
+            until(socket, "told", seq=seq)
 
 
 def test_giving_back_returns_the_lease_and_says_so(connect, fake_city):

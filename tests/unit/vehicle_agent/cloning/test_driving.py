@@ -15,6 +15,7 @@ from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import BasePart, Subscription
 from scm.traffic.signals.part import TrafficPart
 from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.network_view import NetworkView
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import load_car
@@ -109,11 +110,32 @@ def test_lap_is_over_where_it_began_the_same_way_round():
     assert laps.done == 1
 
 
-def driven(part, car="nigel", lasts_s=4.0, with_cameras=True):
+class Watcher(BasePart):
+    """Receives the frames, and what the network makes of them."""
+
+    name, role, period_ns = "watcher", "client", 20_000_000
+    subscriptions = (
+        Subscription(NetworkView, {"vehicle": "n1"}),
+        Subscription(CameraFrame, {"vehicle": "n1", "camera": "front"}),
+    )
+
+    def __init__(self):
+        self.views, self.frames_ns = [], []
+
+    def step(self, now_ns, inbox):
+        for item in inbox:
+            if isinstance(item.message, NetworkView):
+                self.views.append(item.message)
+            else:
+                self.frames_ns.append(item.message.t_ns)
+        return []
+
+
+def driven(part, car="nigel", lasts_s=4.0, with_cameras=True, others=()):
     """Let a network drive; return the car and how far it went."""
     world = WorldPart(OPEN, 1)
     cameras = [CameraPart(OPEN, 1)] if with_cameras else []
-    with Lockstep([world, *cameras, part]) as city:
+    with Lockstep([world, *cameras, part, *others]) as city:
         hosted = world.world.host("n1", car, START, 0)
         city.run_for(lasts_s)
         off = START.inverse() @ hosted.pose
@@ -121,11 +143,16 @@ def driven(part, car="nigel", lasts_s=4.0, with_cameras=True):
 
 
 def test_network_drives_by_frames_after_its_wheels_have_turned(network):
-    off, part = driven(NetworkPart("net", "n1", network))
+    watcher = Watcher()
+    off, part = driven(NetworkPart("net", "n1", network), others=[watcher])
     assert part.problem == ""
     assert 50 < part.frames <= 60
     assert 0.15 < off.x < 0.75  # at 0.25 m/s, a second later
     assert 0.0 < part.infer_s < 0.5
+    assert 2 <= len(watcher.views) <= 16  # 4 a second, fewer on a busy machine
+    assert {view.t_ns for view in watcher.views} <= set(watcher.frames_ns)
+    assert watcher.views[-1].throttle > 0.5
+    assert any(change != 0.0 for change in watcher.views[-1].saliency)
 
 
 def test_car_that_stands_turns_its_wheels_first(network):

@@ -5,18 +5,21 @@ import { RANKS, whileSeen } from "scm/shell/streams.js";
 const AGAIN_MS = 1000;
 const HEAD_END = "\r\n\r\n";
 const LENGTH = /^content-length: *(\d+)/im;
+const TIME = /^x-time-ns: *(\d+)/im;
 
 const letters = new TextDecoder("latin1");
 
 /**
  * Draw every picture of a film, decoded, while the page is visible; the film is requested again when it ends.
  * @param draw receives a picture, which is closed when it returns.
+ * @param receive receives every JPEG that came, and when it was exposed [ns].
  * @returns what ends it.
  */
-export function watch(address, draw) {
+export function watch(address, draw, receive) {
   return whileSeen(() => {
     const ending = new AbortController();
-    follow(address, newestOnly(draw, ending.signal), ending.signal);
+    const show = newestOnly(draw, ending.signal);
+    follow(address, (jpeg, t_ns) => (receive(jpeg, t_ns), show(jpeg)), ending.signal);
     return () => ending.abort();
   }, RANKS.view);
 }
@@ -50,15 +53,17 @@ async function readAll(reader, show) {
 function cut(bytes, show) {
   let at = 0;
   let newest = null;
+  let t_ns = null;
   for (;;) {
     const head = letters.decode(bytes.subarray(at, at + 400)).split(HEAD_END)[0];
     const begin = at + head.length + HEAD_END.length;
     const end = begin + Number(LENGTH.exec(head)?.[1]);
     if (!(end <= bytes.length)) break; // of the head or of the picture some is still to come
     newest = bytes.subarray(begin, end);
+    t_ns = Number(TIME.exec(head)?.[1]); // rounded to what a number holds, as in JSON
     at = end;
   }
-  if (newest) show(new Blob([newest], { type: "image/jpeg" }));
+  if (newest) show(new Blob([newest], { type: "image/jpeg" }), t_ns);
   return at;
 }
 

@@ -1,4 +1,4 @@
-/** The last half minute of all that a car reports, in columns, and its newest scan; received while a page shows it. */
+/** The last half minute of all that a car reports, its newest scan, and what a network makes of a frame; received while a page shows it. */
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { subscribe, RANKS } from "scm/shell/streams.js";
@@ -13,12 +13,16 @@ const NAMES = ["t", "throttle", "steering", "speed", "angle", "yawRate", "accel"
 /** Counts up with every frame that came. */
 export const fresh = signal(0);
 
-/** When the newest came, on this page's clock [ms]; likewise of `scan`. */
+/** When the newest came, on this page's clock [ms]; likewise of `scan` and `network`. */
 export const reportedAt = signal(-Infinity);
 export const scannedAt = signal(-Infinity);
+export const networkAt = signal(-Infinity);
 
 /** The newest turn of its LIDAR: a `ScanRow`; null: none came yet, false: it has no LIDAR. */
 export const scan = signal(null);
+
+/** What a network that drives it made of a frame: the newest `NetworkView`; null: none came yet. */
+export const network = signal(null);
 
 let columns = empty();
 
@@ -36,8 +40,12 @@ export function useReports(vehicle) {
   useEffect(() => {
     columns = empty();
     fresh.value += 1;
-    scan.value = null;
-    return subscribe(`/api/v1/vehicles/${vehicle}/reports?scan=true`, {
+    scan.value = network.value = null;
+    return subscribe(`/api/v1/vehicles/${vehicle}/reports?scan=true&network=true`, {
+      network(newest) {
+        network.value = newest;
+        networkAt.value = performance.now();
+      },
       scan(newest) {
         scan.value = newest ?? false;
         scannedAt.value = performance.now();

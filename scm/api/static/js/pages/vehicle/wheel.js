@@ -30,6 +30,9 @@ export const most = signal(0.4);
 /** Which keys and pads are held: `ahead left`. */
 export const down = signal("");
 
+/** What drives: `keys`, pads among them, or `gamepad`. */
+export const drivenBy = signal("keys");
+
 let socket = null;
 let hand = null;
 let timer = null;
@@ -125,7 +128,8 @@ function stopHands() {
 /** Send the present command; a release is sent at once. */
 function send() {
   if (socket?.readyState !== WebSocket.OPEN || !hand) return;
-  const { held, throttle, steering } = hand.command(most.value);
+  const { held, throttle, steering, by } = hand.command(most.value);
+  drivenBy.value = by;
   down.value = hand.held();
   seq += 1;
   socket.send(JSON.stringify({ type: "drive", seq, t_ms: performance.now(), held, throttle, steering }));

@@ -5,7 +5,7 @@ import { fixed, UNKNOWN } from "scm/shared/format.js";
 import { change } from "scm/shell/api.js";
 import { city, stop } from "scm/shell/store.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
-import { down, drop, giveBack, most, pad, acquire, wheel } from "scm/pages/vehicle/wheel.js";
+import { down, drivenBy, drop, giveBack, most, pad, acquire, wheel } from "scm/pages/vehicle/wheel.js";
 
 const PADS = [
   ["ahead", "▲", "Ahead", "W"],
@@ -87,8 +87,9 @@ function Held({ car }) {
   const { status, round_ms } = wheel.value;
   const stopped = stop.value.engaged;
   const why = stopped ? "The city is stopped: nothing drives" : (WHY[status?.why] ?? "Waiting for the car");
+  const by = !stopped && status?.why === "driving" && drivenBy.value === "gamepad" ? ", by gamepad" : "";
   return html`
-    <p class="now" role="status" data-why=${stopped ? "stopped" : status?.why}>${why}</p>
+    <p class="now" role="status" data-why=${stopped ? "stopped" : status?.why}>${why}${by}</p>
     <div class="instruments">
       <${Bar} name="Throttle" value=${status?.throttle ?? 0} />
       <${Bar} name="Steering" value=${-(status?.steering ?? 0)} shown=${status?.steering ?? 0} />
