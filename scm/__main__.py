@@ -1,6 +1,7 @@
 """The command line: `scm <command> ...`, one file of `scm/commands` a command.
 
-A command of two words, `scm eye detect`, is the file `eye_detect`.
+A command of two words, `scm eye detect`, is the file `eye_detect`; further ones are joined by
+hyphens, `scm camera calibrate-look` is `camera_calibrate_look`.
 """
 
 import argparse
@@ -39,7 +40,7 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
     for name in names("scm.commands") if only is None else [only]:
         command = load("scm.commands", name, "COMMAND", Command)
         sub = commands.add_parser(
-            name.replace("_", " "),
+            _words(name),
             help=command.help,
             description=command.help,
             epilog=f"example: {command.example}",
@@ -79,13 +80,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code
 
 
-def _joined(argv: Sequence[str]) -> list[str]:
-    """Return the arguments with the two words of a command as one."""
+def _words(name: str) -> str:
+    """Return a command as it is typed, by the name of its file."""
+    first, _, others = name.partition("_")
+    return f"{first} {others.replace('_', '-')}".strip()
+
+
+def _known() -> dict[str, str]:
+    """Return the name of each command's file, by the command as it is typed."""
     from scm.registry import names
 
-    known = set(names("scm.commands"))
+    return {_words(name): name for name in names("scm.commands")}
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """Return the arguments with the two words of a command as one."""
+    known = _known()
     for i, (first, second) in enumerate(pairwise(argv)):
-        if f"{first}_{second}" in known:
+        if f"{first} {second}" in known:
             return [*argv[:i], f"{first} {second}", *argv[i + 2 :]]
         if first in known:
             break
@@ -93,21 +105,16 @@ def _joined(argv: Sequence[str]) -> list[str]:
 
 
 def _command_name(joined: Sequence[str]) -> str | None:
-    """Return the name of the requested command, or None if there is none of that name."""
-    from scm.registry import names
-
+    """Return the file of the requested command, or None if there is none of that name."""
     at = 2 if joined[:1] == ["--log"] else 0
-    name = joined[at].replace(" ", "_") if len(joined) > at else ""
-    return name if name in names("scm.commands") else None
+    return _known().get(joined[at]) if len(joined) > at else None
 
 
 def _seconds(argv: Sequence[str]) -> list[str]:
     """Return the possible second words of an incomplete command; empty if it is complete."""
-    from scm.registry import names
-
-    known = names("scm.commands")
+    known = _known()
     first = argv[0] if argv else ""
-    seconds = [name.removeprefix(f"{first}_") for name in known if name.startswith(f"{first}_")]
+    seconds = [name.removeprefix(f"{first} ") for name in known if name.startswith(f"{first} ")]
     is_whole = first in known or (len(argv) > 1 and argv[1] in seconds)
     return [] if is_whole else seconds
 

@@ -4,6 +4,7 @@ It drives a Nigel from anywhere on the lane. Light (`daylight.intensity`, `dayli
 start, speed, way and the car may differ from those of the demonstration. Signals are off.
 
     python -m studies.cloning record demos/five     five laps by the built-in driver, in lockstep
+    python -m studies.cloning record demos/five --looks studies/cloning_looks.toml    a look a lap
     vehicle-agent train demos/five --epochs 20
     scm study run studies/cloning.toml
     python -m studies.cloning label demos/more model.onnx    laps by it, for its next training
@@ -12,8 +13,7 @@ start, speed, way and the car may differ from those of the demonstration. Signal
 import argparse
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import replace as replaced
 from functools import partial
 from pathlib import Path
@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
-from scm.camera.optics import fitted
+from scm.camera.optics import Optics, optics_of
 from scm.camera.part import CameraPart
 from scm.clock import NS_PER_S
 from scm.geometry import Pose2, wrap_angle
@@ -33,7 +33,8 @@ from scm.records.city_map import CityMap, Lane, Segment
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Part
 from scm.study.case import Case
-from scm.vehicles.car import Car, load_car, varied_cars
+from scm.study.loaded_study import load
+from scm.vehicles.car import load_car, varied_cars
 from scm.world.part import WorldPart
 from scm.world.world import generator
 from studies.kidnap import put
@@ -81,9 +82,10 @@ def run(
     off_m, off_deg = rng.uniform(-1.0, 1.0, 2) * (start_m, start_deg)
     begin = lane.at(at_m) @ Pose2(0.0, float(off_m), math.radians(off_deg))
     car = load_car(CAR) if engine != "city" else with_effect(load_car(CAR), concealed)
-    with _seen(smaller(car, width_px)):
+    seen = {"front": smaller(optics_of(car, "front"), width_px)}
+    with varied_cars({CAR: car}):
         world = WorldPart(city_map, case.seed)
-        cameras = CameraPart(city_map, case.seed, case.daylight)
+        cameras = CameraPart(city_map, case.seed, case.daylight, cameras=lambda _: seen)
         driver = NetworkPart("network", VEHICLE, Path(model), speed=speed)
         parts: list[Part] = [world, cameras, driver]
         place: Put = partial(world.world.host, VEHICLE, CAR, begin, 0)
@@ -145,31 +147,42 @@ def _turned(lanes: Sequence[Lane], lane: Lane) -> Lane:
     return replace(lane, start=start, segments=tuple(turned), next=after)
 
 
-def smaller(car: Car, width_px: int) -> Car:
-    """Return a car whose cameras have so many columns."""
-    width, height = car.vector("camera.resolution_px")
-    size = (float(width_px), float(round(height * width_px / width)))
-    resolution = replaced(car.values["camera.resolution_px"], value=size)
-    return replaced(car, values={**car.values, "camera.resolution_px": resolution})
+def smaller(optics: Optics, width_px: int) -> Optics:
+    """Return a camera with so many columns that sees the same."""
+    scale = width_px / optics.width_px
+    return replaced(
+        optics, width_px=width_px, height_px=round(scale * optics.height_px),
+        focal_px=scale * optics.focal_px, blur_px=scale * optics.blur_px,
+    )  # fmt: skip
 
 
-@contextmanager
-def _seen(car: Car) -> Iterator[None]:
-    """Let a car be what its name means, its cameras included."""
-    with varied_cars({CAR: car}):
-        fitted.cache_clear()
-        yield
-    fitted.cache_clear()
+def record(
+    path: Path, laps: int = 5, seed: int = 1, limit_mps: float = LIMIT_MPS,
+    looks: Path | None = None,
+) -> int:  # fmt: skip
+    """Let the built-in driver drive some laps, and record them; return the number of frames.
 
-
-def record(path: Path, laps: int = 5, seed: int = 1, limit_mps: float = LIMIT_MPS) -> int:
-    """Let the built-in driver drive some laps, and record them; return the number of frames."""
+    Args:
+        path: Folder of the demonstration.
+        laps: To drive.
+        seed: Of the city.
+        limit_mps: Of all lanes.
+        looks: Study whose cases vary the car's camera: each lap is seen through that of the next.
+    """
     city_map = lanes_only(load_map(MAP))
     lanes = tuple(replace(lane, speed_limit_mps=limit_mps) for lane in city_map.lanes)
     city_map = replace(city_map, lanes=lanes)
-    part = RecordDemoPart("demo", VEHICLE, path, laps)
+    cars = [load_car(CAR)]
+    if looks is not None:
+        study = load(looks, path.name)  # by this name it draws others than the study itself
+        cars = [study.case(i % len(study.design)).setting.car(CAR) for i in range(laps)]
+    cameras = [{"front": optics_of(car, "front")} for car in cars]
+    part = RecordDemoPart(
+        "demo", VEHICLE, path, laps, on_lap=lambda _: cameras.append(cameras.pop(0))
+    )
     world = WorldPart(city_map, seed, ((VEHICLE, CAR),))
-    with Lockstep([world, CameraPart(city_map, seed), part]) as city:
+    camera_part = CameraPart(city_map, seed, cameras=lambda _: cameras[0])
+    with Lockstep([world, camera_part, part]) as city:
         while not part.is_over:
             city.run_for(1.0)
     return len(part.samples)
@@ -214,9 +227,10 @@ def _main() -> None:
     parser.add_argument("model", type=Path, nargs="?", help="the network that drives, to label")
     parser.add_argument("--laps", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--looks", type=Path, metavar="STUDY", help="vary the camera by lap")
     given = parser.parse_args()
     if given.what == "record":
-        count = record(given.path, given.laps, given.seed)
+        count = record(given.path, given.laps, given.seed, looks=given.looks)
     elif given.model is None:
         parser.error("label: expected the network that drives")
     else:

@@ -72,6 +72,9 @@ class Lens:
         ahead = np.array([[0.0, -1.0, 0.0], [-s, 0.0, -c], [c, 0.0, -s]])
         cy, sy = math.cos(optics.yaw), math.sin(optics.yaw)
         turn = np.array([[cy, sy, 0.0], [-sy, cy, 0.0], [0.0, 0.0, 1.0]])
+        if optics.roll:
+            cr, sr = math.cos(optics.roll), math.sin(optics.roll)
+            ahead = np.array([[cr, sr, 0.0], [-sr, cr, 0.0], [0.0, 0.0, 1.0]]) @ ahead
         rotation = ahead @ turn @ map_R_body.T
         return View(rotation, origin + map_R_body @ np.array(optics.position))
 

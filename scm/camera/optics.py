@@ -1,10 +1,4 @@
-"""The camera parameters of a car file and their defaults.
-
-Optional keys of `[camera]` and their defaults: `distortion` k1 k2 p1 p2 k3 (none), `exposure` and
-`gain` (1), `read_noise` and `shot_noise` in grey levels (1 and 3, see `scm.camera.sensor`),
-`rate_hz` (15), `latency_s` and `drop_out` (0), `jpeg_quality` (80), and `fov_axis`, the side of the
-picture that the field of view spans (horizontal).
-"""
+"""The camera parameters of a car file; `scm.vehicles.car_file_schema` has their defaults."""
 
 import math
 from collections.abc import Mapping
@@ -14,20 +8,15 @@ from types import MappingProxyType
 
 from scm.errors import CarError
 from scm.vehicles.car import Car, car_names, load_car
+from scm.vehicles.car_files import varied_values
 
 CAMERAS = ("front", "rear")
 DEFAULT_CAR = "nigel"
 _POSITION = {"front": "camera.position_m", "rear": "camera.rear_position_m"}
-_NOT_GIVEN = {
-    "exposure": 1.0,
-    "gain": 1.0,
-    "read_noise": 1.0,
-    "shot_noise": 3.0,
-    "rate_hz": 15.0,
-    "latency_s": 0.0,
-    "drop_out": 0.0,
-    "jpeg_quality": 80.0,
-}
+_NUMBERS = (
+    "vignetting", "blur_px", "exposure_time_s", "exposure", "gain", "gamma", "read_noise",
+    "shot_noise", "rate_hz", "latency_s", "drop_out", "jpeg_quality",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +27,16 @@ class Optics:
         position: Of the optical centre, body frame [m].
         yaw: Where it looks about the body's z [rad]: 0 ahead, pi behind.
         pitch_down: How far below the body's level [rad].
+        roll: About its axis, clockwise as the camera looks [rad].
         focal_px: Of the undistorted picture.
         distortion: k1, k2, p1, p2, k3 as OpenCV has them.
+        vignetting: Share of the light that is missing at the corners.
+        blur_px: Standard deviation of what the lens makes of a point.
+        exposure_time_s: During which the camera moves; 0 shows an instant.
         exposure: Factor on the light that reaches the sensor; 1 shows sunlit white as white.
         gain: Factor on what the sensor read, its noise included.
+        white_balance: Factors on red, green and blue.
+        gamma: Exponent of the tone curve; above 1 is darker between black and white.
         read_noise, shot_noise: Standard deviation at black and what light adds at white [grey].
         latency_s: From a frame's exposure to when it can be had.
         drop_out: Share of the frames that never come.
@@ -53,9 +48,15 @@ class Optics:
     position: tuple[float, float, float]
     yaw: float
     pitch_down: float
+    roll: float = 0.0
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    vignetting: float = 0.0
+    blur_px: float = 0.0
+    exposure_time_s: float = 0.0
     exposure: float = 1.0
     gain: float = 1.0
+    white_balance: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    gamma: float = 1.0
     read_noise: float = 1.0
     shot_noise: float = 3.0
     rate_hz: float = 15.0
@@ -78,31 +79,34 @@ def optics_of(car: Car, camera: str) -> Optics:
     x, y, z = car.vector(_POSITION[camera])
     width, height = car.vector("camera.resolution_px")
     half = math.radians(car.value("camera.fov_deg")) / 2.0
-    axis = car.text("camera.fov_axis") if car.has("camera.fov_axis") else "horizontal"
-    across = height if axis == "vertical" else width
-    rest = {
-        name: car.value(f"camera.{name}") if car.has(f"camera.{name}") else default
-        for name, default in _NOT_GIVEN.items()
-    }
-    k1, k2, p1, p2, k3 = (
-        car.vector("camera.distortion") if car.has("camera.distortion") else 5 * (0.0,)
-    )
+    across = height if car.text("camera.fov_axis") == "vertical" else width
+    k1, k2, p1, p2, k3 = car.vector("camera.distortion")
+    red, green, blue = car.vector("camera.white_balance")
     return Optics(
         width_px=round(width),
         height_px=round(height),
         focal_px=across / 2.0 / math.tan(half),
         position=(x, y, z),
-        yaw=0.0 if camera == "front" else math.pi,
+        yaw=car.value("camera.yaw_rad") + (0.0 if camera == "front" else math.pi),
         pitch_down=car.value("camera.pitch_down_rad"),
+        roll=car.value("camera.roll_rad"),
         distortion=(k1, k2, p1, p2, k3),
-        **rest,
+        white_balance=(red, green, blue),
+        **{name: car.value(f"camera.{name}") for name in _NUMBERS},
     )
 
 
-@lru_cache(maxsize=64)
 def fitted(car: str) -> Mapping[str, Optics]:
     """Return the cameras on a car of that file, by name; a file that is not ours is a Nigel's."""
-    model = load_car(car if car in car_names() else DEFAULT_CAR)
+    return _on(load_car(car)) if car in varied_values else _on_file(car)
+
+
+@lru_cache(maxsize=64)
+def _on_file(car: str) -> Mapping[str, Optics]:
+    return _on(load_car(car if car in car_names() else DEFAULT_CAR))
+
+
+def _on(model: Car) -> Mapping[str, Optics]:
     try:
         return MappingProxyType({name: optics_of(model, name) for name in cameras_of(model)})
     except CarError:

@@ -6,16 +6,17 @@ between the two around it. So a frame is up to one snapshot (50 ms) late; a car 
 counts from the frame's time and includes these 50 ms.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import cv2
 
 from scm.camera.daylight import Daylight
 from scm.camera.delivery import UnderWay, is_lost
+from scm.camera.motion import STILL
 from scm.camera.optics import Optics, fitted
 from scm.camera.studio import Studio
-from scm.camera.tween import between, near
+from scm.camera.tween import between, motion, near
 from scm.clock import NS_PER_MS, NS_PER_S, Clock, nanoseconds
 from scm.errors import EyeError
 from scm.records.city_map import CityMap
@@ -55,6 +56,7 @@ class CameraPart(BasePart):
         seed: Of the floor's grain, the sensors' noise and the lost frames.
         daylight: The light in the city; None: a well lit room.
         clock: Times the pictures for the status line; None: it is left out.
+        cameras: Returns the cameras of a car file, by name; None: as the file has them.
     """
 
     name = "camera"
@@ -67,12 +69,14 @@ class CameraPart(BasePart):
         seed: int = 0,
         daylight: Daylight | None = None,
         clock: Clock | None = None,
+        cameras: Callable[[str], Mapping[str, Optics]] | None = None,
     ) -> None:
         self.subscriptions: Sequence[Subscription] = ASLEEP
         self._map = city_map
         self._seed = seed
         self._daylight = daylight or Daylight()
         self._clock = clock
+        self._cameras = cameras
         self._studio: Studio | None = None
         self._is_wanted: IsWanted = _nobody
         self._look_ns: int | None = None
@@ -126,7 +130,7 @@ class CameraPart(BasePart):
         for car in after.vehicles:
             if not self._is_wanted(CameraFrame, {"vehicle": car.vehicle}):
                 continue
-            for camera, optics in fitted(car.car).items():
+            for camera, optics in (self._cameras or fitted)(car.car).items():
                 which = (car.vehicle, camera)
                 if not self._is_wanted(CameraFrame, {"vehicle": car.vehicle, "camera": camera}):
                     continue
@@ -152,8 +156,10 @@ class CameraPart(BasePart):
         own = next((car for car in cars if car.vehicle == vehicle), None)
         if own is None:
             return []
+        exposure_s = optics.exposure_time_s
+        moving = motion(before, after, vehicle, exposure_s) if exposure_s else STILL
         image = self._studio.picture(
-            optics, own, cars, self._shown(t_ns), camera, t_ns, after.boxes
+            optics, own, cars, self._shown(t_ns), camera, t_ns, after.boxes, moving
         )
         quality = [cv2.IMWRITE_JPEG_QUALITY, round(optics.jpeg_quality)]
         good, data = cv2.imencode(".jpg", image, quality)

@@ -12,6 +12,8 @@ from scm.camera.car_mesh import car_thing, footprint
 from scm.camera.daylight import Daylight
 from scm.camera.floor import SHADE, Floor, horizon_rows
 from scm.camera.lens import Lens, View
+from scm.camera.look import Look
+from scm.camera.motion import STILL, begin, doublings, smear
 from scm.camera.optics import Optics
 from scm.camera.painter import Painter
 from scm.camera.sensor import Noise
@@ -25,6 +27,7 @@ from scm.camera.standing import (
     wall_balls,
     wall_thing,
 )
+from scm.geometry import Pose2
 from scm.records.boxes import SnapshotBox
 from scm.records.city_map import Box, CityMap
 from scm.scenery.bodies import car_rotation
@@ -69,6 +72,7 @@ class Studio:
         camera: str,
         t_ns: int,
         moved: Sequence[SnapshotBox] = (),
+        motion: Pose2 = STILL,
     ) -> Image:
         """Return a frame, (height, width, 3); it is valid until the next one.
 
@@ -80,9 +84,16 @@ class Studio:
             camera: Its name, and with it its noise.
             t_ns: When it is exposed.
             moved: Poses of boxes that were pushed; the others are at their place on the map.
+            motion: Of the car during the exposure, half of it before `t_ns`.
         """
         kind = self._kind(optics)
+        at = Pose2(car.x_m, car.y_m, car.yaw_rad)
         view = kind.lens.view(car_rotation(car), np.array([car.x_m, car.y_m, 0.0]))
+        warps = doublings(kind.lens, view, at, motion)
+        if warps:
+            at = begin(at, motion, warps)
+            car = msgspec.structs.replace(car, x_m=at.x, y_m=at.y, yaw_rad=at.yaw)
+            view = kind.lens.view(car_rotation(car), np.array([at.x, at.y, 0.0]))
         canvas = kind.canvas
         self._sky(canvas, kind, view)
         self._floor.paint(canvas, kind.lens, view, self._daylight.intensity * kind.exposure)
@@ -97,7 +108,8 @@ class Studio:
             *(car_thing(other) for other in cars if other.vehicle != car.vehicle),
         ]
         kind.painter.paint(canvas, view, things)
-        frame = kind.lens.bend(canvas)
+        smear(canvas, kind.lens, view, at, motion, warps)
+        frame = kind.look.apply(kind.lens.bend(canvas))
         kind.noise.add(frame, car.vehicle, camera, t_ns)
         return frame
 
@@ -184,6 +196,7 @@ class _Kind:
         self.lens = Lens(optics)
         self.exposure = optics.exposure * optics.gain
         self.painter = Painter(self.lens, daylight, self.exposure)
+        self.look = Look(optics)
         self.noise = Noise(optics, seed)
         width, height = self.lens.canvas_size
         self.canvas: Image = np.zeros((height, width, 3), dtype=np.uint8)

@@ -4,7 +4,9 @@ import math
 
 import msgspec
 
-from scm.geometry import wrap_angle
+from scm.camera.motion import STILL, along
+from scm.clock import seconds
+from scm.geometry import Pose2, wrap_angle
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 
 JUMP_M = 0.3
@@ -40,6 +42,18 @@ def _between(start: SnapshotVehicle | None, end: SnapshotVehicle, share: float) 
         pitch_rad=mixed(start.pitch_rad, end.pitch_rad),
         lights=start.lights if share < 0.5 else end.lights,
     )
+
+
+def motion(before: WorldSnapshot, after: WorldSnapshot, vehicle: str, time_s: float) -> Pose2:
+    """Return how a car moves in a time, by its poses in two snapshots: the later seen from before.
+
+    One that was not there before, or was put elsewhere, stands.
+    """
+    ends = [car for one in (before, after) for car in one.vehicles if car.vehicle == vehicle]
+    if len(ends) < 2 or math.hypot(ends[1].x_m - ends[0].x_m, ends[1].y_m - ends[0].y_m) > JUMP_M:
+        return STILL
+    first, last = (Pose2(car.x_m, car.y_m, car.yaw_rad) for car in ends)
+    return along(first.inverse() @ last, time_s / seconds(after.t_ns - before.t_ns))
 
 
 def near(snapshot: WorldSnapshot, vehicle: str, reach_m: float) -> WorldSnapshot:

@@ -210,16 +210,19 @@ def varied_cars(cars: Mapping[str, Car]) -> Iterator[None]:
     """Let these cars be what `load_car` returns for their names, in this process, for a while.
 
     They look so, too (`scm.scenery.bodies.car_body`). A study's case runs alone in its process,
-    with numbers of its own for a car of a known name.
+    with numbers of its own for a car of a known name. Afterwards those are back that were before.
     """
+    cars_before, values_before = dict(_varied), dict(varied_values)
     _varied.update(cars)
     for name, car in cars.items():
         varied_values[name] = {key: quantity.value for key, quantity in car.values.items()}
     try:
         yield
     finally:
-        for name in cars:
-            del _varied[name], varied_values[name]
+        _varied.clear()
+        _varied.update(cars_before)
+        varied_values.clear()
+        varied_values.update(values_before)
 
 
 _varied: dict[str, Car] = {}

@@ -143,7 +143,8 @@ def test_every_command_shows_an_example_that_it_understands(
     name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     example = load("scm.commands", name, "COMMAND", Command).example
-    words = name.split("_")
+    first, *others = name.split("_")
+    words = [first, *filter(None, ["-".join(others)])]
     assert example.split()[: len(words) + 1] == ["scm", *words]
     assert parse(example.split()[1:]).command == " ".join(words)
     with pytest.raises(SystemExit):

@@ -232,3 +232,23 @@ def test_a_car_that_is_nowhere_is_left_out(car):
     assert [one.vehicle for one in around.vehicles] == ["n1"]
     nowhere = near(WorldSnapshot(t_ns=0, tick=0, vehicles=cars), "n2", 4.0)
     assert [one.vehicle for one in nowhere.vehicles] == ["n1"]
+
+
+def test_cameras_may_be_given_and_change_from_frame_to_frame(
+    city_map, car, optics, floor_drawn_once
+):
+    small = {"width_px": 160, "height_px": 90, "focal_px": 130.0}
+    now = [optics(**small)]
+    part = CameraPart(city_map, cameras=lambda _: {"front": now[0]})
+    with Lockstep([Stage(car), part]) as city:
+        frames = city.subscribe(N1_FRONT)
+        city.run_for(0.3)
+        bright = frames.drain()[-1].message
+        now[0] = optics(**small, exposure=0.25)
+        city.run_for(0.3)
+        dark = frames.drain()[-1].message
+    light = [
+        cv2.imdecode(np.frombuffer(one.payload, np.uint8), cv2.IMREAD_COLOR).mean()
+        for one in (bright, dark)
+    ]
+    assert light[1] == pytest.approx(light[0] / 4, rel=0.05)
