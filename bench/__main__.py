@@ -19,6 +19,7 @@ BENCHMARKS = (
     "codec",
     "eye",
     "camera",
+    "cloning",
     "lidar",
     "recordings",
     "scans",

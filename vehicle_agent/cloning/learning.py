@@ -53,7 +53,7 @@ def learn(
         data_sha256=_hash(paths), scm=__version__, stack=network.stack,
         steering_delay_s=recipe.delay_s, steering_gain=recipe.gain,
     )  # fmt: skip
-    _write(out, network, trained.weights, metadata)
+    write(out, network, trained.weights, metadata)
     return metadata
 
 
@@ -65,7 +65,7 @@ def _hash(paths: list[Path]) -> str:
     return digest.hexdigest()
 
 
-def _write(
+def write(
     path: Path, network: Network, weights: list[tuple[Floats, Floats]], metadata: Metadata
 ) -> None:
     """Write a network with its metadata.
