@@ -238,7 +238,7 @@ class _Full:
 
 
 def _inverted(wanted: float, seen: Floats) -> float:
-    """Return the noise that makes what is wanted of what is seen; 0 if it cannot be told."""
+    """Return the noise that makes what is wanted of what is seen; 0 if there is none to find."""
     rising = np.maximum.accumulate(seen)
     if wanted < VISIBLE * rising[0]:
         return 0.0

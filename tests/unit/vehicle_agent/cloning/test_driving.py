@@ -14,10 +14,12 @@ from scm.maps.route import Path, roads_of
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import BasePart, Subscription
 from scm.traffic.signals.part import TrafficPart
+from scm.v2x.exchange import Incoming
 from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.network_view import NetworkView
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.messages.world_definition import WorldDefinition
 from scm.vehicles.car import load_car
 from scm.vehicles.drivers.limits import limits_of
 from scm.world.part import WorldPart
@@ -92,6 +94,21 @@ def test_demonstrator_leads_back_to_the_lane_and_gives_up_beside_all():
     assert right > inside + 0.05
     assert demonstrator.commands(state(Pose2(9.0, 9.0, 0.0))) is None
     assert demonstrator.commands(state(START)) is not None
+
+
+def test_dagger_stores_the_demonstrator_s_commands_and_not_those_in_force(tmp_path):
+    part = RecordDemoPart("demo", "n1", tmp_path, laps=1, dagger=True)
+    _, jpeg = cv2.imencode(".jpg", np.zeros((36, 64, 3), np.uint8))
+    frame = CameraFrame(
+        vehicle="n1", camera="front", t_ns=0, width_px=64, height_px=36, payload=jpeg.tobytes()
+    )
+    where = replace(state(START @ Pose2(0.0, 0.03, 0.0)), steering=0.9)
+    for message in (WorldDefinition(t_ns=0, seed=0, map=SCHOOL), frame, where):
+        part.step(0, [Incoming(message, 0)])
+    part.finish(0)
+    (sample,) = Demonstration(tmp_path).samples
+    assert sample.steering == pytest.approx(Demonstrator(OPEN).commands(where)[1])
+    assert sample.steering < 0.8
 
 
 def test_demonstration_is_not_overwritten(recorded):
@@ -218,7 +235,7 @@ class BlankFrames(BasePart):
 def beyond_line(network, **options):
     """Let a car drive towards an all-red crossing for 4.6 s, and for 6 s more.
 
-    Returns how far its front was beyond the line then [m], and what the part said of itself.
+    Returns how far its front was beyond the line then [m], and what the part reported.
     """
     world, part = WorldPart(SCHOOL, 1), NetworkPart("net", "n1", network, **options)
     line = SCHOOL.stop_lines[0]
