@@ -32,6 +32,7 @@ BENCHMARKS = (
 LONG = (
     "autonomy_plan",
     "autonomy_real",
+    "cloning_real",
     "dashboard",
     "devkit",
     "flow",

@@ -8,6 +8,8 @@ start, speed, way and the car may differ from those of the demonstration. Signal
     vehicle-agent train demos/five --epochs 20
     scm study run studies/cloning.toml
     python -m studies.cloning label demos/more model.onnx    laps by it, for its next training
+
+`--on 3` records or labels on a track of `tracks.py` instead.
 """
 
 import argparse
@@ -158,7 +160,7 @@ def smaller(optics: Optics, width_px: int) -> Optics:
 
 def record(
     path: Path, laps: int = 5, seed: int = 1, limit_mps: float = LIMIT_MPS,
-    looks: Path | None = None,
+    looks: Path | None = None, on: int = 0,
 ) -> int:  # fmt: skip
     """Let the built-in driver drive some laps, and record them; return the number of frames.
 
@@ -168,8 +170,9 @@ def record(
         seed: Of the city.
         limit_mps: Of all lanes.
         looks: Study whose cases vary the car's camera: each lap is seen through that of the next.
+        on: Number of a track of `tracks.py`; 0: Driving School.
     """
-    city_map = lanes_only(load_map(MAP))
+    city_map = lanes_only(track(on) if on else load_map(MAP))
     lanes = tuple(replace(lane, speed_limit_mps=limit_mps) for lane in city_map.lanes)
     city_map = replace(city_map, lanes=lanes)
     cars = [load_car(CAR)]
@@ -190,14 +193,14 @@ def record(
 
 def label(
     path: Path, model: Path, laps: int = 5, seed: int = 1, start_deg: float = 5.0,
-    start_m: float = 0.02,
+    start_m: float = 0.02, on: int = 0,
 ) -> int:  # fmt: skip
     """Let a network drive, and record what the built-in driver would do (DAgger).
 
     Each lap begins somewhere on the lane and beside its middle, and ends early beyond the lane.
     """
     rng = generator(seed, "label")
-    city_map = lanes_only(load_map(MAP))
+    city_map = lanes_only(track(on) if on else load_map(MAP))
     lane = LanePath.circulation(roads_of(city_map), city_map.lanes[0].name)
     room_m = 0.5 * (city_map.lanes[0].width_m - load_car(CAR).value("body.track_m"))
     world = WorldPart(city_map, seed)
@@ -228,13 +231,14 @@ def _main() -> None:
     parser.add_argument("--laps", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--looks", type=Path, metavar="STUDY", help="vary the camera by lap")
+    parser.add_argument("--on", type=int, default=0, help="a track; default: Driving School")
     given = parser.parse_args()
     if given.what == "record":
-        count = record(given.path, given.laps, given.seed, looks=given.looks)
+        count = record(given.path, given.laps, given.seed, looks=given.looks, on=given.on)
     elif given.model is None:
         parser.error("label: expected the network that drives")
     else:
-        count = label(given.path, given.model, given.laps, given.seed)
+        count = label(given.path, given.model, given.laps, given.seed, on=given.on)
     sys.stdout.write(f"{count} frames in {given.path}\n")
 
 

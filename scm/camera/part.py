@@ -4,6 +4,7 @@ Without subscribers it receives nothing, not even snapshots. The time of a frame
 the camera's period. It is rendered once the world's snapshots have passed that time, interpolated
 between the two around it. So a frame is up to one snapshot (50 ms) late; a car file's `latency_s`
 counts from the frame's time and includes these 50 ms.
+Emulated real cars are rendered at their true poses, see `scm.v2x.emulated_cars`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,9 +22,11 @@ from scm.clock import NS_PER_MS, NS_PER_S, Clock, nanoseconds
 from scm.errors import EyeError
 from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, IsWanted, Subscription
+from scm.v2x.emulated_cars import EmulatedCars
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message
 from scm.v2x.messages.camera_frame import CameraFrame
+from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.world_snapshot import WorldSnapshot
@@ -32,7 +35,7 @@ SUBSCRIBER_CHECK_NS = 100 * NS_PER_MS
 FLASH_NS = 500 * NS_PER_MS
 FARTHEST_M = 12.0
 """Cars farther away are not drawn: a Nigel is 15 pixels wide there."""
-ACTIVE_SUBSCRIPTIONS = (Subscription(WorldSnapshot), Subscription(Spat))
+ACTIVE_SUBSCRIPTIONS = (Subscription(WorldSnapshot), Subscription(Spat), Subscription(EmulatedPose))
 ASLEEP: tuple[Subscription, ...] = ()
 
 Which = tuple[str, str]
@@ -82,6 +85,7 @@ class CameraPart(BasePart):
         self._look_ns: int | None = None
         self._snapshots: list[WorldSnapshot] = []
         self._spats: dict[str, Spat] = {}
+        self._emulated = EmulatedCars()
         self._exposed_ns: dict[Which, int] = {}
         self._under_way = UnderWay()
         self._counted = _Counted()
@@ -103,8 +107,10 @@ class CameraPart(BasePart):
         for item in inbox:
             if isinstance(item.message, Spat):
                 self._spats[item.message.junction] = item.message
+            elif isinstance(item.message, EmulatedPose):
+                self._emulated.update(item.message)
             elif isinstance(item.message, WorldSnapshot):
-                self._snapshots = [*self._snapshots[-1:], item.message]
+                self._snapshots = [*self._snapshots[-1:], self._emulated.seen(item.message)]
                 received_ns = min(item.t_ns, now_ns)
         if received_ns is not None:
             self._expose(received_ns)

@@ -163,7 +163,8 @@ _OF_PART: dict[str, Rights] = {
         services=("eye/*/req",),
     ),
     "camera": Rights(
-        publishes=("v/*/@camera/*",), subscribes=("world/snapshot", "world/def", "tl/*/spat")
+        publishes=("v/*/@camera/*",),
+        subscribes=("world/snapshot", "world/def", "tl/*/spat", "v/*/emulated"),
     ),
     "record": _WATCHES,
     "api": _WATCHES + Rights(publishes=("v/*/cmd/drive",), requests=EVERY_REQUEST),

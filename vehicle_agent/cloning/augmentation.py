@@ -76,10 +76,9 @@ class Augmenter:
         steering = self.steering_back(steering, offset_m, heading_rad)
         if rng.random() < how.mirrored:
             changed, steering = [frame[:, ::-1] for frame in changed], -steering
-        shade = self._shade() if rng.random() < how.shadow else np.ones(1)
         factors = rng.uniform(*how.light) * (1.0 + how.tint * rng.standard_normal(3))
-        light = (shade * factors).astype(np.float32)
-        return [np.clip(one * light, 0.0, 255.0).astype(np.uint8) for one in changed], steering
+        shadow = self._shadow() if rng.random() < how.shadow else None
+        return [_lit(frame, factors, shadow) for frame in changed], steering
 
     def seen_from(self, frame: Image, offset_m: float, heading_rad: float) -> Image:
         """Return a frame as seen from so far to the left, turned so far to the left."""
@@ -116,12 +115,26 @@ class Augmenter:
         floor: Floats = camera @ pitched @ TO_CAMERA @ seen @ body
         return floor
 
-    def _shade(self) -> Floats:
-        """Return a factor (h, w, 1): a shadow between two lines from the top to the bottom."""
+    def _shadow(self) -> tuple[Image, float]:
+        """Return the mask (h, w) of a shadow from the top to the bottom, and the light in it."""
         width, height = self._size
         ends = np.sort(self._rng.uniform(-0.2, 1.2, (2, 2)), axis=1) * width
         corners = ((ends[0, 0], 0), (ends[0, 1], 0), (ends[1, 1], height), (ends[1, 0], height))
-        mask = np.ones((height, width), np.float32)
-        shade = float(self._rng.uniform(*SHADE))
-        cv2.fillConvexPoly(mask, np.round(corners).astype(np.int32), shade)
-        return np.asarray(mask[:, :, None], dtype=np.float64)
+        mask = np.zeros((height, width), np.uint8)
+        cv2.fillConvexPoly(mask, np.round(corners).astype(np.int32), 255)
+        return mask, float(self._rng.uniform(*SHADE))
+
+
+def _lit(frame: Image, factors: Floats, shadow: tuple[Image, float] | None) -> Image:
+    """Return a frame (h, w, 3) whose colours are multiplied by factors (3,), and a shadow on it."""
+    lit: Image = np.asarray(cv2.LUT(frame, _table(factors)), dtype=np.uint8)
+    if shadow is not None:
+        mask, light = shadow
+        cv2.copyTo(cv2.LUT(frame, _table(light * factors)), mask, lit)
+    return lit
+
+
+def _table(factors: Floats) -> Image:
+    """Return what each value of each colour becomes (1, 256, 3)."""
+    values: Floats = np.clip(np.arange(256.0)[:, None] * factors, 0.0, 255.0)
+    return values[None].astype(np.uint8)

@@ -302,11 +302,7 @@ def outputs_of(
     layers = [*network.layers, None]
     for number, ((kernel, bias), layer) in enumerate(zip(weights, layers, strict=True)):
         if isinstance(layer, Convolution):
-            step = (layer.step_px, layer.step_px)
-            values = jax.lax.conv_general_dilated(
-                values, kernel, step, "VALID", dimension_numbers=("NHWC", "HWIO", "NHWC")
-            )
-            values = jax.nn.relu(values + bias)
+            values = jax.nn.relu(_convolved(values, kernel, layer.step_px) + bias)
             continue
         values = values.reshape(len(values), -1) @ kernel + bias
         if layer is None:
@@ -318,3 +314,29 @@ def outputs_of(
             )
             values = jnp.where(stays, values / (1.0 - dropout), 0.0)
     return values
+
+
+def _convolved(values: jax.Array, kernel: jax.Array, step_px: int) -> jax.Array:
+    """Return (n, h, w, out) of (n, h, w, in) and a kernel (k, k, in, out), without padding.
+
+    Short steps go by a product of matrices: with its gradient, that takes 0.6 of the time of XLA's
+    own convolution on a CPU (`pilotnet`, `linear`). At a step of 5, XLA's takes half of it.
+    """
+    if step_px > 2:
+        layout = ("NHWC", "HWIO", "NHWC")
+        return jax.lax.conv_general_dilated(
+            values, kernel, (step_px, step_px), "VALID", dimension_numbers=layout
+        )
+    size_px, _, channels, outputs = kernel.shape
+    count, *size, _ = values.shape
+    height, width = ((one - size_px) // step_px + 1 for one in size)
+    columns = [
+        values[
+            :, row : row + step_px * height : step_px, column : column + step_px * width : step_px
+        ]
+        for row in range(size_px)
+        for column in range(size_px)
+    ]
+    patches = jnp.concatenate(columns, axis=-1).reshape(-1, size_px**2 * channels)
+    product = patches @ kernel.reshape(-1, outputs)
+    return product.reshape(count, height, width, outputs)

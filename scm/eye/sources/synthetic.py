@@ -1,6 +1,6 @@
 """The emulated overhead camera: renders what a real one would see of a snapshot of the world.
 
-Emulated real cars are rendered at their true poses, see `scm.eye.emulated`.
+Emulated real cars are rendered at their true poses, see `scm.v2x.emulated_cars`.
 
 Cars have height, so they shift outwards as in a real picture; tags go through the true lens; edges
 are antialiased; the sensor adds Gaussian noise. The noise is a random part of a sheet drawn once:
@@ -15,13 +15,13 @@ import numpy as np
 from scm.arrays import Image
 from scm.clock import NS_PER_S
 from scm.eye.camera import CameraModel
-from scm.eye.emulated import EmulatedCars
 from scm.eye.render.car import draw_car
 from scm.eye.render.floor import draw_box, draw_scenery
 from scm.eye.source import Frame
 from scm.geometry import Pose2
 from scm.records.city_map import CityMap
 from scm.runtime.part import Subscription
+from scm.v2x.emulated_cars import EmulatedCars
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot

@@ -1,7 +1,8 @@
-"""Emulated real cars, for the emulated camera: it sees their true pose, not the reported one.
+"""Emulated real cars, for rendered cameras: they see their true pose, not the reported one.
 
 A real car's place in the world's snapshot is what its own program reports. An emulated one also
-publishes its true pose, and that is rendered, so that its program only learns it through the Eye.
+publishes its true pose, and that is rendered: its program learns it only by what cameras show, the
+Eye's overhead and the car's own.
 """
 
 import msgspec

@@ -1,14 +1,17 @@
-"""The emulated camera sees emulated real cars where they are, not where they say."""
+"""Rendered cameras see emulated real cars where they are, not where they say."""
 
 import math
 
 import msgspec
 import pytest
 
-from scm.eye.emulated import EmulatedCars
+from scm.camera.part import CameraPart
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.eye.part import EyePart
 from scm.maps.load import load_map
+from scm.v2x.emulated_cars import EmulatedCars
 from scm.v2x.exchange import Incoming
+from scm.v2x.messages.camera_frame import CameraFrame
 from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
@@ -88,3 +91,26 @@ def test_its_own_tag_is_drawn_even_if_the_city_gave_another():
 
 def test_places_beyond_all_maps_are_not_believed():
     assert seen([msgspec.structs.replace(TRUTH, x_m=1e300)], light(CLAIM)) == (CLAIM,)
+
+
+def test_a_cars_own_camera_looks_from_where_the_car_truly_is():
+    frames = {}
+    for name, reports in (("there", [TRUTH]), ("claimed", [])):
+        camera = CameraPart(CITY, seed=3)
+        camera.attach(lambda kind, where: kind is CameraFrame)
+        put = CLAIM if reports else moved_to(TRUTH)
+        out = []
+        for t_ns in (NOW_NS - 50 * NS_PER_MS, NOW_NS):
+            inbox = [Incoming(msgspec.structs.replace(one, t_ns=t_ns), t_ns) for one in reports]
+            out += camera.step(t_ns, [*inbox, Incoming(light(put, t_ns=t_ns), t_ns)])
+        out += camera.step(NOW_NS + NS_PER_S, [])
+        assert EmulatedPose in {one.kind for one in camera.subscriptions}
+        frames[name] = [one.payload for one in out if isinstance(one, CameraFrame)]
+    assert frames["there"] == frames["claimed"] != []
+
+
+def moved_to(truth):
+    return msgspec.structs.replace(
+        CLAIM, x_m=truth.x_m, y_m=truth.y_m, yaw_rad=truth.yaw_rad,
+        steering_rad=truth.steering_rad, lights=(),
+    )  # fmt: skip
