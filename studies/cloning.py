@@ -16,14 +16,13 @@ import argparse
 import math
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import replace as replaced
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from msgspec.structs import replace
 
-from scm.camera.optics import Optics, optics_of
+from scm.camera.optics import optics_of
 from scm.camera.part import CameraPart
 from scm.clock import NS_PER_S
 from scm.geometry import Pose2, wrap_angle
@@ -31,7 +30,7 @@ from scm.maps.load import load_map
 from scm.maps.polyline import advance, extent
 from scm.maps.route import Path as LanePath
 from scm.maps.route import roads_of
-from scm.records.city_map import CityMap, Lane, Segment
+from scm.records.city_map import Box, CityMap, Lane, Segment
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Part
 from scm.study.case import Case
@@ -51,6 +50,7 @@ MAP, CAR, VEHICLE = "driving_school", "nigel", "n1"
 LIMIT_MPS = 0.2  # of the lanes while laps are recorded: a fifth faster is possible
 STEP_S, SLOWEST_MPS, STARTS_S = 0.1, 0.05, 5.0
 LABELLED = 1.5  # times the room to either side: as far out as labels help
+BOX_M, STEP_M = 0.1, 0.02  # of a side; between points of the lane
 WIDTH_PX = 640  # of rendered frames: half of a Nigel's, in less than half the time
 
 Put = Callable[[], HasPose]
@@ -59,7 +59,7 @@ Put = Callable[[], HasPose]
 def run(
     case: Case, model: str = "model.onnx", laps: int = 1, start_deg: float = 0.0,
     start_m: float = 0.0, speed: float = 1.0, concealed: str = "nothing", engine: str = "city",
-    way: str = "there", on: int = 0, width_px: int = WIDTH_PX,
+    way: str = "there", on: int = 0, boxes: int = 0, width_px: int = WIDTH_PX,
 ) -> dict[str, float]:  # fmt: skip
     """Return how far the car drove before a wheel left its lane, and how near the middle.
 
@@ -75,6 +75,7 @@ def run(
         engine: What moves the car: the city, or an engine of `tests/reality`.
         way: Round the lane: `there`, as recorded, or `back`.
         on: Number of a track of `tracks.py`; 0: the study's map.
+        boxes: How many stand about beside the lanes that did not while it was shown.
         width_px: Of rendered frames.
     """
     rng = case.generator("cloning")
@@ -83,8 +84,10 @@ def run(
     at_m = float(rng.uniform(0.0, lane.length_m))
     off_m, off_deg = rng.uniform(-1.0, 1.0, 2) * (start_m, start_deg)
     begin = lane.at(at_m) @ Pose2(0.0, float(off_m), math.radians(off_deg))
+    if boxes:
+        city_map = with_boxes(city_map, boxes, rng)
     car = load_car(CAR) if engine != "city" else with_effect(load_car(CAR), concealed)
-    seen = {"front": smaller(optics_of(car, "front"), width_px)}
+    seen = {"front": optics_of(car, "front").of_width(width_px)}
     with varied_cars({CAR: car}):
         world = WorldPart(city_map, case.seed)
         cameras = CameraPart(city_map, case.seed, case.daylight, cameras=lambda _: seen)
@@ -149,13 +152,19 @@ def _turned(lanes: Sequence[Lane], lane: Lane) -> Lane:
     return replace(lane, start=start, segments=tuple(turned), next=after)
 
 
-def smaller(optics: Optics, width_px: int) -> Optics:
-    """Return a camera with so many columns that sees the same."""
-    scale = width_px / optics.width_px
-    return replaced(
-        optics, width_px=width_px, height_px=round(scale * optics.height_px),
-        focal_px=scale * optics.focal_px, blur_px=scale * optics.blur_px,
-    )  # fmt: skip
+def with_boxes(city_map: CityMap, count: int, rng: np.random.Generator) -> CityMap:
+    """Return a map with more boxes on its floor, each beside the lanes that the car drives."""
+    floor, boxes = city_map.floor, list[Box]()
+    way = LanePath.circulation(roads_of(city_map), city_map.lanes[0].name)
+    middle = np.array([way.at(s)[:2] for s in np.arange(0.0, way.length_m, STEP_M)])
+    least_m = 0.5 * (city_map.lanes[0].width_m + math.sqrt(2.0) * BOX_M)
+    while len(boxes) < count:
+        x, y = rng.uniform(*floor.x_m), rng.uniform(*floor.y_m)
+        if np.hypot(*(middle - (x, y)).T).min() > least_m:
+            yaw = float(rng.uniform(-math.pi, math.pi))
+            name = f"more_{len(boxes)}"
+            boxes.append(Box(name=name, x_m=x, y_m=y, yaw_rad=yaw, length_m=BOX_M, width_m=BOX_M))
+    return replace(city_map, boxes=(*city_map.boxes, *boxes))
 
 
 def record(

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -63,6 +63,14 @@ class Optics:
     latency_s: float = 0.0
     drop_out: float = 0.0
     jpeg_quality: float = 80.0
+
+    def of_width(self, width_px: int) -> "Optics":
+        """Return a camera with so many columns that sees the same."""
+        scale = width_px / self.width_px
+        return replace(
+            self, width_px=width_px, height_px=round(scale * self.height_px),
+            focal_px=scale * self.focal_px, blur_px=scale * self.blur_px,
+        )  # fmt: skip
 
 
 def cameras_of(car: Car) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from scm.camera.optics import fitted
 from scm.maps.check import problems_of
 from scm.maps.load import load_map
 from scm.maps.route import Path, roads_of
-from studies.cloning import lanes_only, smaller
+from studies.cloning import lanes_only
 from studies.tracks import TIGHTEST_M, track
 
 
@@ -46,6 +46,6 @@ def test_lanes_lead_back_over_the_same_floor():
 
 def test_smaller_camera_sees_the_same():
     optics = fitted("nigel")["front"]
-    half = smaller(optics, 640)
+    half = optics.of_width(640)
     assert (half.width_px, half.height_px) == (640, 360)
     assert half.focal_px / half.width_px == pytest.approx(optics.focal_px / optics.width_px)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from scm.camera.optics import optics_of
 from scm.camera.part import CameraPart
 from scm.clock import NS_PER_MS
 from scm.errors import LearningError
@@ -26,15 +27,22 @@ from scm.world.part import WorldPart
 from vehicle_agent.cloning.demonstration import Demonstration
 from vehicle_agent.cloning.demonstrator import Demonstrator
 from vehicle_agent.cloning.driving import NetworkPart
-from vehicle_agent.cloning.learning import learn
+from vehicle_agent.cloning.learning import write
+from vehicle_agent.cloning.model_file import Metadata
 from vehicle_agent.cloning.network import NETWORKS
 from vehicle_agent.cloning.recording import Laps, RecordDemoPart
-from vehicle_agent.cloning.training import Recipe
 
 SCHOOL = load_map("driving_school")
 OPEN = replace(SCHOOL, junctions=(), stop_lines=(), lights=())
 NIGEL = limits_of(load_car("nigel"))
+FRONT = {"front": optics_of(load_car("nigel"), "front").of_width(320)}
+PAPER = NETWORKS["paper"]
 START = Pose2(1.747806, 0.291194, -0.785398)
+
+
+def front_camera():
+    """Return what renders the front camera as small as demonstrations store it."""
+    return CameraPart(OPEN, 1, cameras=lambda _: FRONT)
 
 
 @pytest.fixture(scope="module")
@@ -44,15 +52,26 @@ def recorded(tmp_path_factory):
     part = RecordDemoPart("demo", "n1", path / "mine", laps=5)
     beside = RecordDemoPart("beside", "n1", path / "dagger", laps=5, dagger=True)
     world = WorldPart(OPEN, 1, (("n1", "nigel"),))
-    with Lockstep([world, CameraPart(OPEN, 1), part, beside]) as city:
+    with Lockstep([world, front_camera(), part, beside]) as city:
         city.run_for(12.0)
     return Demonstration(path / "mine")
 
 
 @pytest.fixture(scope="module")
-def network(recorded, tmp_path_factory):
+def network(tmp_path_factory):
+    """Return the file of a network that has not learned yet."""
     path = tmp_path_factory.mktemp("network") / "model.onnx"
-    learn([recorded.path], NETWORKS["paper"], Recipe(epochs=1, copies=1, batch=32), path)
+    rng = np.random.default_rng(1)
+    weights = [
+        (rng.normal(0.0, np.prod(one[:-1]) ** -0.5, one), np.zeros(one[-1]))
+        for one in PAPER.shapes(1)
+    ]
+    metadata = Metadata(
+        model=1, network="paper", outputs=("steering",), car="nigel", map="driving_school",
+        throttle=0.8, delay_s=0.03, frames=0, laps=0, epochs=0, seed=1, error=1.0,
+        held_out_error=None, data_sha256="", scm="",
+    )  # fmt: skip
+    write(path, PAPER, weights, metadata)
     return path
 
 
@@ -151,7 +170,7 @@ class Watcher(BasePart):
 def driven(part, car="nigel", lasts_s=4.0, with_cameras=True, others=()):
     """Let a network drive; return the car and how far it went."""
     world = WorldPart(OPEN, 1)
-    cameras = [CameraPart(OPEN, 1)] if with_cameras else []
+    cameras = [front_camera()] if with_cameras else []
     with Lockstep([world, *cameras, part, *others]) as city:
         hosted = world.world.host("n1", car, START, 0)
         city.run_for(lasts_s)
@@ -191,7 +210,7 @@ def test_without_frames_the_car_stands(network):
 
 
 def test_car_stands_when_its_frames_stop(network):
-    world, cameras = WorldPart(OPEN, 1), CameraPart(OPEN, 1)
+    world, cameras = WorldPart(OPEN, 1), front_camera()
     with Lockstep([world, cameras, NetworkPart("net", "n1", network)]) as city:
         hosted = world.world.host("n1", "nigel", START, 0)
         city.run_for(3.0)
