@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from msgspec import structs
 
+from scm.clock import WallClock
 from scm.fleet import LockstepLink
 from scm.geometry import Pose2
 from scm.maps.load import load_map
@@ -99,11 +100,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("concealed", nargs="*", default=NAMES, help="of %(default)s")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--budget-s", type=float, default=600.0, help="of each diagnosis")
     arguments = parser.parse_args()
     for name in arguments.concealed:
         path = FOUND / name / "drive.mcap"
         record(name, path, arguments.seed)
-        found = diagnose_car(recordings_of_one(path), load_car(CAR), budget=Budget())
+        budget = Budget(arguments.budget_s, WallClock())
+        found = diagnose_car(recordings_of_one(path), load_car(CAR), budget=budget)
         write(found, path.parent)
         lines = [name, *(effect.text for effect in found.diagnosis.effects)]
         sys.stdout.write("\n    ".join(lines) + "\n")
