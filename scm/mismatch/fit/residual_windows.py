@@ -33,6 +33,7 @@ class WindowWhitener:
     """Weighs residuals of one drive, window by window.
 
     Attributes:
+        begin_s: Of each window, (windows,); `streams`: in the order of the values.
         t: Middle of the window of each value, (events,) [s]; `stream`: the number of its stream;
             `pose.x` stands for the way along the body, `pose.y` for that across it.
         log_size: Logarithm of each value's variance, (events,).
@@ -43,13 +44,13 @@ class WindowWhitener:
     ) -> None:
         self.drive = drive
         names = drive.names
-        self._begin = _begins(drive, cuts, length_s)
-        self._end = self._begin + length_s
-        self._names = [*_POSES, *(n for n in names if n not in _POSES)]
-        middle, count = self._begin + 0.5 * length_s, len(self._begin)
-        self.t: Floats = np.tile(middle, len(self._names))
-        self.stream: Ints = np.repeat([names.index(n) for n in self._names], count)
-        size = np.array([noise.own[name] for name in self._names])
+        self.begin_s = _begins(drive, cuts, length_s)
+        self._end = self.begin_s + length_s
+        self.streams = (*_POSES, *(n for n in names if n not in _POSES))
+        middle, count = self.begin_s + 0.5 * length_s, len(self.begin_s)
+        self.t: Floats = np.tile(middle, len(self.streams))
+        self.stream: Ints = np.repeat([names.index(n) for n in self.streams], count)
+        size = np.array([noise.own[name] for name in self.streams])
         # windows overlap, so each counts for the part that is its own
         self._weight = np.repeat(np.sqrt(1.0 / OVERLAP) / size, count)
         self.log_size: Floats = np.repeat(2.0 * np.log(size), count) / OVERLAP
@@ -71,32 +72,32 @@ class WindowWhitener:
             self._cos[:, None] * along_y - self._sin[:, None] * along_x,
             turn,
         ]
-        found += [self._sensor(name, left[name]) for name in self._names[len(_POSES) :]]
+        found += [self._sensor(name, left[name]) for name in self.streams[len(_POSES) :]]
         return np.concatenate(found, axis=0)
 
     def _poses(self, left: dict[str, Floats]) -> tuple[Floats, Floats, Floats]:
         """Return what windows miss along x and y, a wrong heading's way included, and in turn."""
         x, y, yaw = (self._grown(name, left[name]) for name in _POSES)
         t, r = self.drive.stream("pose.yaw").t, left["pose.yaw"]
-        first = _at(t, r, self._begin)
+        first = _at(t, r, self.begin_s)
         ways = []
         for aside in self._aside:
             steps = 0.5 * (r[1:] + r[:-1]) * np.diff(aside)[:, None]
             way = np.concatenate((np.zeros((1, r.shape[1])), np.cumsum(steps, axis=0)))
-            moved = np.interp(self._end, t, aside) - np.interp(self._begin, t, aside)
-            ways.append(_at(t, way, self._end) - _at(t, way, self._begin) - first * moved[:, None])
+            moved = np.interp(self._end, t, aside) - np.interp(self.begin_s, t, aside)
+            ways.append(_at(t, way, self._end) - _at(t, way, self.begin_s) - first * moved[:, None])
         return x + ways[0], y + ways[1], yaw
 
     def _grown(self, name: str, left: Floats) -> Floats:
         t = self.drive.stream(name).t
-        return _at(t, left, self._end) - _at(t, left, self._begin)
+        return _at(t, left, self._end) - _at(t, left, self.begin_s)
 
     def _sensor(self, name: str, left: Floats) -> Floats:
         if name.startswith("encoder."):
             return self._grown(name, left)
         t = self.drive.stream(name).t
         total = np.concatenate((np.zeros((1, left.shape[1])), np.cumsum(left, axis=0)))
-        first, last = np.searchsorted(t, self._begin), np.searchsorted(t, self._end)
+        first, last = np.searchsorted(t, self.begin_s), np.searchsorted(t, self._end)
         return np.asarray((total[last] - total[first]) / np.maximum(last - first, 1)[:, None])
 
 

@@ -1,0 +1,261 @@
+"""Sequential detection of a change in what a car file misses: generalised likelihood ratios.
+
+A change of a known number by `d` moves the misses of every window after it by slopes times `d`. For
+each number and several spans of driving, `d` is estimated from the windows of the newest span and
+from all before it; their difference, in standard deviations, is the score. So a car file need not
+be right: what it has missed from the beginning is no change. How far windows stray, by themselves
+and together, and for how long they stray the same way, is learned from the first minutes.
+
+The onset is where the likelihood of the number with the highest score is greatest, and its interval
+all places that are at least e^-1.35 times as likely (90 %), and a window more on either side.
+Source: Willsky and Jones, A generalized likelihood ratio approach to the detection and estimation
+of jumps in linear systems, IEEE Transactions on Automatic Control 21 (1976).
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.mismatch.fit.residual_windows import LENGTH_S
+from scm.twin.windows import EVERY_S, Windows
+
+LEARN, LEARN_WELL = 400, 1200  # windows: 200 and 600 s of driving
+EARLY = 1.5  # factor on the threshold between the two: 200 s show scatter by a third
+SPANS_S = (10.0, 20.0, 40.0, 80.0, 160.0, 320.0)
+MEMORY = 1200  # windows in which an onset is searched for
+FORGET = 1.0 / 14400.0  # of all before them, for each window: two hours
+LIMIT = 2.5  # standard deviations that a window counts for at most, over all streams
+LEVERAGE = 90.0  # percentile of the windows' information beyond which one counts no more
+TRUST = 0.05  # added to the misses' correlations: sensors are never as alike as a short drive shows
+TOGETHER = 80  # windows: longest span whose scatter 200 s can show
+LIKELY = 1.35  # of the log likelihood: 90 %
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change that was detected.
+
+    Attributes:
+        number: Of the watched number that shows it most.
+        score: In standard deviations, with its sign.
+        size: How far that number changed, in its unit.
+        noticed_s: On the clock of the windows.
+        onset_s: With its interval, 90 %.
+    """
+
+    number: int
+    score: float
+    size: float
+    noticed_s: float
+    onset_s: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Usual:
+    """How a car's windows stray while nothing changes.
+
+    Attributes:
+        size: Of each stream's misses, (streams,).
+        weight: Inverse of the covariance of the misses over their sizes, (streams, streams).
+        most: Information of one window that counts at most, (numbers,).
+        scatter: Variance of a span's score over its information, (spans, numbers).
+    """
+
+    size: Floats
+    weight: Floats
+    most: Floats
+    scatter: Floats
+
+
+class Detector:
+    """Watches the windows of one car.
+
+    Args:
+        threshold: Score from which on a change is reported; see `threshold_of`.
+
+    Attributes:
+        driven_s: How long the car was watched.
+    """
+
+    def __init__(self, threshold: float) -> None:
+        self._threshold = threshold
+        self._learned: Windows | None = None  # all, until there are enough to learn from
+        self._history: History | None = None
+        self.driven_s = 0.0
+
+    @property
+    def is_learning(self) -> bool:
+        """Whether it does not yet know how the car strays."""
+        return self._history is None
+
+    def update(self, windows: Windows) -> Change | None:
+        """Take new windows; return the change that they show, if they do.
+
+        A change stays one: afterwards, give the car another detector.
+        """
+        newest, began = len(windows.begin_s), self.is_learning
+        self.driven_s += EVERY_S * newest
+        if self._history is not None:
+            self._history.add(windows)
+        self._learn(windows)
+        if self._history is None or began:
+            return None
+        scores = self._history.scores(newest)
+        if not scores.size:
+            return None
+        highest = np.unravel_index(np.argmax(np.abs(scores)), scores.shape)
+        score, number = float(scores[highest]), int(highest[-1])
+        threshold = self._threshold * (1.0 if self._learned is None else EARLY)
+        return self._history.change(number, score) if abs(score) >= threshold else None
+
+    def _learn(self, windows: Windows) -> None:
+        """Learn how the car strays, once from few windows and once from more."""
+        before = 0 if self._learned is None else len(self._learned.begin_s)
+        if self._learned is None and self._history is not None:
+            return
+        self._learned = windows if self._learned is None else joined(self._learned, windows)
+        now = len(self._learned.begin_s)
+        if any(before < enough <= now for enough in (LEARN, LEARN_WELL)):
+            self._history = History(usual_of(self._learned), self._learned)
+        if now >= LEARN_WELL:
+            self._learned = None
+
+
+class History:
+    """What windows have shown of each number: of the newest each, of those before in sum.
+
+    Args:
+        usual: How the car strays.
+        windows: By which that was learned.
+    """
+
+    def __init__(self, usual: Usual, windows: Windows) -> None:
+        self._usual = usual
+        self._t = windows.begin_s
+        self._score, self._information = weighed(windows, usual)
+        self._before = np.zeros((2, self._score.shape[1]))  # score and information
+        self._gone = 0
+
+    def add(self, windows: Windows) -> None:
+        """Add new windows; those that leave its memory are added up."""
+        score, information = weighed(windows, self._usual)
+        self._t = np.concatenate((self._t, windows.begin_s))
+        self._score = np.concatenate((self._score, score))
+        self._information = np.concatenate((self._information, information))
+        gone = max(0, len(self._t) - MEMORY)
+        self._before *= (1.0 - FORGET) ** gone
+        self._before += self._score[:gone].sum(axis=0), self._information[:gone].sum(axis=0)
+        self._t, self._score = self._t[gone:], self._score[gone:]
+        self._information = self._information[gone:]
+        self._gone += gone
+
+    def scores(self, newest: int) -> Floats:
+        """Return the scores at each of the newest windows, (newest, spans, numbers)."""
+        score, info = (
+            np.cumsum(np.concatenate((before[None], each)), axis=0)
+            for before, each in zip(self._before, (self._score, self._information), strict=True)
+        )
+        ends = np.arange(len(self._t) - newest + 1, len(self._t) + 1)
+        found = np.zeros((newest, len(SPANS_S), self._score.shape[1]))
+        for k, span_s in enumerate(SPANS_S):
+            begins = ends - round(span_s / EVERY_S)  # none is before the memory begins
+            there = begins + self._gone >= LEARN  # what came before has to show as much
+            a, b = begins[there], ends[there]
+            after = score[b] - score[a], info[b] - info[a]
+            moved, variance = _moved(after, (score[a], info[a]))
+            found[there, k] = moved / np.sqrt(self._usual.scatter[k] * variance)
+        return found
+
+    def change(self, number: int, score: float) -> Change:
+        """Return the change of a number, with its onset: where that is likeliest."""
+        after, before = (
+            np.array([each[:, number] for each in (self._score, self._information)]),
+            self._before[:, number],
+        )
+        after = np.cumsum(after[:, ::-1], axis=1)[:, ::-1]  # from each window on
+        moved, variance = _moved(after, before[:, None] + after[:, :1] - after)
+        likelihood = 0.5 * moved**2 / (self._usual.scatter[:, number].max() * variance)
+        best = int(np.argmax(likelihood))
+        near = np.flatnonzero(likelihood > likelihood[best] - LIKELY)
+        first, last = self._t[near[0]] - EVERY_S, self._t[near[-1]] + LENGTH_S
+        onset_s = float(self._t[best]), float(first), float(last)
+        return Change(number, score, float(moved[best]), float(self._t[-1] + LENGTH_S), onset_s)
+
+
+def _moved(
+    after: tuple[Floats, Floats] | Floats, before: tuple[Floats, Floats] | Floats
+) -> tuple[Floats, Floats]:
+    """Return how far numbers moved between two spans, and that variance for independent windows.
+
+    Where a span shows nothing of a number, it did not move, and its variance is infinite.
+
+    Args:
+        after: Score and information of the later span.
+        before: Likewise, of the earlier one.
+    """
+    is_shown = (after[1] > 0.0) & (before[1] > 0.0)
+    late, early = (np.where(is_shown, one[1], 1.0) for one in (after, before))
+    moved = np.where(is_shown, after[0] / late - before[0] / early, 0.0)
+    return moved, np.where(is_shown, 1.0 / late + 1.0 / early, math.inf)
+
+
+def joined(first: Windows, then: Windows) -> Windows:
+    """Return windows one after the other."""
+    return replace(
+        first,
+        begin_s=np.concatenate((first.begin_s, then.begin_s)),
+        misses=np.concatenate((first.misses, then.misses)),
+        slopes=np.concatenate((first.slopes, then.slopes)),
+    )
+
+
+def usual_of(windows: Windows) -> Usual:
+    """Return how the windows of a car that does not change stray."""
+    misses = windows.misses
+    middle = np.median(misses, axis=0)
+    size = np.maximum(1.4826 * np.median(np.abs(misses - middle), axis=0), 0.5 * misses.std(axis=0))
+    size = np.where(size > 0.0, size, 1.0)
+    apart = np.clip((misses - misses.mean(axis=0)) / size, -4.0, 4.0)
+    covariance = apart.T @ apart / len(apart) + TRUST * np.eye(len(size))
+    spans, numbers = len(SPANS_S), windows.slopes.shape[2]
+    usual = Usual(
+        size, np.linalg.inv(covariance), np.full(numbers, math.inf), np.ones((spans, numbers))
+    )
+    _, information = weighed(windows, usual)
+    usual = replace(usual, most=np.percentile(information, LEVERAGE, axis=0))
+    return replace(usual, scatter=_scatter(*weighed(windows, usual)))
+
+
+def _scatter(score: Floats, information: Floats) -> Floats:
+    """Return how much more the sums over spans scatter than independent windows would."""
+    known = np.maximum(information.sum(axis=0), 1e-30)
+    left = score - score.sum(axis=0) / known * information
+    zero = np.zeros((1, left.shape[1]))
+    score_sums = np.concatenate((zero, np.cumsum(left, axis=0)))
+    info_sums = np.concatenate((zero, np.cumsum(information, axis=0)))
+    found = []
+    for span_s in SPANS_S:
+        span = min(round(span_s / EVERY_S), TOGETHER, len(left) // 2)
+        scores, infos = (sums[span:] - sums[:-span] for sums in (score_sums, info_sums))
+        found.append((scores**2).sum(axis=0) / np.maximum(infos.sum(axis=0), 1e-30))
+    most: Floats = np.maximum(np.array(found), 1.0)
+    return most
+
+
+def weighed(windows: Windows, usual: Usual) -> tuple[Floats, Floats]:
+    """Return each window's score and information of each number, both (n, numbers).
+
+    A window that strays far counts as if it strayed less, and none counts much more than others:
+    it may be a stone or a bad pose.
+    """
+    misses = windows.misses / usual.size
+    slopes = windows.slopes / usual.size[:, None]
+    far = np.sqrt(np.einsum("ni,ij,nj->n", misses, usual.weight, misses) / misses.shape[1])
+    misses = misses * np.minimum(1.0, LIMIT / np.maximum(far, LIMIT))[:, None]
+    leaning = np.einsum("ij,njk->nik", usual.weight, slopes)
+    score = np.einsum("ni,nik->nk", misses, leaning)
+    information: Floats = np.einsum("nik,nik->nk", slopes, leaning)
+    share: Floats = np.sqrt(np.minimum(1.0, usual.most / np.maximum(information, 1e-30)))
+    return score * share, information * share**2

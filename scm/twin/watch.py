@@ -1,0 +1,103 @@
+"""Watches one car: what was recorded of it comes span after span, and a change comes out.
+
+Each span is predicted with what was recorded before it and a second of what comes after, where
+smoothed poses are better. After a change the car is another one: how it strays is learned anew.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from scm.data_quality.prepare import screen, stretches
+from scm.errors import RecordingError
+from scm.recording.read import Recording
+from scm.recording.span import part_of
+from scm.twin.detector import Change, Detector
+from scm.twin.windows import WatchedCar, WatchedNumber, Windows
+
+SPAN_S = 10.0
+BEFORE_S, AFTER_S = 2.0, 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Noticed:
+    """A change of a car.
+
+    Attributes:
+        number: What shows it most; the change may be another one that looks alike.
+        driven_s: How long the car was watched before, since it last changed.
+    """
+
+    change: Change
+    number: WatchedNumber
+    driven_s: float
+
+
+class CarWatch:
+    """Watches one car.
+
+    Args:
+        predictor: Of cars of its version; several cars may share it.
+        threshold: Score from which on a change is reported.
+    """
+
+    def __init__(self, predictor: WatchedCar, threshold: float) -> None:
+        self._predictor, self._threshold = predictor, threshold
+        self._detector = Detector(threshold)
+        self._streams: tuple[str, ...] | None = None
+
+    @property
+    def is_learning(self) -> bool:
+        """Whether it does not yet know how the car strays."""
+        return self._detector.is_learning
+
+    def look(self, recording: Recording, first_s: float, last_s: float) -> Noticed | None:
+        """Look at a span of a recording, once; return the change that it shows, if it does.
+
+        Args:
+            recording: With what surrounds the span, if there is any.
+            first_s: On the recording's clock.
+            last_s: Likewise.
+        """
+        change = None
+        for windows in self._windows(recording, first_s, last_s):
+            change = change or self._detector.update(windows)
+        if change is None:
+            return None
+        driven_s = self._detector.driven_s
+        self._detector = Detector(self._threshold)
+        return Noticed(change, self._predictor.watched[change.number], driven_s)
+
+    def _windows(self, recording: Recording, first_s: float, last_s: float) -> Iterator[Windows]:
+        """Yield the windows of a span, stretch by stretch; a stretch without a sensor shows less.
+
+        Where the car is not driven or not seen there are none.
+        """
+        screened = screen(recording, self._predictor.car)
+        cut = stretches(screened.recording, self._predictor.car, screened.jumps)
+        for stretch in cut.recordings:
+            try:
+                windows = self._predictor.windows(stretch).between(first_s, last_s)
+            except RecordingError:
+                continue
+            if self._streams is None:
+                self._streams = windows.streams
+            if len(windows.begin_s) and windows.streams == self._streams:
+                yield windows
+
+
+def watch(recording: Recording, predictor: WatchedCar, threshold: float) -> Iterator[Noticed]:
+    """Yield the changes of a recorded car, in the order in which they would have been noticed."""
+    one = CarWatch(predictor, threshold)
+    times = [channel.t for channel in recording.channels.values() if len(channel.t)]
+    begin_s = recording.begin_s if recording.begin_s is not None else min(t[0] for t in times)
+    first_s, end_s = begin_s, max(t[-1] for t in times)
+    while first_s < end_s:
+        last_s = first_s + SPAN_S
+        around = first_s - begin_s - BEFORE_S, last_s - begin_s + AFTER_S
+        try:
+            noticed = one.look(part_of(recording, *around), first_s, last_s)
+        except RecordingError:
+            noticed = None  # nothing was recorded there
+        if noticed is not None:
+            yield noticed
+        first_s = last_s
