@@ -9,7 +9,7 @@ start, speed, way and the car may differ from those of the demonstration. Signal
     scm study run studies/cloning.toml
     python -m studies.cloning label demos/more model.onnx    laps by it, for its next training
 
-`--on 3` records or labels on a track of `tracks.py` instead.
+`--on 3` records or labels on a track of `tracks.py` instead; `--boxes 10` lets boxes stand about.
 """
 
 import argparse
@@ -84,8 +84,7 @@ def run(
     at_m = float(rng.uniform(0.0, lane.length_m))
     off_m, off_deg = rng.uniform(-1.0, 1.0, 2) * (start_m, start_deg)
     begin = lane.at(at_m) @ Pose2(0.0, float(off_m), math.radians(off_deg))
-    if boxes:
-        city_map = with_boxes(city_map, boxes, rng)
+    city_map = with_boxes(city_map, boxes, rng)
     car = load_car(CAR) if engine != "city" else with_effect(load_car(CAR), concealed)
     seen = {"front": optics_of(car, "front").of_width(width_px)}
     with varied_cars({CAR: car}):
@@ -169,7 +168,7 @@ def with_boxes(city_map: CityMap, count: int, rng: np.random.Generator) -> CityM
 
 def record(
     path: Path, laps: int = 5, seed: int = 1, limit_mps: float = LIMIT_MPS,
-    looks: Path | None = None, on: int = 0,
+    looks: Path | None = None, on: int = 0, boxes: int = 0,
 ) -> int:  # fmt: skip
     """Let the built-in driver drive some laps, and record them; return the number of frames.
 
@@ -180,8 +179,10 @@ def record(
         limit_mps: Of all lanes.
         looks: Study whose cases vary the car's camera: each lap is seen through that of the next.
         on: Number of a track of `tracks.py`; 0: Driving School.
+        boxes: How many stand about beside the lanes.
     """
     city_map = lanes_only(track(on) if on else load_map(MAP))
+    city_map = with_boxes(city_map, boxes, generator(seed, "boxes"))
     lanes = tuple(replace(lane, speed_limit_mps=limit_mps) for lane in city_map.lanes)
     city_map = replace(city_map, lanes=lanes)
     cars = [load_car(CAR)]
@@ -241,9 +242,12 @@ def _main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--looks", type=Path, metavar="STUDY", help="vary the camera by lap")
     parser.add_argument("--on", type=int, default=0, help="a track; default: Driving School")
+    parser.add_argument("--boxes", type=int, default=0, help="that stand about beside the lanes")
     given = parser.parse_args()
     if given.what == "record":
-        count = record(given.path, given.laps, given.seed, looks=given.looks, on=given.on)
+        count = record(
+            given.path, given.laps, given.seed, looks=given.looks, on=given.on, boxes=given.boxes
+        )
     elif given.model is None:
         parser.error("label: expected the network that drives")
     else:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from scm.arrays import Floats
-from scm.records.city_map import CityMap, Lane, MapTag, Segment, Wall
+from scm.records.city_map import CityMap, Lane, MapTag, Segment, Spawn, Wall
 from scm.records.floor import Floor
 
 CORNERS, REACH_M = (5, 8), (1.1, 1.9)  # of the polygon; of a corner from the middle
@@ -72,4 +72,5 @@ def _map(name: str, lane: Lane, corners: Floats, colour: str) -> CityMap:
         floor=Floor(x_m=(left, right), y_m=(bottom, top), colour=colour),
         tag=MapTag(tag_id=0, size_m=0.0762), lanes=(lane,),
         walls=(Wall(points=walls, closed=True),),
+        spawns=(Spawn(name="start", lane=lane.name, at_m=0.0),),
     )  # fmt: skip

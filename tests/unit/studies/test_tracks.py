@@ -2,13 +2,14 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from scm.camera.optics import fitted
 from scm.maps.check import problems_of
 from scm.maps.load import load_map
 from scm.maps.route import Path, roads_of
-from studies.cloning import lanes_only
+from studies.cloning import BOX_M, lanes_only, with_boxes
 from studies.tracks import TIGHTEST_M, track
 
 
@@ -42,6 +43,17 @@ def test_lanes_lead_back_over_the_same_floor():
         candidates = [0.01 * k for k in range(round(100 * there.length_m))]
         near = [s for s in candidates if math.dist(there.at(s)[:2], pose[:2]) < 0.011]
         assert any(math.cos(there.at(s).yaw - pose.yaw) < -0.999 for s in near)
+
+
+def test_boxes_stand_beside_the_lane():
+    school = lanes_only(load_map("driving_school"))
+    city_map = with_boxes(school, 20, np.random.default_rng(0))
+    boxes = city_map.boxes[len(school.boxes) :]
+    assert len(boxes) == 20
+    assert problems_of(city_map) == []
+    way = Path.circulation(roads_of(city_map), city_map.lanes[0].name)
+    beside = [abs(way.project(box.x_m, box.y_m)[1]) for box in boxes]
+    assert min(beside) > 0.5 * (city_map.lanes[0].width_m + BOX_M)
 
 
 def test_smaller_camera_sees_the_same():

@@ -19,6 +19,12 @@ OPTICS, LIMITS = optics_of(NIGEL, "front"), limits_of(NIGEL)
 SIZE = OPTICS.width_px, OPTICS.height_px
 
 
+STILL = {
+    "offset_std_m": 0.0, "heading_std_rad": 0.0, "mirrored": 0.0, "light": (1.0, 1.0), "tint": 0.0,
+    "shadow": 0.0, "erased": 0.0,
+}  # fmt: skip
+
+
 def augmenter(**how):
     return Augmenter(OPTICS, LIMITS, SIZE, Augmentation(**how), np.random.default_rng(1))
 
@@ -66,20 +72,39 @@ def test_command_leads_back_to_a_point_on_the_way():
 def test_mirrored_frame_steers_the_other_way():
     rng = np.random.default_rng(2)
     frame = rng.integers(0, 256, (SIZE[1], SIZE[0], 3)).astype(np.uint8)
-    still = {"offset_std_m": 0.0, "heading_std_rad": 0.0, "light": (1.0, 1.0), "tint": 0.0}
-    (changed,), steering = augmenter(mirrored=1.0, shadow=0.0, **still)([frame], 0.4)
+    (changed,), steering = augmenter(**STILL | {"mirrored": 1.0})([frame], 0.4)
     assert steering == pytest.approx(-0.4)
-    assert np.abs(changed[:, ::-1].astype(int) - frame).max() <= 1
-    (unchanged,), same = augmenter(mirrored=0.0, shadow=0.0, **still)([frame], 0.4)
+    assert (changed[:, ::-1] == frame).all()
+    (unchanged,), same = augmenter(**STILL)([frame], 0.4)
     assert same == pytest.approx(0.4)
-    assert np.abs(unchanged.astype(int) - frame).max() <= 1
+    assert (unchanged == frame).all()
+
+
+GREY = np.full((SIZE[1], SIZE[0], 3), 200, np.uint8)
 
 
 def test_shadow_darkens_a_part():
-    frame = np.full((SIZE[1], SIZE[0], 3), 200, np.uint8)
-    still = {"offset_std_m": 0.0, "heading_std_rad": 0.0, "light": (1.0, 1.0), "tint": 0.0}
-    (changed, other), _ = augmenter(mirrored=0.0, shadow=1.0, **still)([frame, frame], 0.0)
+    (changed, other), _ = augmenter(**STILL | {"shadow": 1.0})([GREY, GREY], 0.0)
     assert (other == changed).all()  # frames that are seen together are changed alike
     assert len(np.unique(changed)) == 2
     assert changed.min() < 185
     assert changed.max() >= 199
+
+
+def test_light_and_tint_multiply_each_colour():
+    augment = augmenter(**STILL | {"light": (0.5, 0.5), "tint": 0.1})
+    (changed,), _ = augment([GREY], 0.0)
+    (colour,) = np.unique(changed.reshape(-1, 3), axis=0)
+    assert 80 < colour.min() < colour.max() < 120
+
+
+def test_rectangles_of_one_colour_hide_parts_and_steering_stays():
+    augment, hidden = augmenter(**STILL | {"erased": 1.0}), []
+    for _ in range(20):
+        (changed, other), steering = augment([GREY, GREY.copy()], 0.3)
+        assert steering == pytest.approx(0.3)
+        assert (other == changed).all()
+        assert 2 <= len(np.unique(changed.reshape(-1, 3), axis=0)) <= 5
+        hidden.append(float(np.any(changed != GREY, axis=2).mean()))
+    assert 0.0 < min(hidden) < 0.1 < max(hidden) < 0.5
+    assert (GREY == 200).all()
