@@ -9,7 +9,7 @@ floor is distorted a little. The command that belongs to such a picture leads ba
 which is pure pursuit of a point on the lane, `way` ahead.
 Frames: the car's body frame, x ahead, y left, z up; OpenCV's camera axes.
 Source: Bojarski et al., 2016, has shifted and turned views; the homography of the floor and the
-command by pure pursuit are ours. Random erasing: Zhong et al., 2020.
+command by pure pursuit are ours.
 """
 
 import math
@@ -25,7 +25,6 @@ from vehicle_agent.autonomy.plan import CarLimits
 
 TO_CAMERA = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 SHADE = (0.35, 0.9)  # light that is left in a shadow
-MOST_ERASED, ERASED = 4, (0.05, 0.35)  # rectangles; their sides, of the frame's
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +38,6 @@ class Augmentation:
         light: Factors on the light, least and greatest.
         tint: Standard deviation of a factor on each colour.
         shadow: Share of frames with a shadow across them.
-        erased: Share of frames with rectangles of one colour where things may stand (random
-            erasing): what was not there while laps were driven is not to be steered by.
     """
 
     offset_std_m: float = 0.03
@@ -50,7 +47,6 @@ class Augmentation:
     light: tuple[float, float] = (0.5, 1.5)
     tint: float = 0.05
     shadow: float = 0.3
-    erased: float = 0.5
 
 
 class Augmenter:
@@ -80,8 +76,6 @@ class Augmenter:
         steering = self.steering_back(steering, offset_m, heading_rad)
         if rng.random() < how.mirrored:
             changed, steering = [frame[:, ::-1].copy() for frame in changed], -steering
-        if rng.random() < how.erased:
-            self._erase(changed)
         factors = rng.uniform(*how.light) * (1.0 + how.tint * rng.standard_normal(3))
         shadow = self._shadow() if rng.random() < how.shadow else None
         return [_lit(frame, factors, shadow) for frame in changed], steering
@@ -120,17 +114,6 @@ class Augmenter:
         body = np.array([[c, s, -s * offset_m], [-s, c, -c * offset_m], [0.0, 0.0, 1.0]])
         floor: Floats = camera @ pitched @ TO_CAMERA @ seen @ body
         return floor
-
-    def _erase(self, frames: list[Image]) -> None:
-        """Draw upright rectangles of one colour each, the same into all frames."""
-        rng, (width, height) = self._rng, self._size
-        for _ in range(int(rng.integers(1, MOST_ERASED, endpoint=True))):
-            size = rng.uniform(*ERASED, 2) * (width, height)
-            left, top = rng.random(2) * (width, height) - 0.5 * size
-            colour = rng.integers(0, 255, 3, endpoint=True).tolist()
-            corners = (round(left), round(top)), (round(left + size[0]), round(top + size[1]))
-            for frame in frames:
-                cv2.rectangle(frame, *corners, colour, cv2.FILLED)
 
     def _shadow(self) -> tuple[Image, float]:
         """Return the mask (h, w) of a shadow from the top to the bottom, and the light in it."""

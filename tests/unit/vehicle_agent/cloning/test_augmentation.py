@@ -21,7 +21,7 @@ SIZE = OPTICS.width_px, OPTICS.height_px
 
 STILL = {
     "offset_std_m": 0.0, "heading_std_rad": 0.0, "mirrored": 0.0, "light": (1.0, 1.0), "tint": 0.0,
-    "shadow": 0.0, "erased": 0.0,
+    "shadow": 0.0,
 }  # fmt: skip
 
 
@@ -96,15 +96,3 @@ def test_light_and_tint_multiply_each_colour():
     (changed,), _ = augment([GREY], 0.0)
     (colour,) = np.unique(changed.reshape(-1, 3), axis=0)
     assert 80 < colour.min() < colour.max() < 120
-
-
-def test_rectangles_of_one_colour_hide_parts_and_steering_stays():
-    augment, hidden = augmenter(**STILL | {"erased": 1.0}), []
-    for _ in range(20):
-        (changed, other), steering = augment([GREY, GREY.copy()], 0.3)
-        assert steering == pytest.approx(0.3)
-        assert (other == changed).all()
-        assert 2 <= len(np.unique(changed.reshape(-1, 3), axis=0)) <= 5
-        hidden.append(float(np.any(changed != GREY, axis=2).mean()))
-    assert 0.0 < min(hidden) < 0.1 < max(hidden) < 0.5
-    assert (GREY == 200).all()
