@@ -21,6 +21,7 @@ from scm.arrays import Floats
 from scm.mismatch.fit.residual_windows import LENGTH_S
 from scm.twin.windows import EVERY_S, Windows
 
+CLIPPED, WHOLE, INFORMATION = range(3)  # what windows show of a number
 LEARN, LEARN_WELL = 400, 1200  # windows: 200 and 600 s of driving
 EARLY = 1.5  # factor on the threshold between the two: 200 s show scatter by a third
 SPANS_S = (10.0, 20.0, 40.0, 80.0, 160.0, 320.0)
@@ -31,6 +32,17 @@ LEVERAGE = 90.0  # percentile of the windows' information beyond which one count
 TRUST = 0.05  # added to the misses' correlations: sensors are never as alike as a short drive shows
 TOGETHER = 80  # windows: longest span whose scatter 200 s can show
 LIKELY = 1.35  # of the log likelihood: 90 %
+HOURLY, PER_FOLD = 6.43, 0.66  # highest score of an hour; more for e times as many hours
+ALIKE, MOST_ALIKE = 0.8, 5  # of the highest score; other numbers that are named
+
+
+def threshold_of(false_alarm_h: float) -> float:
+    """Return the score that a car which does not change reaches once in so many hours of driving.
+
+    From the highest scores of 6.5 minutes each, 63 of them, of 20 cars of `tests/reality` that do
+    not change: they spread as a Gumbel distribution does.
+    """
+    return HOURLY + PER_FOLD * math.log(false_alarm_h)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +54,9 @@ class Change:
         score: In standard deviations, with its sign.
         size: How far that number changed, in its unit.
         noticed_s: On the clock of the windows.
-        onset_s: With its interval, 90 %.
+        onset_s: Likeliest, and the ends of its interval, 90 %.
+        alike: Further numbers that show it nearly as well, the best first, each with the size of
+            its change.
     """
 
     number: int
@@ -50,6 +64,7 @@ class Change:
     size: float
     noticed_s: float
     onset_s: tuple[float, float, float]
+    alike: tuple[tuple[int, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,9 +121,10 @@ class Detector:
         if not scores.size:
             return None
         highest = np.unravel_index(np.argmax(np.abs(scores)), scores.shape)
-        score, number = float(scores[highest]), int(highest[-1])
         threshold = self._threshold * (1.0 if self._learned is None else EARLY)
-        return self._history.change(number, score) if abs(score) >= threshold else None
+        if abs(scores[highest]) < threshold:
+            return None
+        return self._history.change(scores[highest[:-1]])
 
     def _learn(self, windows: Windows) -> None:
         """Learn how the car strays, once from few windows and once from more."""
@@ -134,70 +150,68 @@ class History:
     def __init__(self, usual: Usual, windows: Windows) -> None:
         self._usual = usual
         self._t = windows.begin_s
-        self._score, self._information = weighed(windows, usual)
-        self._before = np.zeros((2, self._score.shape[1]))  # score and information
+        self._shown = weighed(windows, usual)
+        self._before = np.zeros_like(self._shown[:, 0])  # the sum of those that left its memory
         self._gone = 0
 
     def add(self, windows: Windows) -> None:
         """Add new windows; those that leave its memory are added up."""
-        score, information = weighed(windows, self._usual)
         self._t = np.concatenate((self._t, windows.begin_s))
-        self._score = np.concatenate((self._score, score))
-        self._information = np.concatenate((self._information, information))
+        self._shown = np.concatenate((self._shown, weighed(windows, self._usual)), axis=1)
         gone = max(0, len(self._t) - MEMORY)
         self._before *= (1.0 - FORGET) ** gone
-        self._before += self._score[:gone].sum(axis=0), self._information[:gone].sum(axis=0)
-        self._t, self._score = self._t[gone:], self._score[gone:]
-        self._information = self._information[gone:]
+        self._before += self._shown[:, :gone].sum(axis=1)
+        self._t, self._shown = self._t[gone:], self._shown[:, gone:]
         self._gone += gone
 
     def scores(self, newest: int) -> Floats:
         """Return the scores at each of the newest windows, (newest, spans, numbers)."""
-        score, info = (
-            np.cumsum(np.concatenate((before[None], each)), axis=0)
-            for before, each in zip(self._before, (self._score, self._information), strict=True)
-        )
+        sums = np.cumsum(np.concatenate((self._before[:, None], self._shown), axis=1), axis=1)
         ends = np.arange(len(self._t) - newest + 1, len(self._t) + 1)
-        found = np.zeros((newest, len(SPANS_S), self._score.shape[1]))
+        found = np.zeros((newest, len(SPANS_S), sums.shape[2]))
         for k, span_s in enumerate(SPANS_S):
-            begins = ends - round(span_s / EVERY_S)  # none is before the memory begins
+            begins = ends - round(span_s / EVERY_S)
             there = begins + self._gone >= LEARN  # what came before has to show as much
-            a, b = begins[there], ends[there]
-            after = score[b] - score[a], info[b] - info[a]
-            moved, variance = _moved(after, (score[a], info[a]))
+            there &= begins >= 0
+            before = sums[:, begins[there]]
+            moved, variance = _moved(sums[:, ends[there]] - before, before, CLIPPED)
             found[there, k] = moved / np.sqrt(self._usual.scatter[k] * variance)
         return found
 
-    def change(self, number: int, score: float) -> Change:
-        """Return the change of a number, with its onset: where that is likeliest."""
-        after, before = (
-            np.array([each[:, number] for each in (self._score, self._information)]),
-            self._before[:, number],
-        )
-        after = np.cumsum(after[:, ::-1], axis=1)[:, ::-1]  # from each window on
-        moved, variance = _moved(after, before[:, None] + after[:, :1] - after)
-        likelihood = 0.5 * moved**2 / (self._usual.scatter[:, number].max() * variance)
-        best = int(np.argmax(likelihood))
-        near = np.flatnonzero(likelihood > likelihood[best] - LIKELY)
+    def change(self, scores: Floats) -> Change:
+        """Return the change that scores (numbers,) show; its onset is where that is likeliest."""
+        order = np.argsort(-np.abs(scores), kind="stable")
+        best = int(order[0])
+        after = np.cumsum(self._shown[:, ::-1], axis=1)[:, ::-1]  # from each window on
+        before = self._before[:, None] + after[:, :1] - after
+        moved, variance = _moved(after[..., best], before[..., best], CLIPPED)
+        likelihood = 0.5 * moved**2 / (self._usual.scatter[:, best].max() * variance)
+        onset = int(np.argmax(likelihood))
+        near = np.flatnonzero(likelihood > likelihood[onset] - LIKELY)
         first, last = self._t[near[0]] - EVERY_S, self._t[near[-1]] + LENGTH_S
-        onset_s = float(self._t[best]), float(first), float(last)
-        return Change(number, score, float(moved[best]), float(self._t[-1] + LENGTH_S), onset_s)
+        sizes, _ = _moved(after[:, onset], before[:, onset], WHOLE)
+        others = order[1:][np.abs(scores[order[1:]]) > ALIKE * abs(scores[best])][:MOST_ALIKE]
+        return Change(
+            number=best, score=float(scores[best]), size=float(sizes[best]),
+            noticed_s=float(self._t[-1] + LENGTH_S),
+            onset_s=(float(self._t[onset]), float(first), float(last)),
+            alike=tuple((int(number), float(sizes[number])) for number in others),
+        )  # fmt: skip
 
 
-def _moved(
-    after: tuple[Floats, Floats] | Floats, before: tuple[Floats, Floats] | Floats
-) -> tuple[Floats, Floats]:
+def _moved(after: Floats, before: Floats, score: int) -> tuple[Floats, Floats]:
     """Return how far numbers moved between two spans, and that variance for independent windows.
 
     Where a span shows nothing of a number, it did not move, and its variance is infinite.
 
     Args:
-        after: Score and information of the later span.
-        before: Likewise, of the earlier one.
+        after: What the later span shows, (3, ...), as `weighed` has it.
+        before: Likewise, the earlier one.
+        score: By which of the two scores.
     """
-    is_shown = (after[1] > 0.0) & (before[1] > 0.0)
-    late, early = (np.where(is_shown, one[1], 1.0) for one in (after, before))
-    moved = np.where(is_shown, after[0] / late - before[0] / early, 0.0)
+    is_shown = (after[INFORMATION] > 0.0) & (before[INFORMATION] > 0.0)
+    late, early = (np.where(is_shown, each[INFORMATION], 1.0) for each in (after, before))
+    moved = np.where(is_shown, after[score] / late - before[score] / early, 0.0)
     return moved, np.where(is_shown, 1.0 / late + 1.0 / early, math.inf)
 
 
@@ -223,9 +237,10 @@ def usual_of(windows: Windows) -> Usual:
     usual = Usual(
         size, np.linalg.inv(covariance), np.full(numbers, math.inf), np.ones((spans, numbers))
     )
-    _, information = weighed(windows, usual)
+    information = weighed(windows, usual)[INFORMATION]
     usual = replace(usual, most=np.percentile(information, LEVERAGE, axis=0))
-    return replace(usual, scatter=_scatter(*weighed(windows, usual)))
+    shown = weighed(windows, usual)
+    return replace(usual, scatter=_scatter(shown[CLIPPED], shown[INFORMATION]))
 
 
 def _scatter(score: Floats, information: Floats) -> Floats:
@@ -244,18 +259,18 @@ def _scatter(score: Floats, information: Floats) -> Floats:
     return most
 
 
-def weighed(windows: Windows, usual: Usual) -> tuple[Floats, Floats]:
-    """Return each window's score and information of each number, both (n, numbers).
+def weighed(windows: Windows, usual: Usual) -> Floats:
+    """Return each window's scores and information of each number, (3, n, numbers).
 
-    A window that strays far counts as if it strayed less, and none counts much more than others:
-    it may be a stone or a bad pose.
+    In the first score, a window that strays far counts as if it strayed less: it may be a stone or
+    a bad pose. In the second it counts whole. None counts much more than others by what it shows.
     """
     misses = windows.misses / usual.size
     slopes = windows.slopes / usual.size[:, None]
     far = np.sqrt(np.einsum("ni,ij,nj->n", misses, usual.weight, misses) / misses.shape[1])
-    misses = misses * np.minimum(1.0, LIMIT / np.maximum(far, LIMIT))[:, None]
+    clipped = misses * np.minimum(1.0, LIMIT / np.maximum(far, LIMIT))[:, None]
     leaning = np.einsum("ij,njk->nik", usual.weight, slopes)
-    score = np.einsum("ni,nik->nk", misses, leaning)
-    information: Floats = np.einsum("nik,nik->nk", slopes, leaning)
-    share: Floats = np.sqrt(np.minimum(1.0, usual.most / np.maximum(information, 1e-30)))
-    return score * share, information * share**2
+    information = np.einsum("nik,nik->nk", slopes, leaning)
+    share = np.sqrt(np.minimum(1.0, usual.most / np.maximum(information, 1e-30)))
+    scores = (np.einsum("ni,nik->nk", each, leaning) for each in (clipped, misses))
+    return np.stack((*(score * share for score in scores), information * share**2))

@@ -12,7 +12,8 @@ from scm.errors import RecordingError
 from scm.recording.read import Recording
 from scm.recording.span import part_of
 from scm.twin.detector import Change, Detector
-from scm.twin.windows import WatchedCar, WatchedNumber, Windows
+from scm.twin.windows import EVERY_S, WatchedCar, WatchedNumber, Windows
+from scm.vehicles.car import Car
 
 SPAN_S = 10.0
 BEFORE_S, AFTER_S = 2.0, 1.0
@@ -23,12 +24,14 @@ class Noticed:
     """A change of a car.
 
     Attributes:
-        number: What shows it most; the change may be another one that looks alike.
+        number: What shows it most.
+        alike: What shows it nearly as well, the best first, with the size of its change.
         driven_s: How long the car was watched before, since it last changed.
     """
 
     change: Change
     number: WatchedNumber
+    alike: tuple[tuple[WatchedNumber, float], ...]
     driven_s: float
 
 
@@ -38,12 +41,21 @@ class CarWatch:
     Args:
         predictor: Of cars of its version; several cars may share it.
         threshold: Score from which on a change is reported.
+
+    Attributes:
+        driven_s: How long it was driven and seen.
     """
 
     def __init__(self, predictor: WatchedCar, threshold: float) -> None:
         self._predictor, self._threshold = predictor, threshold
         self._detector = Detector(threshold)
         self._streams: tuple[str, ...] | None = None
+        self.driven_s = 0.0
+
+    @property
+    def car(self) -> Car:
+        """That the predictions are of."""
+        return self._predictor.given
 
     @property
     def is_learning(self) -> bool:
@@ -60,12 +72,15 @@ class CarWatch:
         """
         change = None
         for windows in self._windows(recording, first_s, last_s):
+            self.driven_s += EVERY_S * len(windows.begin_s)
             change = change or self._detector.update(windows)
         if change is None:
             return None
         driven_s = self._detector.driven_s
         self._detector = Detector(self._threshold)
-        return Noticed(change, self._predictor.watched[change.number], driven_s)
+        watched = self._predictor.watched
+        alike = tuple((watched[number], size) for number, size in change.alike)
+        return Noticed(change, watched[change.number], alike, driven_s)
 
     def _windows(self, recording: Recording, first_s: float, last_s: float) -> Iterator[Windows]:
         """Yield the windows of a span, stretch by stretch; a stretch without a sensor shows less.
@@ -85,19 +100,18 @@ class CarWatch:
                 yield windows
 
 
-def watch(recording: Recording, predictor: WatchedCar, threshold: float) -> Iterator[Noticed]:
-    """Yield the changes of a recorded car, in the order in which they would have been noticed."""
-    one = CarWatch(predictor, threshold)
+def watch(recording: Recording, car: CarWatch) -> list[Noticed]:
+    """Return the changes of a recorded car, in the order in which they would have been noticed."""
     times = [channel.t for channel in recording.channels.values() if len(channel.t)]
     begin_s = recording.begin_s if recording.begin_s is not None else min(t[0] for t in times)
-    first_s, end_s = begin_s, max(t[-1] for t in times)
+    first_s, end_s, found = begin_s, max(t[-1] for t in times), list[Noticed]()
     while first_s < end_s:
         last_s = first_s + SPAN_S
         around = first_s - begin_s - BEFORE_S, last_s - begin_s + AFTER_S
         try:
-            noticed = one.look(part_of(recording, *around), first_s, last_s)
+            noticed = car.look(part_of(recording, *around), first_s, last_s)
         except RecordingError:
             noticed = None  # nothing was recorded there
-        if noticed is not None:
-            yield noticed
+        found += [noticed] if noticed is not None else []
         first_s = last_s
+    return found

@@ -79,10 +79,13 @@ class WatchedCar:
         car: As its newest version says.
 
     Attributes:
+        given: The car.
+        car: With every known effect, at rest.
         watched: The numbers whose change would show.
     """
 
     def __init__(self, car: Car) -> None:
+        self.given = car
         self.car = car.with_terms(terms_needed(car))
         self.watched = tuple(number for one in candidates(self.car) for number in _numbers_of(one))
         self._tiles = Tiles(self.car)

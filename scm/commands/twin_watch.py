@@ -1,0 +1,96 @@
+"""`scm twin watch`: since when is a recorded car no longer what its car file says?"""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scm.command import Command
+
+if TYPE_CHECKING:
+    from scm.twin.watch import CarWatch, Noticed
+    from scm.twin.windows import WatchedNumber
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "recording", type=Path, help="description file, its folder, or the .mcap of a run"
+    )
+    parser.add_argument("--car", metavar="FILE", help="car file or name; default: the recording's")
+    parser.add_argument("--vehicle", metavar="NAME", help="only this car of several")
+    parser.add_argument(
+        "--data", type=Path, metavar="DIR",
+        help="folder of the tables; default: beside the description",
+    )  # fmt: skip
+    parser.add_argument(
+        "--false-alarm-h", type=float, default=200.0, metavar="HOURS",
+        help="of driving, in which a car that does not change may be reported once (%(default)g)",
+    )  # fmt: skip
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from scm.errors import RecordingError
+    from scm.recorder.drives import recordings_of
+    from scm.twin.detector import threshold_of
+    from scm.twin.watch import CarWatch, watch
+    from scm.twin.windows import WatchedCar
+    from scm.vehicles.car import load_car
+
+    if not arguments.false_alarm_h > 0.0:
+        msg = f"--false-alarm-h: expected more than 0, got {arguments.false_alarm_h:g}"
+        raise RecordingError(msg)
+    threshold, failures = threshold_of(arguments.false_alarm_h), list[str]()
+    found = recordings_of(arguments.recording, arguments.data, arguments.vehicle, failures.append)
+    cars = dict[str, WatchedCar]()
+    for recording in found:
+        name = arguments.car or recording.vehicle
+        if name not in cars:
+            cars[name] = WatchedCar(load_car(name, trusted=arguments.car is not None))
+        one = CarWatch(cars[name], threshold)
+        changes = watch(recording, one)
+        who = recording.name if len(found) > 1 else arguments.recording
+        print(f"{who}: {_summary(one, len(changes))}")
+        for noticed in changes:
+            print("\n".join(_lines(noticed)))
+    for failure in failures:
+        print(f"scm twin watch: {failure}", file=sys.stderr)
+    return 0
+
+
+def _summary(watched: "CarWatch", changes: int) -> str:
+    from scm.twin.detector import LEARN, LEARN_WELL
+    from scm.twin.windows import EVERY_S
+
+    driven = f"car {watched.car.name}, driven for {watched.driven_s:.0f} s"
+    if watched.driven_s < LEARN * EVERY_S:
+        return f"{driven}: too short, it takes {LEARN * EVERY_S:.0f} s to learn how it strays"
+    times = {0: "it did not change", 1: "it changed once"}
+    text = f"{driven}: {times.get(changes, f'it changed {changes} times')}"
+    if watched.driven_s < LEARN_WELL * EVERY_S:
+        text += f" (in the first {LEARN_WELL * EVERY_S:.0f} s only plain changes are noticed)"
+    return text
+
+
+def _lines(noticed: "Noticed") -> list[str]:
+    """Return what a change is, in words."""
+    change = noticed.change
+    at, first, last = change.onset_s
+    like = (_amount(noticed.number, change.size), *(_amount(*one) for one in noticed.alike))
+    return [
+        f"  changed at {at:.1f} s ({first:.1f} to {last:.1f} s), noticed at"
+        f" {change.noticed_s:.0f} s, score {abs(change.score):.1f}",
+        f"    as by {', or '.join(like)}",
+    ]
+
+
+def _amount(number: "WatchedNumber", size: float) -> str:
+    unit = "" if number.unit in ("1", "") else f" {number.unit}"
+    return f"{number.effect} ({number.name} {size:+.3g}{unit})"
+
+
+COMMAND = Command(
+    help="Find out since when a recorded car is not what its car file says.",
+    example="scm twin watch runs/city.mcap --vehicle n3",
+    arguments=_arguments,
+    run=_run,
+)

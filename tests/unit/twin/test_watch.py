@@ -1,0 +1,80 @@
+"""A car's recording goes in, and since when it has changed comes out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scm.recording.read import Channel
+from scm.twin.detector import threshold_of
+from scm.twin.watch import CarWatch, watch
+from scm.twin.windows import WatchedCar
+from tests.unit.mismatch.made_drive import made_drive, nigel
+
+SINCE_S, LASTS_S = 330.0, 380.0
+BIAS = 0.02
+THRESHOLD = threshold_of(200.0)
+
+
+@pytest.fixture(scope="module")
+def predictor():
+    return WatchedCar(nigel())
+
+
+def biased(name, t, values):
+    return values + BIAS * (t >= SINCE_S) if name == "imu.gyro_z" else values
+
+
+@pytest.fixture(scope="module")
+def changed():
+    return made_drive(seconds=LASTS_S, sense=biased)
+
+
+def without(recording, names, first_s=-np.inf, last_s=np.inf):
+    """Return a recording without what some channels recorded between two times."""
+    channels = dict[str, Channel]()
+    for name, channel in recording.channels.items():
+        stays = ~((channel.t >= first_s) & (channel.t < last_s)) | (name not in names)
+        if stays.any():
+            channels[name] = channel.at(stays)
+    return replace(recording, channels=channels)
+
+
+def test_bias_of_the_gyro_is_noticed_named_and_dated(predictor, changed):
+    car = CarWatch(predictor, THRESHOLD)
+    (noticed,) = watch(changed, car)
+    assert (noticed.number.effect, noticed.number.name) == ("gyro_bias", "bias_rad_s")
+    assert noticed.change.size == pytest.approx(BIAS, rel=0.2)
+    at, first, last = noticed.change.onset_s
+    assert first <= SINCE_S <= last < first + 5.0
+    assert at == pytest.approx(SINCE_S, abs=2.0)
+    assert SINCE_S < noticed.change.noticed_s < SINCE_S + 30.0
+    assert car.driven_s == pytest.approx(LASTS_S, abs=10.0)
+    assert car.is_learning  # the car is another one
+
+
+def test_same_drive_without_it_is_silent_though_the_camera_lost_the_car(predictor):
+    recording = without(made_drive(seconds=LASTS_S), ("pose.x", "pose.y", "pose.yaw"), 300.0, 330.0)
+    car = CarWatch(predictor, THRESHOLD)
+    assert watch(recording, car) == []
+    assert LASTS_S - 45.0 < car.driven_s < LASTS_S - 25.0
+
+
+def test_spans_in_which_a_sensor_is_missing_do_not_count(predictor, changed):
+    car = CarWatch(predictor, THRESHOLD)
+    assert watch(without(changed, ("imu.gyro_z",), 320.0), car) == []
+    assert car.driven_s < 330.0
+
+
+def test_numbers_of_all_parts_of_a_car_are_watched(predictor):
+    names = {(one.effect, one.name) for one in predictor.watched}
+    assert {
+        ("drive_gain", "gain"), ("steer_trim", "offset_rad"), ("payload", "mass_kg"),
+        ("camera_tilt", "tilt_x"), ("grade", "slope_x"), ("grade", "slope_y"),
+    } <= names  # fmt: skip
+    assert "surface_patch" not in {effect for effect, _ in names}
+    assert all(one.step for one in predictor.watched)
+
+
+def test_fewer_false_alarms_take_a_higher_score():
+    assert threshold_of(20.0) < threshold_of(200.0) < threshold_of(2000.0)
