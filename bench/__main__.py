@@ -44,6 +44,7 @@ LONG = (
     "serial",
     "stop",
     "sumo",
+    "twin",
 )  # takes minutes: only where it is asked for, alone, with its own arguments
 
 

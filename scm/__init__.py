@@ -16,6 +16,7 @@ camera      the cars' own cameras, rendered while somebody subscribes
 recorder    everything on the bus into MCAP; written drives
 data_quality, replay    recordings checked and repaired; driven again by the simulator
 mismatch    what the simulator left out, found in recordings; blind trials
+twin        since when a car is no longer what its file says
 ros2        the city as ROS 2 sees it
 selftest    faults injected into a running city
 api, client     REST, event stream, dashboard; the typed client of it

@@ -1,0 +1,91 @@
+"""How soon a change of a car is noticed, which, and since when; what watching costs.
+
+    python -m bench twin [EFFECT ...] [--seed 1] [--strength 2] [--since-s 300]
+
+Cars of `tests/reality`, whose ordinary numbers are not the file's, drive for ten minutes; each
+effect sets in at once, in multiples of the smallest size that 90 s can show. `nothing` is a car
+that does not change. What is named first is what shows the change most, not a diagnosis.
+"""
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from scm.recorder.drives import recordings_of_one
+from scm.recording.read import Recording
+from scm.twin.detector import threshold_of
+from scm.twin.watch import CarWatch, watch
+from scm.twin.windows import WatchedCar
+from scm.vehicles.car import load_car
+from tests.reality.cases import FAULTS, apply, draw_effects, nominal, scattered
+from tests.reality.changing import Changing
+from tests.reality.concealed import EFFECTS
+from tests.reality.recorded import record, write
+
+CAR, LASTS_S, FALSE_ALARM_H = "nigel", 600.0, 200.0
+CARS, MOST_OF_A_CORE = 20, 0.15
+NEVER = ("surface_patch", "unit_error", "clock_drift")  # of a place, and no change of a car
+
+
+def drive(name: str, strength: float, seed: int, since_s: float, folder: Path) -> Recording:
+    """Return the recording of a car in which an effect sets in."""
+    rng = np.random.default_rng([seed, *name.encode()])
+    usual = scattered(nominal(CAR), rng)
+    names = () if name == "nothing" else (name,)
+    effects = draw_effects(names, CAR, (strength, strength), rng)
+    numbers, faults = (
+        Changing(dict(before), apply(before, effects), since_s, since_s)
+        for before in (usual, FAULTS)
+    )
+    write(record(CAR, numbers, faults, LASTS_S, rng), CAR, usual, folder)
+    (recording,) = recordings_of_one(folder)
+    return recording
+
+
+def main() -> None:
+    """Print a row an effect, and what they are together."""
+    parser = argparse.ArgumentParser(prog="python -m bench twin", description=__doc__)
+    listed = [n for n, one in EFFECTS.items() if one.listed and CAR in one.smallest]
+    every = [name for name in listed if name not in NEVER]
+    parser.add_argument("effects", nargs="*", default=[*every, "nothing"])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--strength", type=float, default=2.0)
+    parser.add_argument("--since-s", type=float, default=300.0)
+    given = parser.parse_args()
+    predictor, threshold = WatchedCar(load_car(CAR)), threshold_of(FALSE_ALARM_H)
+    after_s, driven_s, spent_s, dated, named = list[float](), 0.0, 0.0, 0, 0
+    for name in given.effects:
+        with tempfile.TemporaryDirectory() as folder:
+            recording = drive(name, given.strength, given.seed, given.since_s, Path(folder))
+        car, begun_s = CarWatch(predictor, threshold), time.process_time()
+        changes = watch(recording, car)
+        spent_s, driven_s = spent_s + time.process_time() - begun_s, driven_s + car.driven_s
+        if not changes:
+            print(f"{name:<20}no change noticed", flush=True)
+            continue
+        first = changes[0]
+        at_s, low_s, high_s = (t_s - given.since_s for t_s in first.change.onset_s)
+        after_s.append(first.change.noticed_s - given.since_s)
+        dated += low_s <= 0.0 <= high_s
+        named += first.number.effect == name
+        print(
+            f"{name:<20}{after_s[-1]:+5.0f} s, onset {at_s:+5.1f} s ({low_s:+.1f} to {high_s:+.1f})"
+            f", {first.number.effect} {first.change.size:+.3g}, score {abs(first.change.score):.0f}"
+            f"{', and later again' if len(changes) > 1 else ''}",
+            flush=True,
+        )
+    changed = sum(name != "nothing" for name in given.effects)
+    print(f"\nnoticed {len(after_s)} of {changed}, {named} by name; onset in its interval {dated}")
+    if after_s:
+        print(
+            f"after {np.median(after_s):.0f} s (median), {np.percentile(after_s, 95):.0f} s (95 %)"
+        )
+    share = CARS * spent_s / driven_s
+    print(f"{CARS} cars: {share:.2f} of a core, {share / MOST_OF_A_CORE:.2f} of the limit")
+
+
+if __name__ == "__main__":
+    main()
