@@ -29,16 +29,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from scm.errors import RecordingError
     from scm.recorder.drives import recordings_of
     from scm.twin.detector import threshold_of
     from scm.twin.watch import CarWatch, watch
     from scm.twin.windows import WatchedCar
     from scm.vehicles.car import load_car
 
-    if not arguments.false_alarm_h > 0.0:
-        msg = f"--false-alarm-h: expected more than 0, got {arguments.false_alarm_h:g}"
-        raise RecordingError(msg)
     threshold, failures = threshold_of(arguments.false_alarm_h), list[str]()
     found = recordings_of(arguments.recording, arguments.data, arguments.vehicle, failures.append)
     cars = dict[str, WatchedCar]()

@@ -70,6 +70,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="leave out parts, separated by commas, if the computer is too slow: "
         "eye, camera, record, observer, misbehaviour; see docs/performance.md",
     )
+    parser.add_argument(
+        "--twin", action="store_true", help="watch every car, and report since when one has changed"
+    )
     parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")
 
 

@@ -70,6 +70,7 @@ class CityOptions:
         trust_proxy: Proxies whose X-Forwarded-For the server believes.
         ros2: Whether ROS 2 nodes shall see the city.
         demand: Table of trips; None: no further cars come.
+        twin: Whether every car is watched for changes.
         without: Parts to leave out, of `OPTIONAL`.
         radio: Radio parameters in place of the map's, `key=value` each.
     """
@@ -93,6 +94,7 @@ class CityOptions:
     trust_proxy: tuple[str, ...] = ()
     ros2: bool = False
     demand: Path | None = None
+    twin: bool = False
     without: tuple[str, ...] = ()
     radio: tuple[str, ...] = ()
 
@@ -302,6 +304,8 @@ def _parts(plan: _Plan) -> list[Job]:
         jobs.append(part("parking", "gives bays to cars that park, and lets them drive in turn"))
     if plan.options.demand is not None:
         jobs.append(demand(plan.options.demand))
+    if plan.options.twin:
+        jobs.append(part("twin", "watches every car: since when it is not what its file says"))
     if plan.options.ros2:
         jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
     left = plan.options.without

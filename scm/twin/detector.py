@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scm.arrays import Floats
+from scm.errors import RunError
 from scm.mismatch.fit.residual_windows import LENGTH_S
 from scm.twin.windows import EVERY_S, Windows
 
@@ -41,7 +42,12 @@ def threshold_of(false_alarm_h: float) -> float:
 
     From the highest scores of 6.5 minutes each, 96 of them, of 32 cars of `tests/reality` that do
     not change: they spread as a Gumbel distribution does.
+
+    Raises:
+        RunError: when that is not more than 0.
     """
+    if not false_alarm_h > 0.0:
+        raise RunError(f"false_alarm_h: expected more than 0, got {false_alarm_h:g}")
     return HOURLY + PER_FOLD * math.log(false_alarm_h)
 
 

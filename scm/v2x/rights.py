@@ -183,6 +183,10 @@ _OF_PART: dict[str, Rights] = {
         subscribes=("v/*/autonomy", "v/*/state"),
         services=("parking/bay",),
     ),
+    "twin": Rights(
+        publishes=("v/*/twin",),
+        subscribes=("v/*/state", "v/*/sensors", "eye/*/pose/*", "event/*/*"),
+    ),
     "demand": Rights(
         publishes=("demand/status",),
         subscribes=("v/*/trip",),

@@ -36,7 +36,7 @@ def test_short_recording_is_too_short_to_learn_from(root, capsys):
 @pytest.mark.parametrize("hours", ["0", "-1", "nan"])
 def test_impossible_rate_of_false_alarms_is_refused(hours, capsys):
     assert main(["twin", "watch", "drive.mcap", "--false-alarm-h", hours]) == 2
-    assert f"--false-alarm-h: expected more than 0, got {hours}" in capsys.readouterr().err
+    assert f"false_alarm_h: expected more than 0, got {hours}" in capsys.readouterr().err
 
 
 def test_recording_that_is_not_there_is_named(tmp_path, capsys):
