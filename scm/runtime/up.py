@@ -305,7 +305,7 @@ def _parts(plan: _Plan) -> list[Job]:
     if plan.options.demand is not None:
         jobs.append(demand(plan.options.demand))
     if plan.options.twin:
-        jobs.append(part("twin", "watches every car: since when it is not what its file says"))
+        jobs.append(part("twin", "watches cars: since when one has changed"))
     if plan.options.ros2:
         jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
     left = plan.options.without
