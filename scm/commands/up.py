@@ -18,9 +18,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "map", nargs="?", default="driving_school", metavar="MAP", help="map name or file"
     )
     parser.add_argument("--city", default="city", help="name of the city on the bus (%(default)s)")
-    parser.add_argument(
-        "--hosted", type=int, default=4, help="cars the world simulates (%(default)s)"
-    )
+    parser.add_argument("--hosted", type=int, default=4, help="cars of the world (%(default)s)")
     parser.add_argument(
         "--agents", type=int, default=2, help="vehicle agents to start (%(default)s)"
     )

@@ -42,6 +42,7 @@ PLAIN_NUMBERS = {
     "queue": "a count",
     "queue_most": "a count",
     "saturation": "a share of what could pass",
+    "size": "in the unit that stands beside it",
     "certainty": "a probability",
     "contacts": "a count",
     "revision": "a count",
