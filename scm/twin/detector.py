@@ -275,8 +275,8 @@ def weighed(windows: Windows, usual: Usual) -> Floats:
     slopes = windows.slopes / usual.size[:, None]
     far = np.sqrt(np.einsum("ni,ij,nj->n", misses, usual.weight, misses) / misses.shape[1])
     clipped = misses * np.minimum(1.0, LIMIT / np.maximum(far, LIMIT))[:, None]
-    leaning = np.einsum("ij,njk->nik", usual.weight, slopes)
-    information = np.einsum("nik,nik->nk", slopes, leaning)
+    weighted = np.einsum("ij,njk->nik", usual.weight, slopes)
+    information = np.einsum("nik,nik->nk", slopes, weighted)
     share = np.sqrt(np.minimum(1.0, usual.most / np.maximum(information, 1e-30)))
-    scores = (np.einsum("ni,nik->nk", each, leaning) for each in (clipped, misses))
+    scores = (np.einsum("ni,nik->nk", each, weighted) for each in (clipped, misses))
     return np.stack((*(score * share for score in scores), information * share**2))

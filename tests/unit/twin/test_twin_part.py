@@ -91,26 +91,19 @@ def test_change_is_an_event_and_stays_in_the_status(changed):
     )
 
 
-def test_car_that_reports_no_commands_is_blind_in_words(changed):
-    silent = [
-        [replace(one, steering=None) if isinstance(one, VehicleState) else one for one in step]
-        for step in changed[:300]
-    ]
-    out, _ = run(TwinPart(), silent)
-    last = [one for one in out if isinstance(one, TwinStatus)][-1]
-    assert last.state == "blind"
-    assert "no command that it obeyed is known" in last.reason
-
-
-def test_car_of_an_unknown_file_is_blind_in_words(changed):
+@pytest.mark.parametrize(
+    ("lacks", "words"),
+    [({"steering": None}, "no command that it obeyed is known"), ({"car": "unicorn"}, "unicorn")],
+)
+def test_car_that_cannot_be_predicted_is_blind_in_words(changed, lacks, words):
     strange = [
-        [replace(one, car="unicorn") if isinstance(one, VehicleState) else one for one in step]
-        for step in changed[:150]
+        [replace(one, **lacks) if isinstance(one, VehicleState) else one for one in step]
+        for step in changed[:300]
     ]
     out, _ = run(TwinPart(), strange)
     last = [one for one in out if isinstance(one, TwinStatus)][-1]
     assert last.state == "blind"
-    assert "unicorn" in last.reason
+    assert words in last.reason
 
 
 def test_clock_that_jumps_is_no_change_and_nothing_piles_up(changed):
