@@ -44,9 +44,9 @@ def test_lamps_and_diagram_show_what_the_controller_shows_and_time_runs(visit, r
         return dict(shown) == {group["group"]: group["colour"] for group in told}
 
     visited.until(agrees, "the lamps agree with the controller")
-    lit = page.locator('.lamps i[data-lit="true"]').all_inner_texts()
-    assert len(lit) == 2
-    assert set(lit) <= {"R", "Y", "G"}
+    lit = page.locator('.lamps i[data-lit="true"]')
+    visited.until(lambda: len(lit.all_inner_texts()) == 2, "each group has one lamp lit")
+    assert set(lit.all_inner_texts()) <= {"R", "Y", "G"}
     visited.until(lambda: ink(page) > 8, "the diagram is drawn")
     left = page.locator(".head .left b").all_inner_texts()
     visited.until(lambda: page.locator(".head .left b").all_inner_texts() != left, "it counts down")
@@ -185,13 +185,15 @@ def test_flash_is_shown_at_once_with_its_letter_and_ended_with_a_reason(visit, r
     page.wait_for_selector('.runs[data-mode="flash"]')
     try:
         assert running.get("/signals/crossing")["mode"] == "flash"
-        assert set(page.locator('.lamps i[data-lit="true"]').all_inner_texts()) == {"F"}
-        assert "until somebody ends it" in page.inner_text(".runs")
+        lit = page.locator('.lamps i[data-lit="true"]')
+        visited.until(lambda: lit.all_inner_texts() == ["F", "F"], "both groups flash")
+        page.wait_for_selector(".runs >> text=until somebody ends it")
         page.wait_for_selector(".banner >> text=The signals of crossing flash, since")
         lately = running.get("/disturbances")["disturbances"]
         assert [one["end_ns"] for one in lately if one["kind"] == "flash"][-1] is None
         photograph(visited, "signals_disturbed")
-        assert page.locator(".head >> text=stop, look, go in turn").count() == 2
+        rule = page.locator(".head >> text=stop, look, go in turn")
+        visited.until(lambda: rule.count() == 2, "both groups say what to do")
         for width in (1920, 1440, 390):  # no words run under the buttons beside them
             page.set_viewport_size({"width": width, "height": 900})
             for line in page.locator(".head p").all():
