@@ -1,7 +1,8 @@
 """A network that learned from five laps drives by its camera: does it stay in its lane?
 
 It drives a Nigel from anywhere on the lane. Light (`daylight.intensity`, `daylight.azimuth`),
-start, speed, way and the car may differ from those of the demonstration. Signals are off.
+start, speed, way and the car may differ from those of the demonstration. Signals are dark, and
+nobody stops at a line.
 
     python -m studies.cloning record demos/five     five laps by the built-in driver, in lockstep
     python -m studies.cloning record demos/five --looks studies/cloning_looks.toml    a look a lap
@@ -79,17 +80,19 @@ def run(
         width_px: Of rendered frames.
     """
     rng = case.generator("cloning")
-    city_map = lanes_only(track(on) if on else case.map, back=way == "back")
+    drawn = track(on) if on else case.map
+    city_map = lanes_only(drawn, back=way == "back")
     lane = LanePath.circulation(roads_of(city_map), city_map.lanes[0].name)
     at_m = float(rng.uniform(0.0, lane.length_m))
     off_m, off_deg = rng.uniform(-1.0, 1.0, 2) * (start_m, start_deg)
     begin = lane.at(at_m) @ Pose2(0.0, float(off_m), math.radians(off_deg))
-    city_map = with_boxes(city_map, boxes, rng)
+    among = with_boxes(city_map, boxes, rng)
+    city_map, drawn = (replace(one, boxes=among) for one in (city_map, drawn))
     car = load_car(CAR) if engine != "city" else with_effect(load_car(CAR), concealed)
     seen = {"front": optics_of(car, "front").of_width(width_px)}
     with varied_cars({CAR: car}):
         world = WorldPart(city_map, case.seed)
-        cameras = CameraPart(city_map, case.seed, case.daylight, cameras=lambda _: seen)
+        cameras = CameraPart(drawn, case.seed, case.daylight, cameras=lambda _: seen)
         driver = NetworkPart("network", VEHICLE, Path(model), speed=speed)
         parts: list[Part] = [world, cameras, driver]
         place: Put = partial(world.world.host, VEHICLE, CAR, begin, 0)
@@ -133,7 +136,10 @@ def _drive(
 
 
 def lanes_only(city_map: CityMap, *, back: bool = False) -> CityMap:
-    """Return a map whose crossings anybody may pass; `back`: its lanes lead the other way."""
+    """Return a map whose crossings anybody may pass; `back`: its lanes lead the other way.
+
+    Cameras look at the map itself, whose lines and signals remain.
+    """
     lanes = tuple(map(partial(_turned, city_map.lanes), city_map.lanes)) if back else city_map.lanes
     return replace(city_map, lanes=lanes, junctions=(), stop_lines=(), lights=(), crosswalks=())
 
@@ -151,8 +157,8 @@ def _turned(lanes: Sequence[Lane], lane: Lane) -> Lane:
     return replace(lane, start=start, segments=tuple(turned), next=after)
 
 
-def with_boxes(city_map: CityMap, count: int, rng: np.random.Generator) -> CityMap:
-    """Return a map with more boxes on its floor, each beside the lanes that the car drives."""
+def with_boxes(city_map: CityMap, count: int, rng: np.random.Generator) -> tuple[Box, ...]:
+    """Return the boxes of a map and more, each beside the lanes that the car drives."""
     floor, boxes = city_map.floor, list[Box]()
     way = LanePath.circulation(roads_of(city_map), city_map.lanes[0].name)
     middle = np.array([way.at(s)[:2] for s in np.arange(0.0, way.length_m, STEP_M)])
@@ -163,7 +169,7 @@ def with_boxes(city_map: CityMap, count: int, rng: np.random.Generator) -> CityM
             yaw = float(rng.uniform(-math.pi, math.pi))
             name = f"more_{len(boxes)}"
             boxes.append(Box(name=name, x_m=x, y_m=y, yaw_rad=yaw, length_m=BOX_M, width_m=BOX_M))
-    return replace(city_map, boxes=(*city_map.boxes, *boxes))
+    return (*city_map.boxes, *boxes)
 
 
 def record(
@@ -181,10 +187,10 @@ def record(
         on: Number of a track of `tracks.py`; 0: Driving School.
         boxes: How many stand about beside the lanes.
     """
-    city_map = lanes_only(track(on) if on else load_map(MAP))
-    city_map = with_boxes(city_map, boxes, generator(seed, "boxes"))
-    lanes = tuple(replace(lane, speed_limit_mps=limit_mps) for lane in city_map.lanes)
-    city_map = replace(city_map, lanes=lanes)
+    drawn = track(on) if on else load_map(MAP)
+    lanes = tuple(replace(lane, speed_limit_mps=limit_mps) for lane in drawn.lanes)
+    among = with_boxes(lanes_only(drawn), boxes, generator(seed, "boxes"))
+    drawn = replace(drawn, lanes=lanes, boxes=among)
     cars = [load_car(CAR)]
     if looks is not None:
         study = load(looks, path.name)  # by this name it draws others than the study itself
@@ -193,8 +199,8 @@ def record(
     part = RecordDemoPart(
         "demo", VEHICLE, path, laps, on_lap=lambda _: cameras.append(cameras.pop(0))
     )
-    world = WorldPart(city_map, seed, ((VEHICLE, CAR),))
-    camera_part = CameraPart(city_map, seed, cameras=lambda _: cameras[0])
+    world = WorldPart(lanes_only(drawn), seed, ((VEHICLE, CAR),))
+    camera_part = CameraPart(drawn, seed, cameras=lambda _: cameras[0])
     with Lockstep([world, camera_part, part]) as city:
         while not part.is_over:
             city.run_for(1.0)
@@ -210,13 +216,14 @@ def label(
     Each lap begins somewhere on the lane and beside its middle, and ends early beyond the lane.
     """
     rng = generator(seed, "label")
-    city_map = lanes_only(track(on) if on else load_map(MAP))
+    drawn = track(on) if on else load_map(MAP)
+    city_map = lanes_only(drawn)
     lane = LanePath.circulation(roads_of(city_map), city_map.lanes[0].name)
     room_m = 0.5 * (city_map.lanes[0].width_m - load_car(CAR).value("body.track_m"))
     world = WorldPart(city_map, seed)
     driver = NetworkPart("network", VEHICLE, model)
     part = RecordDemoPart("demo", VEHICLE, path, laps, dagger=True)
-    with Lockstep([world, CameraPart(city_map, seed), driver, part]) as city:
+    with Lockstep([world, CameraPart(drawn, seed), driver, part]) as city:
         car, done_m = None, 0.0
         while done_m < laps * lane.length_m:
             at_m = float(rng.uniform(0.0, lane.length_m))

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from scm.camera.optics import fitted
 from scm.maps.check import problems_of
@@ -47,7 +48,7 @@ def test_lanes_lead_back_over_the_same_floor():
 
 def test_boxes_stand_beside_the_lane():
     school = lanes_only(load_map("driving_school"))
-    city_map = with_boxes(school, 20, np.random.default_rng(0))
+    city_map = replace(school, boxes=with_boxes(school, 20, np.random.default_rng(0)))
     boxes = city_map.boxes[len(school.boxes) :]
     assert len(boxes) == 20
     assert problems_of(city_map) == []
