@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
-from scm.api.priority import NICER, stand_back
+from scm.runtime.priority import NICER, stand_back
 
 ROOT = Path(__file__).parent.parent
 TESTS = ROOT / "tests"

@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 
 from scm.api.operations import ProgressReporter
-from scm.api.priority import stand_back
 from scm.errors import RunError
 from scm.runtime.parent_watch import with_parent
+from scm.runtime.priority import stand_back
 
 LOOK_S = 0.2
 GRACE_S = 8.0

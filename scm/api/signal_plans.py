@@ -14,10 +14,10 @@ from pathlib import Path
 import msgspec
 
 from scm.api.operations import ProgressReporter
-from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.errors import PlanError
 from scm.records.signal_plans import PlanProof
+from scm.runtime.priority import stand_back
 from scm.v2x.plan_file import PlanFile
 
 MOST_PLANS = 50

@@ -1,22 +1,51 @@
 """`scm twin`: one part of the city, on its own."""
 
 import argparse
+from pathlib import Path
 
-from scm.command import Command, part_arguments, run_part
+from scm.command import Command, part_arguments, run_part, state_argument, state_of
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     part_arguments(parser)
+    state_argument(parser)
     parser.add_argument(
         "--false-alarm-h", type=float, default=200.0, metavar="HOURS",
         help="of driving, in which a car that does not change may be reported once (%(default)g)",
     )  # fmt: skip
+    parser.add_argument(
+        "--data",
+        type=Path,
+        default=Path("runs"),
+        metavar="DIR",
+        help="reports and car files of what changed go there (%(default)s)",
+    )
+    parser.add_argument(
+        "--budget-s",
+        type=float,
+        default=300.0,
+        metavar="S",
+        help="for the search for what changed (%(default)g)",
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from scm.store.records import records
+    from scm.twin.car import CHANGES, VERSIONS
     from scm.twin.part import TwinPart
+    from scm.v2x.messages.twin_status import TwinChange, TwinVersion
 
-    return run_part(TwinPart(arguments.false_alarm_h), arguments)
+    with state_of(arguments) as state:
+        part = TwinPart(
+            arguments.false_alarm_h,
+            arguments.data,
+            arguments.budget_s,
+            versions={}
+            if state is None
+            else records(state, "twins", f"twin/{VERSIONS}", TwinVersion),
+            changes={} if state is None else records(state, "twins", f"twin/{CHANGES}", TwinChange),
+        )
+        return run_part(part, arguments, state)
 
 
 COMMAND = Command(

@@ -305,7 +305,8 @@ def _parts(plan: _Plan) -> list[Job]:
     if plan.options.demand is not None:
         jobs.append(demand(plan.options.demand))
     if plan.options.twin:
-        jobs.append(part("twin", "watches cars: since when one has changed"))
+        data = ("--data", str(plan.options.record_dir))
+        jobs.append(part("twin", "watches cars: since when one has changed", *data, *stored))
     if plan.options.ros2:
         jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
     left = plan.options.without

@@ -9,6 +9,8 @@ answers  <station>/<digest>   StoredAnswer     see scm.v2x.answers
 marks    <station>                             which batch of which run was written last
 seen     event/<id>           Acknowledgement  who took note of an event (scm.api.acknowledgements)
 calibrations  eye.../<camera>  SightRecord     what a camera sees by (scm.eye.sight)
+twins    twin/version/<car>/<number>  TwinVersion  of a car's file (scm.v2x.messages.twin_status)
+twins    twin/change/<car>/<t_ns>     TwinChange   of a car
 """
 
 from typing import TypeVar

@@ -11,7 +11,15 @@ from contextlib import AbstractContextManager
 from typing import Literal, NamedTuple, Protocol, get_args
 
 Table = Literal[
-    "leases", "plans", "answers", "credentials", "latches", "marks", "seen", "calibrations"
+    "leases",
+    "plans",
+    "answers",
+    "credentials",
+    "latches",
+    "marks",
+    "seen",
+    "calibrations",
+    "twins",
 ]
 Log = Literal["audit"]
 

@@ -32,6 +32,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
     tuple(_TABLE.format(name) for name in ("latches", "marks")),
     (_TABLE.format("seen"),),
     (_TABLE.format("calibrations"),),
+    (_TABLE.format("twins"),),
 )
 """What each schema version adds to the one before; `PRAGMA user_version` counts them."""
 

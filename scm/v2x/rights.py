@@ -57,6 +57,7 @@ EVERY_REQUEST = (
     "v/*/cmd/*",
     "v/*/remove",
     "v/*/park",
+    "v/*/twin/version",
     "parking/bay",
     "world/spawn",
     "world/boxes",
@@ -186,6 +187,8 @@ _OF_PART: dict[str, Rights] = {
     "twin": Rights(
         publishes=("v/*/twin",),
         subscribes=("v/*/state", "v/*/sensors", "eye/*/pose/*", "event/*/*"),
+        requests=("v/*/twin/version",),
+        services=("v/*/twin/version",),
     ),
     "demand": Rights(
         publishes=("demand/status",),

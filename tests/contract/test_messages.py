@@ -88,6 +88,15 @@ PLAIN_NUMBERS = {
     "busy_most": "a share of time",
     "start": "a pose of the map, see its docstring",
     "top": "a share of the frame's height",
+    "probability": "a probability",
+    "value": "of a parameter, whose name says the unit",
+    "low": "of a parameter, whose name says the unit",
+    "high": "of a parameter, whose name says the unit",
+    "before": "of a parameter or an error, whose name says the unit",
+    "now": "of an error, whose name says the unit",
+    "version": "an identity",
+    "after": "an identity",
+    "windows": "a count",
     "saliency": "of the steering command, see its docstring",
 }
 UNITS = tuple(

@@ -16,7 +16,6 @@ from scm.api.etag import Matching, tagged
 from scm.api.inputs import Json
 from scm.api.operations import Operations, ProgressReporter, accepted
 from scm.api.paging import Cursor, Limit, page_of, page_of_names, page_response
-from scm.api.priority import stand_back
 from scm.api.problem import RefusedError
 from scm.api.programs import run_scm
 from scm.api.ranged import send_file
@@ -41,6 +40,7 @@ from scm.records.recordings import (
     RecordingRow,
     Summary,
 )
+from scm.runtime.priority import stand_back
 
 MCAP = "application/octet-stream"
 MOST_S = 120.0

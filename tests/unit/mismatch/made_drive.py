@@ -79,7 +79,7 @@ def made_drive(numbers=(), seconds=20.0, seed=1, sense=lambda name, t, values: v
     add("pose.x", 3, run["x"], POSE_STD, "length")
     add("pose.y", 3, run["y"], POSE_STD, "length")
     add("pose.yaw", 3, np.unwrap(run["yaw"]), YAW_STD, "angle")
-    add("imu.gyro_z", 1, run["yaw_rate"], GYRO_STD, "angular rate")
+    add("imu.gyro_z", 1, run["yaw_rate"], GYRO_STD, "angular speed")
     add("imu.accel_x", 1, run["accel_x"], ACCEL_STD, "acceleration")
     add("imu.accel_y", 1, run["accel_y"], ACCEL_STD, "acceleration")
     add("encoder.left", 2, counts * run["wheel_angle.rl"], 0.0, "count")

@@ -7,6 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S, nanoseconds
+from scm.geometry import wrap_angle
 from scm.twin.part import GONE_NS, TwinPart
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.city_event import CityEvent
@@ -21,13 +22,14 @@ BEGAN_NS = 1_700_000_000 * NS_PER_S
 EVERY_S = 0.02
 
 
-def reports(recording, name="n1"):
+def reports(recording, name="n1", lasts_s=LASTS_S):
     """Return what the car of a recording would report, one list a step of 0.1 s."""
-    t = np.arange(0.1, LASTS_S - 0.1, EVERY_S)
+    t = np.arange(0.1, lasts_s - 0.1, EVERY_S)
 
     def at(channel):
         one = recording.channels[channel]
-        return np.interp(t, one.t, one.values).tolist()
+        values = np.unwrap(one.values) if channel == "pose.yaw" else one.values
+        return np.interp(t, one.t, values).tolist()
 
     x, y, yaw, gyro, left, right, ax, ay = map(at, (
         "pose.x", "pose.y", "pose.yaw", "imu.gyro_z", "encoder.left", "encoder.right",
@@ -43,8 +45,8 @@ def reports(recording, name="n1"):
     for k, t_s in enumerate(t.tolist()):
         t_ns = BEGAN_NS + nanoseconds(t_s)
         state = VehicleState(
-            vehicle=name, t_ns=t_ns, seq=k, x_m=x[k], y_m=y[k], yaw_rad=yaw[k], speed_mps=0.2,
-            yaw_rate_radps=0.0, steering_rad=0.0, throttle=throttle[k], steering=steering[k],
+            vehicle=name, t_ns=t_ns, seq=k, x_m=x[k], y_m=y[k], yaw_rad=wrap_angle(yaw[k]),
+            speed_mps=0.2, yaw_rate_radps=0.0, steering_rad=0.0, throttle=throttle[k], steering=steering[k],
             source="simulated",
         )  # fmt: skip
         sensors = VehicleSensors(
@@ -113,6 +115,6 @@ def test_clock_that_jumps_is_no_change_and_nothing_piles_up(changed):
     out, _ = run(part, [*changed[:1500], *later, *changed[:300]])
     assert not [one for one in out if isinstance(one, CityEvent)]
     assert [one for one in out if isinstance(one, TwinStatus)][-1].driven_s > 280.0
-    assert len(part._cars["n1"].messages.reports) < 800
+    assert len(part._cars["n1"]._messages.reports) < 800
     part.step(BEGAN_NS + 10 * hour + GONE_NS, [])
     assert part._cars == {}

@@ -1,0 +1,419 @@
+"""One car of the city: what it sent, how it is watched, its changes, and the versions of its file.
+
+Each ten seconds of its reports are looked at once. A change is searched for its cause when it was
+driven for some time since; what the search finds is a candidate (`versions`).
+"""
+
+import math
+import re
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+from msgspec import structs
+
+from scm.clock import nanoseconds, seconds
+from scm.errors import CarError, RecordingError, ScmError
+from scm.recorder.driven import CarMessages, recording_of
+from scm.recording.read import Recording
+from scm.twin.investigation import Compared, Explained, compare, explain
+from scm.twin.memory import CarMemory
+from scm.twin.versions import (
+    BY_TWIN,
+    PROBATION_S,
+    SEEN_S,
+    CarVersions,
+    in_words,
+    is_worse,
+    verdict,
+)
+from scm.twin.watch import AFTER_S, BEFORE_S, SPAN_S, CarWatch, Noticed
+from scm.twin.windows import WatchedCar
+from scm.v2x.exchange import Call, Outgoing, PersistedState
+from scm.v2x.message import Message, Refused
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.twin_status import TwinChange, TwinStatus, TwinVersion
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.messages.version_request import VersionRequest
+
+NAME = "twin"
+CHANGES, VERSIONS = "change", "version"  # begin the keys of records
+CHANGED_AGAIN = "the car changed again before it was confirmed"
+LOOK_NS, BEFORE_NS = nanoseconds(SPAN_S), nanoseconds(BEFORE_S)
+DUE_NS = nanoseconds(SPAN_S + AFTER_S)
+LEAP_NS = nanoseconds(2.0)  # of a clock: what was recorded before does not belong to what follows
+MOST_CHANGES = 20
+BY_EYE, FEWEST_SEEN = "eye", 50  # poses of a first look, for the Eye to be a witness
+SEARCHED_BEFORE_S, SEARCHED_AFTER_S = 120.0, 90.0  # of a change, for a search
+MOST_AFTER_S, LEAST_AFTER_S = 300.0, 40.0
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What all cars share.
+
+    Attributes:
+        threshold: Score from which on a change is reported.
+        predictor: Returns what predicts cars of a file.
+        executor: Runs searches and comparisons.
+        data: Folder for reports and car files; None: nothing is searched for.
+        budget_s: For a search.
+    """
+
+    threshold: float
+    predictor: Callable[[str], WatchedCar]
+    executor: Callable[[], Executor]
+    data: Path | None
+    budget_s: float
+
+
+@dataclass(slots=True)
+class _Trial:
+    """A version on new driving, compared with the one before it.
+
+    Attributes:
+        since_s: From when on driving is new.
+        driven_s: How long the car had been driven then.
+        done: How many comparisons were made.
+    """
+
+    since_s: float
+    driven_s: float
+    done: int = 0
+
+
+class TwinCar:
+    """One car of the city.
+
+    Args:
+        first: Its first report.
+        now_ns: On our clock.
+        setup: What all cars share.
+        versions, changes: As an earlier process left them.
+
+    Attributes:
+        newest_ns: Of its reports, on their clock; `arrived_ns`: when that came, on ours.
+        next_ns: From when on its reports were not looked at.
+        changes: That were noticed, the newest last.
+    """
+
+    def __init__(
+        self, first: VehicleState, now_ns: int, setup: Setup,
+        versions: Iterable[TwinVersion] = (), changes: Iterable[TwinChange] = (),
+    ) -> None:  # fmt: skip
+        self.name, self.car, self._setup = first.vehicle, first.car, setup
+        self._begin_ns = self.next_ns = self.newest_ns = first.t_ns
+        self.arrived_ns = now_ns
+        self.changes = deque(map(_interrupted, changes), maxlen=MOST_CHANGES)
+        self.versions = CarVersions(first.car, versions)
+        self._messages, self._memory = CarMessages(), CarMemory()
+        self._watch: CarWatch | None = None
+        self._watched_s = self._looked_s = self._driven_s = 0.0
+        self._is_seen: bool | None = None  # by the Eye; None: not decided yet
+        self._reason = ""
+        self._trial = _Trial(0.0, 0.0) if self.versions.candidate is not None else None
+        self._search: Future[Explained] | None = None
+        self._comparison: Future[Compared] | None = None
+        self._requested: Compared | None = None
+        self._searched_until = 0.0, 0.0
+
+    @property
+    def waits_ns(self) -> int:
+        """For how long reports have been due to be looked at; less than 0: they are not."""
+        behind_s = self._memory.last_s - self._watched_s - SPAN_S
+        arrived_ns = self.newest_ns - self.next_ns - DUE_NS
+        return max(arrived_ns, nanoseconds(behind_s)) if behind_s >= 0.0 else arrived_ns
+
+    def receive(self, message: Message, now_ns: int) -> None:
+        """Store what the car sent, or what was seen of it."""
+        if isinstance(message, VehicleState):
+            if abs(message.t_ns - self.newest_ns) > LEAP_NS:
+                self._messages, self.next_ns = CarMessages(), message.t_ns
+            if message.t_ns < self.newest_ns - LEAP_NS:  # its clock was put back
+                self._memory = CarMemory()
+                self._watched_s = self._looked_s = seconds(message.t_ns - self._begin_ns)
+                if self._trial is not None:
+                    self._trial.since_s = self._watched_s
+            self.newest_ns, self.arrived_ns = message.t_ns, now_ns
+        self._messages.add(message)
+
+    def look(self) -> list[Outgoing]:
+        """Look at the next ten seconds; return the status, and a change if there is one."""
+        out = list[Outgoing]()
+        try:
+            if self.newest_ns - self.next_ns >= DUE_NS:
+                self._remember()
+            if self._watch is None:
+                file = self.versions.in_force.file
+                self._watch = CarWatch(self._setup.predictor(file), self._setup.threshold)
+            if self._memory.last_s >= self._watched_s + SPAN_S:
+                out += self._watch_on(self._watch)
+            self._reason = ""
+        except (CarError, RecordingError) as error:
+            self._reason = str(error)
+        return [self.status(), *out]
+
+    def _remember(self) -> None:
+        """Take ten seconds of messages into the memory."""
+        first_ns, self.next_ns = self.next_ns, self.next_ns + LOOK_NS
+        try:
+            first_s = seconds(first_ns - self._begin_ns)
+            self._memory.add(self._recording(), first_s, first_s + SPAN_S)
+        finally:
+            _forget(self._messages, self.next_ns - BEFORE_NS)
+
+    def _recording(self) -> Recording:
+        """Return the messages that are stored as a recording.
+
+        Raises:
+            RecordingError: when they have no poses, or no commands that the car obeyed.
+        """
+        messages = self._messages
+        if self._is_seen is None:
+            self._is_seen = sum(map(len, messages.seen.values())) >= FEWEST_SEEN
+        if self._is_seen:
+            reports = [report._replace(source=BY_EYE) for report in messages.reports]
+            messages = replace(messages, reports=reports)
+        return recording_of(messages, Path(NAME), self.name, self._begin_ns)
+
+    def _watch_on(self, watch: CarWatch) -> list[Outgoing]:
+        """Look at ten seconds of the memory; return a change, if they show one."""
+        first_s = self._memory.begin_after(self._watched_s)
+        self._watched_s = last_s = first_s + SPAN_S
+        recording = self._memory.between(first_s - BEFORE_S, last_s + AFTER_S)
+        before_s = watch.driven_s
+        noticed = watch.look(recording, first_s, last_s)
+        if first_s >= self._looked_s:
+            self._looked_s = last_s
+            self._driven_s += watch.driven_s - before_s
+        if noticed is None:
+            return []
+        self._trial = None
+        out = self._stored(self.versions.reject(CHANGED_AGAIN))
+        change = _change(noticed, self._begin_ns)
+        self.changes.append(change)
+        ago_s = seconds(change.noticed_ns - change.since_ns)
+        like = ", or ".join(dict.fromkeys((change.effect, *change.alike)))
+        text = (
+            f"{self.name} is not what {self.car} says any more, since {ago_s:.0f} s: as by {like}"
+        )
+        return [*out, self._change_stored(change), self._event("car_changed", text, "warning")]
+
+    def work(self) -> list[Outgoing]:
+        """Go on with searching for the cause of a change, and with comparing versions."""
+        if self._setup.data is None:
+            return []
+        if self._search is not None:
+            return self._searched(self._search) if self._search.done() else []
+        if self._comparison is not None:
+            return self._compared(self._comparison) if self._comparison.done() else []
+        waiting = next((one for one in self.changes if one.search == "driving"), None)
+        if waiting is not None:
+            return self._search_for(waiting, self._setup.data)
+        return self._compare()
+
+    def _search_for(self, change: TwinChange, data: Path) -> list[Outgoing]:
+        """Start the search for the cause of a change, when the car was driven long enough since."""
+        since_s = seconds(change.since_ns - self._begin_ns)
+        later = (one for one in self.changes if one.since_ns > change.since_ns)
+        ends = next((seconds(one.since_low_ns - self._begin_ns) for one in later), None)
+        last_s = min(self._memory.last_s, since_s + MOST_AFTER_S, ends or math.inf)
+        if ends is None and last_s < since_s + SEARCHED_AFTER_S:
+            return []
+        if last_s < since_s + LEAST_AFTER_S:
+            text = f"It changed again after {last_s - since_s:.0f} s: too soon to search."
+            return self._now(change, structs.replace(change, search="failed", text=text))
+        number = self.versions.newest[-1].number + 1
+        report = f"twin-{_slug(self.name)}-{seconds(change.since_ns):.0f}"
+        low_s, high_s = (
+            seconds(t_ns - self._begin_ns) for t_ns in (change.since_low_ns, change.since_high_ns)
+        )
+        try:
+            recording = self._memory.between(since_s - SEARCHED_BEFORE_S, last_s)
+        except RecordingError as error:
+            return self._now(change, structs.replace(change, search="failed", text=str(error)))
+        self._search = self._setup.executor().submit(
+            explain, recording, self.versions.in_force.file, data / "reports" / report,
+            data / "twins" / self.name / f"{number}.toml", (low_s, high_s), self._setup.budget_s,
+        )  # fmt: skip
+        self._searched_until = last_s, self._driven_s
+        return self._now(change, structs.replace(change, search="searching", report=report))
+
+    def _searched(self, search: Future[Explained]) -> list[Outgoing]:
+        """Take what a search found."""
+        self._search = None
+        change = next(one for one in self.changes if one.search == "searching")
+        try:
+            found = search.result()
+        except ScmError as error:
+            failed = structs.replace(change, search="failed", text=str(error), report="")
+            return self._now(change, failed)
+        state = "named" if found.effects else "undecided" if found.between else "unexplained"
+        named = structs.replace(
+            change, search=state, effects=found.effects, between=found.between,
+            drive_this=found.drive_this, text=found.text,
+        )  # fmt: skip
+        if found.since_s is not None:
+            since_ns, low_ns, high_ns = (self._begin_ns + nanoseconds(t_s) for t_s in found.since_s)
+            named = structs.replace(
+                named, since_ns=since_ns, since_low_ns=low_ns, since_high_ns=high_ns
+            )
+        text = f"{self.name} changed: {named.text}"
+        out = [*self._now(change, named), self._event("change_explained", text, "warning")]
+        is_newest = named is self.changes[-1]
+        if found.car_file is not None and is_newest:
+            names = [one.name for one in found.effects]
+            file = str(found.car_file)
+            made = self.versions.propose(file, names, named.report, self.newest_ns)
+            self._trial = _Trial(*self._searched_until)
+            out += self._stored(made)
+        return [*out, self.status()]
+
+    def _compare(self) -> list[Outgoing]:
+        """Compare the version on trial with the one before it, when there was enough driving."""
+        trial, candidate = self._trial, self.versions.candidate
+        steps = PROBATION_S if candidate is None else SEEN_S
+        if trial is None or self._driven_s - trial.driven_s < steps[trial.done]:
+            return []
+        new = self.versions.in_force if candidate is None else candidate
+        try:
+            recording = self._memory.between(trial.since_s, self._memory.last_s)
+        except RecordingError:
+            return []
+        self._comparison = self._setup.executor().submit(
+            compare, recording, self.versions[new.after].file, new.file
+        )
+        return []
+
+    def _compared(self, comparison: Future[Compared]) -> list[Outgoing]:
+        """Adopt the candidate, reject it, or roll the version in force back; or go on."""
+        self._comparison, trial, candidate = None, self._trial, self.versions.candidate
+        if trial is None:  # the car changed meanwhile
+            return []
+        steps = PROBATION_S if candidate is None else SEEN_S
+        trial.done += 1
+        is_last = trial.done == len(steps)
+        self._trial = None if is_last else trial
+        try:
+            compared = comparison.result()
+        except ScmError as error:
+            return self._rejected(f"it cannot be compared: {error}") if is_last else []
+        if candidate is None:
+            if not is_worse(compared):
+                return []
+            errors = in_words(compared)
+            return self._put(self.versions.in_force.after, f"worse later: {errors}", compared)
+        action, reason = verdict(compared, is_last=is_last)
+        if action == "adopt":
+            return self._put(candidate.number, reason, compared)
+        return self._rejected(reason, compared) if action == "reject" else []
+
+    def _put(self, number: int, reason: str, compared: Compared) -> list[Outgoing]:
+        """Request a version in force as an operator would: there is one way, and it is audited."""
+        self._trial, self._requested = None, compared
+        request = VersionRequest(vehicle=self.name, version=number, by=BY_TWIN, reason=reason)
+        return [Call(request)]
+
+    def _rejected(self, reason: str, compared: Compared | None = None) -> list[Outgoing]:
+        rejected = self.versions.reject(reason, compared)
+        if rejected is None:
+            return []
+        text = f"{self.name}: version {rejected.number} is rejected: {reason}"
+        return [*self._stored(rejected), self._event("version_rejected", text), self.status()]
+
+    def answer(self, request: VersionRequest) -> tuple[Message, list[Outgoing]]:
+        """Put a version in force; return the reply and what else to send."""
+        number, before = request.version, self.versions.in_force.number
+        if number not in self.versions:
+            last = self.versions.newest[-1].number
+            detail = f"{self.name} has no version {number}; it has 0 to {last}"
+            return Refused(code="not_found", detail=detail), []
+        if number == before:
+            return self.status(), []
+        compared = self._requested if request.by == BY_TWIN else None
+        changed = self.versions.put_in_force(number, request.by, request.reason, compared)
+        self._requested = self._comparison = self._trial = self._watch = None
+        if request.by == BY_TWIN and number > before:
+            self._trial = _Trial(self._memory.last_s, self._driven_s)
+        changes = [seconds(one.since_high_ns - self._begin_ns) for one in self.changes]
+        self._watched_s = max([0.0, *changes])  # it learns from what was driven since
+        level: Literal["info", "warning"] = "info" if number > before else "warning"
+        way = "is predicted by" if number > before else "goes back to"
+        text = f"{self.name} {way} version {number}: {request.reason or 'no reason given'}"
+        stored = [item for one in changed for item in self._stored(one)]
+        return self.status(), [*stored, self._event("version", text, level), self.status()]
+
+    def refused(self) -> list[Outgoing]:
+        """Start a comparison again whose result could not be put in force."""
+        self._requested = None
+        if self._trial is None:
+            self._trial = _Trial(self._memory.last_s, self._driven_s)
+        return []
+
+    def status(self) -> TwinStatus:
+        """Return what is known of the car."""
+        is_learning = self._watch is None or self._watch.is_learning
+        return TwinStatus(
+            vehicle=self.name, t_ns=self.next_ns, car=self.car, reason=self._reason,
+            state="blind" if self._reason else "learning" if is_learning else "watching",
+            driven_s=self._driven_s, changes=tuple(self.changes),
+            version=self.versions.in_force.number, versions=self.versions.newest,
+        )  # fmt: skip
+
+    def _now(self, change: TwinChange, then: TwinChange) -> list[Outgoing]:
+        """Replace a change by what is known of it now."""
+        self.changes[self.changes.index(change)] = then
+        return [self._change_stored(then)]
+
+    def _change_stored(self, change: TwinChange) -> PersistedState:
+        return PersistedState("twins", f"{CHANGES}/{self.name}/{change.noticed_ns}", change)
+
+    def _stored(self, version: TwinVersion | None) -> list[Outgoing]:
+        if version is None:
+            return []
+        return [PersistedState("twins", f"{VERSIONS}/{self.name}/{version.number}", version)]
+
+    def _event(
+        self, name: str, text: str, severity: Literal["info", "warning"] = "info"
+    ) -> CityEvent:
+        return CityEvent(
+            severity=severity, source=NAME, t_ns=self.newest_ns, name=name, vehicle=self.name,
+            text=text,
+        )  # fmt: skip
+
+
+def _interrupted(change: TwinChange) -> TwinChange:
+    """Return a change of an earlier process, whose memory is gone."""
+    if change.search not in ("driving", "waiting", "searching"):
+        return change
+    text = "The twin part was started again before its cause was found."
+    return structs.replace(change, search="failed", text=text)
+
+
+def _slug(name: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", name.lower())
+
+
+def _forget(messages: CarMessages, before_ns: int) -> None:
+    """Forget what a car sent before a time, and what was seen of it."""
+    messages.reports = [one for one in messages.reports if one.t_ns >= before_ns]
+    messages.sensors = [one for one in messages.sensors if one.t_ns >= before_ns]
+    messages.seen = {
+        camera: [one for one in poses if one.t_ns >= before_ns]
+        for camera, poses in messages.seen.items()
+    }
+    messages.hit_ns = [t_ns for t_ns in messages.hit_ns if t_ns >= before_ns]
+
+
+def _change(noticed: Noticed, begin_ns: int) -> TwinChange:
+    change = noticed.change
+    since_ns, low_ns, high_ns = (begin_ns + nanoseconds(t_s) for t_s in change.onset_s)
+    return TwinChange(
+        noticed_ns=begin_ns + nanoseconds(change.noticed_s), since_ns=since_ns,
+        since_low_ns=low_ns, since_high_ns=high_ns, effect=noticed.number.effect,
+        parameter=noticed.number.name, size=change.size, unit=noticed.number.unit,
+        score=abs(change.score), alike=tuple(number.effect for number, _ in noticed.alike),
+    )  # fmt: skip

@@ -1,0 +1,131 @@
+"""The versions of one car's file: one is in force, one at most is a candidate.
+
+A candidate is adopted when it predicts driving better that no fit has seen, and nothing worse. On
+later driving it is compared with the version that it replaced, and rolled back if that was better.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Literal
+
+from msgspec.structs import replace
+
+from scm.twin.investigation import Compared
+from scm.v2x.messages.twin_status import TwinVersion
+
+SEEN_S = (120.0, 240.0)  # of driving, after which a candidate is compared
+PROBATION_S = (150.0, 300.0)  # likewise, after it was adopted
+MOST_SENT = 20
+ERRORS = {"position_m": ("position", "mm", 1e3), "yaw_rad": ("heading", "mrad", 1e3)}
+BY_TWIN = "twin"
+
+
+class CarVersions:
+    """The versions of one car's file.
+
+    Args:
+        car: Name or path of the file that the car came with.
+        stored: As an earlier process left them; those of another file do not count.
+    """
+
+    def __init__(self, car: str, stored: Iterable[TwinVersion] = ()) -> None:
+        self._car = car
+        first = TwinVersion(number=0, car=car, file=car, made_ns=0, state="adopted")
+        self._by_number = {0: first} | {one.number: one for one in stored if one.car == car}
+
+    def __getitem__(self, number: int) -> TwinVersion:
+        return self._by_number[number]
+
+    def __contains__(self, number: int) -> bool:
+        return number in self._by_number
+
+    @property
+    def newest(self) -> tuple[TwinVersion, ...]:
+        """The newest, by number; at most as many as a message has."""
+        return tuple(self._by_number[number] for number in sorted(self._by_number)[-MOST_SENT:])
+
+    @property
+    def in_force(self) -> TwinVersion:
+        """By which the car is predicted."""
+        return next(one for one in reversed(self.newest) if one.state == "adopted")
+
+    @property
+    def candidate(self) -> TwinVersion | None:
+        """That is compared with it."""
+        return next((one for one in self.newest if one.state == "candidate"), None)
+
+    def propose(self, file: str, effects: Sequence[str], report: str, made_ns: int) -> TwinVersion:
+        """Add a candidate, and return it."""
+        made = TwinVersion(
+            number=max(self._by_number) + 1, car=self._car, file=file, made_ns=made_ns,
+            state="candidate", after=self.in_force.number, effects=tuple(effects),
+            report=report,
+        )  # fmt: skip
+        return self._put(made)
+
+    def reject(self, reason: str, compared: Compared | None = None) -> TwinVersion | None:
+        """Reject the candidate, if there is one, and return it."""
+        if self.candidate is None:
+            return None
+        return self._put(_judged(self.candidate, "rejected", BY_TWIN, reason, compared))
+
+    def put_in_force(
+        self, number: int, by: str, reason: str, compared: Compared | None = None
+    ) -> list[TwinVersion]:
+        """Put a version in force, and return all that this changed."""
+        changed, before = list[TwinVersion](), self.in_force.number
+        for one in self.newest:
+            if one.number == number:
+                continue
+            if one.state == "adopted" and one.number > number:
+                changed.append(self._put(replace(one, state="rolled_back", by=by, reason=reason)))
+            elif one.state == "adopted" and number > before:
+                changed.append(self._put(replace(one, state="replaced")))
+        return [*changed, self._put(_judged(self[number], "adopted", by, reason, compared))]
+
+    def _put(self, version: TwinVersion) -> TwinVersion:
+        self._by_number[version.number] = version
+        return version
+
+
+def _judged(
+    version: TwinVersion,
+    state: Literal["adopted", "rejected"],
+    by: str,
+    reason: str,
+    compared: Compared | None,
+) -> TwinVersion:
+    changed = replace(version, state=state, by=by, reason=reason)
+    if compared is None:
+        return changed
+    return replace(changed, windows=compared.windows, errors=compared.errors)
+
+
+def verdict(compared: Compared, *, is_last: bool) -> tuple[str, str]:
+    """Return what becomes of a candidate, `adopt`, `reject` or `wait`, and why."""
+    errors = in_words(compared)
+    if compared.worse:
+        reason = f"{', '.join(map(_name, compared.worse))} worse on new driving: {errors}"
+        return ("reject" if is_last else "wait"), reason
+    if compared.better:
+        return "adopt", f"{', '.join(map(_name, compared.better))} better on new driving: {errors}"
+    return ("reject" if is_last else "wait"), f"no better on new driving: {errors}"
+
+
+def is_worse(compared: Compared) -> bool:
+    """Return whether a version in force predicts the pose worse than the one before it."""
+    return bool(set(ERRORS) & set(compared.worse))
+
+
+def in_words(compared: Compared) -> str:
+    """Return the errors of two versions after 3 s."""
+    shown = [
+        f"{word} {per_unit * one.before:.3g} to {per_unit * one.now:.3g} {unit}"
+        for one in compared.errors
+        if one.name in ERRORS
+        for word, unit, per_unit in (ERRORS[one.name],)
+    ]
+    return f"{', '.join(shown)} after 3 s, {compared.windows} windows"
+
+
+def _name(error: str) -> str:
+    return ERRORS[error][0] if error in ERRORS else error.rpartition("_")[0].replace("_", " ")
