@@ -46,8 +46,8 @@ def reports(recording, name="n1", lasts_s=LASTS_S):
         t_ns = BEGAN_NS + nanoseconds(t_s)
         state = VehicleState(
             vehicle=name, t_ns=t_ns, seq=k, x_m=x[k], y_m=y[k], yaw_rad=wrap_angle(yaw[k]),
-            speed_mps=0.2, yaw_rate_radps=0.0, steering_rad=0.0, throttle=throttle[k], steering=steering[k],
-            source="simulated",
+            speed_mps=0.2, yaw_rate_radps=0.0, steering_rad=0.0, throttle=throttle[k],
+            steering=steering[k], source="simulated",
         )  # fmt: skip
         sensors = VehicleSensors(
             vehicle=name, t_ns=t_ns, encoder_left=round(left[k]), encoder_right=round(right[k]),
