@@ -15,7 +15,6 @@ from scm.recording.read import Channel, Recording
 from scm.recording.units import UNITS
 
 MEMORY_S = 900.0
-DATA = "driven.npz"
 UNIT = {dimension: unit for unit, (dimension, factor) in UNITS.items() if factor == 1.0}
 
 
@@ -98,22 +97,29 @@ def write(recording: Recording, folder: Path) -> Path:
     Raises:
         RecordingError: when it cannot be written.
     """
-    columns = dict[str, Any]()
-    tables = list[dict[str, Any]]()
+    by_times = dict[bytes, list[str]]()
     for name, channel in recording.channels.items():
-        column = name.replace(".", "_")
-        columns |= {f"{column}_t": channel.t, column: channel.values}
-        described: dict[str, Any] = {"column": column, "unit": UNIT[channel.dimension]}
-        described |= {} if channel.std is None else {"std": channel.std}
-        described |= {} if channel.point == (0.0, 0.0) else {"point": list(channel.point)}
-        time = {"column": f"{column}_t", "unit": "s"}
-        tables.append({"file": DATA, "time": time, "channels": {name: described}})
+        by_times.setdefault(channel.t.tobytes(), []).append(name)
+    tables = list[dict[str, Any]]()
+    for names in by_times.values():
+        described = {name: _described(name, recording.channels[name]) for name in names}
+        file = f"{names[0].partition('.')[0]}_{len(tables)}.npz"
+        tables.append({"file": file, "time": {"column": "t", "unit": "s"}, "channels": described})
     of_car = {"recording": 1, "vehicle": recording.vehicle, "frame": "world"}
     path = folder / FILE_NAME
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        np.savez_compressed(folder / DATA, **columns)
+        for table, names in zip(tables, by_times.values(), strict=True):
+            t = recording.channels[names[0]].t
+            columns = {name: recording.channels[name].values for name in names}
+            np.savez_compressed(folder / table["file"], t=t, **columns)
         path.write_bytes(msgspec.yaml.encode({**of_car, "tables": tables}))
     except OSError as error:
         raise RecordingError(f"{folder}: cannot be written: {error}") from error
     return path
+
+
+def _described(name: str, channel: Channel) -> dict[str, Any]:
+    found: dict[str, Any] = {"column": name, "unit": UNIT[channel.dimension]}
+    found |= {} if channel.std is None else {"std": channel.std}
+    return found | ({} if channel.point == (0.0, 0.0) else {"point": list(channel.point)})

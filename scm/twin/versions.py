@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from scm.twin.investigation import Compared
 from scm.v2x.messages.twin_status import TwinVersion
+from scm.vehicles.car import Car
 
 SEEN_S = (120.0, 240.0)  # of driving, after which a candidate is compared
 PROBATION_S = (150.0, 300.0)  # likewise, after it was adopted
@@ -129,3 +130,31 @@ def in_words(compared: Compared) -> str:
 
 def _name(error: str) -> str:
     return ERRORS[error][0] if error in ERRORS else error.rpartition("_")[0].replace("_", " ")
+
+
+def differences(before: Car, now: Car) -> list[str]:
+    """Return how a car file differs from another, a line an effect or number.
+
+    Numbers that moved by less than their standard deviation are counted, not listed.
+    """
+    lines, little = list[str](), 0
+    names = [{one.name for one in car.terms} | {one.kind.name for one in car.measures}
+             for car in (before, now)]  # fmt: skip
+    lines += [f"with {name}" for name in sorted(names[1] - names[0])]
+    lines += [f"without {name}" for name in sorted(names[0] - names[1])]
+    for key in sorted(now.values):
+        new, old = now.values[key], before.values.get(key)
+        if not isinstance(new.value, float) or (old is not None and old.value == new.value):
+            continue
+        unit = "" if new.unit == "1" else f" {new.unit}"
+        if old is None:
+            lines.append(f"{key} {new.value:.4g}{unit}")
+        elif not isinstance(old.value, float):
+            continue
+        elif old.std is not None and abs(new.value - old.value) < old.std:
+            little += 1
+        else:
+            lines.append(f"{key} {old.value:.4g} to {new.value:.4g}{unit}")
+    if little:
+        lines.append(f"{little} numbers moved by less than their standard deviation")
+    return lines

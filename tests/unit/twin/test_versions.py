@@ -1,0 +1,116 @@
+"""Versions of a car's file: which is in force, and why."""
+
+from dataclasses import replace
+
+import pytest
+
+from scm.twin.investigation import Compared, compare
+from scm.twin.versions import BY_TWIN, CarVersions, differences, is_worse, verdict
+from scm.v2x.messages.twin_status import TwinError
+from scm.vehicles.car import load_car
+from tests.unit.mismatch.made_drive import made_drive, nigel
+
+TRIM = -0.05
+
+
+def compared(*, better=(), worse=()):
+    errors = (TwinError(name="position_m", before=0.03, now=0.004),)
+    return Compared(100, errors, tuple(better), tuple(worse))
+
+
+def states(versions):
+    return [one.state for one in versions.newest]
+
+
+def test_file_that_the_car_came_with_is_version_0_in_force():
+    versions = CarVersions("nigel")
+    assert (versions.in_force.number, versions.in_force.file) == (0, "nigel")
+    assert versions.candidate is None
+
+
+def test_candidate_is_adopted_with_errors_and_reason_and_can_be_taken_back():
+    versions = CarVersions("nigel")
+    made = versions.propose("1.toml", ["steer_trim"], "report", 5)
+    assert (made.number, made.after, versions.candidate) == (1, 0, made)
+    changed = versions.put_in_force(1, BY_TWIN, "better", compared(better=["position_m"]))
+    assert [(one.number, one.state) for one in changed] == [(0, "replaced"), (1, "adopted")]
+    assert versions.in_force.windows == 100
+    assert versions.in_force.errors == compared().errors
+    versions.put_in_force(0, "anna", "I know better")
+    assert states(versions) == ["adopted", "rolled_back"]
+    assert (versions[1].by, versions[1].reason) == ("anna", "I know better")
+    versions.put_in_force(1, "anna", "no")
+    assert states(versions) == ["replaced", "adopted"]
+
+
+def test_rejected_candidate_stays_in_the_list_and_the_next_has_a_new_number():
+    versions = CarVersions("nigel")
+    versions.propose("1.toml", [], "", 5)
+    assert versions.reject("no better").state == "rejected"
+    assert versions.reject("again") is None
+    assert versions.propose("2.toml", [], "", 6).number == 2
+    assert versions.in_force.number == 0
+
+
+def test_stored_versions_come_back_but_not_those_of_another_file():
+    stored = CarVersions("nigel")
+    stored.propose("1.toml", [], "", 5)
+    stored.put_in_force(1, BY_TWIN, "better")
+    assert CarVersions("nigel", stored.newest).in_force.number == 1
+    assert CarVersions("f1tenth", stored.newest).in_force.file == "f1tenth"
+
+
+@pytest.mark.parametrize(
+    ("better", "worse", "is_last", "action"),
+    [
+        (["position_m"], [], False, "adopt"),
+        ([], [], False, "wait"),
+        ([], [], True, "reject"),
+        (["position_m"], ["gyro_rad"], False, "wait"),
+        (["position_m"], ["gyro_rad"], True, "reject"),
+    ],
+)
+def test_nothing_is_adopted_that_is_no_better_or_worse_in_anything(better, worse, is_last, action):
+    found, reason = verdict(compared(better=better, worse=worse), is_last=is_last)
+    assert found == action
+    assert "position 30 to 4 mm after 3 s, 100 windows" in reason
+
+
+def test_only_a_worse_pose_rolls_back():
+    assert is_worse(compared(worse=["yaw_rad"]))
+    assert not is_worse(compared(worse=["gyro_rad"]))
+
+
+@pytest.fixture(scope="module")
+def trimmed(tmp_path_factory):
+    """The file of a Nigel with trimmed steering."""
+    text = nigel().path.read_text("utf-8")
+    text = text.replace("terms = [", 'terms = [\n    "steer_trim",', 1)
+    path = tmp_path_factory.mktemp("cars") / "trimmed.toml"
+    head, section, rest = text.partition("[steering]")
+    path.write_text(f"{head}{section}\ntrim_rad = {{ value = {TRIM} }}{rest}", "utf-8")
+    return path
+
+
+def test_car_file_that_is_right_is_better_on_new_driving_and_the_wrong_one_worse(trimmed):
+    drive = made_drive([("steering.trim_rad", TRIM)], seconds=40.0)
+    right, wrong = (
+        compare(drive, *files) for files in (("nigel", str(trimmed)), (str(trimmed), "nigel"))
+    )
+    assert {"position_m", "yaw_rad"} <= set(right.better)
+    assert right.worse == ()
+    assert {"position_m", "yaw_rad"} <= set(wrong.worse)
+    assert right.windows > 20
+
+
+def test_difference_of_two_files_names_effects_and_numbers(trimmed):
+    now = load_car(trimmed)
+    lines = differences(nigel(), now)
+    assert lines == ["with steer_trim", f"steering.trim_rad {TRIM:g} rad"]
+    mass = now.quantity("body.mass_kg")
+    assert mass.std is not None
+    for times, line in ((0.5, "1 numbers moved by less"), (2.0, "body.mass_kg 2.4 to ")):
+        moved = mass.value + times * mass.std
+        heavier = type(mass)(moved, mass.std, mass.unit, "test")
+        other = replace(now, values={**now.values, "body.mass_kg": heavier})
+        assert any(one.startswith(line) for one in differences(now, other))
