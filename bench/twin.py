@@ -1,10 +1,12 @@
 """How soon a change of a car is noticed, which, and since when; what watching costs.
 
-    python -m bench twin [EFFECT ...] [--seed 1] [--strength 2] [--since-s 300]
+    python -m bench twin [EFFECT ...] [--seed 1] [--strength 2] [--since-s 300] [--search]
 
 Cars of `tests/reality`, whose ordinary numbers are not the file's, drive for ten minutes; each
 effect sets in at once, in multiples of the smallest size that 90 s can show. `nothing` is a car
-that does not change. What is named first is what shows the change most, not a diagnosis.
+that does not change. What is named first is what shows the change most, not a diagnosis; with
+`--search` each change is searched for as `scm up --twin` does, and the car file found compared with
+the given one on the driving after that.
 """
 
 import argparse
@@ -14,9 +16,15 @@ from pathlib import Path
 
 import numpy as np
 
+from scm.errors import RecordingError
 from scm.recorder.drives import recordings_of_one
 from scm.recording.read import Recording
-from scm.twin.detector import threshold_of
+from scm.recording.span import part_of
+from scm.twin.car import SEARCHED_AFTER_S, SEARCHED_BEFORE_S
+from scm.twin.detector import Change, threshold_of
+from scm.twin.investigation import compare, explain
+from scm.twin.part import BUDGET_S
+from scm.twin.versions import verdict
 from scm.twin.watch import CarWatch, watch
 from scm.twin.windows import WatchedCar
 from scm.vehicles.car import load_car
@@ -45,6 +53,32 @@ def drive(name: str, strength: float, seed: int, since_s: float, folder: Path) -
     return recording
 
 
+def search(recording: Recording, change: Change, folder: Path) -> str:
+    """Return what a search finds, and whether its car file would be adopted."""
+    begin_s = recording.begin_s or 0.0
+    since_s, low_s, high_s = (t_s - begin_s for t_s in change.onset_s)
+    until_s = max(since_s + SEARCHED_AFTER_S, change.noticed_s - begin_s)
+    began_s = time.process_time()
+    found = explain(
+        part_of(recording, since_s - SEARCHED_BEFORE_S, until_s), CAR, folder / "report",
+        folder / "1.toml", (begin_s + low_s, begin_s + high_s), BUDGET_S,
+    )  # fmt: skip
+    spent_s = time.process_time() - began_s
+    names = " + ".join(one.name for one in found.effects) or "nothing"
+    dated = (
+        "" if found.since_s is None else f", onset {found.since_s[0] - begin_s - since_s:+.1f} s"
+    )
+    line = f"{names}{dated}, {spent_s:.0f} s of processor time"
+    if found.car_file is None:
+        return f"{line}; {found.text}"
+    try:
+        later = compare(part_of(recording, until_s, None), CAR, str(found.car_file))
+    except RecordingError as error:
+        return f"{line}; {error}"
+    action, reason = verdict(later, is_last=True)
+    return f"{line}; {action}: {reason}"
+
+
 def main() -> None:
     """Print a row an effect, and what they are together."""
     parser = argparse.ArgumentParser(prog="python -m bench twin", description=__doc__)
@@ -54,6 +88,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--strength", type=float, default=2.0)
     parser.add_argument("--since-s", type=float, default=300.0)
+    parser.add_argument("--search", action="store_true", help="for what each change is")
     given = parser.parse_args()
     predictor, threshold = WatchedCar(load_car(CAR)), threshold_of(FALSE_ALARM_H)
     after_s, driven_s, spent_s, dated, named = list[float](), 0.0, 0.0, 0, 0
@@ -77,6 +112,9 @@ def main() -> None:
             f"{', and later again' if len(changes) > 1 else ''}",
             flush=True,
         )
+        if given.search:
+            with tempfile.TemporaryDirectory() as folder:
+                print(" " * 20 + search(recording, first.change, Path(folder)), flush=True)
     changed = sum(name != "nothing" for name in given.effects)
     print(f"\nnoticed {len(after_s)} of {changed}, {named} by name; onset in its interval {dated}")
     if after_s:

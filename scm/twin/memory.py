@@ -111,7 +111,7 @@ def write(recording: Recording, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         for table, names in zip(tables, by_times.values(), strict=True):
             t = recording.channels[names[0]].t
-            columns = {name: recording.channels[name].values for name in names}
+            columns: dict[str, Any] = {name: recording.channels[name].values for name in names}
             np.savez_compressed(folder / table["file"], t=t, **columns)
         path.write_bytes(msgspec.yaml.encode({**of_car, "tables": tables}))
     except OSError as error:

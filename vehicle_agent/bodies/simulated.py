@@ -5,11 +5,13 @@ time never jumps: after a stall of the process it moves by at most 0.1 s.
 """
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from scm.arrays import Floats
-from scm.clock import NS_PER_MS, seconds
+from scm.clock import NS_PER_MS, nanoseconds, seconds
 from scm.geometry import Pose2
 from scm.records.city_map import CityMap
 from scm.v2x.messages.contact import Contact
@@ -18,6 +20,7 @@ from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.bank import Bank
 from scm.vehicles.battery_pack import Packs
 from scm.vehicles.car import Car, load_car
+from scm.vehicles.describe_effects import neutral_of, params_of
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
@@ -31,13 +34,40 @@ TICK_S = 0.02  # of the agent, in which a contact is measured
 SENSORS = "scm.vehicles.sensors"
 
 
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change of a car that it does not report, to try `scm twin` with.
+
+    Attributes:
+        car_file: Of the car as it is afterwards, by name or path.
+        after_s: Of the body's time.
+    """
+
+    car_file: str
+    after_s: float
+
+
 class SimulatedBody:
-    """One car in a kernel of its own."""
+    """One car in a kernel of its own.
+
+    Args:
+        car: Its file, by name or path.
+        seed: Of the sensors' noise.
+        change: After which it is another car; None: it stays as its file says.
+
+    Raises:
+        CarError: when a file is wrong.
+    """
 
     wants_eye = False
 
-    def __init__(self, car: str, seed: int) -> None:
-        self._car = load_car(car)
+    def __init__(self, car: str, seed: int, change: Change | None = None) -> None:
+        self._car, self._left_ns = load_car(car), 0
+        self._then: Mapping[str, float] = {}
+        if change is not None:
+            then = load_car(change.car_file)
+            self._car, self._then = both(self._car, then)
+            self._left_ns = nanoseconds(change.after_s)
         self._build(self._car, Pose2(0.0, 0.0, 0.0))
         self._now_ns: int | None = None
         self.limits = limits_of(self._fleet.car)
@@ -92,6 +122,11 @@ class SimulatedBody:
             self._fleet.advance(seconds(step_ns))
             self._packs.drain(self._rows, seconds(step_ns))
             self._now_ns += step_ns
+            self._left_ns -= step_ns
+        if self._then and self._left_ns <= 0:
+            for key, value in self._then.items():
+                self._fleet.set_parameter(self._row, key, value)
+            self._then = {}
 
     def command(self, throttle: float, steering: float) -> None:
         """Set the kernel's commands."""
@@ -163,6 +198,26 @@ class SimulatedBody:
 
     def close(self) -> None:
         """Do nothing: it holds no resources."""
+
+
+def both(car: Car, then: Car) -> tuple[Car, dict[str, float]]:
+    """Return a car that can become another: with its effects too, at rest, and its numbers."""
+    have = {term.name for term in car.terms}
+    new = [term for term in then.terms if term.name not in have]
+    rest = {
+        param.key: neutral_of(term)[param.name]
+        for term in new
+        for param in params_of(term)
+        if param.name in neutral_of(term)
+    }
+    able = car.with_terms(new, rest)
+    numbers = {
+        param.key: then.value(param.key)
+        for term in then.terms
+        for param in params_of(term)
+        if then.value(param.key) != able.value(param.key)
+    }
+    return able, numbers
 
 
 def _open(car: str, seed: int, wiring: Wiring) -> Body:

@@ -2,9 +2,14 @@
 
 import argparse
 import gc
+import math
 import threading
+from typing import TYPE_CHECKING
 
 from scm.command import Command, credentials_argument, credentials_of, spawn_argument
+
+if TYPE_CHECKING:
+    from vehicle_agent.body import BodyKind
 
 TAG_KEY = "ips.tag_id"
 
@@ -21,7 +26,31 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="glued onto its roof; default: as its --calibration says, else as the city gives it",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="of the sensors' noise (%(default)s)")
+    parser.add_argument(
+        "--becomes", metavar="FILE", help="car file that is true of it later, unreported: for "
+        "trying scm twin",
+    )  # fmt: skip
+    parser.add_argument(
+        "--after-s", type=float, default=0.0, metavar="S", help="when it becomes so (%(default)g)"
+    )
     _real_arguments(parser)
+
+
+def _body_of(arguments: argparse.Namespace) -> "str | BodyKind":
+    """Return what moves the car."""
+    from scm.errors import RunError
+    from vehicle_agent.body import BodyKind
+
+    if arguments.becomes is None:
+        return "nigel" if arguments.serial else "simulated"
+    if arguments.serial:
+        raise RunError("--becomes: a car that is simulated changes so, no real one (--serial)")
+    if not 0.0 <= arguments.after_s < math.inf:
+        raise RunError(f"--after-s: expected 0 or more, got {arguments.after_s:g}")
+    from vehicle_agent.bodies.simulated import Change, SimulatedBody
+
+    change = Change(arguments.becomes, arguments.after_s)
+    return BodyKind("remote", lambda car, seed, _: SimulatedBody(car, seed, change))
 
 
 def _real_arguments(parser: argparse.ArgumentParser) -> None:
@@ -79,6 +108,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
     check_name(arguments.name, "--name")
     check_name(arguments.city, "--city")
+    body = _body_of(arguments)
     credentials = credentials_of(arguments, arguments.name)
     stop_requested, done, clock = stop_on_signal(), threading.Event(), WallClock()
     with ZenohBus(
@@ -90,7 +120,7 @@ def _run(arguments: argparse.Namespace) -> int:
             arguments.spawn,
             bus.session,
             arguments.seed,
-            "nigel" if arguments.serial else "simulated",
+            body,
             Wiring(
                 port=arguments.serial,
                 baud=arguments.baud,
