@@ -44,7 +44,7 @@ class Augmentation:
     heading_std_rad: float = 0.08
     way_m: float = 0.5
     mirrored: float = 0.5
-    light: tuple[float, float] = (0.5, 1.5)
+    light: tuple[float, float] = (0.35, 1.8)
     tint: float = 0.05
     shadow: float = 0.3
 
