@@ -18,10 +18,17 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.twin_status import TwinEffect, TwinError, TwinParameter, TwinStatus
 from scm.v2x.messages.version_request import VersionRequest
 from tests.unit.mismatch.made_drive import made_drive, nigel
-from tests.unit.twin.test_twin_part import BEGAN_NS, reports
-from tests.unit.twin.test_watch import BIAS
+from tests.unit.twin.reported import (
+    BEGAN_NS,
+    BIAS,
+    LEARNED,
+    SINCE_S,
+    WELL_LEARNED,
+    biased,
+    changed_drive,
+    reports,
+)
 
-SINCE_S, LASTS_S = 70.0, 140.0
 TEXT = "The gyro reads 0.02 rad/s too much."
 NUMBER = TwinParameter(name="bias_rad_s", value=0.02, low=0.019, high=0.021)
 EFFECT = TwinEffect(name="gyro_bias", probability=0.99, parameters=(NUMBER,), text=TEXT)
@@ -49,21 +56,17 @@ class Prepared(Executor):
 @pytest.fixture(autouse=True)
 def soon(monkeypatch):
     """Learn, search and compare after little driving: a drive of two minutes has to do."""
-    monkeypatch.setattr(detector, "LEARN", 80)
-    monkeypatch.setattr(detector, "LEARN_WELL", 120)
+    monkeypatch.setattr(detector, "LEARN", LEARNED)
+    monkeypatch.setattr(detector, "LEARN_WELL", WELL_LEARNED)
     monkeypatch.setattr(twin_car, "SEARCHED_AFTER_S", 15.0)
     monkeypatch.setattr(twin_car, "LEAST_AFTER_S", 5.0)
     monkeypatch.setattr(twin_car, "SEEN_S", (8.0, 8.0))
     monkeypatch.setattr(twin_car, "PROBATION_S", (4.0, 8.0))
 
 
-def biased(since_s):
-    return lambda name, t, values: values + BIAS * (t >= since_s) * (name == "imu.gyro_z")
-
-
 @pytest.fixture(scope="module")
 def changed():
-    return reports(made_drive(seconds=LASTS_S, sense=biased(SINCE_S)), lasts_s=LASTS_S)
+    return reports(changed_drive())
 
 
 class City:

@@ -2,61 +2,35 @@
 
 from itertools import pairwise
 
-import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from scm.clock import NS_PER_MS, NS_PER_S, nanoseconds
-from scm.geometry import wrap_angle
+from scm.clock import NS_PER_MS, NS_PER_S
+from scm.twin import detector
 from scm.twin.part import GONE_NS, TwinPart
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.twin_status import TwinStatus
-from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
-from tests.unit.mismatch.made_drive import made_drive
-from tests.unit.twin.test_watch import BIAS, LASTS_S, SINCE_S, biased
+from tests.unit.twin.reported import (
+    BEGAN_NS,
+    BIAS,
+    LASTS_S,
+    LEARNED,
+    SINCE_S,
+    WELL_LEARNED,
+    changed_drive,
+    reports,
+)
 
-BEGAN_NS = 1_700_000_000 * NS_PER_S
-EVERY_S = 0.02
+HOUR_NS = 3600 * NS_PER_S
 
 
-def reports(recording, name="n1", lasts_s=LASTS_S):
-    """Return what the car of a recording would report, one list a step of 0.1 s."""
-    t = np.arange(0.1, lasts_s - 0.1, EVERY_S)
-
-    def at(channel):
-        one = recording.channels[channel]
-        values = np.unwrap(one.values) if channel == "pose.yaw" else one.values
-        return np.interp(t, one.t, values).tolist()
-
-    x, y, yaw, gyro, left, right, ax, ay = map(at, (
-        "pose.x", "pose.y", "pose.yaw", "imu.gyro_z", "encoder.left", "encoder.right",
-        "imu.accel_x", "imu.accel_y",
-    ))  # fmt: skip
-    command = recording.channels["command.throttle"].t
-    row = np.searchsorted(command, t - 0.5 * EVERY_S, side="right") - 1
-    throttle, steering = (
-        recording.channels[f"command.{which}"].values[row].tolist()
-        for which in ("throttle", "steering")
-    )
-    steps = [[]]
-    for k, t_s in enumerate(t.tolist()):
-        t_ns = BEGAN_NS + nanoseconds(t_s)
-        state = VehicleState(
-            vehicle=name, t_ns=t_ns, seq=k, x_m=x[k], y_m=y[k], yaw_rad=wrap_angle(yaw[k]),
-            speed_mps=0.2, yaw_rate_radps=0.0, steering_rad=0.0, throttle=throttle[k],
-            steering=steering[k], source="simulated",
-        )  # fmt: skip
-        sensors = VehicleSensors(
-            vehicle=name, t_ns=t_ns, encoder_left=round(left[k]), encoder_right=round(right[k]),
-            accel_mps2=(ax[k], ay[k], 9.81), gyro_radps=(0.0, 0.0, gyro[k]),
-        )  # fmt: skip
-        steps[-1] += [state, sensors]
-        if k % 5 == 4:
-            steps.append([])
-    return steps
+@pytest.fixture(autouse=True)
+def soon(monkeypatch):
+    monkeypatch.setattr(detector, "LEARN", LEARNED)
+    monkeypatch.setattr(detector, "LEARN_WELL", WELL_LEARNED)
 
 
 def run(part, steps):
@@ -70,7 +44,7 @@ def run(part, steps):
 
 @pytest.fixture(scope="module")
 def changed():
-    return reports(made_drive(seconds=LASTS_S, sense=biased))
+    return reports(changed_drive())
 
 
 def test_change_is_an_event_and_stays_in_the_status(changed):
@@ -109,12 +83,11 @@ def test_car_that_cannot_be_predicted_is_blind_in_words(changed, lacks, words):
 
 
 def test_clock_that_jumps_is_no_change_and_nothing_piles_up(changed):
-    hour = 3600 * NS_PER_S
-    later = [[replace(one, t_ns=one.t_ns + hour) for one in step] for step in changed[1500:3000]]
+    later = [[replace(one, t_ns=one.t_ns + HOUR_NS) for one in step] for step in changed[300:650]]
     part = TwinPart()
-    out, _ = run(part, [*changed[:1500], *later, *changed[:300]])
+    out, _ = run(part, [*changed[:300], *later, *changed[:200]])
     assert not [one for one in out if isinstance(one, CityEvent)]
-    assert [one for one in out if isinstance(one, TwinStatus)][-1].driven_s > 280.0
+    assert [one for one in out if isinstance(one, TwinStatus)][-1].driven_s > 50.0
     assert len(part._cars["n1"]._messages.reports) < 800
-    part.step(BEGAN_NS + 10 * hour + GONE_NS, [])
+    part.step(BEGAN_NS + 10 * HOUR_NS + GONE_NS, [])
     assert part._cars == {}
