@@ -62,8 +62,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--without",
-        type=lambda text: tuple(filter(None, text.split(","))),
-        default=(),
+        action="extend",
+        type=lambda text: list(filter(None, text.split(","))),
+        default=[],
         metavar="PARTS",
         help="leave out parts, separated by commas, if the computer is too slow: "
         "eye, camera, record, observer, misbehaviour; see docs/performance.md",
@@ -80,7 +81,8 @@ def options_of(arguments: argparse.Namespace) -> "CityOptions":
 
     settings = {**vars(arguments), "map_name": arguments.map}
     settings |= {
-        name: tuple(settings[name]) for name in ("radio", "cameras_of", "trust_proxy", "origin")
+        name: tuple(settings[name])
+        for name in ("radio", "cameras_of", "trust_proxy", "origin", "without")
     }
     return CityOptions(**{field.name: settings[field.name] for field in fields(CityOptions)})
 

@@ -92,7 +92,7 @@ def test_the_recorder_is_told_of_which_cars_it_keeps_pictures(tmp_path):
 
 def test_parts_may_be_left_out_and_the_server_knows_which_should_be_there(tmp_path):
     words = ["up", "--port", "0", "--listen", "tcp/127.0.0.1:0", "--record-dir", str(tmp_path)]
-    jobs = _parts(_plan_of(options_of(parse([*words, "--without", "eye,record"]))))
+    jobs = _parts(_plan_of(options_of(parse([*words, "--without", "eye", "--without", "record"]))))
     there = ["traffic", "monitor", "world", "camera", "observer", "misbehaviour"]
     assert [job.name for job in jobs] == [*there, "api"]
     assert parse(jobs[-1].command()[3:]).expects == there
