@@ -66,6 +66,12 @@ def _calibration(request: Facts) -> str:
     return f"put calibration {named} in force at {camera}" if named else f"calibrate {camera}"
 
 
+def _version(request: Facts) -> str:
+    number = request["version"]
+    named = f"version {number} of its file" if number else "the file that it came with"
+    return f"predict {request['vehicle']} by {named}"
+
+
 def _bay(request: Facts) -> str:
     return f"give {request['vehicle']} {request.get('bay') or 'any bay'}"
 
@@ -87,6 +93,7 @@ _REQUESTS: dict[str, Callable[[Facts], str]] = {
     "StopRequest": lambda request: (
         "stop the city" if request["engaged"] else "release the city stop"
     ),
+    "VersionRequest": _version,
 }
 
 

@@ -6,6 +6,7 @@ a person resets it, so that none is missed between two readings.
 
 from collections import Counter as Tally
 from collections.abc import Iterable, Iterator
+from typing import get_args
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
@@ -17,9 +18,11 @@ from scm.api.city import City
 from scm.api.picture import Picture
 from scm.api.stream import Stream
 from scm.clock import Clock, seconds
+from scm.records.twins import State
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 BUCKETS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 1.0, 2.5)
+TWIN_STATES: tuple[str, ...] = get_args(State)
 METHODS = frozenset({"GET", "HEAD", "OPTIONS", "POST", "PUT", "PATCH", "DELETE"})
 _ENDLESS = "text/event-stream", "multipart/x-mixed-replace", "application/octet-stream"
 
@@ -116,6 +119,7 @@ class _OfCity(Collector):
         yield from self._of_world(picture)
         yield from _of_parts(picture)
         yield from self._of_monitors(picture)
+        yield from _of_twins(picture)
         bus = self._city.link
         yield _gauge("scm_router_up", "Whether the bus can be reached.", float(bus.is_connected()))
         yield _counter(
@@ -196,6 +200,25 @@ def _of_parts(picture: Picture) -> Iterator[Metric]:
         dropped.add_metric((row.name,), row.dropped)
     yield late
     yield dropped
+
+
+def _of_twins(picture: Picture) -> Iterator[Metric]:
+    statuses = {name: held.message for name, held in picture.twins.items()}
+    state = {
+        (name, one): float(status.state == one)
+        for name, status in statuses.items()
+        for one in TWIN_STATES
+    }
+    yield _by("scm_twin_state", "1: the state of its twin.", ("vehicle", "state"), state)
+    driven_s = {(name,): status.driven_s for name, status in statuses.items()}
+    what = "How long a car was driven and watched since the twin part began."
+    yield _by("scm_twin_driven_seconds", what, ("vehicle",), driven_s)
+    changes = {(name,): float(len(status.changes)) for name, status in statuses.items()}
+    what = "Changes of a car; of more than 20 the newest 20 are counted."
+    yield _by("scm_twin_changes", what, ("vehicle",), changes)
+    version = {(name,): float(status.version) for name, status in statuses.items()}
+    what = "Version of its car file in force; 0: the file that it came with."
+    yield _by("scm_twin_version", what, ("vehicle",), version)
 
 
 def _gauge(name: str, about: str, value: float) -> Metric:

@@ -25,6 +25,7 @@ from scm.v2x.messages.signal_status import SignalStatus
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.violation import Violation
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
@@ -68,7 +69,7 @@ class Picture:
 
     Attributes:
         spats, monitors, sites, signal_statuses: By junction.
-        trips, autonomy, autonomy_plans, room_maps: By vehicle.
+        trips, autonomy, autonomy_plans, room_maps, twins: By vehicle.
         map_origins: By vehicle, where the frame of its `room_maps` lies in the city.
         traffic: The observer's newest counts; `violations` the last it reported, oldest first.
         frames, tags: By camera, the last few, oldest first; `eye_statuses` the newest.
@@ -92,6 +93,7 @@ class Picture:
     autonomy_plans: dict[str, Held[AutonomyPlan]] = field(default_factory=dict)
     room_maps: dict[str, Held[OccupancyMap]] = field(default_factory=dict)
     map_origins: dict[str, Pose2] = field(default_factory=dict)
+    twins: dict[str, Held[TwinStatus]] = field(default_factory=dict)
     traffic: Held[TrafficCounts] | None = None
     violations: tuple[Violation, ...] = ()
     frames: dict[str, tuple[Held[EyeFrame], ...]] = field(default_factory=dict)

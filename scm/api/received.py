@@ -27,6 +27,7 @@ from scm.v2x.messages.signal_status import SignalStatus
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.violation import Violation
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
@@ -157,6 +158,22 @@ class ReceivedAutonomy:
             del self.statuses[name]
         for name in [n for n, held in self.plans.items() if held.arrived_ns < oldest_ns]:
             del self.plans[name]
+
+
+class ReceivedTwins:
+    """The newest status of each car that the twin part watches."""
+
+    def __init__(self) -> None:
+        self.statuses: dict[str, Held[TwinStatus]] = {}
+
+    def receive(self, status: TwinStatus, t_ns: int) -> None:
+        """Store what is known of a car."""
+        self.statuses[status.vehicle] = Held(status, t_ns)
+
+    def forget(self, oldest_ns: int) -> None:
+        """Drop what arrived before a time."""
+        for name in [n for n, held in self.statuses.items() if held.arrived_ns < oldest_ns]:
+            del self.statuses[name]
 
 
 class ReceivedEye:

@@ -18,6 +18,7 @@ from scm.api.routes.autonomy import autonomy_of
 from scm.api.routes.boxes import boxes_of
 from scm.api.routes.stop import stop_of
 from scm.api.signal_rows import junction_rows, status_rows
+from scm.api.twin_rows import twin_rows
 from scm.api.vehicle_rows import vehicles_topic
 from scm.records.disturbances import Disturbance
 
@@ -93,6 +94,7 @@ def topics_of(city: City, seen: Acknowledgements) -> dict[str, Topic]:
         "autonomy": Topic(autonomy_of, 4),
         "room_maps": Topic(room_maps_of, 4),
         "boxes": Topic(boxes_of, 2),
+        "twins": Topic(twin_rows, 10),
         "acknowledgements": Topic(lambda _: seen.newest(ACKNOWLEDGED_SHOWN), 4),
         "eye": Topic(lambda picture: camera_rows(picture, floor), 2),
         "stations": Topic(lambda picture: picture.stations, 10),

@@ -21,6 +21,7 @@ from scm.api.received import (
     ReceivedEye,
     ReceivedSignals,
     ReceivedTraffic,
+    ReceivedTwins,
     ReceivedWorld,
 )
 from scm.api.room_maps import ReceivedMaps
@@ -60,12 +61,14 @@ from scm.v2x.messages.signal_status import SignalStatus
 from scm.v2x.messages.spat import Spat
 from scm.v2x.messages.traffic_counts import TrafficCounts
 from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.violation import Violation
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import WorldSnapshot
 
 FORGET_NS = 60 * NS_PER_S
+FORGET_TWINS_NS = 600 * NS_PER_S  # as the twin part does
 
 
 class CityView(BasePart):
@@ -84,6 +87,7 @@ class CityView(BasePart):
         self._traffic = ReceivedTraffic()
         self._autonomy = ReceivedAutonomy()
         self._room_maps = ReceivedMaps()
+        self._twins = ReceivedTwins()
         self._eye_accuracy = EyeAccuracyPart()
         self._eye = ReceivedEye(self._eye_accuracy)
         self._cameras = CameraWatch()
@@ -115,6 +119,7 @@ class CityView(BasePart):
             AutonomyStatus: self._autonomy.receive_status,
             AutonomyPlan: self._autonomy.receive_plan,
             OccupancyMap: self._room_maps.receive,
+            TwinStatus: self._twins.receive,
             Spat: self._signals.receive_spat,
             SignalSite: self._signals.receive_site,
             SignalStatus: self._signals.receive_status,
@@ -178,6 +183,7 @@ class CityView(BasePart):
             autonomy_plans=dict(self._autonomy.plans),
             room_maps=dict(self._room_maps.newest),
             map_origins=dict(self._room_maps.origins),
+            twins=dict(self._twins.statuses),
             traffic=self._traffic.counts,
             violations=tuple(self._traffic.violations),
             frames={camera: tuple(frames) for camera, frames in self._eye.frames.items()},
@@ -362,5 +368,6 @@ class CityView(BasePart):
         self._world.forget(now_ns - FORGET_NS)
         self._autonomy.forget(now_ns - FORGET_NS)
         self._room_maps.forget(now_ns - FORGET_NS)
+        self._twins.forget(now_ns - FORGET_TWINS_NS)
         self._eye.forget(now_ns - FORGET_NS)
         self._eye_accuracy.forget()

@@ -34,6 +34,7 @@ from scm.client.nouns.stop import StopNoun
 from scm.client.nouns.stream import StreamNoun
 from scm.client.nouns.studies import StudiesNoun
 from scm.client.nouns.traffic import TrafficNoun
+from scm.client.nouns.twins import TwinsNoun
 from scm.client.nouns.vehicles import VehiclesNoun
 from scm.client.teleop import Wheel, acquired
 from scm.client.work import finished
@@ -76,6 +77,7 @@ class Client:
         self.stream = StreamNoun(self.connection)
         self.studies = StudiesNoun(self.connection)
         self.traffic = TrafficNoun(self.connection)
+        self.twins = TwinsNoun(self.connection)
         self.vehicles = VehiclesNoun(self.connection)
 
     def wheel(self, vehicle: str, reason: str = "") -> AbstractContextManager[Wheel]:

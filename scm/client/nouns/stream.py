@@ -18,7 +18,7 @@ class StreamNoun(Noun):
 
         Args:
             topics: comma-separated: pulse, stop, vehicles, signals, signal_status, autonomy,
-                room_maps, boxes, acknowledgements, eye, stations, events; none: all
+                room_maps, boxes, twins, acknowledgements, eye, stations, events; none: all
         """
 
     @operation("GET", "/api/v1/vehicles.bin")

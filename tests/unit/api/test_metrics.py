@@ -20,6 +20,7 @@ from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.presence import Presence
+from tests.unit.api.made_twins import blind, watched
 
 
 @pytest.fixture
@@ -134,3 +135,14 @@ def test_with_keys_metrics_need_one(view, fake_city, city_map, client_of, tmp_pa
     assert ask("GET", "/metrics").status_code == 401
     headers = {"Authorization": f"Bearer {key}"}
     assert ask("GET", "/metrics", headers=headers).status_code == 200
+
+
+def test_of_watched_cars_state_driving_changes_and_version_are_counted(read, hear):
+    hear(1.0, watched(), blind())
+    numbers = read()
+    states = [numbers["scm_twin_state", one, "n1"] for one in ("learning", "watching", "blind")]
+    assert states == [0.0, 1.0, 0.0]
+    assert numbers["scm_twin_state", "blind", "n3"] == 1.0
+    assert numbers["scm_twin_driven_seconds", "n1"] == pytest.approx(1104.26)
+    assert (numbers["scm_twin_changes", "n1"], numbers["scm_twin_changes", "n3"]) == (2.0, 0.0)
+    assert (numbers["scm_twin_version", "n1"], numbers["scm_twin_version", "n3"]) == (1.0, 0.0)

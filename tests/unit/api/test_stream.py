@@ -33,7 +33,7 @@ def test_a_page_first_gets_everything(stream, hear, snapshot, event):
         assert name == "snapshot"
         assert set(body) == {
             "acknowledgements", "signal_status", "vehicles", "pulse", "signals", "boxes", "stop",
-            "eye", "stations", "events", "run", "autonomy", "room_maps",
+            "eye", "stations", "events", "run", "autonomy", "room_maps", "twins",
         }  # fmt: skip
         assert body["vehicles"]["vehicles"][0]["vehicle"] == "n1"
         assert [item["text"] for item in body["events"]] == ["hello"]

@@ -1,0 +1,209 @@
+"""Twins: since when a car has changed, what it is, and the versions of its car file.
+
+The records that a status holds are those of `scm.v2x.messages.twin_status`, with words on each
+field; a test compares them.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from scm.records.body import Body, By, Reason
+from scm.records.fields import CarName, ReasonText, RequestedBy, TNs, VehicleName
+
+EffectName = Annotated[str, Meta(description="Name of an effect.", examples=["steer_trim"])]
+EffectNames = Annotated[
+    tuple[str, ...], Meta(description="Names of effects.", examples=[["steer_trim", "gyro_bias"]])
+]
+ReportName = Annotated[
+    str,
+    Meta(description="Name of the mismatch report; empty: none.", examples=["twin-n3-1200"]),
+]
+Search = Literal["driving", "waiting", "searching", "named", "undecided", "unexplained", "failed"]
+State = Literal["learning", "watching", "blind"]
+WatchedS = Annotated[
+    float, Meta(description="How long it was driven and watched [s].", examples=[812.0])
+]
+VersionNumber = Annotated[
+    int, Meta(description="Number of a version; 0: the file that it came with.", examples=[1])
+]
+
+
+class TwinParameter(msgspec.Struct, kw_only=True, frozen=True):
+    """A parameter of an effect with its 90 % interval, in the unit in which its name ends.
+
+    Attributes:
+        name: As reports call it.
+        value: Since the change.
+        low: Lower end of the 90 % interval.
+        high: Upper end of the 90 % interval.
+        before: Before the change; null: the effect was not there.
+    """
+
+    name: Annotated[str, Meta(examples=["offset_rad"])]
+    value: Annotated[float, Meta(examples=[-0.031])]
+    low: Annotated[float, Meta(examples=[-0.033])]
+    high: Annotated[float, Meta(examples=[-0.029])]
+    before: Annotated[float, Meta(examples=[0.0])] | None = None
+
+
+class TwinEffect(msgspec.Struct, kw_only=True, frozen=True):
+    """An effect that explains a change.
+
+    Attributes:
+        probability: Among all that were tried.
+        parameters: As it is since the change.
+        text: What a mechanic would say.
+    """
+
+    name: EffectName
+    probability: Annotated[float, Meta(examples=[0.97])]
+    parameters: tuple[TwinParameter, ...]
+    text: Annotated[str, Meta(examples=["The front wheels point 1.8° to the right."])] = ""
+
+
+class TwinChange(msgspec.Struct, kw_only=True, frozen=True):
+    """A change of a car.
+
+    Attributes:
+        noticed_ns: When it was noticed, on the clock of the car's reports [ns].
+        since_ns: When it most likely began [ns].
+        since_low_ns: Not before that, with `since_high_ns` as a 90 % interval [ns].
+        since_high_ns: Upper end of that interval [ns].
+        effect: Known effect whose change looks most like it.
+        parameter: Of that effect: what would have changed.
+        size: By how much, in `unit`.
+        unit: Of `size`.
+        score: In standard deviations of what is usual.
+        alike: Further effects that look nearly as much like it, the best first.
+        search: How far the search for its cause is. `driving`: more driving is needed; `waiting`;
+            `searching`; `named`; `undecided`: `between` these; `unexplained`: by no known effect;
+            `failed`: why, says `text`.
+        effects: That explain it, the likeliest first.
+        between: Effects that this driving cannot distinguish.
+        drive_this: The drive that would.
+        text: The result in one or two sentences.
+    """
+
+    noticed_ns: TNs
+    since_ns: TNs
+    since_low_ns: TNs
+    since_high_ns: TNs
+    effect: EffectName
+    parameter: Annotated[str, Meta(examples=["offset_rad"])]
+    size: Annotated[float, Meta(examples=[-0.025])]
+    unit: Annotated[str, Meta(examples=["rad"])]
+    score: Annotated[float, Meta(examples=[30.0])]
+    alike: EffectNames = ()
+    search: Search = "driving"
+    effects: tuple[TwinEffect, ...] = ()
+    between: EffectNames = ()
+    drive_this: Annotated[str, Meta(examples=["Drive a circle to the left at full steering."])] = ""
+    text: Annotated[str, Meta(examples=["The front wheels point 1.8° to the right."])] = ""
+    report: ReportName = ""
+
+
+class TwinError(msgspec.Struct, kw_only=True, frozen=True):
+    """An error of predictions, a root mean square in the unit in which its name ends.
+
+    Attributes:
+        name: Of what.
+        before: Of the version that another was found from.
+        now: Of that other.
+    """
+
+    name: Annotated[str, Meta(examples=["position_m"])]
+    before: Annotated[float, Meta(examples=[0.041])]
+    now: Annotated[float, Meta(examples=[0.018])]
+
+
+class TwinVersion(msgspec.Struct, kw_only=True, frozen=True):
+    """A version of a car's file.
+
+    Attributes:
+        file: Name or path of the car file.
+        made_ns: When it was found [ns].
+        state: `candidate`: compared on new driving; `adopted`; `rejected`: not better there;
+            `rolled_back`: adopted first; `replaced`: a newer one is.
+        after: Number of the version that it was found from.
+        effects: That distinguish it, by name.
+        by: Who adopted it, rejected it or rolled it back last.
+        reason: Why.
+        windows: Of 3 s, on driving that no fit has seen.
+        errors: There, after 3 s.
+    """
+
+    number: VersionNumber
+    car: CarName
+    file: Annotated[str, Meta(examples=["runs/twins/n3/1.toml"])]
+    made_ns: TNs
+    state: Literal["candidate", "adopted", "rejected", "rolled_back", "replaced"]
+    after: VersionNumber = 0
+    effects: EffectNames = ()
+    by: RequestedBy = ""
+    reason: ReasonText = ""
+    report: ReportName = ""
+    windows: Annotated[int, Meta(examples=[38])] = 0
+    errors: tuple[TwinError, ...] = ()
+
+
+class Twin(msgspec.Struct, kw_only=True, frozen=True):
+    """All that the city knows of one car's changes.
+
+    Attributes:
+        t_ns: Until when its reports were looked at, on their clock [ns].
+        state: `learning` how the car usually strays; `watching`; `blind`: why, says `reason`.
+        reason: Why it cannot be watched; empty: it can.
+        changes: The newest last; at most 20.
+        version: Number of the version in force.
+        versions: All, by number; at most the newest 20.
+    """
+
+    vehicle: VehicleName
+    t_ns: TNs
+    car: CarName
+    state: State
+    driven_s: WatchedS
+    reason: ReasonText = ""
+    changes: tuple[TwinChange, ...] = ()
+    version: VersionNumber = 0
+    versions: tuple[TwinVersion, ...] = ()
+
+
+class TwinRow(msgspec.Struct, kw_only=True, frozen=True):
+    """One car in short.
+
+    Attributes:
+        t_ns: Until when its reports were looked at, on their clock [ns].
+        state: `learning` how the car usually strays; `watching`; `blind`: why, says `reason`.
+        reason: Why it cannot be watched; empty: it can.
+        version: Number of the version in force.
+        changes: How many were noticed; at most 20 are stored.
+        changed_ns: When the newest began, on the clock of `t_ns` [ns]; null: it has not changed.
+        search: How far the search for its cause is, as in the car's changes; null: likewise.
+        newest: What it is, in short; empty: likewise.
+    """
+
+    vehicle: VehicleName
+    car: CarName
+    t_ns: TNs
+    state: State
+    reason: ReasonText
+    driven_s: WatchedS
+    version: VersionNumber
+    changes: int
+    changed_ns: TNs | None
+    search: Search | None
+    newest: Annotated[str, Meta(examples=["steer trim, 97 %"])]
+
+
+class VersionBody(Body, kw_only=True, frozen=True):
+    """By which version of its file a car is predicted from now on."""
+
+    version: Annotated[
+        int,
+        Meta(ge=0, le=9999, description="its number; 0: the file that it came with", examples=[0]),
+    ]
+    by: By = ""
+    reason: Reason = ""
