@@ -7,7 +7,7 @@ import pytest
 from tests.e2e.pages.town import town
 from tests.e2e.pages.visiting import Visit, judge
 
-PAGES = ("map", "signals", "vehicles", "eye", "recordings", "mismatch", "events")
+PAGES = ("map", "signals", "vehicles", "twins", "eye", "recordings", "mismatch", "events")
 
 
 def release(running):

@@ -1,5 +1,7 @@
 """Statuses of watched cars: one that was searched and adopted, one undecided, one blind."""
 
+from msgspec.structs import replace
+
 from scm.clock import NS_PER_S
 from scm.v2x.messages.twin_status import (
     TwinChange,
@@ -42,7 +44,7 @@ def versions(now_ns=NOW_NS):
         TwinError(name="speed_mps", before=0.021, now=0.0205),
     )
     return (
-        ORIGINAL,
+        replace(ORIGINAL, state="replaced"),
         TwinVersion(
             number=1, car="nigel", file="runs/twins/n1/1.toml", made_ns=now_ns - 700 * NS_PER_S,
             state="adopted", effects=("steer_trim",), by="twin", windows=38, errors=errors,

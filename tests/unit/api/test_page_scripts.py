@@ -99,3 +99,31 @@ def test_a_car_has_one_colour_on_the_map_and_in_the_eyes_picture(run):
         light, _dark = run("shared/car_shape.js", "paintOf", kind, True)
         assert light == f"#{red:02x}{green:02x}{blue:02x}"
     assert run("shared/car_shape.js", "paintOf", "real", False)[0] == "#8a929c"
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "options", "expected"),
+    [
+        ("offset_rad", [-0.031, -0.0334, -0.0288, 0], {"width": 0.0046},
+         ["-1.78°", "-1.91°", "-1.65°", "0.00°"]),
+        ("position_m", [0.041, 0.0182], {}, ["4.10 cm", "1.82 cm"]),
+        ("bias_rad_s", [-0.0115, None], {}, ["-0.659°/s", "—"]),
+        ("gradient", [-1.6], {"unit": "rad*s^2/m"}, ["-1.60 rad·s²/m"]),
+        ("gain", [0.875, 0.86], {"width": 0.02, "unit": "1"}, ["0.875", "0.860"]),
+        ("torque_nm", [0.0], {}, ["0 N·m"]),
+        ("delay_s", [0.04, 1.2], {}, ["0.04 s", "1.20 s"]),
+    ],
+)  # fmt: skip
+def test_numbers_are_written_in_the_unit_in_which_their_name_ends(
+    run, name, values, options, expected
+):
+    found = run("shared/amounts.js", "amounts", name, values, options)
+    assert [text.replace("\N{MINUS SIGN}", "-") for text in found] == expected
+
+
+@pytest.mark.parametrize(
+    ("share", "expected"),
+    [(1.0, "over 99.9 %"), (0.0, "under 0.1 %"), (0.97, "97 %"), (0.99, "99.0 %")],
+)
+def test_no_probability_is_certain(run, share, expected):
+    assert run("shared/amounts.js", "percent", share) == expected

@@ -4,6 +4,7 @@ export const PAGES = [
   { name: "signals", title: "Signals", load: () => import("scm/pages/signals/page.js") },
   { name: "vehicles", title: "Vehicles", load: () => import("scm/pages/vehicle/page.js") },
   { name: "cars", title: "Car files", under: "vehicles", load: () => import("scm/pages/cars/page.js") },
+  { name: "twins", title: "Twins", load: () => import("scm/pages/twins/page.js") },
   { name: "eye", title: "Eye", load: () => import("scm/pages/eye/page.js") },
   { name: "recordings", title: "Recordings", load: () => import("scm/pages/recordings/page.js") },
   { name: "mismatch", title: "Mismatch", load: () => import("scm/pages/mismatch/page.js") },

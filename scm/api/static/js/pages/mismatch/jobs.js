@@ -1,7 +1,7 @@
 /** Searches and drives that run, wait or ended lately: each with its progress, and a way to end it. */
 import { html } from "scm/shared/html.js";
 import { change } from "scm/shell/api.js";
-import { useFetched } from "scm/pages/mismatch/fetched.js";
+import { useFetched } from "scm/shared/fetched.js";
 import { span } from "scm/shared/format.js";
 
 const KINDS = new Set(["mismatch", "drive"]);

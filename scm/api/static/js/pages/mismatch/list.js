@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { moment } from "scm/shared/format.js";
 import { html } from "scm/shared/html.js";
-import { useFetched } from "scm/pages/mismatch/fetched.js";
+import { useFetched } from "scm/shared/fetched.js";
 import { isActive, Jobs, useJobs } from "scm/pages/mismatch/jobs.js";
 import { StartForm } from "scm/pages/mismatch/start_form.js";
 import { length, verdictOf } from "scm/pages/mismatch/words.js";

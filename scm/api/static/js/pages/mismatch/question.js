@@ -7,7 +7,7 @@ import { change } from "scm/shell/api.js";
 import { go } from "scm/shell/router.js";
 import { city, useTopics, world } from "scm/shell/store.js";
 import { DriveFloor, leavesFloor } from "scm/pages/mismatch/drive_floor.js";
-import { useFetched } from "scm/pages/mismatch/fetched.js";
+import { useFetched } from "scm/shared/fetched.js";
 import { Bar, isActive, useJobs } from "scm/pages/mismatch/jobs.js";
 import { ends, Grid, scale, useWidth } from "scm/pages/mismatch/plot.js";
 import { short } from "scm/pages/mismatch/words.js";

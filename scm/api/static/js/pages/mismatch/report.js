@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { placed } from "scm/shared/base.js";
 import { html } from "scm/shared/html.js";
-import { useFetched } from "scm/pages/mismatch/fetched.js";
+import { useFetched } from "scm/shared/fetched.js";
 import { Head } from "scm/pages/mismatch/head.js";
 import { linkMoments } from "scm/pages/mismatch/moments.js";
 import { Question } from "scm/pages/mismatch/question.js";

@@ -3,7 +3,7 @@ import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { searchBody, question, SearchFields } from "scm/shared/search_fields.js";
 import { change, notify } from "scm/shell/api.js";
-import { useFetched } from "scm/pages/mismatch/fetched.js";
+import { useFetched } from "scm/shared/fetched.js";
 import { zipOf } from "scm/pages/mismatch/zip.js";
 
 const KNOWN = /\.(ya?ml|csv|csv\.gz|npz|mat|parquet|bag|db3|mcap)$/i;

@@ -4,6 +4,7 @@ import { autonomyOf, stateInWords } from "scm/shared/autonomy.js";
 import { stuckBy } from "scm/shared/condition.js";
 import { html } from "scm/shared/html.js";
 import { age, fixed, span, UNKNOWN } from "scm/shared/format.js";
+import { twinInWords, twinOf } from "scm/shared/twins.js";
 import { since_ms } from "scm/shell/store.js";
 import { Battery } from "scm/pages/vehicle/battery.js";
 import { isAtHome, ownerOf } from "scm/pages/vehicle/lease.js";
@@ -20,6 +21,7 @@ export function FactsPanel({ car }) {
   const link = useLink(car.vehicle);
   const { x_m: x, y_m: y, yaw_rad: yaw } = car;
   const parking = autonomyOf(car.vehicle);
+  const twin = twinOf(car.vehicle);
   const age_ms = car.age_ms + since_ms.value;
   return html`
     <section class="panel facts" aria-label="State">
@@ -39,6 +41,7 @@ export function FactsPanel({ car }) {
         <dt>Last report</dt><dd class=${age_ms > STALE_MS ? "warn" : ""}>${age(age_ms)} <small>ago</small></dd>
         <dt>Round trip</dt><dd data-fact="link" title=${link?.title ?? ""}>${link?.text ?? UNKNOWN}</dd>
         <dt>Eye sees it off by</dt><dd>${eyeOf(car.eye)}</dd>
+        ${twin && html`<dt>Twin</dt><dd data-fact="twin"><a href="/twins/${car.vehicle}">${twinInWords(twin)}</a></dd>`}
         <dt>Misbehaviour</dt><dd class=${misbehaviourOf(car.vehicle).suspected ? "bad" : ""}>${misbehaviourText(car.vehicle)}</dd>
       </dl>
     </section>

@@ -6,7 +6,7 @@ import { CloseUp } from "scm/pages/vehicle/close_up.js";
 import { FleetTable } from "scm/pages/vehicle/fleet_table.js";
 
 export function Page() {
-  useTopics("vehicles", "autonomy");
+  useTopics("vehicles", "autonomy", "twins");
   const name = route.value.rest;
   if (!name) return html`<${FleetTable} />`;
   const car = world.value.vehicles.find((one) => one.vehicle === name);

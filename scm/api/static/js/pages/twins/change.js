@@ -1,0 +1,63 @@
+/** One change: what it is, since when, how sure, and which drive would decide. */
+import { amounts, nameOf, percent } from "scm/shared/amounts.js";
+import { clock, moment, span, spaced } from "scm/shared/format.js";
+import { html } from "scm/shared/html.js";
+import { ago } from "scm/shared/twins.js";
+import { changeInWords, hasReport, SEARCHES } from "scm/pages/twins/words.js";
+
+export function Change({ change, now_ns }) {
+  const [word, meaning] = SEARCHES[change.search];
+  const [size] = amounts(change.parameter, [change.size], { unit: change.unit });
+  const isNamed = change.effects.length > 0;
+  const why = change.search === "failed" ? change.text : meaning;
+  return html`
+    <article class="panel change" data-search=${change.search} aria-label="Change at ${moment(change.since_ns)}">
+      <div class="panel-head">
+        <h2>${changeInWords(change)}</h2>
+        <span class="search" data-search=${change.search}>${word}</span>
+      </div>
+      ${!isNamed && why && html`<p class="quiet">${why}</p>`}
+      <dl>
+        <dt>Since</dt>
+        <dd>${moment(change.since_ns)} <small>${ago(change.since_ns, now_ns)}, ${interval(change)} with 90 %</small></dd>
+        <dt>Noticed</dt>
+        <dd>${span((change.noticed_ns - change.since_ns) / 1e9)} later <small>${change.score.toFixed(0)} standard deviations beyond what is usual</small></dd>
+        ${!isNamed && html`<dt>As by</dt><dd>${spaced(change.effect)}, ${nameOf(change.parameter)} changed by ${size}</dd>`}
+      </dl>
+      ${change.effects.map((effect) => html`<${Effect} key=${effect.name} effect=${effect} change=${change} />`)}
+      ${change.drive_this && html`<p class="decides"><b>Drive this to decide${ofWhat(change)}:</b> ${change.drive_this}</p>`}
+      ${hasReport(change) && html`<p><a href="/mismatch/${change.report}">Report of the search${change.drive_this ? ", with this drive" : ""}</a></p>`}
+    </article>
+  `;
+}
+
+/** Between which moments it began. */
+const interval = ({ since_low_ns, since_high_ns }) => `between ${clock(since_low_ns)} and ${clock(since_high_ns)}`;
+
+/** What is open, where the heading says something else. */
+const ofWhat = ({ effects, between }) => (effects.length && between.length ? ` between ${between.map(spaced).join(" and ")}` : "");
+
+function Effect({ effect, change }) {
+  return html`
+    <div class="scroll" tabindex="0" role="region" aria-label="Parameters of ${spaced(effect.name)}">
+      <table>
+        <caption>${spaced(effect.name)} <small>${percent(effect.probability)} sure</small></caption>
+        <thead><tr><th>Parameter</th><th class="number">Now</th><th class="number">90 % interval</th><th class="number">Before</th></tr></thead>
+        <tbody>${effect.parameters.map((one) => html`<${Parameter} key=${one.name} parameter=${one} effect=${effect} change=${change} />`)}</tbody>
+      </table>
+    </div>
+  `;
+}
+
+function Parameter({ parameter, effect, change }) {
+  const { name, value, low, high, before } = parameter;
+  const isOfChange = effect.name === change.effect && name === change.parameter;
+  const options = { unit: isOfChange ? change.unit : "", width: high - low };
+  const [now, least, most, then] = amounts(name, [value, low, high, before], options);
+  return html`
+    <tr>
+      <td>${nameOf(name)}</td><td class="number">${now}</td>
+      <td class="number">${least} to ${most}</td><td class="number">${before === null ? "not there" : then}</td>
+    </tr>
+  `;
+}
