@@ -204,19 +204,19 @@ def _of_parts(picture: Picture) -> Iterator[Metric]:
 
 def _of_twins(picture: Picture) -> Iterator[Metric]:
     statuses = {name: held.message for name, held in picture.twins.items()}
-    state = {
+    state: Labels = {
         (name, one): float(status.state == one)
         for name, status in statuses.items()
         for one in TWIN_STATES
     }
     yield _by("scm_twin_state", "1: the state of its twin.", ("vehicle", "state"), state)
-    driven_s = {(name,): status.driven_s for name, status in statuses.items()}
+    driven_s: Labels = {(name,): status.driven_s for name, status in statuses.items()}
     what = "How long a car was driven and watched since the twin part began."
     yield _by("scm_twin_driven_seconds", what, ("vehicle",), driven_s)
-    changes = {(name,): float(len(status.changes)) for name, status in statuses.items()}
+    changes: Labels = {(name,): float(len(status.changes)) for name, status in statuses.items()}
     what = "Changes of a car; of more than 20 the newest 20 are counted."
     yield _by("scm_twin_changes", what, ("vehicle",), changes)
-    version = {(name,): float(status.version) for name, status in statuses.items()}
+    version: Labels = {(name,): float(status.version) for name, status in statuses.items()}
     what = "Version of its car file in force; 0: the file that it came with."
     yield _by("scm_twin_version", what, ("vehicle",), version)
 
