@@ -3,8 +3,8 @@
 import msgspec
 
 from scm.api.picture import Picture
-from scm.records.twins import Twin, TwinRow
-from scm.v2x.messages.twin_status import TwinChange, TwinEffect, TwinStatus
+from scm.records.twins import Twin, TwinChange, TwinEffect, TwinRow
+from scm.v2x.messages.twin_status import TwinStatus
 
 MOST_SHARE = 0.999  # no probability is shown as certain
 

@@ -30,10 +30,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from scm.records.twins import TwinChange, TwinVersion
     from scm.store.records import records
     from scm.twin.car import CHANGES, VERSIONS
     from scm.twin.part import TwinPart
-    from scm.v2x.messages.twin_status import TwinChange, TwinVersion
 
     with state_of(arguments) as state:
         part = TwinPart(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from scm.command import Command
 
 if TYPE_CHECKING:
-    from scm.v2x.messages.twin_status import TwinChange, TwinVersion
+    from scm.records.twins import TwinChange, TwinVersion
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,10 +25,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from scm.errors import RunError
+    from scm.records.twins import TwinChange, TwinVersion
     from scm.store.open import open_store
     from scm.store.records import records
     from scm.twin.car import CHANGES, NAME, VERSIONS
-    from scm.v2x.messages.twin_status import TwinChange, TwinVersion
 
     file = Path(arguments.state.removeprefix("sqlite:"))
     if arguments.state.startswith("sqlite:") and not file.is_file():

@@ -1,8 +1,4 @@
-"""Twins: since when a car has changed, what it is, and the versions of its car file.
-
-The records that a status holds are those of `scm.v2x.messages.twin_status`, with words on each
-field; a test compares them.
-"""
+"""Twins: since when a car has changed, what it is, and the versions of its car file."""
 
 from typing import Annotated, Literal
 
@@ -20,7 +16,7 @@ ReportName = Annotated[
     str,
     Meta(description="Name of the mismatch report; empty: none.", examples=["twin-n3-1200"]),
 ]
-Search = Literal["driving", "waiting", "searching", "named", "undecided", "unexplained", "failed"]
+Search = Literal["driving", "searching", "named", "undecided", "unexplained", "failed"]
 State = Literal["learning", "watching", "blind"]
 WatchedS = Annotated[
     float, Meta(description="How long it was driven and watched [s].", examples=[812.0])
@@ -31,13 +27,14 @@ VersionNumber = Annotated[
 
 
 class TwinParameter(msgspec.Struct, kw_only=True, frozen=True):
-    """A parameter of an effect with its 90 % interval, in the unit in which its name ends.
+    """A parameter of an effect with its 90 % interval, in its unit.
 
     Attributes:
         name: As reports call it.
         value: Since the change.
         low: Lower end of the 90 % interval.
         high: Upper end of the 90 % interval.
+        unit: Of all of these.
         before: Before the change; null: the effect was not there.
     """
 
@@ -45,6 +42,7 @@ class TwinParameter(msgspec.Struct, kw_only=True, frozen=True):
     value: Annotated[float, Meta(examples=[-0.031])]
     low: Annotated[float, Meta(examples=[-0.033])]
     high: Annotated[float, Meta(examples=[-0.029])]
+    unit: Annotated[str, Meta(examples=["rad"])] = ""
     before: Annotated[float, Meta(examples=[0.0])] | None = None
 
 
@@ -77,8 +75,8 @@ class TwinChange(msgspec.Struct, kw_only=True, frozen=True):
         unit: Of `size`.
         score: In standard deviations of what is usual.
         alike: Further effects that look nearly as much like it, the best first.
-        search: How far the search for its cause is. `driving`: more driving is needed; `waiting`;
-            `searching`; `named`; `undecided`: `between` these; `unexplained`: by no known effect;
+        search: How far the search for its cause is. `driving`: more driving is needed; `searching`;
+            `named`; `undecided`: `between` these; `unexplained`: by no known effect;
             `failed`: why, says `text`.
         effects: That explain it, the likeliest first.
         between: Effects that this driving cannot distinguish.

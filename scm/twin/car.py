@@ -19,6 +19,7 @@ from scm.clock import nanoseconds, seconds
 from scm.errors import CarError, RecordingError, ScmError
 from scm.recorder.driven import CarMessages, recording_of
 from scm.recording.read import Recording
+from scm.records.twins import TwinChange, TwinVersion
 from scm.twin.investigation import Compared, Explained, compare, explain
 from scm.twin.memory import CarMemory
 from scm.twin.versions import (
@@ -35,7 +36,7 @@ from scm.twin.windows import WatchedCar
 from scm.v2x.exchange import Call, Outgoing, PersistedState
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
-from scm.v2x.messages.twin_status import TwinChange, TwinStatus, TwinVersion
+from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.version_request import VersionRequest
 
@@ -117,7 +118,7 @@ class TwinCar:
         self._trial = _Trial(0.0, 0.0) if self.versions.candidate is not None else None
         self._search: Future[Explained] | None = None
         self._comparison: Future[Compared] | None = None
-        self._requested: Compared | None = None
+        self._requested: tuple[int, Compared] | None = None  # of a version
         self._searched_until = 0.0, 0.0
 
     @property
@@ -313,7 +314,7 @@ class TwinCar:
 
     def _put(self, number: int, reason: str, compared: Compared) -> list[Outgoing]:
         """Request a version in force as an operator would: there is one way, and it is audited."""
-        self._trial, self._requested = None, compared
+        self._trial, self._requested = None, (number, compared)
         request = VersionRequest(vehicle=self.name, version=number, by=BY_TWIN, reason=reason)
         return [Call(request)]
 
@@ -333,10 +334,12 @@ class TwinCar:
             return Refused(code="not_found", detail=detail), []
         if number == before:
             return self.status(), []
-        compared = self._requested if request.by == BY_TWIN else None
+        requested, compared = self._requested or (-1, None)
+        if requested != number or request.by != BY_TWIN:
+            compared = None  # an operator's choice
         changed = self.versions.put_in_force(number, request.by, request.reason, compared)
         self._requested = self._comparison = self._trial = self._watch = None
-        if request.by == BY_TWIN and number > before:
+        if compared is not None and number > before:
             self._trial = _Trial(self._memory.last_s, self._driven_s)
         changes = [seconds(one.since_high_ns - self._begin_ns) for one in self.changes]
         self._watched_s = max([0.0, *changes])  # it learns from what was driven since
@@ -387,7 +390,7 @@ class TwinCar:
 
 def _interrupted(change: TwinChange) -> TwinChange:
     """Return a change of an earlier process, whose memory is gone."""
-    if change.search not in ("driving", "waiting", "searching"):
+    if change.search not in ("driving", "searching"):
         return change
     text = "The twin part was started again before its cause was found."
     return structs.replace(change, search="failed", text=text)

@@ -26,11 +26,11 @@ from scm.mismatch.pipeline import write as write_result
 from scm.mismatch.report.car_file import FILE, write_own_terms
 from scm.mismatch.validate.free_runs import got_worse, judge, nothing_got_worse
 from scm.recording.read import Recording
+from scm.records.twins import TwinEffect, TwinError, TwinParameter
 from scm.replay.drive import Drive
 from scm.runtime.parent_watch import Leash, end_with
 from scm.runtime.priority import stand_back
 from scm.twin.memory import write
-from scm.v2x.messages.twin_status import TwinEffect, TwinError, TwinParameter
 from scm.vehicles.car import load_car
 
 HORIZON_S = 3.0
@@ -173,7 +173,7 @@ def _in_words(diagnosis: Diagnosis, effects: Sequence[Effect]) -> str:
 def _as_message(effect: Effect) -> TwinEffect:
     parameters = tuple(
         TwinParameter(
-            name=name, value=one.value, low=one.low, high=one.high,
+            name=name, value=one.value, low=one.low, high=one.high, unit=one.unit,
             before=effect.before[name].value if name in effect.before else None,
         )
         for name, one in effect.parameters.items()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.records.twins import TwinChange, TwinVersion
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.twin.car import NAME, Setup, TwinCar
 from scm.twin.detector import threshold_of
@@ -21,7 +22,6 @@ from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.part_status import PartStatus
-from scm.v2x.messages.twin_status import TwinChange, TwinVersion
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.version_request import VersionRequest

@@ -9,8 +9,8 @@ from typing import Literal
 
 from msgspec.structs import replace
 
+from scm.records.twins import TwinVersion
 from scm.twin.investigation import Compared
-from scm.v2x.messages.twin_status import TwinVersion
 from scm.vehicles.car import Car
 
 SEEN_S = (120.0, 240.0)  # of driving, after which a candidate is compared

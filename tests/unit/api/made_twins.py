@@ -3,14 +3,8 @@
 from msgspec.structs import replace
 
 from scm.clock import NS_PER_S
-from scm.v2x.messages.twin_status import (
-    TwinChange,
-    TwinEffect,
-    TwinError,
-    TwinParameter,
-    TwinStatus,
-    TwinVersion,
-)
+from scm.records.twins import TwinChange, TwinEffect, TwinError, TwinParameter, TwinVersion
+from scm.v2x.messages.twin_status import TwinStatus
 
 NOW_NS = 1200 * NS_PER_S
 TRIM = TwinParameter(name="offset_rad", value=-0.031, low=-0.0334, high=-0.0288, before=0.0)

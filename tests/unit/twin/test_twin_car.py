@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RecordingError
+from scm.records.twins import TwinEffect, TwinError, TwinParameter
 from scm.twin import car as twin_car
 from scm.twin import detector
 from scm.twin.investigation import AtOnce, Compared, Explained, explain
@@ -15,7 +16,7 @@ from scm.twin.part import TwinPart
 from scm.v2x.exchange import Answer, Call, Incoming, PersistedState
 from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
-from scm.v2x.messages.twin_status import TwinEffect, TwinError, TwinParameter, TwinStatus
+from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.version_request import VersionRequest
 from tests.unit.mismatch.made_drive import made_drive, nigel
 from tests.unit.twin.reported import (

@@ -5,8 +5,8 @@ import pytest
 
 from scm.__main__ import main
 from scm.clock import NS_PER_S
+from scm.records.twins import TwinChange, TwinEffect, TwinParameter, TwinVersion
 from scm.store.open import open_store
-from scm.v2x.messages.twin_status import TwinChange, TwinEffect, TwinParameter, TwinVersion
 from tests.unit.mismatch.made_drive import nigel
 
 SINCE_NS = 1_800_000_000 * NS_PER_S

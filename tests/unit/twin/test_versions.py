@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from scm.records.twins import TwinError
 from scm.twin.investigation import Compared, compare
 from scm.twin.versions import BY_TWIN, CarVersions, differences, is_worse, verdict
-from scm.v2x.messages.twin_status import TwinError
 from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import made_drive, nigel
 

@@ -24,7 +24,7 @@ export function Change({ change, now_ns }) {
         <dd>${span((change.noticed_ns - change.since_ns) / 1e9)} later <small>${change.score.toFixed(0)} standard deviations beyond what is usual</small></dd>
         ${!isNamed && html`<dt>As by</dt><dd>${spaced(change.effect)}, ${nameOf(change.parameter)} changed by ${size}</dd>`}
       </dl>
-      ${change.effects.map((effect) => html`<${Effect} key=${effect.name} effect=${effect} change=${change} />`)}
+      ${change.effects.map((effect) => html`<${Effect} key=${effect.name} effect=${effect} />`)}
       ${change.drive_this && html`<p class="decides"><b>Drive this to decide${ofWhat(change)}:</b> ${change.drive_this}</p>`}
       ${hasReport(change) && html`<p><a href="/mismatch/${change.report}">Report of the search${change.drive_this ? ", with this drive" : ""}</a></p>`}
     </article>
@@ -37,23 +37,20 @@ const interval = ({ since_low_ns, since_high_ns }) => `between ${clock(since_low
 /** What is open, where the heading says something else. */
 const ofWhat = ({ effects, between }) => (effects.length && between.length ? ` between ${between.map(spaced).join(" and ")}` : "");
 
-function Effect({ effect, change }) {
+function Effect({ effect }) {
   return html`
     <div class="scroll" tabindex="0" role="region" aria-label="Parameters of ${spaced(effect.name)}">
       <table>
         <caption>${spaced(effect.name)} <small>${percent(effect.probability)} sure</small></caption>
         <thead><tr><th>Parameter</th><th class="number">Now</th><th class="number">90 % interval</th><th class="number">Before</th></tr></thead>
-        <tbody>${effect.parameters.map((one) => html`<${Parameter} key=${one.name} parameter=${one} effect=${effect} change=${change} />`)}</tbody>
+        <tbody>${effect.parameters.map((one) => html`<${Parameter} key=${one.name} parameter=${one} />`)}</tbody>
       </table>
     </div>
   `;
 }
 
-function Parameter({ parameter, effect, change }) {
-  const { name, value, low, high, before } = parameter;
-  const isOfChange = effect.name === change.effect && name === change.parameter;
-  const options = { unit: isOfChange ? change.unit : "", width: high - low };
-  const [now, least, most, then] = amounts(name, [value, low, high, before], options);
+function Parameter({ parameter: { name, value, low, high, unit, before } }) {
+  const [now, least, most, then] = amounts(name, [value, low, high, before], { unit, width: high - low });
   return html`
     <tr>
       <td>${nameOf(name)}</td><td class="number">${now}</td>

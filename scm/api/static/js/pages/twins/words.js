@@ -4,7 +4,6 @@ import { spaced } from "scm/shared/format.js";
 /** How far the search for a change's cause is: a word or two, and what that means where nothing was found yet. */
 export const SEARCHES = {
   driving: ["needs driving", "Its cause is searched for once the car was driven for long enough since."],
-  waiting: ["waits", "Its search begins when another one has ended."],
   searching: ["searching", "A search for its cause runs."],
   named: ["cause found", ""],
   undecided: ["undecided", "What was driven so far cannot distinguish them."],
