@@ -130,6 +130,8 @@ class TwinVersion(msgspec.Struct, kw_only=True, frozen=True):
         reason: Why.
         windows: Of 3 s, on driving that no fit has seen.
         errors: There, after 3 s.
+        abilities: What the car can do by it, and could before: `cruise_mps`, at 0.8 of its
+            throttle; `stopping_m`, from there; `turning_radius_m`, at full steering.
     """
 
     number: VersionNumber
@@ -144,6 +146,7 @@ class TwinVersion(msgspec.Struct, kw_only=True, frozen=True):
     report: ReportName = ""
     windows: Annotated[int, Meta(examples=[38])] = 0
     errors: tuple[TwinError, ...] = ()
+    abilities: tuple[TwinParameter, ...] = ()
 
 
 class Twin(msgspec.Struct, kw_only=True, frozen=True):

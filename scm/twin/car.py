@@ -29,6 +29,7 @@ from scm.twin.versions import (
     CarVersions,
     in_words,
     is_worse,
+    meaning,
     verdict,
 )
 from scm.twin.watch import AFTER_S, BEFORE_S, SPAN_S, CarWatch, Noticed
@@ -266,9 +267,7 @@ class TwinCar:
         out = [*self._now(change, named), self._event("change_explained", text, "warning")]
         is_newest = named is self.changes[-1]
         if found.car_file is not None and is_newest:
-            names = [one.name for one in found.effects]
-            file = str(found.car_file)
-            made = self.versions.propose(file, names, named.report, self.newest_ns)
+            made = self.versions.propose(found, named.report, self.newest_ns)
             self._trial = _Trial(*self._searched_until)
             out += self._stored(made)
         return [*out, self.status()]
@@ -346,8 +345,13 @@ class TwinCar:
         level: Literal["info", "warning"] = "info" if number > before else "warning"
         way = "is predicted by" if number > before else "goes back to"
         text = f"{self.name} {way} version {number}: {request.reason or 'no reason given'}"
+        means = meaning(self.versions.in_force.abilities) if number > before else []
         stored = [item for one in changed for item in self._stored(one)]
-        return self.status(), [*stored, self._event("version", text, level), self.status()]
+        events = [self._event("version", text, level)]
+        if means:
+            text = f"{self.name} {'; '.join(means)}"
+            events.append(self._event("abilities_changed", text, "warning"))
+        return self.status(), [*stored, *events, self.status()]
 
     def refused(self) -> list[Outgoing]:
         """Start a comparison again whose result could not be put in force."""

@@ -30,6 +30,7 @@ from scm.records.twins import TwinEffect, TwinError, TwinParameter
 from scm.replay.drive import Drive
 from scm.runtime.parent_watch import Leash, end_with
 from scm.runtime.priority import stand_back
+from scm.twin.abilities import compared_abilities
 from scm.twin.memory import write
 from scm.vehicles.car import load_car
 
@@ -51,6 +52,7 @@ class Explained:
         since_s: When they changed, with the 90 % interval, on the recording's clock; None: the
             search does not say.
         car_file: Of the car as it is now; None: nothing was found that holds.
+        abilities: What it can do, and could before.
     """
 
     effects: tuple[TwinEffect, ...]
@@ -59,6 +61,7 @@ class Explained:
     text: str
     since_s: tuple[float, float, float] | None
     car_file: Path | None
+    abilities: tuple[TwinParameter, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +129,8 @@ def explain(
     """
     budget = Budget(budget_s, WallClock())
     write(recording, out / RECORDING)
-    found = diagnose_car([recording], load_car(car_file), budget=budget)
+    car = load_car(car_file)
+    found = diagnose_car([recording], car, budget=budget)
     write_result(found, out)
     effects = [one for one in found.diagnosis.effects if _is_of(one, onset_s)]
     is_found = bool(effects) and found.found_car is not None and found.found_car is not found.car
@@ -142,6 +146,7 @@ def explain(
         text=_in_words(found.diagnosis, effects),
         since_s=_since(effects),
         car_file=made if is_found else None,
+        abilities=compared_abilities(car, load_car(made)) if is_found else (),
     )
 
 

@@ -4,13 +4,13 @@ A candidate is adopted when it predicts driving better that no fit has seen, and
 later driving it is compared with the version that it replaced, and rolled back if that was better.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Literal
 
 from msgspec.structs import replace
 
-from scm.records.twins import TwinVersion
-from scm.twin.investigation import Compared
+from scm.records.twins import TwinParameter, TwinVersion
+from scm.twin.investigation import Compared, Explained
 from scm.vehicles.car import Car
 
 SEEN_S = (120.0, 240.0)  # of driving, after which a candidate is compared
@@ -54,12 +54,13 @@ class CarVersions:
         """That is compared with it."""
         return next((one for one in self.newest if one.state == "candidate"), None)
 
-    def propose(self, file: str, effects: Sequence[str], report: str, made_ns: int) -> TwinVersion:
-        """Add a candidate, and return it."""
+    def propose(self, found: Explained, report: str, made_ns: int) -> TwinVersion:
+        """Add the car file that a search found as a candidate, and return it."""
         made = TwinVersion(
-            number=max(self._by_number) + 1, car=self._car, file=file, made_ns=made_ns,
-            state="candidate", after=self.in_force.number, effects=tuple(effects),
-            report=report,
+            number=max(self._by_number) + 1, car=self._car, file=str(found.car_file),
+            made_ns=made_ns, state="candidate", after=self.in_force.number,
+            effects=tuple(one.name for one in found.effects), report=report,
+            abilities=found.abilities,
         )  # fmt: skip
         return self._put(made)
 
@@ -130,6 +131,25 @@ def in_words(compared: Compared) -> str:
 
 def _name(error: str) -> str:
     return ERRORS[error][0] if error in ERRORS else error.rpartition("_")[0].replace("_", " ")
+
+
+def meaning(abilities: Iterable[TwinParameter]) -> list[str]:
+    """Return what a version means for driving: abilities whose interval leaves out the one before.
+
+    Order and names are those of `scm.twin.abilities`.
+    """
+    words = {
+        "cruise_mps": ("drives {:.3g} m/s at 0.8 of its throttle", 1.0),
+        "stopping_m": ("needs {:.3g} mm from there to stop", 1e3),
+        "turning_radius_m": ("turns in a radius of {:.0f} mm at best", 1e3),
+    }
+    found = list[str]()
+    for one in abilities:
+        if one.before is not None and not one.low <= one.before <= one.high:
+            text, per_unit = words[one.name]
+            before = f"{per_unit * one.before:.3g}"
+            found.append(f"{text.format(per_unit * one.value)}, {before} before")
+    return found
 
 
 def differences(before: Car, now: Car) -> list[str]:

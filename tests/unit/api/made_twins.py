@@ -30,6 +30,16 @@ def change(at_s, now_ns=NOW_NS, **more):
 ORIGINAL = TwinVersion(number=0, car="nigel", file="nigel", made_ns=0, state="adopted")
 
 
+ABILITIES = tuple(
+    TwinParameter(name=name, value=value, low=low, high=high, unit=unit, before=before)
+    for name, unit, value, low, high, before in (
+        ("cruise_mps", "m/s", 0.2141, 0.2078, 0.2185, 0.2145),
+        ("stopping_m", "m", 0.0067, 0.0054, 0.0081, 0.0068),
+        ("turning_radius_m", "m", 0.2811, 0.2711, 0.2873, 0.2493),
+    )
+)
+
+
 def versions(now_ns=NOW_NS):
     """Return the file that a car came with, the one in force, and a candidate."""
     errors = (
@@ -44,6 +54,7 @@ def versions(now_ns=NOW_NS):
             state="adopted", effects=("steer_trim",), by="twin", windows=38, errors=errors,
             reason="position better on new driving: position 41 to 18.2 mm, "
             "heading 92 to 31 mrad after 3 s, 38 windows", report="twin-n1-300",
+            abilities=ABILITIES,
         ),
         TwinVersion(
             number=2, car="nigel", file="runs/twins/n1/2.toml", made_ns=now_ns - 60 * NS_PER_S,

@@ -1,16 +1,23 @@
 """Versions of a car's file: which is in force, and why."""
 
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
+from msgspec import structs
 
-from scm.records.twins import TwinError
-from scm.twin.investigation import Compared, compare
-from scm.twin.versions import BY_TWIN, CarVersions, differences, is_worse, verdict
+from scm.records.twins import TwinEffect, TwinError, TwinParameter
+from scm.twin.abilities import abilities_of, compared_abilities
+from scm.twin.investigation import Compared, Explained, compare
+from scm.twin.versions import BY_TWIN, CarVersions, differences, is_worse, meaning, verdict
 from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import made_drive, nigel
 
 TRIM = -0.05
+STOPS = TwinParameter(name="stopping_m", value=0.058, low=0.052, high=0.066, unit="m", before=0.007)
+TRIMMED = TwinEffect(name="steer_trim", probability=0.9, parameters=())
+FOUND = Explained((TRIMMED,), (), "", "", None, Path("1.toml"), (STOPS,))
 
 
 def compared(*, better=(), worse=()):
@@ -30,8 +37,9 @@ def test_file_that_the_car_came_with_is_version_0_in_force():
 
 def test_candidate_is_adopted_with_errors_and_reason_and_can_be_taken_back():
     versions = CarVersions("nigel")
-    made = versions.propose("1.toml", ["steer_trim"], "report", 5)
+    made = versions.propose(FOUND, "report", 5)
     assert (made.number, made.after, versions.candidate) == (1, 0, made)
+    assert (made.file, made.effects, made.abilities) == ("1.toml", ("steer_trim",), (STOPS,))
     changed = versions.put_in_force(1, BY_TWIN, "better", compared(better=["position_m"]))
     assert [(one.number, one.state) for one in changed] == [(0, "replaced"), (1, "adopted")]
     assert versions.in_force.windows == 100
@@ -45,16 +53,16 @@ def test_candidate_is_adopted_with_errors_and_reason_and_can_be_taken_back():
 
 def test_rejected_candidate_stays_in_the_list_and_the_next_has_a_new_number():
     versions = CarVersions("nigel")
-    versions.propose("1.toml", [], "", 5)
+    versions.propose(FOUND, "", 5)
     assert versions.reject("no better").state == "rejected"
     assert versions.reject("again") is None
-    assert versions.propose("2.toml", [], "", 6).number == 2
+    assert versions.propose(FOUND, "", 6).number == 2
     assert versions.in_force.number == 0
 
 
 def test_stored_versions_come_back_but_not_those_of_another_file():
     stored = CarVersions("nigel")
-    stored.propose("1.toml", [], "", 5)
+    stored.propose(FOUND, "", 5)
     stored.put_in_force(1, BY_TWIN, "better")
     assert CarVersions("nigel", stored.newest).in_force.number == 1
     assert CarVersions("f1tenth", stored.newest).in_force.file == "f1tenth"
@@ -114,3 +122,38 @@ def test_difference_of_two_files_names_effects_and_numbers(trimmed):
         heavier = type(mass)(moved, mass.std, mass.unit, "test")
         other = replace(now, values={**now.values, "body.mass_kg": heavier})
         assert any(one.startswith(line) for one in differences(now, other))
+
+
+def test_abilities_are_said_where_they_changed():
+    same = structs.replace(STOPS, before=0.055)
+    turns = TwinParameter(
+        name="turning_radius_m", value=0.281, low=0.271, high=0.287, unit="m", before=0.2493
+    )
+    assert meaning([same]) == []
+    assert meaning([STOPS, turns]) == [
+        "needs 58 mm from there to stop, 7 before",
+        "turns in a radius of 281 mm at best, 249 before",
+    ]
+
+
+def test_late_throttle_lengthens_the_way_to_stop_and_trim_the_wider_circle(trimmed, tmp_path):
+    text = nigel().path.read_text("utf-8").replace("terms = [", 'terms = ["drive_delay",', 1)
+    late = tmp_path / "late.toml"
+    late.write_text(text.replace("[drive]", "[drive]\ndelay_s = { value = 0.25 }", 1), "utf-8")
+    speed, stopping, _ = compared_abilities(nigel(), load_car(late))
+    assert stopping.before == pytest.approx(0.007, abs=0.001)
+    assert stopping.value == pytest.approx(stopping.before + 0.25 * speed.value, rel=0.1)
+    assert speed.low < speed.before < speed.high
+    *_, radius = compared_abilities(nigel(), load_car(trimmed))
+    assert radius.low > 1.05 * radius.before
+
+
+def test_nine_in_ten_other_cars_of_the_file_lie_in_the_interval():
+    speed, stopping, radius = compared_abilities(nigel(), nigel())
+    others = abilities_of(nigel(), count=400, seed=2)
+    for one, values in (
+        (speed, others.speed),
+        (stopping, others.stopping),
+        (radius, others.radius),
+    ):
+        assert 0.84 < np.mean((values >= one.low) & (values <= one.high)) < 0.96

@@ -8,6 +8,9 @@ import { change } from "scm/shell/api.js";
 import { VERSIONS } from "scm/pages/twins/words.js";
 
 const PLAIN = 0.95; // of an error, as the twin part requires of a better version
+const ABILITIES = {
+  cruise_mps: "Speed at 0.8 throttle", stopping_m: "Way to stop from there", turning_radius_m: "Tightest radius",
+};
 const ERRORS = { yaw_rad: "heading", gyro_rad: "yaw rate", wheel_m: "distance, wheels" };
 
 export function Versions({ car, onChanged }) {
@@ -38,6 +41,7 @@ function Version({ version, inForce, onUse }) {
       ${state === "candidate" && html`<p class="quiet">It is compared with the version in force on new driving.</p>`}
       ${(by || reason) && html`<p class="quiet">${VERSIONS[state]}${by && ` by ${by}`}${reason && `: ${reason}`}</p>`}
       ${version.errors.length > 0 && html`<${Errors} version=${version} />`}
+      ${version.abilities.length > 0 && html`<${Abilities} version=${version} />`}
       <p class="quiet file"><code>${version.file}</code>${report && html` <a href="/mismatch/${report}">report</a>`}</p>
     </li>
   `;
@@ -52,6 +56,22 @@ function Errors({ version }) {
         return html`
           <dt>${ERRORS[name] ?? spaced(name.replace(/_[a-z0-9]+$/, ""))}</dt>
           <dd data-side=${now < PLAIN * before ? "better" : now > before / PLAIN ? "worse" : "same"}>${then} → ${here}</dd>
+        `;
+      })}
+    </dl>
+  `;
+}
+
+/** What the car can do by it, with the 90 % interval, and could before. */
+function Abilities({ version }) {
+  return html`
+    <dl class="abilities" aria-label="What the car can do">
+      ${version.abilities.map(({ name, unit, value, low, high, before }) => {
+        const [now, least, most, then] = amounts(name, [value, low, high, before], { unit });
+        const hasChanged = before < low || before > high;
+        return html`
+          <dt>${ABILITIES[name] ?? spaced(name)}</dt>
+          <dd data-changed=${hasChanged}>${now} <small>${least} to ${most}${hasChanged && `, before ${then}`}</small></dd>
         `;
       })}
     </dl>
