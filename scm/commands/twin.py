@@ -38,7 +38,7 @@ def _run(arguments: argparse.Namespace) -> int:
     with state_of(arguments) as state:
         part = TwinPart(
             arguments.false_alarm_h,
-            arguments.data,
+            arguments.data.resolve(),
             arguments.budget_s,
             versions={}
             if state is None

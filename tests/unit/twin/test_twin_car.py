@@ -47,6 +47,8 @@ class Prepared(Executor):
     def submit(self, function, /, *args, **kwargs):
         self.calls.append((function.__name__, args))
         answer, future = self.answers.pop(0), Future()
+        if answer is None:
+            return future  # it takes for ever
         if isinstance(answer, Exception):
             future.set_exception(answer)
         else:
@@ -116,6 +118,7 @@ def test_change_is_searched_for_named_and_its_car_file_adopted_and_stored(change
     assert change.since_ns == pytest.approx(BEGAN_NS + 70.1 * NS_PER_S, abs=0.2 * NS_PER_S)
     assert [one.state for one in status.versions] == ["replaced", "adopted"]
     assert status.version == 1
+    assert status.state == "watching"  # by what the memory has of the car since it changed
     assert "gyro better on new driving" in status.versions[1].reason
     assert city.events == ["car_changed", "change_explained", "version"]
     assert [name for name, _ in city.executor.calls][:2] == ["explain", "compare"]
@@ -177,6 +180,30 @@ def test_operator_chooses_a_version_and_an_unknown_one_is_refused(changed, tmp_p
         (answer,) = [one for one in city.step(wrong) if isinstance(one, Answer)]
         assert isinstance(answer.reply, Refused)
         assert words in answer.reply.detail
+
+
+def test_operator_who_was_first_is_named_and_not_the_twin(changed, tmp_path):
+    city = City(tmp_path, found_with_file(tmp_path), BETTER)
+    steps = iter(changed)
+    while not city.calls:
+        city.step(*next(steps))
+    city.calls = [Call(VersionRequest(vehicle="n1", version=1, by="anna", reason="now"))]
+    city.step()
+    version = city.last.versions[1]
+    assert (version.by, version.reason, version.windows) == ("anna", "now", 0)
+    city.run(steps)
+    assert len(city.executor.calls) == 2  # what she chose is not tried
+
+
+def test_candidate_is_rejected_when_the_car_changes_again(tmp_path):
+    def twice(name, t, values):
+        return biased(SINCE_S)(name, t, values) - 4.0 * BIAS * (t >= 155.0) * (name == "imu.gyro_z")
+
+    again = reports(made_drive(seconds=185.0, sense=twice), lasts_s=185.0)
+    status = City(tmp_path, found_with_file(tmp_path), None).run(again)
+    assert [one.state for one in status.versions] == ["adopted", "rejected"]
+    assert status.versions[1].reason == "the car changed again before it was confirmed"
+    assert [one.search for one in status.changes] == ["named", "driving"]
 
 
 def test_restart_loses_no_version_and_repeats_no_alarm(changed, tmp_path):
