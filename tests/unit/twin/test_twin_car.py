@@ -8,10 +8,11 @@ from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RecordingError
+from scm.mismatch.findings import Course, Effect, Equation, Estimate
 from scm.records.twins import TwinEffect, TwinError, TwinParameter
 from scm.twin import car as twin_car
 from scm.twin import detector
-from scm.twin.investigation import AtOnce, Compared, Explained, explain
+from scm.twin.investigation import AtOnce, Compared, Explained, _is_of, explain
 from scm.twin.part import TwinPart
 from scm.v2x.exchange import Answer, Call, Incoming, PersistedState
 from scm.v2x.message import Refused
@@ -243,3 +244,22 @@ def test_search_names_the_effect_dates_it_and_writes_report_recording_and_car(tm
     assert {"report.json", "report.html", "recording"} <= {
         one.name for one in (tmp_path / "report").iterdir()
     }
+
+
+@pytest.mark.parametrize(
+    ("course", "since_s", "counts"),
+    [
+        (Course.STEP, 105.0, True),
+        (Course.STEP, 60.0, False),
+        (Course.STEP, 150.0, False),
+        (Course.RAMP, None, True),
+        (Course.CONSTANT, None, False),
+    ],
+)
+def test_only_effects_that_began_when_the_car_changed_explain_it(course, since_s, counts):
+    since = None if since_s is None else Estimate(value=since_s, low=0.0, high=200.0, unit="s")
+    effect = Effect(
+        name="steer_trim", is_known=True, equation=Equation.STEERING, depends_on=(), parameters={},
+        probability=1.0, text="", course=course, since_s=since,
+    )  # fmt: skip
+    assert _is_of(effect, (100.0, 102.0)) is counts
