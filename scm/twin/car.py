@@ -8,7 +8,7 @@ import math
 import re
 from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -53,6 +53,10 @@ SEARCHED_BEFORE_S, SEARCHED_AFTER_S = 120.0, 90.0  # of a change, for a search
 MOST_AFTER_S, LEAST_AFTER_S = 300.0, 40.0
 
 
+FAILURES = (ScmError, OSError, BrokenExecutor)
+"""Of searches and comparisons, which never end the part."""
+
+
 @dataclass(frozen=True, slots=True)
 class Setup:
     """What all cars share.
@@ -67,7 +71,7 @@ class Setup:
 
     threshold: float
     predictor: Callable[[str], WatchedCar]
-    executor: Callable[[], Executor]
+    executor: Executor
     data: Path | None
     budget_s: float
 
@@ -237,7 +241,7 @@ class TwinCar:
             recording = self._memory.between(since_s - SEARCHED_BEFORE_S, last_s)
         except RecordingError as error:
             return self._now(change, structs.replace(change, search="failed", text=str(error)))
-        self._search = self._setup.executor().submit(
+        self._search = self._setup.executor.submit(
             explain, recording, self.versions.in_force.file, data / "reports" / report,
             data / "twins" / self.name / f"{number}.toml", (low_s, high_s), self._setup.budget_s,
         )  # fmt: skip
@@ -250,8 +254,8 @@ class TwinCar:
         change = next(one for one in self.changes if one.search == "searching")
         try:
             found = search.result()
-        except ScmError as error:
-            failed = structs.replace(change, search="failed", text=str(error), report="")
+        except FAILURES as error:
+            failed = structs.replace(change, search="failed", text=_in_words(error), report="")
             return self._now(change, failed)
         state = "named" if found.effects else "undecided" if found.between else "unexplained"
         named = structs.replace(
@@ -283,7 +287,7 @@ class TwinCar:
             recording = self._memory.between(trial.since_s, self._memory.last_s)
         except RecordingError:
             return []
-        self._comparison = self._setup.executor().submit(
+        self._comparison = self._setup.executor.submit(
             compare, recording, self.versions[new.after].file, new.file
         )
         return []
@@ -299,8 +303,8 @@ class TwinCar:
         self._trial = None if is_last else trial
         try:
             compared = comparison.result()
-        except ScmError as error:
-            return self._rejected(f"it cannot be compared: {error}") if is_last else []
+        except FAILURES as error:
+            return self._rejected(f"not compared: {_in_words(error)}") if is_last else []
         if candidate is None:
             if not is_worse(compared):
                 return []
@@ -398,6 +402,12 @@ def _interrupted(change: TwinChange) -> TwinChange:
         return change
     text = "The twin part was started again before its cause was found."
     return structs.replace(change, search="failed", text=text)
+
+
+def _in_words(failure: Exception) -> str:
+    if isinstance(failure, BrokenExecutor):
+        return "The process that worked on it was killed."
+    return str(failure)
 
 
 def _slug(name: str) -> str:

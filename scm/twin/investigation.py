@@ -7,8 +7,9 @@ import multiprocessing
 import os
 import shutil
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -94,15 +95,36 @@ class AtOnce(Executor):
         return future
 
 
-def worker() -> tuple[Executor, object]:
-    """Return an executor of one process that goes after the city's, and what it lives by.
+class Worker(Executor):
+    """One process that goes after the city's, started when it is needed, and again if it is killed.
 
-    It ends when the second, the end of a pipe, is closed or its owner dies.
+    It ends with the process that has it.
     """
-    context = multiprocessing.get_context("spawn")
-    leash, held = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(1, context, initializer=_begin, initargs=(leash,))
-    return pool, held
+
+    def __init__(self) -> None:
+        self._pool: ProcessPoolExecutor | None = None
+        self._pipe: Connection | None = None  # the worker ends when it is closed
+
+    def submit(self, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
+        """Run a function in the worker, after those before it."""
+        try:
+            return self._running().submit(function, *args, **kwargs)
+        except BrokenExecutor:  # it was killed: for its memory, say
+            self._pool = None
+            return self._running().submit(function, *args, **kwargs)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the worker, whatever it does."""
+        if self._pool is not None and self._pipe is not None:
+            self._pipe.close()
+            self._pool.shutdown(wait, cancel_futures=cancel_futures)
+
+    def _running(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            context = multiprocessing.get_context("spawn")
+            leash, self._pipe = context.Pipe(duplex=False)
+            self._pool = ProcessPoolExecutor(1, context, initializer=_begin, initargs=(leash,))
+        return self._pool
 
 
 def _begin(leash: Leash) -> None:

@@ -15,7 +15,7 @@ from scm.records.twins import TwinChange, TwinVersion
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.twin.car import NAME, Setup, TwinCar
 from scm.twin.detector import threshold_of
-from scm.twin.investigation import worker
+from scm.twin.investigation import Worker
 from scm.twin.windows import WatchedCar
 from scm.v2x.exchange import Answer, Incoming, Outgoing
 from scm.v2x.message import Message, Refused
@@ -59,9 +59,9 @@ class TwinPart(BasePart):
     ) -> None:  # fmt: skip
         self._cars: dict[str, TwinCar] = {}
         self._predictors: dict[str, WatchedCar] = {}
-        self._executor, self._pipe = executor, object()
+        self._executor = executor or Worker()
         threshold = threshold_of(false_alarm_h)
-        self._setup = Setup(threshold, self._predictor, self._worker, data, budget_s)
+        self._setup = Setup(threshold, self._predictor, self._executor, data, budget_s)
         self._versions, self._changes = _by_car(versions or {}), _by_car(changes or {})
         self._status_ns = -NS_PER_S
 
@@ -92,9 +92,7 @@ class TwinPart(BasePart):
     def finish(self, now_ns: int) -> list[Outgoing]:
         """End the worker, whatever it does."""
         del now_ns
-        if self._executor is not None:
-            self._executor.shutdown(wait=False, cancel_futures=True)
-        self._pipe = None
+        self._executor.shutdown(wait=False, cancel_futures=True)
         return []
 
     def _receive(self, message: Message, now_ns: int) -> None:
@@ -133,11 +131,6 @@ class TwinPart(BasePart):
         if car not in self._predictors:
             self._predictors[car] = WatchedCar(load_car(car))
         return self._predictors[car]
-
-    def _worker(self) -> Executor:
-        if self._executor is None:
-            self._executor, self._pipe = worker()
-        return self._executor
 
 
 def _by_car(stored: Mapping[str, R]) -> dict[str, list[R]]:

@@ -1,7 +1,9 @@
 """What becomes of a change: it is searched for, and a better car file is put in force."""
 
 import dataclasses
-from concurrent.futures import Executor, Future
+import os
+import signal
+from concurrent.futures import BrokenExecutor, Executor, Future
 
 import pytest
 from msgspec.structs import replace
@@ -10,9 +12,10 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RecordingError
 from scm.mismatch.findings import Course, Effect, Equation, Estimate
 from scm.records.twins import TwinEffect, TwinError, TwinParameter
+from scm.runtime.priority import NICER
 from scm.twin import car as twin_car
 from scm.twin import detector
-from scm.twin.investigation import AtOnce, Compared, Explained, _is_of, explain
+from scm.twin.investigation import AtOnce, Compared, Explained, Worker, _is_of, explain
 from scm.twin.part import TwinPart
 from scm.v2x.exchange import Answer, Call, Incoming, PersistedState
 from scm.v2x.message import Refused
@@ -155,6 +158,7 @@ def test_candidate_that_is_no_better_twice_is_rejected(changed, tmp_path):
     ("found", "search", "words"),
     [
         (RecordingError("no pose at all"), "failed", "no pose at all"),
+        (BrokenExecutor("x"), "failed", "The process that worked on it was killed."),
         (Explained((), ("a", "b"), "Drive slowly.", "It may be a or b.", None, None),
          "undecided", "It may be a or b."),
         (Explained((), (), "", "Nothing known.", None, None), "unexplained", "Nothing known."),
@@ -263,3 +267,21 @@ def test_only_effects_that_began_when_the_car_changed_explain_it(course, since_s
         probability=1.0, text="", course=course, since_s=since,
     )  # fmt: skip
     assert _is_of(effect, (100.0, 102.0)) is counts
+
+
+def test_worker_that_was_killed_is_started_again_and_stands_back():
+    worker = Worker()
+
+    def process_id():
+        try:
+            return worker.submit(os.getpid).result(60.0)
+        except BrokenExecutor:
+            return None
+
+    try:
+        first = process_id()
+        assert worker.submit(os.getpriority, os.PRIO_PROCESS, 0).result(60.0) == NICER
+        os.kill(first, signal.SIGKILL)
+        assert (process_id() or process_id()) not in (None, first)
+    finally:
+        worker.shutdown(wait=True)
