@@ -158,8 +158,10 @@ class TwinCar:
             if self._memory.last_s >= self._watched_s + SPAN_S:
                 out += self._watch_on(self._watch)
             self._reason = ""
-        except (CarError, RecordingError) as error:
+        except RecordingError as error:
             self._reason = str(error)
+        except CarError as error:
+            self._reason, self._watched_s = str(error), self._memory.last_s
         return [self.status(), *out]
 
     def _remember(self) -> None:

@@ -71,15 +71,25 @@ def test_change_is_an_event_and_stays_in_the_status(changed):
     ("lacks", "words"),
     [({"steering": None}, "no command that it obeyed is known"), ({"car": "unicorn"}, "unicorn")],
 )
-def test_car_that_cannot_be_predicted_is_blind_in_words(changed, lacks, words):
-    strange = [
-        [replace(one, **lacks) if isinstance(one, VehicleState) else one for one in step]
-        for step in changed[:300]
+def test_car_that_cannot_be_predicted_is_blind_in_words_and_others_are_watched(
+    changed, lacks, words
+):
+    both = [
+        [
+            *step,
+            *(
+                replace(one, vehicle="n2", **(lacks if isinstance(one, VehicleState) else {}))
+                for one in step
+            ),
+        ]
+        for step in changed[:450]
     ]
-    out, _ = run(TwinPart(), strange)
-    last = [one for one in out if isinstance(one, TwinStatus)][-1]
-    assert last.state == "blind"
-    assert words in last.reason
+    out, _ = run(TwinPart(), both)
+    last = {one.vehicle: one for one in out if isinstance(one, TwinStatus)}
+    assert last["n2"].state == "blind"
+    assert words in last["n2"].reason
+    assert last["n1"].state == "learning"
+    assert last["n1"].driven_s > 30.0
 
 
 def test_clock_that_jumps_is_no_change_and_nothing_piles_up(changed):
