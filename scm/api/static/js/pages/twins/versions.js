@@ -71,7 +71,7 @@ function Abilities({ version }) {
         const hasChanged = before < low || before > high;
         return html`
           <dt>${ABILITIES[name] ?? spaced(name)}</dt>
-          <dd data-changed=${hasChanged}>${now} <small>${least} to ${most}${hasChanged && `, before ${then}`}</small></dd>
+          <dd data-changed=${hasChanged}>${now} <small>${least.split(" ")[0]} to ${most}${hasChanged && `, before ${then}`}</small></dd>
         `;
       })}
     </dl>
