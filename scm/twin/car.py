@@ -51,8 +51,6 @@ MOST_CHANGES = 20
 BY_EYE, FEWEST_SEEN = "eye", 50  # poses of a first look, for the Eye to be a witness
 SEARCHED_BEFORE_S, SEARCHED_AFTER_S = 120.0, 90.0  # of a change, for a search
 MOST_AFTER_S, LEAST_AFTER_S = 300.0, 40.0
-
-
 FAILURES = (ScmError, OSError, BrokenExecutor)
 """Of searches and comparisons, which never end the part."""
 
@@ -253,7 +251,9 @@ class TwinCar:
     def _searched(self, search: Future[Explained]) -> list[Outgoing]:
         """Take what a search found."""
         self._search = None
-        change = next(one for one in self.changes if one.search == "searching")
+        change = next((one for one in self.changes if one.search == "searching"), None)
+        if change is None:  # so many came since that it is forgotten
+            return []
         try:
             found = search.result()
         except FAILURES as error:
