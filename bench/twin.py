@@ -90,6 +90,9 @@ def main() -> None:
     parser.add_argument("--since-s", type=float, default=300.0)
     parser.add_argument("--search", action="store_true", help="for what each change is")
     given = parser.parse_args()
+    for name in given.effects:
+        if name not in (*every, "nothing"):
+            parser.error(f"{name}: expected one of {', '.join(every)}, nothing")
     predictor, threshold = WatchedCar(load_car(CAR)), threshold_of(FALSE_ALARM_H)
     after_s, driven_s, spent_s, dated, named = list[float](), 0.0, 0.0, 0, 0
     for name in given.effects:
