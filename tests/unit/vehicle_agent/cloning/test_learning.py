@@ -17,7 +17,7 @@ from vehicle_agent.cloning.model_file import KEY, Model
 from vehicle_agent.cloning.training import Recipe, balanced
 
 PLAIN = Augmentation(offset_std_m=0.0, heading_std_rad=0.0, mirrored=0.5, shadow=0.0)
-RECIPE = Recipe(epochs=12, copies=4, batch=32, rate=5e-3, how=PLAIN)
+RECIPE = Recipe(epochs=20, copies=4, batch=32, rate=5e-3, how=PLAIN)
 
 
 @pytest.fixture(scope="module")
