@@ -257,7 +257,7 @@ class TwinCar:
         try:
             found = search.result()
         except FAILURES as error:
-            failed = structs.replace(change, search="failed", text=_in_words(error), report="")
+            failed = structs.replace(change, search="failed", text=_why(error), report="")
             return self._now(change, failed)
         state = "named" if found.effects else "undecided" if found.between else "unexplained"
         named = structs.replace(
@@ -306,7 +306,7 @@ class TwinCar:
         try:
             compared = comparison.result()
         except FAILURES as error:
-            return self._rejected(f"not compared: {_in_words(error)}") if is_last else []
+            return self._rejected(f"not compared: {_why(error)}") if is_last else []
         if candidate is None:
             if not is_worse(compared):
                 return []
@@ -406,7 +406,7 @@ def _interrupted(change: TwinChange) -> TwinChange:
     return structs.replace(change, search="failed", text=text)
 
 
-def _in_words(failure: Exception) -> str:
+def _why(failure: Exception) -> str:
     if isinstance(failure, BrokenExecutor):
         return "The process that worked on it was killed."
     return str(failure)

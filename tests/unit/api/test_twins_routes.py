@@ -53,7 +53,7 @@ def test_rows_say_what_changed_in_short(client, hear):
         (change(1, search="unexplained"), "no known effect explains it"),
     ],
 )
-def test_change_is_said_in_some_words(found, words):
+def test_change_in_short_is_what_explains_it_or_what_it_looks_like(found, words):
     assert in_short(found) == words
 
 

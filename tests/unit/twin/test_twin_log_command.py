@@ -64,7 +64,7 @@ def test_two_versions_are_compared(store, capsys):
         (["n3", "--between", "1", "0"], "expected more than 0, got 0"),
     ],
 )
-def test_what_is_not_there_is_said(store, arguments, words, capsys):
+def test_what_is_not_there_is_refused_in_words(store, arguments, words, capsys):
     assert main(["twin", "log", *arguments, "--state", store]) == 2
     assert words in capsys.readouterr().err
 

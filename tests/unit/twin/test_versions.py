@@ -124,7 +124,7 @@ def test_difference_of_two_files_names_effects_and_numbers(trimmed):
         assert any(one.startswith(line) for one in differences(now, other))
 
 
-def test_abilities_are_said_where_they_changed():
+def test_abilities_are_reported_where_they_changed():
     same = structs.replace(STOPS, before=0.055)
     turns = TwinParameter(
         name="turning_radius_m", value=0.281, low=0.271, high=0.287, unit="m", before=0.2493
