@@ -6,6 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.records.twins import TwinVersion
 from scm.twin import detector
 from scm.twin.part import GONE_NS, TwinPart
 from scm.v2x.exchange import Incoming
@@ -13,6 +14,7 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.vehicle_state import VehicleState
+from tests.unit.mismatch.made_drive import nigel
 from tests.unit.twin.reported import (
     BEGAN_NS,
     BIAS,
@@ -101,3 +103,14 @@ def test_clock_that_jumps_is_no_change_and_nothing_piles_up(changed):
     assert len(part._cars["n1"]._messages.reports) < 800
     part.step(BEGAN_NS + 10 * HOUR_NS + GONE_NS, [])
     assert part._cars == {}
+
+
+def test_car_that_was_away_comes_back_with_its_version(changed):
+    file = str(nigel().path)
+    version = TwinVersion(number=1, car="nigel", file=file, made_ns=BEGAN_NS, state="adopted")
+    part = TwinPart(versions={"n1/1": version})
+    _, now_ns = run(part, changed[:20])
+    part.step(now_ns + 2 * GONE_NS, [])
+    assert part._cars == {}
+    out, _ = run(part, changed[:130])
+    assert [one.version for one in out if isinstance(one, TwinStatus)] == [1]
