@@ -21,6 +21,7 @@ def twin_of(status: TwinStatus) -> Twin:
 
 def _row(status: TwinStatus) -> TwinRow:
     newest = status.changes[-1] if status.changes else None
+    place = newest.causes[0] if newest is not None and newest.cause == "place" else None
     return TwinRow(
         vehicle=status.vehicle,
         car=status.car,
@@ -33,11 +34,18 @@ def _row(status: TwinStatus) -> TwinRow:
         changed_ns=None if newest is None else newest.since_ns,
         search=None if newest is None else newest.search,
         newest="" if newest is None else in_short(newest),
+        x_m=None if place is None else place.x_m,
+        y_m=None if place is None else place.y_m,
+        radius_m=None if place is None else place.radius_m,
     )
 
 
 def in_short(change: TwinChange) -> str:
     """Return what a change is, in some words: what explains it, or what it looks like."""
+    if change.cause == "place":
+        return f"the floor at ({change.causes[0].x_m:.1f}, {change.causes[0].y_m:.1f}), not the car"
+    if change.cause == "camera":
+        return f"{f'camera {change.causes[0].camera}'.rstrip()}, not the car"
     if change.effects:
         return " and ".join(map(_effect, change.effects))
     if change.search == "unexplained":

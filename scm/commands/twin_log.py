@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 from scm.command import Command
 
 if TYPE_CHECKING:
-    from scm.records.twins import TwinChange, TwinVersion
+    from scm.records.twins import TwinCause, TwinChange, TwinVersion
+
+LEAST_SHOWN = 0.05  # of probabilities
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,6 +62,10 @@ def _of_change(change: "TwinChange") -> list[str]:
     )
     since = f"{_time(change.since_ns)} ({low:+.1f} to {high:+.1f} s)"
     lines = [f"changed since {since}, noticed {_time(change.noticed_ns)}: {change.search}"]
+    if change.causes:
+        causes = [one for one in change.causes if one.probability >= LEAST_SHOWN]
+        words = [f"{_cause(one)} {100 * one.probability:.0f} %" for one in causes]
+        lines.append(f"  of {change.cause}: {', '.join(words)}")
     if change.text:
         lines.append(f"  {change.text}")
     for effect in change.effects:
@@ -70,6 +76,12 @@ def _of_change(change: "TwinChange") -> list[str]:
     if change.drive_this:
         lines.append(f"  to tell {' and '.join(change.between)} apart: {change.drive_this}")
     return [*lines, *([f"  report: {change.report}"] if change.report else [])]
+
+
+def _cause(cause: "TwinCause") -> str:
+    if cause.x_m is not None:
+        return f"{cause.kind} ({cause.x_m:.2f}, {cause.y_m:.2f}), {cause.radius_m} m"
+    return f"{cause.kind} {cause.camera}".rstrip()
 
 
 def _of_version(version: "TwinVersion", by_number: dict[int, "TwinVersion"]) -> list[str]:

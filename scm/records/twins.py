@@ -16,7 +16,11 @@ ReportName = Annotated[
     str,
     Meta(description="Name of the mismatch report; empty: none.", examples=["twin-n3-1200"]),
 ]
-Search = Literal["driving", "searching", "named", "undecided", "unexplained", "failed"]
+PlaceM = Annotated[float, Meta(examples=[1.2])] | None
+Kind = Literal["car", "tag", "place", "camera", "everywhere"]
+Search = Literal[
+    "driving", "searching", "named", "undecided", "unexplained", "elsewhere", "failed"
+]  # fmt: skip
 State = Literal["learning", "watching", "blind"]
 WatchedS = Annotated[
     float, Meta(description="How long it was driven and watched [s].", examples=[812.0])
@@ -61,6 +65,27 @@ class TwinEffect(msgspec.Struct, kw_only=True, frozen=True):
     text: Annotated[str, Meta(examples=["The front wheels point 1.8° to the right."])] = ""
 
 
+class TwinCause(msgspec.Struct, kw_only=True, frozen=True):
+    """What a change may be of.
+
+    Attributes:
+        kind: `car`; `tag`: of this car; `place`: the floor there, for all cars; `camera`: for all
+            cars that it sees; `everywhere`: for all cars since then, as a mopped floor.
+        probability: Among all of these.
+        x_m: Middle of the place, in the map frame; null: no place.
+        y_m: Likewise.
+        radius_m: Of the place; null: no place.
+        camera: Empty: no camera, or its name is not known.
+    """
+
+    kind: Kind
+    probability: Annotated[float, Meta(examples=[0.97])]
+    x_m: PlaceM = None
+    y_m: PlaceM = None
+    radius_m: Annotated[float, Meta(examples=[0.35])] | None = None
+    camera: Annotated[str, Meta(examples=["north"])] = ""
+
+
 class TwinChange(msgspec.Struct, kw_only=True, frozen=True):
     """A change of a car.
 
@@ -77,11 +102,15 @@ class TwinChange(msgspec.Struct, kw_only=True, frozen=True):
         alike: Further effects that look nearly as much like it, the best first.
         search: How far the search for its cause is. `driving`: more driving is needed; `searching`;
             `named`; `undecided`: `between` these; `unexplained`: by no known effect;
-            `failed`: why, says `text`.
+            `elsewhere`: not searched for, since not the car changed, as `cause` says; `failed`:
+            why, says `text`.
         effects: That explain it, the likeliest first.
         between: Effects that this driving cannot distinguish.
         drive_this: The drive that would.
         text: The result in one or two sentences.
+        cause: Whose change it is, of `causes`, or `undecided`.
+        causes: The likeliest first.
+        decide_by: Which car would have to drive where to decide the cause; empty: it is decided.
     """
 
     noticed_ns: TNs
@@ -100,6 +129,9 @@ class TwinChange(msgspec.Struct, kw_only=True, frozen=True):
     drive_this: Annotated[str, Meta(examples=["Drive a circle to the left at full steering."])] = ""
     text: Annotated[str, Meta(examples=["The front wheels point 1.8° to the right."])] = ""
     report: ReportName = ""
+    cause: Kind | Literal["undecided"] = "undecided"
+    causes: tuple[TwinCause, ...] = ()
+    decide_by: Annotated[str, Meta(examples=["Let n5 drive through (1.2, 0.4)."])] = ""
 
 
 class TwinError(msgspec.Struct, kw_only=True, frozen=True):
@@ -184,6 +216,9 @@ class TwinRow(msgspec.Struct, kw_only=True, frozen=True):
         changed_ns: When the newest began, on the clock of `t_ns` [ns]; null: it has not changed.
         search: How far the search for its cause is, as in the car's changes; null: likewise.
         newest: What it is, in short; empty: likewise.
+        x_m: Middle of the place whose floor changed, in the map frame; null: it is no place.
+        y_m: Likewise.
+        radius_m: Of that place; null: likewise.
     """
 
     vehicle: VehicleName
@@ -197,6 +232,9 @@ class TwinRow(msgspec.Struct, kw_only=True, frozen=True):
     changed_ns: TNs | None
     search: Search | None
     newest: Annotated[str, Meta(examples=["steer trim, 97 %"])]
+    x_m: PlaceM = None
+    y_m: PlaceM = None
+    radius_m: Annotated[float, Meta(examples=[0.35])] | None = None
 
 
 class VersionBody(Body, kw_only=True, frozen=True):

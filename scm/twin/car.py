@@ -20,6 +20,7 @@ from scm.errors import CarError, RecordingError, ScmError
 from scm.recorder.driven import CarMessages, recording_of
 from scm.recording.read import Recording
 from scm.records.twins import TwinChange, TwinVersion
+from scm.twin.causes import ELSEWHERE, OWN, Witness, cause_in_words, located
 from scm.twin.investigation import Compared, Explained, compare, explain
 from scm.twin.memory import CarMemory
 from scm.twin.versions import (
@@ -51,6 +52,8 @@ MOST_CHANGES = 20
 BY_EYE, FEWEST_SEEN = "eye", 50  # poses of a first look, for the Eye to be a witness
 SEARCHED_BEFORE_S, SEARCHED_AFTER_S = 120.0, 90.0  # of a change, for a search
 MOST_AFTER_S, LEAST_AFTER_S = 300.0, 40.0
+LOCATED_NS = nanoseconds(300.0)  # after a change was noticed, whose it is may still come out
+SAME_S = 10.0  # changes that began within that may be one
 FAILURES = (ScmError, OSError, BrokenExecutor)
 """Of searches and comparisons, which never end the part."""
 
@@ -167,7 +170,7 @@ class TwinCar:
         first_ns, self.next_ns = self.next_ns, self.next_ns + LOOK_NS
         try:
             first_s = seconds(first_ns - self._begin_ns)
-            self._memory.add(self._recording(), first_s, first_s + SPAN_S)
+            self._memory.add(self._recording(), first_s, first_s + SPAN_S, self._camera())
         finally:
             _forget(self._messages, self.next_ns - BEFORE_NS)
 
@@ -185,13 +188,18 @@ class TwinCar:
             messages = replace(messages, reports=reports)
         return recording_of(messages, Path(NAME), self.name, self._begin_ns)
 
+    def _camera(self) -> str:
+        """Return which camera saw the car most; empty: none, or the car itself is the witness."""
+        seen = self._messages.seen
+        return max(seen, key=lambda name: len(seen[name])) if self._is_seen and seen else ""
+
     def _watch_on(self, watch: CarWatch) -> list[Outgoing]:
         """Look at ten seconds of the memory; return a change, if they show one."""
         first_s = self._memory.begin_after(self._watched_s)
         self._watched_s = last_s = first_s + SPAN_S
         recording = self._memory.between(first_s - BEFORE_S, last_s + AFTER_S)
         before_s = watch.driven_s
-        noticed = watch.look(recording, first_s, last_s)
+        noticed = watch.look(recording, first_s, last_s, self._memory.camera_at(first_s))
         if first_s >= self._looked_s:
             self._looked_s = last_s
             self._driven_s += watch.driven_s - before_s
@@ -208,6 +216,47 @@ class TwinCar:
         )
         return [*out, self._change_stored(change), self._event("car_changed", text, "warning")]
 
+    def witness(self, of: "TwinCar", since_s: float) -> Witness | None:
+        """Return what the car shows about a change, and between which of its own that counts.
+
+        Args:
+            of: The car that changed.
+            since_s: On the city's clock.
+        """
+        if self._watch is None:
+            return None
+        own = [
+            seconds(one.since_ns)
+            for one in self.changes
+            if one.cause in OWN and abs(seconds(one.since_ns) - since_s) > SAME_S
+        ]
+        first_s = max((t_s for t_s in own if t_s < since_s), default=-math.inf)
+        last_s = min((t_s for t_s in own if t_s > since_s), default=math.inf)
+        if self is of:
+            last_s = math.inf
+        return Witness(self._watch.evidence, seconds(self._begin_ns), first_s, last_s)
+
+    def locate(self, cars: Iterable["TwinCar"]) -> list[Outgoing]:
+        """Say whose each new change is, by what all cars drove."""
+        out, cars = list[Outgoing](), tuple(cars)
+        for change in tuple(self.changes):
+            if self.newest_ns - change.noticed_ns > LOCATED_NS:
+                continue
+            since_s = seconds(change.since_ns)
+            witnesses = {one.name: one.witness(self, since_s) for one in cars}
+            found = located(change, self.name, {n: w for n, w in witnesses.items() if w})
+            if found is None or found == change:
+                continue
+            out += self._now(change, found)
+            if found.cause not in (change.cause, "undecided"):
+                text = cause_in_words(found, self.name)
+                out.append(self._event("change_located", text, "warning"))
+                made = self.versions.candidate
+                if found.cause in ELSEWHERE and made is not None and made.report == found.report:
+                    self._trial = None
+                    out += self._rejected(text)
+        return [*out, self.status()] if out else []
+
     def work(self) -> list[Outgoing]:
         """Go on with searching for the cause of a change, and with comparing versions."""
         if self._setup.data is None:
@@ -217,6 +266,8 @@ class TwinCar:
         if self._comparison is not None:
             return self._compared(self._comparison) if self._comparison.done() else []
         waiting = next((one for one in self.changes if one.search == "driving"), None)
+        if waiting is not None and waiting.cause in ELSEWHERE:
+            return self._now(waiting, structs.replace(waiting, search="elsewhere"))
         if waiting is not None:
             return self._search_for(waiting, self._setup.data)
         return self._compare()
@@ -272,7 +323,7 @@ class TwinCar:
         text = f"{self.name} changed: {named.text}"
         out = [*self._now(change, named), self._event("change_explained", text, "warning")]
         is_newest = named is self.changes[-1]
-        if found.car_file is not None and is_newest:
+        if found.car_file is not None and is_newest and named.cause not in ELSEWHERE:
             made = self.versions.propose(found, named.report, self.newest_ns)
             self._trial = _Trial(*self._searched_until)
             out += self._stored(made)

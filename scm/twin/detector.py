@@ -111,6 +111,11 @@ class Detector:
         """Whether it does not yet know how the car strays."""
         return self._history is None
 
+    @property
+    def usual(self) -> Usual | None:
+        """How the car strays; None: not known yet."""
+        return None if self._history is None else self._history.usual
+
     def update(self, windows: Windows) -> Change | None:
         """Take new windows; return the change that they show, if they do.
 
@@ -154,7 +159,7 @@ class History:
     """
 
     def __init__(self, usual: Usual, windows: Windows) -> None:
-        self._usual = usual
+        self.usual = usual
         self._t = windows.begin_s
         self._shown = weighed(windows, usual)
         self._before = np.zeros_like(self._shown[:, 0])  # the sum of those that left its memory
@@ -163,7 +168,7 @@ class History:
     def add(self, windows: Windows) -> None:
         """Add new windows; those that leave its memory are added up."""
         self._t = np.concatenate((self._t, windows.begin_s))
-        self._shown = np.concatenate((self._shown, weighed(windows, self._usual)), axis=1)
+        self._shown = np.concatenate((self._shown, weighed(windows, self.usual)), axis=1)
         gone = max(0, len(self._t) - MEMORY)
         self._before *= (1.0 - FORGET) ** gone
         self._before += self._shown[:, :gone].sum(axis=1)
@@ -181,7 +186,7 @@ class History:
             there &= begins >= 0
             before = sums[:, begins[there]]
             moved, variance = _moved(sums[:, ends[there]] - before, before, CLIPPED)
-            found[there, k] = moved / np.sqrt(self._usual.inflation[k] * variance)
+            found[there, k] = moved / np.sqrt(self.usual.inflation[k] * variance)
         return found
 
     def change(self, scores: Floats) -> Change:
@@ -191,7 +196,7 @@ class History:
         after = np.cumsum(self._shown[:, ::-1], axis=1)[:, ::-1]  # from each window on
         before = self._before[:, None] + after[:, :1] - after
         moved, variance = _moved(after[..., best], before[..., best], CLIPPED)
-        likelihood = 0.5 * moved**2 / (self._usual.inflation[:, best].max() * variance)
+        likelihood = 0.5 * moved**2 / (self.usual.inflation[:, best].max() * variance)
         onset = int(np.argmax(likelihood))
         near = np.flatnonzero(likelihood > likelihood[onset] - LIKELY)
         first, last = self._t[near[0]] - EVERY_S, self._t[near[-1]] + LENGTH_S
@@ -226,6 +231,7 @@ def joined(first: Windows, then: Windows) -> Windows:
     return replace(
         first,
         begin_s=np.concatenate((first.begin_s, then.begin_s)),
+        places=np.concatenate((first.places, then.places)),
         misses=np.concatenate((first.misses, then.misses)),
         slopes=np.concatenate((first.slopes, then.slopes)),
     )

@@ -25,6 +25,7 @@ class _Piece:
     first_s: float
     last_s: float
     recording: Recording
+    camera: str
 
 
 class CarMemory:
@@ -38,15 +39,16 @@ class CarMemory:
         self._pieces = deque[_Piece]()
         self.last_s = -math.inf
 
-    def add(self, recording: Recording, first_s: float, last_s: float) -> None:
+    def add(self, recording: Recording, first_s: float, last_s: float, camera: str = "") -> None:
         """Add what was recorded from `first_s` on, on the recording's clock.
 
         Args:
             recording: May go on after `last_s`: that counts until the next is added.
             first_s: What was recorded before does not count.
             last_s: Until when all is there.
+            camera: By which the car was seen; empty: by none.
         """
-        self._pieces.append(_Piece(first_s, last_s, _from(recording, first_s, math.inf)))
+        self._pieces.append(_Piece(first_s, last_s, _from(recording, first_s, math.inf), camera))
         self.last_s = last_s
         while self._pieces[0].last_s < last_s - MEMORY_S:
             self._pieces.popleft()
@@ -55,6 +57,10 @@ class CarMemory:
         """Return where driving goes on after a moment; the end of all if nothing follows."""
         later = (max(one.first_s, first_s) for one in self._pieces if one.last_s > first_s)
         return next(later, self.last_s)
+
+    def camera_at(self, t_s: float) -> str:
+        """Return which camera saw the car at a time; empty: none."""
+        return next((one.camera for one in self._pieces if one.first_s <= t_s < one.last_s), "")
 
     def between(self, first_s: float, last_s: float) -> Recording:
         """Return what was driven in a span.

@@ -79,7 +79,8 @@ class TwinPart(BasePart):
             self._leave(self._cars.pop(name))
         waiting = [one for one in self._cars.values() if one.waits_ns >= 0]
         if waiting:
-            out += max(waiting, key=lambda one: one.waits_ns).look()
+            car = max(waiting, key=lambda one: one.waits_ns)
+            out += [*car.look(), *car.locate(self._cars.values())]
         for one in self._cars.values():
             out += one.work()
         if now_ns - self._status_ns >= NS_PER_S:

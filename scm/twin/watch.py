@@ -11,7 +11,8 @@ from scm.data_quality.prepare import screen, stretches
 from scm.errors import RecordingError
 from scm.recording.read import Recording
 from scm.recording.span import part_of
-from scm.twin.detector import Change, Detector
+from scm.twin.detector import Change, Detector, Usual
+from scm.twin.evidence import Evidence
 from scm.twin.windows import EVERY_S, WatchedCar, WatchedNumber, Windows
 from scm.vehicles.car import Car
 
@@ -44,12 +45,16 @@ class CarWatch:
 
     Attributes:
         driven_s: How long it was driven and seen.
+        evidence: What its newest windows show, by how it strayed before the newest change.
     """
 
     def __init__(self, predictor: WatchedCar, threshold: float) -> None:
         self._predictor, self._threshold = predictor, threshold
         self._detector = Detector(threshold)
         self._streams: tuple[str, ...] | None = None
+        self._usual: Usual | None = None
+        self._early = list[tuple[Windows, str]]()  # until it is known how the car strays
+        self.evidence = Evidence.none(predictor.watched)
         self.driven_s = 0.0
 
     @property
@@ -62,18 +67,22 @@ class CarWatch:
         """Whether it does not yet know how the car strays."""
         return self._detector.is_learning
 
-    def look(self, recording: Recording, first_s: float, last_s: float) -> Noticed | None:
+    def look(
+        self, recording: Recording, first_s: float, last_s: float, camera: str = ""
+    ) -> Noticed | None:
         """Look at a span of a recording, once; return the change that it shows, if it does.
 
         Args:
             recording: With what surrounds the span, if there is any.
             first_s: On the recording's clock.
             last_s: Likewise.
+            camera: That saw the car in it, if one did.
         """
         change = None
         for windows in self._windows(recording, first_s, last_s):
             self.driven_s += EVERY_S * len(windows.begin_s)
             change = change or self._detector.update(windows)
+            self._remember(windows, camera)
         if change is None:
             return None
         driven_s = self._detector.driven_s
@@ -81,6 +90,18 @@ class CarWatch:
         watched = self._predictor.watched
         alike = tuple((watched[number], size) for number, size in change.alike)
         return Noticed(change, watched[change.number], alike, driven_s)
+
+    def _remember(self, windows: Windows, camera: str) -> None:
+        """Add windows to the evidence, weighed by how the car strays; early ones when it is known.
+
+        After a change they are weighed as before it, until it is known how the car strays now.
+        """
+        self._usual = self._detector.usual or self._usual
+        self._early.append((windows, camera))
+        if self._usual is not None:
+            for early, by in self._early:
+                self.evidence.add(early, self._usual, by)
+            self._early.clear()
 
     def _windows(self, recording: Recording, first_s: float, last_s: float) -> Iterator[Windows]:
         """Yield the windows of a span, stretch by stretch; a stretch without a sensor shows less.

@@ -16,7 +16,7 @@ from scm.arrays import Floats
 from scm.mismatch.effect_catalogue import Candidate, Parameter, candidates, terms_needed
 from scm.mismatch.findings import Equation
 from scm.mismatch.fit.noise import Noise, usual_noise
-from scm.mismatch.fit.residual_windows import WindowWhitener, least_sizes
+from scm.mismatch.fit.residual_windows import LENGTH_S, WindowWhitener, least_sizes
 from scm.mismatch.fit.rollouts import Motions, Rollouts, Tiles
 from scm.mismatch.fit.sensor_prediction import Prediction
 from scm.recording.read import Recording
@@ -54,12 +54,14 @@ class Windows:
 
     Attributes:
         begin_s: On the recording's clock, rising, (n,).
+        places: Where the car was in the middle of each, x and y, (n, 2) [m].
         streams: `pose.x` stands for the way along the body, `pose.y` for that across it.
         misses: Measured minus predicted, (n, streams) [m, rad, or the sensor's unit].
         slopes: What one unit of each watched number adds to the prediction, (n, streams, numbers).
     """
 
     begin_s: Floats
+    places: Floats
     streams: tuple[str, ...]
     misses: Floats
     slopes: Floats
@@ -68,8 +70,9 @@ class Windows:
         """Return the windows that begin in a span of time."""
         these = (self.begin_s >= first_s) & (self.begin_s < last_s)
         return replace(
-            self, begin_s=self.begin_s[these], misses=self.misses[these], slopes=self.slopes[these]
-        )
+            self, begin_s=self.begin_s[these], places=self.places[these],
+            misses=self.misses[these], slopes=self.slopes[these],
+        )  # fmt: skip
 
 
 class WatchedCar:
@@ -108,7 +111,9 @@ class WatchedCar:
         misses = misses.reshape(count, -1, misses.shape[1]).transpose(1, 0, 2)
         steps = np.array([one.step for one in self.watched])
         slopes = (misses[:, :, :1] - misses[:, :, 1:]) / steps
-        return Windows(by_window.begin_s, streams, misses[:, :, 0], slopes)
+        middle = by_window.begin_s + 0.5 * LENGTH_S
+        places = np.stack([drive.smoothed[name].at(middle) for name in ("pose.x", "pose.y")], 1)
+        return Windows(by_window.begin_s, places, streams, misses[:, :, 0], slopes)
 
     def _residuals(self, drive: Drive) -> list[Floats]:
         """Return measured minus predicted of every stream, of the car and of each step."""
@@ -126,9 +131,8 @@ class WatchedCar:
 
     def _none(self, drive: Drive) -> Windows:
         count = len(drive.streams)
-        return Windows(
-            np.empty(0), drive.names, np.empty((0, count)), np.empty((0, count, len(self.watched)))
-        )
+        none = np.empty((0, count, len(self.watched)))
+        return Windows(np.empty(0), np.empty((0, 2)), drive.names, none[:, :, 0], none)
 
 
 def _numbers_of(one: Candidate) -> list[WatchedNumber]:

@@ -11,10 +11,12 @@ from scm.runtime.part import BasePart, Service, Subscription
 from scm.v2x.exchange import Answer, Incoming, Outgoing
 from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.version_request import VersionRequest
+from tests.e2e.pages.test_map_page import is_drawn
 from tests.e2e.pages.town import BEGIN_NS, Town, town
 from tests.e2e.pages.visiting import Visit, in_each_look, judge, photograph
-from tests.unit.api.made_twins import blind, undecided, watched
+from tests.unit.api.made_twins import blind, floor_changed, undecided, watched
 
+PLACE_EDGE = [255, 176, 0]
 NOW_NS = BEGIN_NS + 1_200_000_000_000
 
 
@@ -33,7 +35,8 @@ class TwinStub(BasePart):
         """Report; answer requests."""
         del now_ns
         answers = [Answer(item, self._use(item.message)) for item in inbox]
-        return [*answers, self.status, undecided("n2", NOW_NS), blind("n3", NOW_NS)]
+        return [*answers, self.status, undecided("n2", NOW_NS), blind("n3", NOW_NS),
+                floor_changed("n4", NOW_NS)]  # fmt: skip
 
     def _use(self, request: Any) -> TwinStatus:
         self.requests.append(request)
@@ -77,6 +80,7 @@ def test_changes_are_shown_and_another_version_is_put_in_force(
         page.wait_for_selector("tr[data-car=n1] >> text=Looks like tyre grip")
         page.wait_for_selector("tr[data-car=n2] >> text=12 min ago")
         assert "No command that it obeyed" in page.inner_text("tr[data-car=n3]")
+        page.wait_for_selector("tr[data-car=n4] >> text=The floor at (1.2, 0.4), not the car")
         look_at(visited, "twins")
         page.click("tr[data-car=n1] a")
         named = page.wait_for_selector(".change[data-search=named]").inner_text()
@@ -99,7 +103,17 @@ def test_changes_are_shown_and_another_version_is_put_in_force(
         page.goto(f"{running.url}/twins/n2")
         page.wait_for_selector(".change h2 >> text=Looks like steer trim or gyro bias")
         page.wait_for_selector(".decides >> text=Drive a circle")
+        page.wait_for_selector(".decides >> text=Let n1 drive for a minute.")
+        page.wait_for_selector("dd >> text=undecided: the car itself 62 %, the floor everywhere")
         look_at(visited, "twin_undecided")
+        page.goto(f"{running.url}/twins/n4")
+        page.wait_for_selector(
+            ".change h2 >> text=Not the car: the floor within 0.35 m of (1.2, 0.4)"
+        )
+        look_at(visited, "twin_floor")
+        page.goto(f"{running.url}/map")
+        is_drawn(page, PLACE_EDGE, 200)
+        photograph(visited, "twin_place")
         page.goto(f"{running.url}/vehicles/n1")
         line = "watching, version 0, changed 70 s ago: looks like tyre grip"
         page.wait_for_selector(f"[data-fact=twin] a[href='/twins/n1'] >> text={line}")

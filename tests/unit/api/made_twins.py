@@ -3,7 +3,14 @@
 from msgspec.structs import replace
 
 from scm.clock import NS_PER_S
-from scm.records.twins import TwinChange, TwinEffect, TwinError, TwinParameter, TwinVersion
+from scm.records.twins import (
+    TwinCause,
+    TwinChange,
+    TwinEffect,
+    TwinError,
+    TwinParameter,
+    TwinVersion,
+)
 from scm.v2x.messages.twin_status import TwinStatus
 
 NOW_NS = 1200 * NS_PER_S
@@ -83,6 +90,22 @@ def undecided(vehicle="n2", now_ns=NOW_NS):
     found = change(
         480, now_ns, search="undecided", between=("steer_trim", "gyro_bias"), drive_this=QUESTION,
         text="It may be steer_trim or gyro_bias.", report="twin-n2-480",
+        causes=(
+            TwinCause(kind="car", probability=0.62),
+            TwinCause(kind="everywhere", probability=0.34),
+            TwinCause(kind="camera", probability=0.04),
+        ),
+        decide_by="Let n1 drive for a minute.",
+    )  # fmt: skip
+    return watched(vehicle, now_ns, changes=(found,), version=0, versions=(ORIGINAL,))
+
+
+def floor_changed(vehicle="n4", now_ns=NOW_NS):
+    """Return a car that noticed a patch of the floor."""
+    place = TwinCause(kind="place", probability=0.973, x_m=1.2, y_m=0.4, radius_m=0.35)
+    found = change(
+        900, now_ns, effect="rolling_resistance", parameter="coefficient", size=0.012, unit="1",
+        alike=(), search="elsewhere", cause="place", causes=(place,),
     )  # fmt: skip
     return watched(vehicle, now_ns, changes=(found,), version=0, versions=(ORIGINAL,))
 

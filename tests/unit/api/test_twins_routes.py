@@ -7,15 +7,24 @@ from msgspec.structs import replace
 from scm.api.twin_rows import in_short
 from scm.api.view import FORGET_TWINS_NS
 from scm.clock import NS_PER_S
-from scm.records.twins import Twin
+from scm.records.twins import Twin, TwinCause
 from scm.v2x.message import Refused
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.version_request import VersionRequest
 from tests.unit.api.conftest import Client, bearer
-from tests.unit.api.made_twins import NAMED, NOW_NS, blind, change, undecided, watched
+from tests.unit.api.made_twins import (
+    NAMED,
+    NOW_NS,
+    blind,
+    change,
+    floor_changed,
+    undecided,
+    watched,
+)
 
 URL = "/api/v1/twins"
+NORTH = TwinCause(kind="camera", probability=0.95, camera="north")
 PART = Presence(role="part", station="twin", session="s", alive=True)
 
 
@@ -29,16 +38,21 @@ def test_record_has_the_fields_of_the_message():
 
 def test_rows_say_what_changed_in_short(client, hear):
     assert client("GET", URL).json() == {"items": [], "next": None}
-    hear(1.0, undecided(), watched(), blind())
-    first, second, third = client("GET", URL).json()["items"]
+    hear(1.0, undecided(), watched(), blind(), floor_changed())
+    first, second, third, fourth = client("GET", URL).json()["items"]
     assert first == {
         "vehicle": "n1", "car": "nigel", "t_ns": NOW_NS, "state": "watching", "reason": "",
         "driven_s": 1104.3, "version": 1, "changes": 2, "changed_ns": 1130 * NS_PER_S,
         "search": "searching", "newest": "looks like tyre grip",
+        "x_m": None, "y_m": None, "radius_m": None,
     }  # fmt: skip
     assert second["newest"] == "looks like steer trim or gyro bias"
     assert (third["state"], third["reason"]) == ("blind", "no command that it obeyed is known")
     assert (third["changes"], third["newest"], third["changed_ns"]) == (0, "", None)
+    assert (fourth["search"], fourth["newest"]) == (
+        "elsewhere", "the floor at (1.2, 0.4), not the car"
+    )  # fmt: skip
+    assert (fourth["x_m"], fourth["y_m"], fourth["radius_m"]) == (1.2, 0.4, 0.35)
 
 
 @pytest.mark.parametrize(
@@ -51,6 +65,8 @@ def test_rows_say_what_changed_in_short(client, hear):
             "steer trim, 97 % and steer trim, 97 %",
         ),
         (change(1, search="unexplained"), "no known effect explains it"),
+        (change(1, cause="camera", causes=(NORTH,)), "camera north, not the car"),
+        (change(1, cause="camera", causes=(replace(NORTH, camera=""),)), "camera, not the car"),
     ],
 )
 def test_change_in_short_is_what_explains_it_or_what_it_looks_like(found, words):

@@ -22,7 +22,8 @@ def drive(count, *, seed=0, wrong=0.0, changed=0.0, since=0, until=None, lasting
     number = np.full(count, wrong)
     number[since:until] += changed
     misses = SIZE * noise + number[:, None] * slopes[:, :, 1]
-    return Windows(EVERY_S * np.arange(count), ("x", "y", "yaw", "wheel"), misses, slopes)
+    nowhere = np.zeros((count, 2))
+    return Windows(EVERY_S * np.arange(count), nowhere, ("x", "y", "yaw", "wheel"), misses, slopes)
 
 
 def changes_in(windows, detector=None):

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import RecordingError
 from scm.mismatch.findings import Course, Effect, Equation, Estimate
-from scm.records.twins import TwinEffect, TwinError, TwinParameter
+from scm.records.twins import TwinCause, TwinEffect, TwinError, TwinParameter
 from scm.runtime.priority import NICER
 from scm.twin import car as twin_car
 from scm.twin import detector
@@ -107,11 +107,44 @@ class City:
         return [one.name for one in self.out if isinstance(one, CityEvent)]
 
 
+def by_the_floor(monkeypatch):
+    """Let each change be of a place."""
+    place = TwinCause(kind="place", probability=0.99, x_m=1.0, y_m=2.0, radius_m=0.35)
+    monkeypatch.setattr(
+        twin_car, "located", lambda change, *_: replace(change, cause="place", causes=(place,))
+    )
+
+
 def found_with_file(tmp_path):
     """Return what a search finds, with a car file that can be put in force."""
     path = tmp_path / "1.toml"
     path.write_text(nigel().path.read_text("utf-8"), "utf-8")
     return dataclasses.replace(FOUND, car_file=path)
+
+
+def test_change_of_the_floor_is_not_searched_for_in_the_car(changed, tmp_path, monkeypatch):
+    by_the_floor(monkeypatch)
+    city = City(tmp_path)
+    (change,) = city.run(changed).changes
+    assert (change.search, change.cause) == ("elsewhere", "place")
+    assert city.executor.calls == []
+    (event,) = [one for one in city.out if getattr(one, "name", "") == "change_located"]
+    assert event.text == "Not n1 changed but the floor, within 0.35 m of (1.0, 2.0)"
+
+
+def test_version_found_for_a_change_that_proves_to_be_the_floor_s_is_rejected(
+    changed, tmp_path, monkeypatch
+):
+    city = City(tmp_path, found_with_file(tmp_path), None)
+    steps = iter(changed)
+    for messages in steps:
+        city.step(*messages)
+        if city.out and isinstance(city.out[-1], TwinStatus) and len(city.last.versions) > 1:
+            break
+    by_the_floor(monkeypatch)
+    status = city.run(steps)
+    assert status.versions[1].state == "rejected"
+    assert status.versions[1].reason.startswith("Not n1 changed but the floor")
 
 
 def test_change_is_searched_for_named_and_its_car_file_adopted_and_stored(changed, tmp_path):
@@ -124,7 +157,7 @@ def test_change_is_searched_for_named_and_its_car_file_adopted_and_stored(change
     assert status.version == 1
     assert status.state == "watching"  # by what the memory has of the car since it changed
     assert "gyro better on new driving" in status.versions[1].reason
-    assert city.events == ["car_changed", "change_explained", "version"]
+    assert city.events == ["car_changed", "change_located", "change_explained", "version"]
     assert [name for name, _ in city.executor.calls][:2] == ["explain", "compare"]
     recording, car_file, out, *_ = city.executor.calls[0][1]
     assert car_file == "nigel"

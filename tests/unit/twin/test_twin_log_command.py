@@ -5,7 +5,7 @@ import pytest
 
 from scm.__main__ import main
 from scm.clock import NS_PER_S
-from scm.records.twins import TwinChange, TwinEffect, TwinParameter, TwinVersion
+from scm.records.twins import TwinCause, TwinChange, TwinEffect, TwinParameter, TwinVersion
 from scm.store.open import open_store
 from tests.unit.mismatch.made_drive import nigel
 
@@ -16,7 +16,12 @@ CHANGE = TwinChange(
     since_high_ns=SINCE_NS + NS_PER_S, effect="understeer", parameter="gradient", size=1.0,
     unit="rad*s^2/m", score=20.0, search="named", text="The wheels turn too little.",
     effects=(TwinEffect(name="steer_gain", probability=0.97, parameters=(NUMBER,)),),
-    report="twin-n3-1800000000",
+    report="twin-n3-1800000000", cause="car",
+    causes=(
+        TwinCause(kind="car", probability=0.92),
+        TwinCause(kind="place", probability=0.06, x_m=1.2, y_m=0.4, radius_m=0.35),
+        TwinCause(kind="camera", probability=0.02, camera="north"),
+    ),
 )  # fmt: skip
 
 
@@ -45,10 +50,11 @@ def test_changes_and_versions_are_printed_with_what_differs(store, capsys):
     assert lines[0] == (
         "changed since 2027-01-15 08:00:00 (-1.0 to +1.0 s), noticed 2027-01-15 08:00:11: named"
     )
-    assert lines[1] == "  The wheels turn too little."
-    assert lines[2] == "  steer_gain, 97 %: gain 0.85 (0.83 to 0.87)"
-    assert lines[4] == "version 1: adopted, found 2027-01-15 08:01:40, by twin: position better"
-    assert lines[6:] == ["  with steer_gain", "  steering.gain 0.85"]
+    assert lines[1] == "  of car: car 92 %, place (1.20, 0.40), 0.35 m 6 %"
+    assert lines[2] == "  The wheels turn too little."
+    assert lines[3] == "  steer_gain, 97 %: gain 0.85 (0.83 to 0.87)"
+    assert lines[5] == "version 1: adopted, found 2027-01-15 08:01:40, by twin: position better"
+    assert lines[7:] == ["  with steer_gain", "  steering.gain 0.85"]
 
 
 def test_two_versions_are_compared(store, capsys):

@@ -14,7 +14,7 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.vehicle_state import VehicleState
-from tests.unit.mismatch.made_drive import nigel
+from tests.unit.mismatch.made_drive import made_drive, nigel
 from tests.unit.twin.reported import (
     BEGAN_NS,
     BIAS,
@@ -51,7 +51,7 @@ def changed():
 
 def test_change_is_an_event_and_stays_in_the_status(changed):
     out, _ = run(TwinPart(), changed)
-    (event,) = [one for one in out if isinstance(one, CityEvent)]
+    event, _ = [one for one in out if isinstance(one, CityEvent)]
     assert (event.severity, event.name, event.vehicle) == ("warning", "car_changed", "n1")
     assert event.text.startswith("n1 is not what nigel says any more, since ")
     assert "gyro_bias" in event.text
@@ -61,12 +61,24 @@ def test_change_is_an_event_and_stays_in_the_status(changed):
     assert "watching" in {one.state for one in statuses}
     assert all(0.0 <= b.driven_s - a.driven_s <= 11.0 for a, b in pairwise(statuses))
     (change,) = statuses[-1].changes
-    assert change.effect == "gyro_bias"
+    assert (change.effect, change.cause) == ("gyro_bias", "car")  # no floor biases a gyro
     assert change.size == pytest.approx(BIAS, rel=0.3)
     assert change.since_low_ns <= BEGAN_NS + SINCE_S * NS_PER_S <= change.since_high_ns
     assert [one.detail for one in out if isinstance(one, PartStatus)][-1] == (
         "1 cars watched, 1 changed"
     )
+
+
+def test_change_of_one_car_is_its_own_where_another_drives_as_before(changed):
+    healthy = reports(made_drive(seconds=LASTS_S), name="n2")
+    both = [[*one, *other] for one, other in zip(changed, healthy, strict=True)]
+    out, _ = run(TwinPart(), both)
+    names = [one.name for one in out if isinstance(one, CityEvent)]
+    assert names == ["car_changed", "change_located"]
+    statuses = {one.vehicle: one for one in out if isinstance(one, TwinStatus)}
+    (change,) = statuses["n1"].changes
+    assert (change.cause, change.causes[0].kind, change.decide_by) == ("car", "car", "")
+    assert statuses["n2"].changes == ()
 
 
 @pytest.mark.parametrize(

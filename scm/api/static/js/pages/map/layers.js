@@ -13,12 +13,13 @@ export const LAYERS = {
   tracks: "Tracks of the Eye",
   autonomy: "Plans of cars that park themselves",
   rooms: "Maps that cars make",
+  places: "Places whose floor changed",
   costmap: "Costmap of the chosen car",
   path: "Planned path of the chosen car",
   lidar: "LIDAR of the chosen car",
 };
 
-const FIRST = { names: true, roads: false, times: true, trails: false, heat: false, tracks: false, autonomy: true, rooms: true, costmap: false, path: true, lidar: false };
+const FIRST = { names: true, roads: false, times: true, trails: false, heat: false, tracks: false, autonomy: true, rooms: true, places: true, costmap: false, path: true, lidar: false };
 
 /** Name to whether it is shown. */
 export const layers = signal({ ...FIRST, ...read() });

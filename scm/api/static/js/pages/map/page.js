@@ -12,7 +12,7 @@ import { StationsPanel } from "scm/pages/map/stations_panel.js";
 import { VehicleTable } from "scm/pages/map/vehicle_table.js";
 
 export function Page() {
-  useTopics("signals", "boxes", "stations", "autonomy", "room_maps");
+  useTopics("signals", "boxes", "stations", "autonomy", "room_maps", "twins");
   useFleet();
   const requested = route.value.query.vehicle; // `/map?vehicle=n1` shows that car
   useEffect(() => void (requested && (selected.value = requested)), [requested]);

@@ -1,4 +1,4 @@
-/** One frame of the map, from below to above: roads, heat, path, scan, trails, costmap, boxes, maps, plans, cars, tracks, names, signals. */
+/** One frame of the map, from below to above: roads, heat, path, scan, trails, costmap, boxes, maps, places, plans, cars, tracks, names, signals. */
 import { drawBoxes } from "scm/shared/box_shape.js";
 import { drawCar, drawHalo, drawLabel, footprint } from "scm/shared/car_shape.js";
 import { coveredBy, drawLight } from "scm/shared/light_shape.js";
@@ -14,6 +14,7 @@ import { Ground } from "scm/pages/map/ground.js";
 import { Heat } from "scm/pages/map/heat.js";
 import { followed, layers } from "scm/pages/map/layers.js";
 import { drawAim } from "scm/pages/map/park_at.js";
+import { drawPlaces } from "scm/pages/map/places.js";
 import { RoadNames } from "scm/pages/map/road_names.js";
 import { drawRoomMaps } from "scm/pages/map/room_maps.js";
 import { drawOffer } from "scm/pages/map/send_to.js";
@@ -92,6 +93,7 @@ export class Scene {
     drawCostmap(paper, view);
     drawBoxes(paper, view, boxes.peek(), city.peek()?.boxes ?? []);
     drawRoomMaps(paper, view);
+    drawPlaces(paper, view);
     drawPlans(paper, view);
     this.#drawCars(on);
     drawParticles(paper, view);

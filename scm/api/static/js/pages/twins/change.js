@@ -3,7 +3,9 @@ import { amounts, nameOf, percent } from "scm/shared/amounts.js";
 import { clock, moment, span, spaced } from "scm/shared/format.js";
 import { html } from "scm/shared/html.js";
 import { ago } from "scm/shared/twins.js";
-import { changeInWords, hasReport, SEARCHES } from "scm/pages/twins/words.js";
+import { CAUSES, changeInWords, hasReport, SEARCHES } from "scm/pages/twins/words.js";
+
+const LEAST_SHOWN = 0.05; // of probabilities
 
 export function Change({ change, now_ns }) {
   const [word, meaning] = SEARCHES[change.search];
@@ -22,10 +24,12 @@ export function Change({ change, now_ns }) {
         <dd>${moment(change.since_ns)} <small>${ago(change.since_ns, now_ns)}, ${interval(change)} with 90 %</small></dd>
         <dt>Noticed</dt>
         <dd>${span((change.noticed_ns - change.since_ns) / 1e9)} later <small>${change.score.toFixed(0)} standard deviations beyond what is usual</small></dd>
+        ${change.causes.length > 0 && html`<dt>Whose</dt><dd>${whose(change)}</dd>`}
         ${!isNamed && html`<dt>As by</dt><dd>${spaced(change.effect)}, ${nameOf(change.parameter)} changed by ${size}</dd>`}
       </dl>
       ${change.effects.map((effect) => html`<${Effect} key=${effect.name} effect=${effect} />`)}
       ${change.drive_this && html`<p class="decides"><b>Drive this to decide${ofWhat(change)}:</b> ${change.drive_this}</p>`}
+      ${change.decide_by && html`<p class="decides"><b>To decide whose it is:</b> ${change.decide_by}</p>`}
       ${hasReport(change) && html`<p><a href="/mismatch/${change.report}">Report of the search${change.drive_this ? ", with this drive" : ""}</a></p>`}
     </article>
   `;
@@ -33,6 +37,13 @@ export function Change({ change, now_ns }) {
 
 /** Between which moments it began. */
 const interval = ({ since_low_ns, since_high_ns }) => `between ${clock(since_low_ns)} and ${clock(since_high_ns)}`;
+
+/** Whose it is, or may be, each with its probability. */
+function whose({ cause, causes }) {
+  const shown = cause === "undecided" ? causes.filter(({ probability }) => probability >= LEAST_SHOWN) : causes.slice(0, 1);
+  const words = shown.map((one) => html`${CAUSES[one.kind](one)} <small>${percent(one.probability)}</small>`);
+  return cause === "undecided" ? html`undecided: ${words.map((one, k) => [k ? ", " : "", one])}` : words;
+}
 
 /** What is open, where the heading says something else. */
 const ofWhat = ({ effects, between }) => (effects.length && between.length ? ` between ${between.map(spaced).join(" and ")}` : "");

@@ -1,0 +1,152 @@
+"""Whose change it is, by what all cars show where and when."""
+
+import math
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+from scm.clock import NS_PER_S, nanoseconds
+from scm.records.twins import TwinChange
+from scm.twin.causes import JUDGED_AFTER_S, Witness, cause_in_words, causes_of, located
+from scm.twin.evidence import Evidence
+from scm.twin.windows import EVERY_S, WatchedNumber
+
+SINCE_S, LASTS_S, LAP_S = 300.0, 420.0, 20.0
+NUMBERS = tuple(
+    WatchedNumber(effect, "size", "1", equation, {}, 1.0)
+    for effect, equation in (
+        ("rolling_resistance", "drive"),
+        ("steer_trim", "steering"),
+        ("pose_point", "sensor"),
+        ("camera_tilt", "sensor"),
+    )
+)
+ROLLING, TRIM, POINT, TILT = range(len(NUMBERS))
+SIZE = 1.0  # standard deviations of a window
+BEND = (0.0, 1.0)  # the north of the circle that all drive
+
+
+def drives(seed, is_affected=lambda t_s, x, y: False, number=ROLLING, usually=None):
+    """Return what a car shows that goes round a circle of 1 m, with a change of one number."""
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(0.0, LASTS_S, EVERY_S)
+    angle = math.tau * t_s / LAP_S + seed
+    places = np.column_stack((np.cos(angle), np.sin(angle)))
+    scores = rng.standard_normal((len(t_s), len(NUMBERS)))
+    scores[:, number] += SIZE * is_affected(t_s, *places.T)
+    if usually is not None:
+        scores[:, ROLLING] += usually(*places.T)
+    cameras = np.where(places[:, 0] < 0.0, "west", "east")
+    return Evidence(
+        NUMBERS, t_s, places, cameras, scores, np.ones_like(scores), np.ones(len(NUMBERS))
+    )
+
+
+def since(t_s, x, y):
+    return t_s >= SINCE_S
+
+
+def in_bend(t_s, x, y):
+    return (t_s >= SINCE_S) & (np.hypot(x - BEND[0], y - BEND[1]) < 0.35)
+
+
+def under_west(t_s, x, y):
+    return (t_s >= SINCE_S) & (x < 0.0)
+
+
+def causes(*cars, **others):
+    """Return what changed `n0`, the first of some cars."""
+    every = {f"n{k}": Witness(car, 0.0) for k, car in enumerate(cars)} | others
+    return causes_of("n0", (SINCE_S, SINCE_S - 2.0, SINCE_S + 2.0), every)
+
+
+@pytest.mark.parametrize(
+    ("kind", "cars"),
+    [
+        ("car", [drives(1, since, TRIM), drives(2), drives(3)]),
+        ("tag", [drives(1, since, POINT), drives(2), drives(3)]),
+        ("place", [drives(1, in_bend), drives(2, in_bend), drives(3, in_bend)]),
+        ("camera", [drives(k, under_west, TILT) for k in (1, 2, 3)]),
+        ("everywhere", [drives(1, since), drives(2, since), drives(3, since)]),
+    ],
+)
+def test_each_cause_is_found_where_other_cars_drive_too(kind, cars):
+    found = causes(*cars)
+    assert found[0].kind == kind
+    assert found[0].probability > 0.9
+    assert sum(one.probability for one in found) == pytest.approx(1.0)
+    if kind == "place":
+        assert math.hypot(found[0].x_m - BEND[0], found[0].y_m - BEND[1]) < 0.3
+    assert found[0].camera == ("west" if kind == "camera" else "")
+
+
+def test_one_car_alone_does_not_tell_its_change_from_that_of_everything():
+    found = {one.kind: one.probability for one in causes(drives(1, since))}
+    assert found["car"] < 0.9
+    assert found["everywhere"] > 0.1
+
+
+def test_bend_where_a_car_always_strays_is_no_place_that_changed():
+    """Both drive on as before, the first with a change of its own."""
+
+    def usually(x, y):
+        return 2.0 * (y > 0.8)
+
+    changed = drives(1, since, TRIM, usually=usually)
+    assert causes(changed, drives(2, usually=usually))[0].kind == "car"
+
+
+def test_car_that_changed_by_itself_at_another_time_is_no_witness_from_then_on():
+    other = drives(2, lambda t_s, x, y: t_s >= SINCE_S + 20.0)
+    found = causes(drives(1, since), n1=Witness(other, 0.0, last_s=SINCE_S + 20.0))
+    assert found[0].kind == "car"
+    assert causes(drives(1, since), other)[0].kind == "everywhere"
+
+
+def test_cars_whose_clocks_begin_at_other_times_are_compared_at_the_same():
+    late = drives(2, lambda t_s, x, y: t_s >= SINCE_S - 100.0)
+    found = causes(drives(1, since), n1=Witness(late, 100.0), n2=Witness(late, 100.0))
+    assert found[0].kind == "everywhere"
+
+
+def change():
+    since_ns = nanoseconds(SINCE_S)
+    return TwinChange(
+        noticed_ns=since_ns + 10 * NS_PER_S, since_ns=since_ns, since_low_ns=since_ns - NS_PER_S,
+        since_high_ns=since_ns + NS_PER_S, effect="rolling_resistance", parameter="coefficient",
+        size=0.05, unit="1", score=12.0,
+    )  # fmt: skip
+
+
+def test_change_says_whose_it_is_and_does_not_change_by_a_hair():
+    cars = {f"n{k}": Witness(drives(k + 1, in_bend), 0.0) for k in range(3)}
+    found = located(change(), "n0", cars)
+    assert (found.cause, found.decide_by) == ("place", "")
+    assert cause_in_words(found, "n0").startswith(
+        "Not n0 changed but the floor, within 0.35 m of ("
+    )
+    assert located(found, "n0", cars) == found
+
+
+def test_undecided_change_says_which_car_would_decide():
+    alone = located(change(), "n0", {"n0": Witness(drives(1, since), 0.0)})
+    assert alone.cause == "undecided"
+    assert alone.decide_by == "Let another car drive for a minute."
+    stands = drives(2)
+    stands.t_s = stands.t_s - LASTS_S
+    both = {"n0": Witness(drives(1, since), 0.0), "n7": Witness(stands, 0.0)}
+    assert located(change(), "n0", both).decide_by == "Let n7 drive for a minute."
+
+
+def test_change_since_which_little_was_driven_is_not_judged_yet():
+    cars = {f"n{k}": Witness(drives(k + 1, in_bend), 0.0) for k in range(3)}
+    early = structs.replace(change(), since_ns=nanoseconds(LASTS_S - JUDGED_AFTER_S + 1.0))
+    assert located(early, "n0", cars) is None
+
+
+def test_car_whose_evidence_is_of_later_shows_nothing_of_the_change():
+    later = drives(1, since)
+    later.t_s = later.t_s + SINCE_S
+    assert located(change(), "n0", {"n0": Witness(later, 0.0)}) is None
+    assert located(change(), "n0", {"n1": Witness(later, 0.0)}) is None
