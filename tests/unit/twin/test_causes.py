@@ -7,8 +7,8 @@ import pytest
 from msgspec import structs
 
 from scm.clock import NS_PER_S, nanoseconds
-from scm.records.twins import TwinChange
-from scm.twin.causes import JUDGED_AFTER_S, Witness, cause_in_words, causes_of, located
+from scm.records.twins import TwinCause, TwinChange
+from scm.twin.causes import JUDGED_AFTER_S, Witness, _decided_by, cause_in_words, causes_of, located
 from scm.twin.evidence import Evidence
 from scm.twin.windows import EVERY_S, WatchedNumber
 
@@ -104,10 +104,23 @@ def test_car_that_changed_by_itself_at_another_time_is_no_witness_from_then_on()
     assert causes(drives(1, since), other)[0].kind == "everywhere"
 
 
-def test_cars_whose_clocks_begin_at_other_times_are_compared_at_the_same():
-    late = drives(2, lambda t_s, x, y: t_s >= SINCE_S - 100.0)
-    found = causes(drives(1, since), n1=Witness(late, 100.0), n2=Witness(late, 100.0))
-    assert found[0].kind == "everywhere"
+def test_cars_are_compared_by_the_city_s_clock():
+    """By its own clock it changed at the same time: that was long before."""
+    found = causes(drives(1, since), n1=Witness(drives(2, since), -200.0))
+    assert found == causes(drives(1, since))
+
+
+def test_car_that_was_not_watched_before_is_no_witness():
+    late = drives(2, lambda t_s, x, y: t_s >= 0.0)
+    late.t_s = late.t_s + SINCE_S
+    found = {one.kind: one.probability for one in causes(drives(1, since), late)}
+    alone = {one.kind: one.probability for one in causes(drives(1, since))}
+    assert found == pytest.approx(alone, abs=1e-6)
+
+
+def test_no_floor_moves_a_tag():
+    first, *_ = causes(drives(1, since, POINT))
+    assert (first.kind, first.probability > 0.9) == ("tag", True)
 
 
 def change():
@@ -126,6 +139,8 @@ def test_change_says_whose_it_is_and_does_not_change_by_a_hair():
     assert cause_in_words(found, "n0").startswith(
         "Not n0 changed but the floor, within 0.35 m of ("
     )
+    for car in cars.values():
+        car.evidence.t_s[-3:] = math.inf  # not driven yet
     assert located(found, "n0", cars) == found
 
 
@@ -133,10 +148,26 @@ def test_undecided_change_says_which_car_would_decide():
     alone = located(change(), "n0", {"n0": Witness(drives(1, since), 0.0)})
     assert alone.cause == "undecided"
     assert alone.decide_by == "Let another car drive for a minute."
-    stands = drives(2)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "words"),
+    [
+        ("car everywhere", "Let n7 drive for a minute."),
+        ("car place", "Let n7 drive through (1.0, 2.0), and n0 elsewhere."),
+        ("place everywhere", "Let n0 drive farther away from (1.0, 2.0)."),
+        ("car camera", "Let n7 drive where camera north sees it."),
+        ("car tag", "Let n0 drive on."),
+    ],
+)
+def test_car_that_drove_least_is_sent_where_causes_differ(kinds, words):
+    where = {"place": {"x_m": 1.0, "y_m": 2.0, "radius_m": 0.35}, "camera": {"camera": "north"}}
+    found = [TwinCause(kind=kind, probability=0.5, **where.get(kind, {})) for kind in kinds.split()]
+    busy, stands = drives(2), drives(3)
     stands.t_s = stands.t_s - LASTS_S
-    both = {"n0": Witness(drives(1, since), 0.0), "n7": Witness(stands, 0.0)}
-    assert located(change(), "n0", both).decide_by == "Let n7 drive for a minute."
+    cars = {"n0": busy, "n1": busy, "n7": stands}
+    cars = {name: Witness(one, 0.0) for name, one in cars.items()}
+    assert _decided_by(found, "n0", SINCE_S, cars) == words
 
 
 def test_change_since_which_little_was_driven_is_not_judged_yet():
