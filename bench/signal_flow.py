@@ -20,7 +20,7 @@ from scm.records.city_map import CityMap
 from scm.traffic.signals.controller import Controller
 from scm.traffic.signals.controller_state import Observations
 from scm.traffic.signals.detectors import JunctionDetectors, Seen, reach_of
-from scm.traffic.signals.part import timetables_of
+from scm.traffic.signals.junction_timings import timetables_of
 from scm.traffic.signals.program import STEP_NS, program_of
 from scm.traffic.signals.timing import NIGEL
 

@@ -152,7 +152,14 @@ _OF_PART: dict[str, Rights] = {
     ),
     "traffic": Rights(
         publishes=("tl/*/spat", "tl/*/site", "tl/*/status", "v2x/tx/*/*"),
-        subscribes=("tl/*/mon", "v2x/rx/*/*/*", "eye/pose/*", "world/def"),
+        subscribes=(
+            "tl/*/mon",
+            "v2x/rx/*/*/*",
+            "eye/pose/*",
+            "world/def",
+            "v/*/twin",
+            "event/*/world",
+        ),
         services=("tl/*/req", "tl/*/wish"),
     ),
     "monitor": Rights(

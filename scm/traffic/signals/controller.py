@@ -7,15 +7,15 @@ request begins or ends a colour against a time guaranteed in SPaT. While there i
 it flashes red; then it restarts through all red.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from scm.errors import PlanError, nearest
+from scm.records.signal_plans import SignalStage
 from scm.records.signals import Colour, SignalGroup
 from scm.traffic.signals import kernel, operator_overrides
 from scm.traffic.signals.controller_state import (
     COLOUR_OF,
-    NEXT_COLOUR,
     NO_OBSERVATIONS,
     LastShown,
     Observations,
@@ -24,8 +24,10 @@ from scm.traffic.signals.controller_state import (
     ShownColour,
     ShownColours,
     StepTimes,
+    Timing,
 )
-from scm.traffic.signals.forecast import Coming, forecasts, schedule, within
+from scm.traffic.signals.custom_plans import retimed, stages_of
+from scm.traffic.signals.forecast import Coming, forecasts, schedule
 from scm.traffic.signals.green_wave import Wave
 from scm.traffic.signals.guaranteed_time import (
     GuaranteedTime,
@@ -40,9 +42,10 @@ from scm.traffic.signals.operator_overrides import NEED_RINGS, Override
 from scm.traffic.signals.plan import FLASH, Timetable, load_timetable, plan_names
 from scm.traffic.signals.policy import (
     FIXED,
-    Answer,
     JunctionView,
     Status,
+    check_groups,
+    known_plan,
     load_policy,
     policy_names,
     site_of,
@@ -69,6 +72,7 @@ class Controller:
         failure: Why a policy was replaced by fixed time; empty: none was.
         changed: Whether the last step changed a colour.
         late_steps: How many steps were so late that they put the cycle off.
+        program: Of the kernel, in force.
     """
 
     def __init__(
@@ -99,10 +103,10 @@ class Controller:
             PlanError: when there is no such plan or policy, or a plan is not safe.
         """
         self.junction = junction
-        self._program = program
+        self.program = program
         self._revision = revision
         tables = tables or {name: (load_timetable(name, program), None) for name in plan_names()}
-        self._timetables = Timetables(tables, _checked_plan(junction, plan, tables))
+        self._timetables = Timetables(tables, known_plan(junction, plan, tables))
         self._site = site_of(junction, program, learned, car)
         self._policies = {name: load_policy(name) for name in policy_names()}
         self._policy_state = PolicyState(self._checked_policy(policy))
@@ -113,6 +117,8 @@ class Controller:
         self.mode = "start"
         self.changed = False
         self.late_steps = 0
+        self._next_timing: Timing | None = None
+        self._custom_stages = dict[str, tuple[SignalStage, ...]]()
         self._flash_reasons: set[str] = set()
         self._state = kernel.start(program)
         self._shown = ShownColours(program)
@@ -167,7 +173,7 @@ class Controller:
         if plan not in plans and plan in self._policies:
             self._policy_state.default = plan
         else:
-            self._timetables.request(_checked_plan(self.junction, plan, plans))
+            self._timetables.request(known_plan(self.junction, plan, plans))
             self._policy_state.default = FIXED
         self.failure = self._policy_state.failed = ""
 
@@ -181,8 +187,13 @@ class Controller:
     def request_custom_plan(self, table: Timetable, wave: Wave | None = None) -> None:
         """Request a custom plan; it comes once every guaranteed time allows for it."""
         self._timetables.offer_custom_plan(table, wave)
+        self._custom_stages[table.plan] = stages_of(table, self.program)
         self._policy_state.default = FIXED
         self.failure = self._policy_state.failed = ""
+
+    def request_timing(self, timing: Timing) -> None:
+        """Request other least times; they come when all is red and no time is guaranteed."""
+        self._next_timing = None if timing.program is self.program else timing
 
     def outlook(self, now_ns: int) -> tuple[Coming, ...]:
         """Return the greens to come, as the timetable says or the policy foresees."""
@@ -197,7 +208,7 @@ class Controller:
             PlanError: saying why it is refused.
         """
         self.overrides = operator_overrides.apply(
-            self.overrides, request, self._program, self._policies, now_ns
+            self.overrides, request, self.program, self._policies, now_ns
         )
         if request.verb == "policy":
             self.failure = self._policy_state.failed = ""
@@ -217,6 +228,7 @@ class Controller:
                 self.overrides, now_ns, *self._shown.changed_at(self._times.shown_ns)
             )
         if self.is_flashing:
+            self._use_timing(now_ns)
             self.mode = FLASH
             self.priority = {one.key: "rejected" for one in observations.priority}
             requested: frozenset[str] = frozenset()
@@ -224,7 +236,7 @@ class Controller:
             self._requested = self._next_requests(now_ns, dt_ns, observations)
             requested = self._shown.gate(self._requested, now_ns)
         self._state = kernel.step(
-            self._program, self._state, requested, dt_ns, flash=self.mode == FLASH
+            self.program, self._state, requested, dt_ns, flash=self.mode == FLASH
         )
         self._show(now_ns)
         if self.changed or now_ns - self._outlook.updated_ns >= FORECAST_EVERY_NS:
@@ -292,21 +304,49 @@ class Controller:
             self._restart_cycle(now_ns)
         target = self._target_policy()
         if self.policy != FIXED:
-            if target == FIXED:
+            if target == FIXED or (self._next_timing is not None and self.mode != "preempt"):
                 self._return_to_timetable(now_ns)
             elif target != self.policy:
                 self._begin_policy(target)
         elif now_ns >= self._timetables.cycle.ends_ns:
-            if target != FIXED and not self._shown.has_guaranteed_red_end():
-                self._begin_policy(target)
-            else:
-                self._timetables.next_cycle()
-                self.mode = "plan"
+            self._end_cycle(target, now_ns)
         if self.policy == FIXED:
             self.priority = {one.key: "rejected" for one in observations.priority}
-            self._timetables.commit_next(now_ns, goes_on=target == FIXED)
+            self._timetables.commit_next(now_ns, goes_on=self._goes_on())
             return self._timetables.requested(now_ns)
         return self._step_policy(now_ns, dt_ns, observations)
+
+    def _end_cycle(self, target: str, now_ns: int) -> None:
+        """Begin what follows a cycle of the timetable: other times, a policy, or the next cycle."""
+        if not self._shown.has_guaranteed_red_end():
+            if self._next_timing is not None and kernel.is_all_red(self._state):
+                self._use_timing(now_ns)
+                self._state = kernel.start(self.program)
+                self.mode = "start"
+                return
+            if target != FIXED and self._next_timing is None:
+                self._begin_policy(target)
+                return
+        self._timetables.next_cycle()
+        self.mode = "plan"
+
+    def _goes_on(self) -> bool:
+        """Return whether another cycle of the timetable follows this one."""
+        return self._target_policy() == FIXED and self._next_timing is None
+
+    def _use_timing(self, now_ns: int) -> None:
+        """Use the times that were requested, if any; all groups are red or flash."""
+        if (timing := self._next_timing) is None:
+            return
+        self.program, self._next_timing = timing.program, None
+        self._site = site_of(self.junction, timing.program, self._site.learned, timing.car)
+        custom = {
+            name: (retimed(name, self._custom_stages[name], timing.program), wave)
+            for name, (_, wave) in self._timetables.custom_plans.items()
+        }
+        self._timetables.retime(timing.tables, custom)
+        self._restart_ns = max(times.clearance for times in timing.program.times) + STEP_NS
+        self._timetables.clear(now_ns, now_ns + self._restart_ns)
 
     def _begin_policy(self, name: str) -> None:
         self.policy = name
@@ -318,7 +358,7 @@ class Controller:
         ends = self._shown.guarantees()
         left = [
             still_ns(self._state, i, times, ends[i], now_ns)
-            for i, times in enumerate(self._program.times)
+            for i, times in enumerate(self.program.times)
         ]
         self._timetables.clear(now_ns, now_ns + max(left) + 3 * STEP_NS)
 
@@ -328,13 +368,15 @@ class Controller:
             self._policy_state.memory, answer = self._policies[self.policy].step(
                 self._site, self._policy_state.memory, view
             )
-            self._check(answer)
+            check_groups(answer, self.program)
         except Exception as cause:  # noqa: BLE001 a policy is a plug-in: signals go on whatever it does
             self._fail(cause)
             self._return_to_timetable(now_ns)
             return frozenset()
         self.mode, self.priority = answer.mode, answer.priority
-        return self._with_overrides(answer.groups)
+        return operator_overrides.applied(
+            self.overrides, answer.groups, self._shown.green(), holds=self.mode != "preempt"
+        )
 
     def _fail(self, cause: Exception) -> None:
         self._policy_state.failed = self.policy
@@ -354,7 +396,7 @@ class Controller:
         if self.mode == FLASH:
             return
         if self.policy == FIXED:
-            if self._target_policy() == FIXED:
+            if self._goes_on():
                 self._outlook.ends = {
                     name: self._timetables.likely_end_ns(name, now_ns, red=shown.colour == "red")
                     for name, shown in self._shown.items()
@@ -365,25 +407,11 @@ class Controller:
         try:
             turns = self._policies[self.policy].foresee(self._site, self._policy_state.memory, view)
             self._outlook.coming = tuple(
-                schedule(self._program, self._state, guarantees, turns, now_ns)
+                schedule(self.program, self._state, guarantees, turns, now_ns)
             )
-            self._outlook.ends = forecasts(self._program, self._state, self._outlook.coming)
+            self._outlook.ends = forecasts(self.program, self._state, self._outlook.coming)
         except Exception as cause:  # noqa: BLE001 as above; the next step replaces it
             self._fail(cause)
-
-    def _with_overrides(self, requested: frozenset[str]) -> frozenset[str]:
-        """Return a policy's requests with the overrides, which it may have ignored, applied."""
-        green = self._shown.green()
-        may_hold = self.mode != "preempt"  # pre-emption goes before a hold
-        held = operator_overrides.groups_of(self.overrides, "hold") & green
-        omitted = operator_overrides.groups_of(self.overrides, "omit") - green
-        return requested - omitted | (held if may_hold else frozenset())
-
-    def _check(self, answer: Answer) -> None:
-        unknown = [group for group in answer.groups if group not in self._program.groups]
-        if unknown:
-            msg = f"wishes {unknown}, expected groups of {list(self._program.groups)}"
-            raise PlanError(msg)
 
     def _show(self, now_ns: int) -> None:
         """Show the kernel's phases, and guarantee when they end."""
@@ -392,7 +420,7 @@ class Controller:
         if self._is_as_shown(now_ns):
             return
         before = self._shown.guarantees()
-        for index, name in enumerate(self._program.groups):
+        for index, name in enumerate(self.program.groups):
             colour = COLOUR_OF[self._state[index].phase]
             shown = self._shown.get(name)
             if shown is None or shown.colour != colour:
@@ -417,6 +445,7 @@ class Controller:
         basis = (
             [group.phase for group in self._state],
             self._target_policy(),
+            self._next_timing is None,
             timetables.cycle,
             timetables.staying_green,
         )
@@ -429,7 +458,7 @@ class Controller:
 
     def _of_green(self, index: int, shown: ShownColour, now_ns: int) -> GuaranteedTime:
         """Return the guaranteed time of a green whose end was not known."""
-        name, least_ns = self._program.groups[index], self._program.times[index].min_green
+        name, least_ns = self.program.groups[index], self.program.times[index].min_green
         if self.policy != FIXED or self._timetables.cycle.timetable is None:
             return requested_green(
                 shown.guaranteed, now_ns, least_ns, requested=name in self._requested
@@ -440,14 +469,14 @@ class Controller:
     def _guarantee_of(
         self, index: int, colour: Colour, now_ns: int, before: list[GuaranteedTime | None]
     ) -> GuaranteedTime:
-        name, times = self._program.groups[index], self._program.times[index]
+        name, times = self.program.groups[index], self.program.times[index]
         is_timed = self.policy == FIXED
         match colour:
             case "red" if is_timed:
-                plans = self._timetables.coming if self._target_policy() == FIXED else ()
+                plans = self._timetables.coming if self._goes_on() else ()
                 return red_end(name, self._timetables.cycle, now_ns, plans)
             case "red":
-                return earliest_green(self._program, self._state, index, before, now_ns)
+                return earliest_green(self.program, self._state, index, before, now_ns)
             case "green" if is_timed:
                 return self._timetables.green_end(name, now_ns, now_ns + times.min_green)
             case "green":
@@ -461,34 +490,11 @@ class Controller:
         """Return what all groups show; at most steps that is as before."""
         last = self._last
         if last.groups is None or now_ns > last.groups_until_ns:
+            planned = None if self.mode == FLASH else self.policy == FIXED
             last.groups = tuple(
-                self._signal_group(name, shown, now_ns) for name, shown in self._shown.items()
+                shown.as_published(name, self._outlook.ends.get(name), now_ns, planned=planned)
+                for name, shown in self._shown.items()
             )
             ends = [one.likely_end_ns for one in last.groups if one.likely_end_ns is not None]
             last.groups_until_ns = min(ends, default=last.until_ns)
         return last.groups
-
-    def _signal_group(self, name: str, shown: ShownColour, now_ns: int) -> SignalGroup:
-        likely = None
-        if self.mode != FLASH:
-            forecast_ns, is_red = self._outlook.ends.get(name), shown.colour == "red"
-            planned = self.policy == FIXED
-            likely = within(shown.guaranteed, forecast_ns, now_ns, red=is_red, planned=planned)
-        return SignalGroup(
-            group=name,
-            colour=shown.colour,
-            since_ns=shown.since_ns,
-            min_end_ns=shown.guaranteed.min_end_ns,
-            max_end_ns=shown.guaranteed.max_end_ns,
-            next_colour=NEXT_COLOUR[shown.colour],
-            likely_end_ns=likely and likely.end_ns,
-            likely_confidence=likely and likely.confidence,
-        )
-
-
-def _checked_plan(junction: str, plan: str, plans: Collection[str]) -> str:
-    if plan not in plans:
-        names = [*plans, *policy_names(), FLASH]
-        msg = f"junction {junction}: no plan {plan!r}{nearest(plan, names)}, only {names}"
-        raise PlanError(msg)
-    return plan

@@ -6,10 +6,12 @@ from typing import Any
 
 from scm.records.signals import Colour, SignalGroup
 from scm.traffic.signals.detectors import Detector
-from scm.traffic.signals.forecast import Coming
+from scm.traffic.signals.forecast import Coming, within
 from scm.traffic.signals.guaranteed_time import LATE_STEPS_NS, GuaranteedTime
 from scm.traffic.signals.kernel import Phase, Program
 from scm.traffic.signals.policy import PriorityCall
+from scm.traffic.signals.timetables import Tables
+from scm.traffic.signals.timing import CarFacts
 
 COLOUR_OF: dict[Phase, Colour] = {
     Phase.RED: "red",
@@ -33,6 +35,32 @@ class ShownColour:
     colour: Colour
     since_ns: int
     guaranteed: GuaranteedTime
+
+    def as_published(
+        self, group: str, forecast_ns: int | None, now_ns: int, *, planned: bool | None
+    ) -> SignalGroup:
+        """Return it as `Spat` has it.
+
+        Args:
+            group: Its name.
+            forecast_ns: When it will likely end; None: not known.
+            now_ns: The present time.
+            planned: Whether a timetable runs; None: the lights flash.
+        """
+        likely = None
+        if planned is not None:
+            red = self.colour == "red"
+            likely = within(self.guaranteed, forecast_ns, now_ns, red=red, planned=planned)
+        return SignalGroup(
+            group=group,
+            colour=self.colour,
+            since_ns=self.since_ns,
+            min_end_ns=self.guaranteed.min_end_ns,
+            max_end_ns=self.guaranteed.max_end_ns,
+            next_colour=NEXT_COLOUR[self.colour],
+            likely_end_ns=likely and likely.end_ns,
+            likely_confidence=likely and likely.confidence,
+        )
 
 
 class ShownColours(dict[str, ShownColour]):
@@ -74,6 +102,15 @@ class ShownColours(dict[str, ShownColour]):
             elif is_green and latest_ns is not None and now_ns >= latest_ns - LATE_STEPS_NS:
                 passed.discard(name)
         return frozenset(passed)
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """What follows for a junction from the cars: its kernel's program, and its own timetables."""
+
+    program: Program
+    tables: Tables
+    car: CarFacts
 
 
 @dataclass(slots=True)

@@ -8,7 +8,7 @@ kernel stays safe whatever a plan requests; a refused one would not do what its 
 
 import math
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from msgspec.structs import replace
 
@@ -24,6 +24,7 @@ from scm.traffic.signals.plan import (
     Stage,
     TimedStage,
     Timetable,
+    green_ns,
     least_between_ns,
     timetable,
 )
@@ -114,14 +115,40 @@ def stages_of(table: Timetable, program: Program) -> tuple[SignalStage, ...]:
     return tuple(made)
 
 
-def map_timetable(stages: Sequence[PlanStage], program: Program) -> Timetable:
+def map_timetable(
+    stages: Sequence[PlanStage], program: Program, *, longer: bool = False
+) -> Timetable:
     """Return the timetable of a junction's own stages.
+
+    Args:
+        stages: Of the map.
+        program: Of the junction.
+        longer: Greens become no shorter than a minimum green, instead of being refused.
 
     Raises:
         PlanError: naming every problem of the stages at once.
     """
     made = [SignalStage(groups=stage.groups, green_s=stage.green_s) for stage in stages]
-    return limited_table(OWN, made, program)
+    return retimed(OWN, made, program) if longer else limited_table(OWN, made, program)
+
+
+def retimed(plan: str, stages: Iterable[SignalStage], program: Program) -> Timetable:
+    """Return the timetable of a plan for other least times; greens become no shorter than those.
+
+    Raises:
+        PlanError: when a group is not green in every cycle.
+    """
+    cycle = tuple(
+        Stage(
+            one.groups,
+            max(whole_steps_ns(one.green_s), green_ns(program, one.groups)),
+            whole_steps_ns(one.extra_red_s),
+        )
+        for one in stages
+    )
+    table = timetable(plan, cycle, program)
+    check_table(table, program)
+    return table
 
 
 def adopted(city_map: CityMap, car: CarFacts = NIGEL) -> tuple[CityMap, dict[str, str]]:

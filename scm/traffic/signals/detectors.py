@@ -174,11 +174,16 @@ class JunctionDetectors:
     def __init__(self, junction: Junction, roads: Roads, reach_m: float = MIN_REACH_M) -> None:
         self.approaches = approaches_of(junction, roads, reach_m)
         self.received_ns: int | None = None
-        self._roads = roads
+        self._junction, self._roads = junction, roads
         self._cars: dict[int, _Car] = {}
         self._coming: dict[str, dict[int, float]] = {a.line.name: {} for a in self.approaches}
         self._counts = dict.fromkeys(self._coming, 0)
         self._extended_ns: dict[str, int | None] = dict.fromkeys(self._coming)
+
+    def extend_to(self, program: Program) -> None:
+        """Know cars from as far before the line as other least times require."""
+        reach_m = reach_of(program, self._roads)
+        self.approaches = approaches_of(self._junction, self._roads, reach_m)
 
     def add(self, seen: Seen, arrived_ns: int) -> None:
         """Add a car as received or seen; data older than the known one is ignored."""

@@ -9,7 +9,7 @@ from scm.clock import NS_PER_MS
 from scm.records.city_map import Junction
 from scm.store.records import PlanRecord
 from scm.traffic.signals.controller import Controller
-from scm.traffic.signals.controller_state import Observations
+from scm.traffic.signals.controller_state import Observations, Timing
 from scm.traffic.signals.custom_plans import (
     check_plan_name,
     table_of,
@@ -77,6 +77,12 @@ class JunctionSignals:
         self._known_overrides = controller.overrides
         self._events: list[Outgoing] = []
         self._by_group: Mapping[str, Detector] = {}
+        self._timing: Timing | None = None
+
+    def request_timing(self, timing: Timing) -> None:
+        """Request other least times, from the next safe moment on."""
+        self._timing = timing
+        self.controller.request_timing(timing)
 
     def receive_monitor(self, status: MonitorStatus, arrived_ns: int) -> None:
         """Flash while the monitor reports a fault."""
@@ -156,6 +162,12 @@ class JunctionSignals:
             silent = now_ns - self._monitor_ns > MONITOR_SILENT_NS
             self._flash("silence", "the monitor fell silent", on=silent)
         controller.step(now_ns, self._observations(now_ns))
+        if self._timing is not None and controller.program is self._timing.program:
+            self._reports = StatusReports(
+                self.junction.name, self._timing.program, self._timing.tables
+            )
+            self.detectors.extend_to(self._timing.program)
+            self._timing = None
         spat = controller.spat(now_ns)
         self._report_expired(now_ns)
         self._report_changes(now_ns)

@@ -78,6 +78,11 @@ def step(
     return tuple(after)
 
 
+def is_all_red(state: State) -> bool:
+    """Return whether every group is red, and nobody who went last is still protected."""
+    return all(group.phase is Phase.RED for group in state)
+
+
 def _advance(group: GroupState, times: GroupTimes, *, is_requested: bool, dt: int) -> GroupState:
     """Return a group's state `dt` later as far as it depends on nobody else."""
     elapsed = group.elapsed + dt

@@ -85,6 +85,22 @@ def groups_of(active: Sequence[Override], verb: Verb) -> frozenset[str]:
     return frozenset(group for one in active if one.verb == verb for group in one.groups)
 
 
+def applied(
+    active: Sequence[Override], requested: frozenset[str], green: frozenset[str], *, holds: bool
+) -> frozenset[str]:
+    """Return a policy's requests with the overrides, which it may have ignored, applied.
+
+    Args:
+        active: The overrides.
+        requested: By the policy.
+        green: Groups that are green.
+        holds: Whether a hold counts: pre-emption goes before it.
+    """
+    held = groups_of(active, "hold") & green
+    omitted = groups_of(active, "omit") - green
+    return requested - omitted | (held if holds else frozenset())
+
+
 def _check(request: SignalRequest, program: Program, policies: Collection[str]) -> None:
     where = f"junction {request.junction}: {request.verb}"
     for group in request.groups:

@@ -9,41 +9,35 @@ detectors also uses the CAMs that the roadside unit receives, and the overhead c
 
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from scm.errors import PlanError, nearest
 from scm.log import event
-from scm.maps.once_per_map import once_per_map
-from scm.maps.route import Roads, roads_of
+from scm.maps.route import roads_of
 from scm.records.city_map import CityMap
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.store.records import PlanRecord
+from scm.traffic.signals.changed_times import ChangedTimes
 from scm.traffic.signals.controller import Controller
-from scm.traffic.signals.custom_plans import OWN, map_timetable
 from scm.traffic.signals.detectors import JunctionDetectors, Seen, Sightings, reach_of
-from scm.traffic.signals.green_wave import links_of, waves_of
 from scm.traffic.signals.junction import JunctionSignals
-from scm.traffic.signals.kernel import Program
-from scm.traffic.signals.plan import load_timetable, plan_names
+from scm.traffic.signals.junction_timings import timings_of, topologies_of
 from scm.traffic.signals.policy import FIXED
 from scm.traffic.signals.priority_requests import PriorityRequests
-from scm.traffic.signals.program import STEP_NS, program_of
-from scm.traffic.signals.proof.load_checks import check_junction
+from scm.traffic.signals.program import STEP_NS
 from scm.traffic.signals.status_reports import StatusReports
-from scm.traffic.signals.timetables import Tables
 from scm.traffic.signals.timing import NIGEL, CarFacts
 from scm.v2x.etsi.convert import roadside_station
-from scm.v2x.etsi.mapem import MapemBody
-from scm.v2x.etsi.topology import mapem_of
 from scm.v2x.exchange import Answer, Incoming, Outgoing, PersistedState
 from scm.v2x.message import Refused
 from scm.v2x.messages.cam import CamRx
+from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.plan_request import PlanRequest
 from scm.v2x.messages.signal_request import SignalRequest
 from scm.v2x.messages.srem import SremRx
+from scm.v2x.messages.twin_status import TwinStatus
 
 _log = logging.getLogger(__name__)
 
@@ -78,26 +72,28 @@ class TrafficPart(BasePart):
         self.role = "part"
         self.period_ns = STEP_NS
         self.services = (Service(PlanRequest), Service(SignalRequest))
-        roads, given = roads_of(city_map), _junctions_of(city_map, car)
+        roads, timings = roads_of(city_map), timings_of(city_map, car)
+        topologies = topologies_of(city_map)
+        self._changed_times = ChangedTimes(city_map, car, timings)
         self._sightings = Sightings()
         self._junctions = {
             junction.name: JunctionSignals(
                 junction,
                 Controller(
                     junction.name,
-                    given[junction.name].program,
+                    timings[junction.name].program,
                     plan or junction.plan,
                     city_map.revision,
                     policy=policy,
-                    tables=given[junction.name].tables,
+                    tables=timings[junction.name].tables,
                     learned=learned,
                     car=car,
                 ),
-                JunctionDetectors(junction, roads, reach_of(given[junction.name].program, roads)),
+                JunctionDetectors(junction, roads, reach_of(timings[junction.name].program, roads)),
                 PriorityRequests(junction, roads),
-                given[junction.name].topology,
+                topologies[junction.name],
                 StatusReports(
-                    junction.name, given[junction.name].program, given[junction.name].tables
+                    junction.name, timings[junction.name].program, timings[junction.name].tables
                 ),
             )
             for junction in city_map.junctions
@@ -109,14 +105,15 @@ class TrafficPart(BasePart):
 
     @property
     def subscriptions(self) -> tuple[Subscription, ...]:
-        """The monitor and requests for priority; and cars, where detectors are needed."""
+        """The monitor, requests for priority, versions of cars; cars, where detectors need them."""
         listening = [
             Subscription(CamRx, {"receiver": station})
             for station, signals in self._by_station.items()
             if signals.controller.needs_detectors
         ]
         tracks = (Subscription(EyeTrack),) if listening else ()
-        return (Subscription(MonitorStatus), Subscription(SremRx), *listening, *tracks)
+        cars = (Subscription(TwinStatus), Subscription(CityEvent, {"source": "world"}))
+        return (Subscription(MonitorStatus), Subscription(SremRx), *cars, *listening, *tracks)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Handle requests, cars and the monitor, step every junction, publish what it shows."""
@@ -131,8 +128,14 @@ class TrafficPart(BasePart):
                 self._add_sighting([message.receiver], self._sightings.of_cam(message), item.t_ns)
             elif isinstance(message, EyeTrack):
                 self._add_sighting(self._by_station, self._sightings.of_track(message), item.t_ns)
+            elif isinstance(message, TwinStatus | CityEvent):
+                self._changed_times.receive(message, now_ns)
             elif isinstance(message, PlanRequest | SignalRequest):
                 outbox += self._serve(item, message, now_ns)
+        timings, events = self._changed_times.step(now_ns)
+        outbox += events
+        for name, timing in timings.items():
+            self._junctions[name].request_timing(timing)
         for signals in self._junctions.values():
             outbox += signals.step(now_ns)
         return outbox
@@ -179,56 +182,3 @@ class TrafficPart(BasePart):
             is_override = isinstance(request, SignalRequest) or request.stages
             code = "invalid" if is_override else "not_found"
             return [Answer(item, Refused(code=code, detail=str(refusal)))]
-
-
-@dataclass(frozen=True, slots=True)
-class _Given:
-    """What follows for a junction from the map: checked once, and shared by cities of one map."""
-
-    program: Program
-    tables: Tables
-    topology: MapemBody
-
-
-@once_per_map
-def _junctions_of(city_map: CityMap, car: CarFacts) -> dict[str, _Given]:
-    """Return what follows for each junction.
-
-    Raises:
-        PlanError: when a plan is not safe for a junction.
-    """
-    roads = roads_of(city_map)
-    programs = {j.name: program_of(j, roads, car) for j in city_map.junctions}
-    tables = timetables_of(city_map, roads, programs, car)
-    for name, program in programs.items():
-        check_junction(name, program, (table for table, _ in tables[name].values()))
-    return {
-        junction.name: _Given(
-            programs[junction.name], tables[junction.name], mapem_of(roads, junction)
-        )
-        for junction in city_map.junctions
-    }
-
-
-def timetables_of(
-    city_map: CityMap, roads: Roads, programs: dict[str, Program], car: CarFacts
-) -> dict[str, Tables]:
-    """Return the timetables of all plans by junction; of several junctions they make green waves.
-
-    A junction with stages of its own also has the plan `own`, which is not coordinated.
-
-    Raises:
-        PlanError: when a plan is not safe for a junction.
-    """
-    links = links_of(city_map, roads, car) if len(programs) > 1 else []
-    tables: dict[str, Tables] = {name: {} for name in programs}
-    for plan in plan_names():
-        alone = {name: load_timetable(plan, program) for name, program in programs.items()}
-        waves = waves_of(links, alone) if links else {n: (t, None) for n, t in alone.items()}
-        for name, pair in waves.items():
-            tables[name] = {**tables[name], plan: pair}
-    for junction in city_map.junctions:
-        if junction.stages:
-            table = map_timetable(junction.stages, programs[junction.name])
-            tables[junction.name] = {**tables[junction.name], OWN: (table, None)}
-    return tables

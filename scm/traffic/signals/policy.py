@@ -5,16 +5,17 @@ and that is never changed, only replaced. Whatever it answers, the kernel decide
 the controller keeps published guarantees; so a policy can be slow or wrong, never unsafe.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from scm import registry
-from scm.errors import PlanError
+from scm.errors import PlanError, nearest
 from scm.traffic.signals.detectors import Detector
 from scm.traffic.signals.guaranteed_time import GREEN_NOTICE_NS
 from scm.traffic.signals.kernel import GroupTimes, Program, State
 from scm.traffic.signals.operator_overrides import Override
+from scm.traffic.signals.plan import FLASH
 from scm.traffic.signals.rings import Layout, PhaseTimes, layout_of
 from scm.traffic.signals.timing import NIGEL, CarFacts, headway_s
 
@@ -155,6 +156,31 @@ def load_policy(name: str) -> Policy:
         PlanError: when there is none.
     """
     return registry.load(PACKAGE, name, "POLICY", Policy, error=PlanError)
+
+
+def known_plan(junction: str, plan: str, plans: Collection[str]) -> str:
+    """Return the name of a plan.
+
+    Raises:
+        PlanError: when it is none of those that a junction has.
+    """
+    if plan not in plans:
+        names = [*plans, *policy_names(), FLASH]
+        msg = f"junction {junction}: no plan {plan!r}{nearest(plan, names)}, only {names}"
+        raise PlanError(msg)
+    return plan
+
+
+def check_groups(answer: Answer, program: Program) -> None:
+    """Refuse an answer of a policy that names other groups than the junction's.
+
+    Raises:
+        PlanError: naming them.
+    """
+    unknown = [group for group in answer.groups if group not in program.groups]
+    if unknown:
+        msg = f"wishes {unknown}, expected groups of {list(program.groups)}"
+        raise PlanError(msg)
 
 
 def site_of(

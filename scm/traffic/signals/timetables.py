@@ -46,6 +46,22 @@ class Timetables:
         """The plan in force if it is a custom one; None: it is one of the junction's own."""
         return None if self.plan in self._own_tables else self._tables[self.plan]
 
+    @property
+    def custom_plans(self) -> Tables:
+        """The custom plans that run, are pending or come."""
+        known = {**self._tables, **self._entering_plans}
+        return {name: pair for name, pair in known.items() if name not in self._own_tables}
+
+    def retime(self, tables: Tables, custom_plans: Tables) -> None:
+        """Use other timetables of the same plans; `clear` must follow, with all groups red.
+
+        Args:
+            tables: Of the junction's own plans.
+            custom_plans: Of those in `custom_plans`.
+        """
+        self._own_tables = dict(tables)
+        self._tables, self._entering_plans = {**tables, **custom_plans}, {}
+
     def request(self, plan: str) -> None:
         """Make a plan pending for the next cycle, or let it stay."""
         self.pending = "" if plan == self.plan and self._committed_plan in ("", plan) else plan

@@ -5,7 +5,8 @@ import pytest
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 from scm.traffic.signals.green_wave import Wave, dwell_ns, links_of, stretch
-from scm.traffic.signals.part import TrafficPart, timetables_of
+from scm.traffic.signals.junction_timings import timetables_of
+from scm.traffic.signals.part import TrafficPart
 from scm.traffic.signals.plan import load_timetable
 from scm.traffic.signals.program import STEP_NS, program_of
 from scm.traffic.signals.timetables import Timetables
