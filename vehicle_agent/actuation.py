@@ -46,6 +46,11 @@ class ActuationGate:
         """How often each limit of a real car's guard became active."""
         return "" if self._guard is None else self._guard.summary
 
+    def assume_decel(self, decel_mps2: float | None) -> None:
+        """Let a real car's guard assume that the car brakes less; None: as it came."""
+        if self._guard is not None:
+            self._guard.assume_decel(decel_mps2)
+
     def see(self, track: EyeTrack, now_ns: int) -> None:
         """Give body and guard a track of the car from the Eye."""
         self._body.see(track, now_ns)

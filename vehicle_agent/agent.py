@@ -18,6 +18,7 @@ from scm.v2x.exchange import Answer, Incoming, Outgoing
 from scm.v2x.key import check_name
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.cam import CamRx
+from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.city_stop import CityStop
 from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.denm import DenmRx
@@ -31,6 +32,7 @@ from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.radio_status import RadioStatus
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spatem import SpatemRx
+from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.world_definition import WorldDefinition
 from vehicle_agent.body import BodyKind, Wiring
@@ -92,6 +94,7 @@ class AgentPart:
         self._map: CityMap | None = None
         self._defined_ns: int | None = None
         self._session: CitySession | None = None
+        self._twin: TwinStatus | None = None
         self._stopped = False
         self._faults: dict[str, MonitorStatus] = {}
         self._status_ns: int | None = None
@@ -112,6 +115,7 @@ class AgentPart:
             LightRequest: self._on_lights,
             EchoRequest: self._on_echo,
             EyeTrack: self._on_eye,
+            TwinStatus: self._on_twin,
         }
         self.subscriptions: Sequence[Subscription] = self._subscriptions()
         own = {"vehicle": name}
@@ -178,6 +182,7 @@ class AgentPart:
             Subscription(CityStop),
             Subscription(Contact, own),
             Subscription(DriveCommand, own),
+            Subscription(TwinStatus, own),
             *([Subscription(EyeTrack, own)] if self._body.wants_eye else []),
         )
 
@@ -215,6 +220,8 @@ class AgentPart:
         if session.trips.off_lane:
             event(_log, "cannot_drive", reason=session.trips.off_lane)
         session.guard.stop(self._stopped)
+        if self._twin is not None:
+            session.follow(self._twin)
         for status in self._faults.values():
             session.signals.receive_monitor_status(status)
         self._session = session
@@ -275,6 +282,18 @@ class AgentPart:
             self._faults[item.message.junction] = item.message
             if self._session is not None:
                 self._session.signals.receive_monitor_status(item.message)
+        return []
+
+    def _on_twin(self, item: Incoming) -> list[Outgoing]:
+        if isinstance(item.message, TwinStatus):
+            self._twin = item.message
+            text = "" if self._session is None else self._session.follow(item.message)
+            if text:
+                changed = CityEvent(
+                    severity="warning", source=self.name, t_ns=item.t_ns, name="limits_changed",
+                    text=text, vehicle=self.name,
+                )  # fmt: skip
+                return [changed]
         return []
 
     def _on_stop(self, item: Incoming) -> list[Outgoing]:

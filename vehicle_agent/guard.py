@@ -25,7 +25,7 @@ it ends less far out, but never while the car still rolls the other way.
 
 import math
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import NamedTuple
 
 from scm.clock import seconds
@@ -163,7 +163,7 @@ class RealGuard:
     """Limits the actuators of one real car; it stops the car until the first pose arrives."""
 
     def __init__(self, limits: GuardLimits) -> None:
-        self._limits = limits
+        self._given = self._limits = limits
         self._seen: _Seen | None = None
         self._now_ns: int | None = None
         self._throttle = self._steering = 0.0
@@ -174,6 +174,12 @@ class RealGuard:
     def summary(self) -> str:
         """How often each limit became active, for a status line: `fence 2, slew 5`."""
         return ", ".join(f"{reason} {count}" for reason, count in sorted(self.counts.items()))
+
+    def assume_decel(self, decel_mps2: float | None) -> None:
+        """Assume from now on that the car brakes less; None: as given. Never more than given."""
+        given = self._given
+        least = given.decel_mps2 if decel_mps2 is None else min(decel_mps2, given.decel_mps2)
+        self._limits = replace(given, decel_mps2=least)
 
     def see(self, track: EyeTrack, now_ns: int) -> None:
         """Receive a track of this car; `now_ns` is when it arrived, on our own clock.

@@ -20,6 +20,7 @@ from scm.v2x.messages.contact import Contact
 from scm.v2x.messages.denm import DenmTx
 from scm.v2x.messages.eye_track import EyeTrack
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
+from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.driver import RouteView
 from scm.vehicles.drivers.cam_tracker import CamTracker
@@ -30,6 +31,7 @@ from scm.vehicles.guard import Guard, Guarded
 from scm.vehicles.lights import OFF, TURNS, Headlights, Indicators, Switches, lamps
 from vehicle_agent.actuation import ActuationGate
 from vehicle_agent.body import Body
+from vehicle_agent.changed_car import ChangedCar, changed_car
 from vehicle_agent.guard import RealGuard
 
 _log = logging.getLogger(__name__)
@@ -64,6 +66,7 @@ class CitySession:
         self.cars = CamTracker()
         self.guard = Guard(epoch)
         self._roads = roads_of(city_map)
+        self._map, self._changed = city_map, ChangedCar(body.limits)
         self.trips = TripDriver(vehicle, self._roads, body.limits, body.motion().pose, now_ns)
         self.gate = ActuationGate(body, real)
         self._tried_ns = now_ns
@@ -83,6 +86,20 @@ class CitySession:
     def see(self, track: EyeTrack, now_ns: int) -> None:
         """Receive a track of the car from the overhead cameras."""
         self.gate.see(track, now_ns)
+
+    def follow(self, status: TwinStatus) -> str:
+        """Drive by the version of the car file that is in force; return what changes, in words."""
+        changed, before = changed_car(status, self._body.limits, self._map), self._changed
+        self._changed = changed
+        self.trips.use_limits(changed.limits)
+        self.gate.assume_decel(changed.decel_mps2)
+        if changed.unfit != before.unfit:
+            unfit = changed.unfit
+            return f"{self._vehicle} {f'does not drive: {unfit}' if unfit else 'may drive again'}"
+        if changed.limits.decel != before.limits.decel:
+            braking = f"{changed.limits.decel:.2g} m/s2, before {before.limits.decel:.2g}"
+            return f"{self._vehicle} brakes with {braking}, by version {status.version}"
+        return ""
 
     def push(self, contact: Contact) -> None:
         """Apply a contact to the body; the next report includes it."""
@@ -120,7 +137,7 @@ class CitySession:
             throttle, steering = self._decide(now_ns)
             self.guard.drive(throttle, steering, epoch, self._seq, now_ns)
         self._body.show(self._lamp_switches(hazard=self.guard.lost))
-        off_lane = "" if self._is_driven_by_other else self.trips.off_lane
+        off_lane = "" if self._is_driven_by_other else self.trips.off_lane or self._changed.unfit
         guarded = self.gate.pass_on(self.guard.output(now_ns), off_lane, now_ns)
         self._last_command = guarded.throttle, guarded.steering
         return self._reports(guarded, previous_command, now_ns, sensed=sensed)
@@ -132,7 +149,7 @@ class CitySession:
         if not (was_lifted or is_due):
             return
         self._tried_ns, pose = now_ns, self._body.motion().pose
-        self.trips = TripDriver(self._vehicle, self._roads, self._body.limits, pose, now_ns)
+        self.trips = TripDriver(self._vehicle, self._roads, self._changed.limits, pose, now_ns)
         off_lane = self.trips.off_lane
         if was_lifted or not off_lane:
             event(_log, "put_down", x_m=round(pose.x, 3), y_m=round(pose.y, 3), trouble=off_lane)

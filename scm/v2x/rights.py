@@ -97,6 +97,7 @@ _OF_ROLE: dict[str, Rights] = {
             "v/{me}/alive/*",
             "v/{me}/contact",
             "v/{me}/cmd/drive",
+            "v/{me}/twin",
             "v2x/rx/{me}/*/*",
             "eye/pose/{me}",
             "eye/*/pose/{me}",

@@ -15,10 +15,10 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from scm.records.twins import TwinParameter, TwinVersion
+from scm.records.twins import TwinVersion
 from scm.traffic.car_facts import slowest_of
 from scm.traffic.signals.timing import LANE_MPS, CarFacts
-from scm.v2x.messages.twin_status import TwinStatus
+from scm.v2x.messages.twin_status import TwinStatus, ability_problem
 
 MAX_FACTOR = 4.0  # times what was given by hand: a car worse than that does not belong on the road
 MAX_CARS = 10_000  # of different names; a station could invent them
@@ -47,7 +47,7 @@ class ChangedCars:
 
     def receive(self, status: TwinStatus) -> str:
         """Take a car's version in force; return what of it is nonsense, once a version."""
-        version = next((one for one in status.versions if one.number == status.version), None)
+        version = status.in_force
         known = status.car, status.version
         is_new = self._versions.get(status.vehicle) != known
         if version is None or (is_new and len(self._versions) >= MAX_CARS):
@@ -55,7 +55,7 @@ class ChangedCars:
         self._versions[status.vehicle] = known
         self._away.pop(status.vehicle, None)
         self._cars.pop(status.vehicle, None)
-        nonsense = [_nonsense(one) for one in version.abilities]
+        nonsense = [ability_problem(one) for one in version.abilities]
         changed = _changed(status, version, self._given)
         if changed.words:
             self._cars[status.vehicle] = changed
@@ -95,7 +95,7 @@ class ChangedCars:
 
 def _changed(status: TwinStatus, version: TwinVersion, given: CarFacts) -> _Changed:
     """Return a car by its version in force, no better in anything than what was given."""
-    now = {one.name: one for one in version.abilities if not _nonsense(one)}
+    now = {one.name: one for one in version.abilities if not ability_problem(one)}
     before = {one.name: one.before for one in _first(status, version).abilities}
     facts, words = given, dict[str, str]()
     speed, stop = now.get("cruise_mps"), now.get("stopping_m")
@@ -133,12 +133,3 @@ def _line(status: TwinStatus, version: TwinVersion) -> Iterator[TwinVersion]:
 def _ratio(now: float, before: float | None) -> float:
     is_known = before is not None and math.isfinite(before) and before > 0.0
     return now / before if before is not None and is_known else 1.0
-
-
-def _nonsense(one: TwinParameter) -> str:
-    """Return what is wrong with an ability; empty: nothing."""
-    numbers = (one.low, one.value, one.high)
-    if all(map(math.isfinite, numbers)) and 0.0 <= one.low <= one.value <= one.high:
-        return ""
-    got = ", ".join(f"{number:g}" for number in numbers)
-    return f"{one.name}: got {got}, expected three numbers from 0 on that do not fall"

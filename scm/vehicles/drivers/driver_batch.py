@@ -158,16 +158,21 @@ class DriverBatch:
             seed: Decides where it turns while it circulates.
         """
         self.leave(index)
+        self.use_limits(index, limits)
+        ints = self._state.ints[index]
+        ints[col.SEED], ints[col.LAST_NS] = seed, col.NEVER_NS
+        self._state.floats[index] = 0.0
+        self._entered[index] = True
+        self.show(index, limits.length, limits.width)
+
+    def use_limits(self, index: int, limits: CarLimits) -> None:
+        """Drive a car by other limits from now on, wherever it is on its way."""
         if limits not in self._kinds:
             row = col.kind_row(limits, self.lane_graph.sharpest_change(limits.wheelbase))
             kinds = np.vstack([self._state.kinds, row])
             self._state = replace(self._state, kinds=kinds)
             self._kinds[limits] = len(kinds) - 1
-        ints = self._state.ints[index]
-        ints[col.KIND], ints[col.SEED], ints[col.LAST_NS] = self._kinds[limits], seed, col.NEVER_NS
-        self._state.floats[index] = 0.0
-        self._entered[index] = True
-        self.show(index, limits.length, limits.width)
+        self._state.ints[index, col.KIND] = self._kinds[limits]
 
     def show(self, index: int, length: float, width: float) -> None:
         """Show a car to the others as an outline of this size [m], once it sends CAMs."""

@@ -103,6 +103,10 @@ class TripDriver:
         except MapError as error:
             self.off_lane = str(error)
 
+    def use_limits(self, limits: CarLimits) -> None:
+        """Drive by other limits from now on."""
+        self.driver.batch.use_limits(OWN, limits)
+
     def begin(self, request: RouteRequest, pose: Pose2, now_ns: int) -> RouteReply:
         """Send the car on a trip from where it is; a trip under way ends without arrival.
 
