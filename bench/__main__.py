@@ -45,6 +45,7 @@ LONG = (
     "stop",
     "sumo",
     "twin",
+    "twin_forecast",
 )  # takes minutes: only where it is asked for, alone, with its own arguments
 
 

@@ -96,7 +96,7 @@ class AgentPart:
         self._session: CitySession | None = None
         self._twin: TwinStatus | None = None
         self._stopped = False
-        self._faults: dict[str, MonitorStatus] = {}
+        self._faults = dict[str, MonitorStatus]()
         self._status_ns: int | None = None
         self._is_wanted: IsWanted | None = None
         self._is_sensing, self._checked_ns = True, -SUBSCRIBER_CHECK_NS
@@ -118,10 +118,8 @@ class AgentPart:
             TwinStatus: self._on_twin,
         }
         self.subscriptions: Sequence[Subscription] = self._subscriptions()
-        own = {"vehicle": name}
-        self.services: Sequence[Service] = tuple(
-            Service(kind, own) for kind in (RouteRequest, LightRequest, EchoRequest)
-        )
+        served = (RouteRequest, LightRequest, EchoRequest)
+        self.services = tuple(Service(kind, {"vehicle": name}) for kind in served)
 
     def attach(self, is_wanted: IsWanted) -> None:
         """Simulate from now on only sensors that somebody subscribes to."""

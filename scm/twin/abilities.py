@@ -1,7 +1,6 @@
 """What a car can do by its file: how fast it drives, how soon it stops, how tightly it turns.
 
-Cars drawn from the file's standard deviations, each number for itself, drive straight at the
-throttle of ordinary driving, lose it as their guard stops them, and drive circles at full steering.
+Cars drawn from the file's standard deviations and correlations drive straight at the throttle of ordinary driving, lose it as their guard stops them, and drive circles at full steering.
 """
 
 from dataclasses import dataclass
@@ -95,10 +94,20 @@ def _drawn(car: Car, count: int, rng: np.random.Generator) -> Fleet:
     fleet = Fleet(car, count)
     for row in range(count):
         fleet.add(Pose2(0.0, APART_M * row, 0.0))
-    for at, column in enumerate(fleet.columns):
+    errors = dict[str, Floats]()
+    for column in fleet.columns:
         quantity = car.values.get(column.param.key)
         if quantity is not None and quantity.std and isinstance(quantity.value, float):
-            drawn = quantity.value + quantity.std * rng.standard_normal(count - 1)
+            errors[column.param.key] = rng.standard_normal(count - 1)
+    for group in car.correlated:
+        known = [at for at, key in enumerate(group.numbers) if key in errors]
+        root = np.linalg.cholesky(np.array(group.matrix)[np.ix_(known, known)])
+        mixed = root @ np.array([errors[group.numbers[at]] for at in known])
+        errors.update(zip((group.numbers[at] for at in known), mixed, strict=True))
+    for at, column in enumerate(fleet.columns):
+        key = column.param.key
+        if key in errors:
+            drawn = car.value(key) + (car.values[key].std or 0.0) * errors[key]
             fleet.parameters[1:count, at] = np.clip(drawn, *column.param.bounds)
     return fleet
 

@@ -12,6 +12,7 @@ from scm.twin.abilities import abilities_of, compared_abilities
 from scm.twin.investigation import Compared, Explained, compare
 from scm.twin.versions import BY_TWIN, CarVersions, differences, is_worse, meaning, verdict
 from scm.vehicles.car import load_car
+from scm.vehicles.correlated import Correlated
 from tests.unit.mismatch.made_drive import made_drive, nigel
 
 TRIM = -0.05
@@ -160,3 +161,14 @@ def test_nine_in_ten_other_cars_of_the_file_lie_in_the_interval():
         (radius, others.radius),
     ):
         assert 0.84 < np.mean((values >= one.low) & (values <= one.high)) < 0.96
+
+
+def test_errors_that_come_together_narrow_or_widen_what_a_car_may_do():
+    numbers = ("drive.no_load_speed_rad_s", "wheel.damping_linear_nms")
+
+    def spread(correlation):
+        matrix = ((1.0, correlation), (correlation, 1.0))
+        car = replace(nigel(), correlated=(Correlated(numbers, matrix),))
+        return np.std(abilities_of(car).speed)
+
+    assert spread(-0.99) > 1.1 * spread(0.99)
