@@ -1,6 +1,6 @@
 """Whether the stopping distance forecast for a changed car comes true, and red lights overrun.
 
-    python -m bench twin_forecast [--cars 30] [--seed 3201] [--any-effect]
+    python -m bench twin_forecast [--cars 30] [--seed 3201] [--any-effect | --red-lights]
 
 Cars of `tests/reality`, whose ordinary numbers are not the file's, drive for 120 s with one effect
 concealed. A car file is found as by `scm mismatch`, which need not search for the effect's name
@@ -10,7 +10,8 @@ has a 90 % interval. Then the same car loses its throttle at ordinary speed.
 Red lights: the yellow begins while a car is 0 to 0.5 m before the line. Its driver goes on where it
 could not stop comfortably; else it lets go of the throttle as late as that allows. Who passes the
 line after the yellow overran a red light. The driver reckons with the car as it came, or as the
-version in force says; the yellow is as given by hand, or follows that version.
+version in force says; the yellow is as given by hand, or follows that version. With `--red-lights`
+no car file is found: the version says what the car does, 10 % more or less.
 """
 
 import argparse
@@ -116,13 +117,25 @@ def forecast(
 def overran(stop: Stop, decel_mps2: float, yellow: float) -> Floats:
     """Return for each approach whether the car passes the line after the yellow."""
     v, braking_m = stop.speed, stop.speed**2 / (2.0 * decel_mps2)
-    keeps_m = braking_m + STOP_MARGIN
-    goes = v * NIGEL.reaction_s + keeps_m > APPROACHES_M
-    begins_s = (APPROACHES_M - keeps_m) / v
-    rolls_s = ROW_S * np.searchsorted(stop.way, keeps_m)
+    goes = v * NIGEL.reaction_s + braking_m > APPROACHES_M
+    begins_s = np.maximum(NIGEL.reaction_s, (APPROACHES_M - braking_m - STOP_MARGIN) / v)
+    left_m = APPROACHES_M - v * begins_s
+    rolls_s = ROW_S * np.searchsorted(stop.way, left_m)
     passes_s = np.where(goes, APPROACHES_M / v, begins_s + rolls_s)
-    passes = goes | (stop.way[-1] > keeps_m)
+    passes = goes | (stop.way[-1] > left_m)
     return np.asarray(passes & (passes_s > yellow))
+
+
+def known(stop: Stop) -> tuple[TwinParameter, ...]:
+    """Return what a version would say that knows the car to 10 %."""
+    before = stop_of(nominal(CAR))
+    rows = (
+        ("cruise_mps", stop.speed, before.speed), ("stopping_m", stop.way[-1], before.way[-1])
+    )  # fmt: skip
+    return tuple(
+        TwinParameter(name=name, low=0.9 * now, value=now, high=1.1 * now, before=was)
+        for name, now, was in rows
+    )
 
 
 def yellow_of(facts: CarFacts) -> float:
@@ -156,6 +169,7 @@ def main() -> None:
     parser.add_argument("--cars", type=int, default=30)
     parser.add_argument("--seed", type=int, default=3201)
     parser.add_argument("--any-effect", action="store_true", help="search for the effect as well")
+    parser.add_argument("--red-lights", action="store_true", help="find no car file")
     given = parser.parse_args()
     inside, reds, names = list[bool](), list[tuple[float, float, float]](), list(STRENGTHS)
     for number in range(given.cars):
@@ -165,7 +179,11 @@ def main() -> None:
         effects = draw_effects((name,), CAR, STRENGTHS[name], rng)
         numbers, faults = apply(usual, effects), apply(FAULTS, effects)
         stop = stop_of(numbers)
-        abilities = forecast(numbers, faults, name, rng, any_effect=given.any_effect)
+        abilities = (
+            known(stop)
+            if given.red_lights
+            else forecast(numbers, faults, name, rng, any_effect=given.any_effect)
+        )
         spent_s = time.process_time() - begun_s
         head = f"{number:<4}{name:<20}{effects[0][1]:5.1f}  needs {1e3 * stop.way[-1]:6.1f} mm"
         if not abilities:

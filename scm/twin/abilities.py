@@ -1,6 +1,7 @@
 """What a car can do by its file: how fast it drives, how soon it stops, how tightly it turns.
 
-Cars drawn from the file's standard deviations and correlations drive straight at the throttle of ordinary driving, lose it as their guard stops them, and drive circles at full steering.
+Cars drawn from the file's standard deviations and correlations drive straight at the throttle of
+ordinary driving, lose it as their guard stops them, and drive circles at full steering.
 """
 
 from dataclasses import dataclass
