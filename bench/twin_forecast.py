@@ -201,7 +201,7 @@ def main() -> None:
             flush=True,
         )
     if inside:
-        low, high = wilson(sum(inside), len(inside))
+        _, low, high, _ = wilson(sum(inside), len(inside))
         print(
             f"\nin the interval of 90 %: {sum(inside)} of {len(inside)} ({low:.2f} to {high:.2f})"
         )
