@@ -46,6 +46,8 @@ LONG = (
     "sumo",
     "twin",
     "twin_forecast",
+    "twin_false_alarms",
+    "twin_peers",
 )  # takes minutes: only where it is asked for, alone, with its own arguments
 
 

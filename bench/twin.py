@@ -38,17 +38,20 @@ CARS, MOST_OF_A_CORE = 20, 0.15
 NEVER = ("surface_patch", "unit_error", "clock_drift")  # of a place, and no change of a car
 
 
-def drive(name: str, strength: float, seed: int, since_s: float, folder: Path) -> Recording:
+def drive(
+    name: str, strength: float, seed: int, since_s: float, folder: Path,
+    lasts_s: float = LASTS_S, car: str = CAR,
+) -> Recording:  # fmt: skip
     """Return the recording of a car in which an effect sets in."""
     rng = np.random.default_rng([seed, *name.encode()])
-    usual = scattered(nominal(CAR), rng)
+    usual = scattered(nominal(car), rng)
     names = () if name == "nothing" else (name,)
-    effects = draw_effects(names, CAR, (strength, strength), rng)
+    effects = draw_effects(names, car, (strength, strength), rng)
     numbers, faults = (
         Changing(dict(before), apply(before, effects), since_s, since_s)
         for before in (usual, FAULTS)
     )
-    write(record(CAR, numbers, faults, LASTS_S, rng), CAR, usual, folder)
+    write(record(car, numbers, faults, lasts_s, rng), car, usual, folder)
     (recording,) = recordings_of_one(folder)
     return recording
 

@@ -98,13 +98,14 @@ class Detector:
 
     Attributes:
         driven_s: How long the car was watched.
+        highest: Score that the newest windows reach, to be held against the threshold.
     """
 
     def __init__(self, threshold: float) -> None:
         self._threshold = threshold
         self._learned: Windows | None = None  # all, until there are enough to learn from
         self._history: History | None = None
-        self.driven_s = 0.0
+        self.driven_s = self.highest = 0.0
 
     @property
     def is_learning(self) -> bool:
@@ -123,6 +124,7 @@ class Detector:
         """
         newest, began = len(windows.begin_s), self.is_learning
         self.driven_s += EVERY_S * newest
+        self.highest = 0.0
         if self._history is not None:
             self._history.add(windows)
         self._learn(windows)
@@ -132,8 +134,8 @@ class Detector:
         if not scores.size:
             return None
         highest = np.unravel_index(np.argmax(np.abs(scores)), scores.shape)
-        threshold = self._threshold * (1.0 if self._learned is None else EARLY)
-        if abs(scores[highest]) < threshold:
+        self.highest = float(abs(scores[highest])) / (1.0 if self._learned is None else EARLY)
+        if self.highest < self._threshold:
             return None
         return self._history.change(scores[highest[:-1]])
 

@@ -46,6 +46,7 @@ class CarWatch:
     Attributes:
         driven_s: How long it was driven and seen.
         evidence: What its newest windows show, by how it strayed before the newest change.
+        highest: Score that the newest span reaches, to be held against the threshold.
     """
 
     def __init__(self, predictor: WatchedCar, threshold: float) -> None:
@@ -55,7 +56,7 @@ class CarWatch:
         self._usual: Usual | None = None
         self._early = list[tuple[Windows, str]]()  # until it is known how the car strays
         self.evidence = Evidence.none(predictor.watched)
-        self.driven_s = 0.0
+        self.driven_s = self.highest = 0.0
 
     @property
     def car(self) -> Car:
@@ -78,11 +79,12 @@ class CarWatch:
             last_s: Likewise.
             camera: That saw the car in it, if one did.
         """
-        change = None
+        change, self.highest = None, 0.0
         for windows in self._windows(recording, first_s, last_s):
             self.driven_s += EVERY_S * len(windows.begin_s)
             change = change or self._detector.update(windows)
             self._remember(windows, camera)
+            self.highest = max(self.highest, self._detector.highest)
         if change is None:
             return None
         driven_s = self._detector.driven_s
@@ -123,9 +125,14 @@ class CarWatch:
 
 def watch(recording: Recording, car: CarWatch) -> list[Noticed]:
     """Return the changes of a recorded car, in the order in which they would have been noticed."""
+    return [noticed for noticed in looks(recording, car) if noticed is not None]
+
+
+def looks(recording: Recording, car: CarWatch) -> Iterator[Noticed | None]:
+    """Look at a recorded car, span after span; yield the change that each shows, if it does."""
     times = [channel.t for channel in recording.channels.values() if len(channel.t)]
     begin_s = recording.begin_s if recording.begin_s is not None else min(t[0] for t in times)
-    first_s, end_s, found = begin_s, max(t[-1] for t in times), list[Noticed]()
+    first_s, end_s = begin_s, max(t[-1] for t in times)
     while first_s < end_s:
         last_s = first_s + SPAN_S
         around = first_s - begin_s - BEFORE_S, last_s - begin_s + AFTER_S
@@ -133,6 +140,5 @@ def watch(recording: Recording, car: CarWatch) -> list[Noticed]:
             noticed = car.look(part_of(recording, *around), first_s, last_s)
         except RecordingError:
             noticed = None  # nothing was recorded there
-        found += [noticed] if noticed is not None else []
+        yield noticed
         first_s = last_s
-    return found
