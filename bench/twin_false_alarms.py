@@ -106,7 +106,10 @@ def report(drives: Sequence[Healthy]) -> None:
             f"{alarms:3} alarms, measured / stated {measured / stated_h:.2f}"
         )
     hourly, per_fold, peaks = tail(drives)
-    print(f"{peaks} peaks: highest score of an hour {hourly:.2f}, of e times as many {per_fold:.2f} more")
+    print(
+        f"{peaks} peaks: highest score of an hour {hourly:.2f}, "
+        f"of e times as many {per_fold:.2f} more"
+    )
 
 
 def _most(alarms: int) -> float:

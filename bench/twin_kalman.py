@@ -23,11 +23,23 @@ NAMES = (
     "gyro_bias", "wheel_radius",
 )  # fmt: skip
 KINDS = 5  # of innovations: along, across, heading, yaw rate, speed
-SERVO_S, GATE = 0.03, 4.0  # time constant [s]; standard deviations that an innovation counts at most
-START = (1.0, 15.0, 0.05, 0.02, 1.0, 0.0, 0.0, 1.0)  # gain and steering relative to the file's
-START_STD = (0.2, 8.0, 0.1, 0.02, 0.1, 0.03, 0.01, 0.03)
-WANDER = (0.02, 1.0, 0.01, 0.004, 0.01, 0.003, 0.001, 0.003)  # standard deviation in 100 s
-SPEED_NOISE, ANGLE_NOISE, WAY_NOISE, TURN_NOISE = 0.05, 0.04, 0.002, 0.01  # in a second
+SERVO_S, GATE = (
+    0.03,
+    4.0,
+)  # time constant [s]; standard deviations that an innovation counts at most
+START = (
+    0.9,
+    math.log(15.0),
+    -0.05,
+    0.02,
+    1.0,
+    0.0,
+    0.0,
+    1.0,
+)  # rate: its logarithm; gains: of the file's
+START_STD = (0.1, 0.3, 0.05, 0.02, 0.1, 0.03, 0.01, 0.03)
+WANDER = (0.02, 0.06, 0.01, 0.004, 0.01, 0.003, 0.001, 0.003)  # standard deviation in 100 s
+SPEED_NOISE, ANGLE_NOISE, WAY_NOISE, TURN_NOISE = 0.02, 0.02, 0.002, 0.003  # in a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,9 +107,9 @@ def _step(s: Floats, area: Floats, k: int, car: Floats, out: Floats) -> None:
     steering = _mean(area, 1, float(k))
     for i in range(SIZE):
         out[i] = s[i]
-    share = 1.0 - math.exp(-STEP_S * max(s[RATE], 1.0))
-    target = car[0] * s[GAIN] * throttle - s[DRAG] * math.tanh(s[SPEED] / 0.02) / max(s[RATE], 1.0)
-    out[SPEED] = s[SPEED] + share * (target - s[SPEED])
+    rate = math.exp(s[RATE])
+    target = car[0] * s[GAIN] * throttle - s[DRAG] * math.tanh(s[SPEED] / 0.02) / rate
+    out[SPEED] = s[SPEED] + (1.0 - math.exp(-STEP_S * rate)) * (target - s[SPEED])
     turn = (car[1] * s[STEERING] * steering + s[TRIM] - s[ANGLE]) * STEP_S / SERVO_S
     out[ANGLE] = s[ANGLE] + min(max(turn, -car[2] * STEP_S), car[2] * STEP_S)
     speed = 0.5 * (s[SPEED] + out[SPEED])
@@ -125,6 +137,34 @@ def _update(s: Floats, p: Floats, h: Floats, off: float, variance: float, gain: 
         for j in range(SIZE):
             p[i, j] -= gain[i] * gain[j] / total
     return unit
+
+
+@kernel_function
+def _add(sums: Floats, kind: int, unit: float) -> None:
+    sums[0, kind] += unit
+    sums[1, kind] += unit * unit
+
+
+@kernel_function
+def _take_pose(
+    s: Floats, p: Floats, pose: Floats, car: Floats, noise: Floats, h: Floats, gain: Floats,
+    sums: Floats,
+) -> None:  # fmt: skip
+    """Take a pose (lateness, x, y, yaw) along the body, across it, and in heading."""
+    c, sine = math.cos(s[2]), math.sin(s[2])
+    late, x, y = pose[0], pose[1] - s[0], pose[2] - s[1]
+    h[:] = 0.0
+    h[0], h[1], h[SPEED] = c, sine, late
+    off = c * x + sine * y - late * s[SPEED]
+    _add(sums, 0, _update(s, p, h, off, noise[SIZE], gain))
+    x, y = pose[1] - s[0], pose[2] - s[1]
+    h[0], h[1], h[SPEED] = -sine, c, 0.0
+    _add(sums, 1, _update(s, p, h, c * y - sine * x, noise[SIZE], gain))
+    turning = math.tan(s[ANGLE]) / car[3]
+    h[:] = 0.0
+    h[2], h[SPEED] = 1.0, late * turning
+    off = pose[3] - s[2] - late * s[SPEED] * turning
+    _add(sums, 2, _update(s, p, h, off, noise[SIZE + 1], gain))
 
 
 @array_kernel
@@ -156,25 +196,7 @@ def _filter(
             p[i, i] += noise[i]
             s[i] = now[i]
         while pose < len(pose_at) and pose_at[pose] <= k + 1:
-            c, sine = math.cos(s[2]), math.sin(s[2])
-            late, x, y = poses[pose, 0], poses[pose, 1] - s[0], poses[pose, 2] - s[1]
-            h[:] = 0.0
-            h[0], h[1], h[SPEED] = c, sine, late
-            unit = _update(s, p, h, c * x + sine * y - late * s[SPEED], noise[SIZE], gain)
-            sums[0, 0] += unit
-            sums[1, 0] += unit * unit
-            x, y = poses[pose, 1] - s[0], poses[pose, 2] - s[1]
-            h[0], h[1], h[SPEED] = -sine, c, 0.0
-            unit = _update(s, p, h, c * y - sine * x, noise[SIZE], gain)
-            sums[0, 1] += unit
-            sums[1, 1] += unit * unit
-            turning = math.tan(s[ANGLE]) / car[3]
-            h[:] = 0.0
-            h[2], h[SPEED] = 1.0, late * turning
-            off = poses[pose, 3] - s[2] - late * s[SPEED] * turning
-            unit = _update(s, p, h, off, noise[SIZE + 1], gain)
-            sums[0, 2] += unit
-            sums[1, 2] += unit * unit
+            _take_pose(s, p, poses[pose], car, noise, h, gain, sums)
             for i in range(3):
                 counts[i] += 1.0
             pose += 1
@@ -183,17 +205,14 @@ def _filter(
         h[SPEED], h[BIAS] = turning, 1.0
         h[ANGLE] = s[SPEED] * (1.0 + math.tan(s[ANGLE]) ** 2) / car[3]
         off = gyro[k + 1] - s[SPEED] * turning - s[BIAS]
-        unit = _update(s, p, h, off, noise[SIZE + 2], gain)
-        sums[0, 3] += unit
-        sums[1, 3] += unit * unit
+        _add(sums, 3, _update(s, p, h, off, noise[SIZE + 2], gain))
         counts[3] += 1.0
         if not math.isnan(counted[k + 1]):
             h[:] = 0.0
             middle = s[SPEED] - 0.5 * COUNTED_S * (s[SPEED] - before) / STEP_S
             h[SPEED], h[WHEEL] = s[WHEEL], middle
-            unit = _update(s, p, h, counted[k + 1] - s[WHEEL] * middle, noise[SIZE + 3], gain)
-            sums[0, 4] += unit
-            sums[1, 4] += unit * unit
+            off = counted[k + 1] - s[WHEEL] * middle
+            _add(sums, 4, _update(s, p, h, off, noise[SIZE + 3], gain))
             counts[4] += 1.0
         if (k + 1) % EVERY == 0:
             row = (k + 1) // EVERY - 1

@@ -14,59 +14,34 @@ residual: ASAP's idea: what the car file misses is learned, here by ridge regres
           commands and motion, from all healthy cars and then the car's own 200 s; what remains
           is watched.
 
-Each method's tests are scaled to count alike, and its threshold is the score that the healthy
-drives reach so often; `--check` healthy drives were not seen by any of that.
+Some healthy drives teach the methods and scale their tests to count alike; the threshold of each is
+the score that so many of further healthy drives reach. The twin looks each ten seconds, as it does
+in a city, the others each half second. Named is what the first report calls by the right name.
 """
 
 import argparse
 import math
+import pickle
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
 from pathlib import Path
-from typing import Protocol
+from typing import cast
 
 import numpy as np
 
 from bench.twin import CAR, LASTS_S, NEVER, drive
-from bench.twin_kalman import KINDS, NAMES, filtered
+from bench.twin_peer_methods import LEARN_S, METHODS, Drive, Method
 from scm.arrays import Floats
 from scm.recording.read import Recording
-from scm.twin.detector import Detector, joined
 from scm.twin.watch import CarWatch, looks
 from scm.twin.windows import EVERY_S, WatchedCar, Windows
 from scm.vehicles.car import load_car
 from tests.reality.concealed import EFFECTS
 
-SINCE_S, LEARN_S, SETTLED_S = 300.0, 200.0, 100.0
-SPANS_S = (10.0, 40.0, 160.0)
-SLACKS = (0.25, 0.5)  # standard deviations a window that a cumulative sum forgives
+SINCE_S = 300.0
 FIRST_HEALTHY = 5000
 RATES = (1, 3)  # drives of the healthy ones whose scores reach the threshold
-
-
-@dataclass(frozen=True, slots=True)
-class Drive:
-    """One drive as all methods read it.
-
-    Attributes:
-        spans: Windows as the twin looked at them, ten seconds each.
-        ours: Highest score of the twin's detector in each, with its time, (n, 2).
-    """
-
-    name: str
-    recording: Recording
-    spans: tuple[Windows, ...]
-    ours: Floats
-
-    @property
-    def windows(self) -> Windows:
-        """All of them."""
-        whole = self.spans[0]
-        for more in self.spans[1:]:
-            whole = joined(whole, more)
-        return whole
 
 
 class Collecting(CarWatch):
@@ -92,161 +67,12 @@ def driven(predictor: WatchedCar, name: str, strength: float, seed: int) -> Driv
     return Drive(name, recording, tuple(watch.spans), np.array(rows))
 
 
-class Method(Protocol):
-    """A way to notice changes."""
+@dataclass(frozen=True, slots=True)
+class Found:
+    """When a drive's score first reached a threshold, and what that was called."""
 
-    def fit(self, healthy: Sequence[Drive]) -> None:
-        """Learn what is learned from cars that do not change."""
-
-    def tests(self, one: Drive) -> tuple[Floats, Floats]:
-        """Return times, (n,), and what each test shows then, (n, tests)."""
-
-
-class Ours:
-    """The twin's detector, whose only test is its score."""
-
-    def fit(self, healthy: Sequence[Drive]) -> None:
-        """Nothing is learned from other cars."""
-
-    def tests(self, one: Drive) -> tuple[Floats, Floats]:
-        """Return times, (n,), and what each test shows then, (n, tests)."""
-        return one.ours[:, 0], one.ours[:, 1:]
-
-
-class Cusum:
-    """Cumulative sums on pose residuals alone."""
-
-    def fit(self, healthy: Sequence[Drive]) -> None:
-        """Nothing is learned from other cars."""
-
-    def tests(self, one: Drive) -> tuple[Floats, Floats]:
-        """Return times, (n,), and what each sum shows then, (n, tests)."""
-        begin_s, misses = one.windows.begin_s[::2], one.windows.misses[::2, :3]
-        learned = begin_s - begin_s[0] < LEARN_S
-        unit = np.clip(_unit(misses, learned), -4.0, 4.0)
-        square = _unit((unit**2).sum(axis=1, keepdims=True), learned)
-        both = np.concatenate((unit, -unit, square), axis=1)
-        sums = np.zeros((len(begin_s), both.shape[1] * len(SLACKS)))
-        steps = np.concatenate([both - slack for slack in SLACKS], axis=1)
-        for k in range(int(learned.sum()), len(begin_s)):
-            sums[k] = np.maximum(sums[k - 1] + steps[k], 0.0)
-        return begin_s + 1.0, sums
-
-
-class Kalman:
-    """Drift of a Kalman filter's parameters, and of its innovations."""
-
-    def __init__(self) -> None:
-        self._car, self._together = load_car(CAR), Together()
-
-    def fit(self, healthy: Sequence[Drive]) -> None:
-        """Learn how parameters of cars that do not change wander together."""
-        self._together.fit([self._moved(one)[1] for one in healthy])
-
-    def tests(self, one: Drive) -> tuple[Floats, Floats]:
-        """Return times, (n,), and what each test shows then, (n, tests)."""
-        t, moved = self._moved(one)
-        return t, self._together.tests(moved)
-
-    def _moved(self, one: Drive) -> tuple[Floats, Floats]:
-        t, values = filtered(one.recording, self._car)
-        return t, departures(t, values, t[0] + SETTLED_S)
-
-
-class Residual:
-    """A learned residual: what the car file misses and regression cannot explain."""
-
-    def __init__(self, ridge: float = 30.0) -> None:
-        self._ridge, self._together = ridge, Together()
-        self._weights = self._size = np.zeros((0, 0))
-
-    def fit(self, healthy: Sequence[Drive]) -> None:
-        """Learn what is missed of all cars, and how the rest wanders."""
-        terms = np.concatenate([self._terms(one) for one in healthy])
-        misses = np.concatenate([one.windows.misses for one in healthy])
-        self._size = misses.std(axis=0)
-        self._weights = _ridge(terms, misses / self._size, self._ridge)
-        self._together.fit([self._moved(one)[1] for one in healthy])
-
-    def tests(self, one: Drive) -> tuple[Floats, Floats]:
-        """Return times, (n,), and what each test shows then, (n, tests)."""
-        t, moved = self._moved(one)
-        return t, self._together.tests(moved)
-
-    def _moved(self, one: Drive) -> tuple[Floats, Floats]:
-        t, terms = one.windows.begin_s + 1.0, self._terms(one)
-        left = one.windows.misses / self._size - terms @ self._weights
-        own = t - t[0] < LEARN_S
-        left -= terms @ _ridge(terms[own], left[own], self._ridge)
-        unit = np.clip(_unit(left, own), -4.0, 4.0)
-        return t, departures(t, np.concatenate((unit, unit**2), axis=1), t[0])
-
-    def _terms(self, one: Drive) -> Floats:
-        """Return 1, commands and motion around each window, and their products, (n, terms)."""
-        channels, begin_s = one.recording.channels, one.windows.begin_s
-        plain = []
-        for name in ("command.throttle", "command.steering"):
-            t, values = channels[name].t, channels[name].values
-            area = np.concatenate(([0.0], np.cumsum(values[:-1] * np.diff(t))))
-            ends = np.interp(begin_s[:, None] + np.array((-1.0, -0.5, 0.0, 0.5, 1.0)), t, area)
-            plain += [*np.diff(ends, axis=1).T / 0.5]
-        x, y, yaw = (channels[f"pose.{axis}"] for axis in ("x", "y", "yaw"))
-        ends = np.stack((begin_s - 0.5, begin_s))
-        moved = [np.diff(np.interp(ends, c.t, c.values), axis=0)[0] for c in (x, y)]
-        turned = np.diff(np.interp(ends, yaw.t, np.unwrap(yaw.values)), axis=0)[0]
-        plain += [np.hypot(*moved) / 0.5 / 0.25, turned / 0.5]
-        products = [a * b for a, b in combinations_with_replacement(plain, 2)]
-        return np.stack((np.ones(len(begin_s)), *plain, *products), axis=1)
-
-
-class Together:
-    """Departures of several values, each alone and all together, scaled by healthy cars'."""
-
-    def fit(self, healthy: Sequence[Floats]) -> None:
-        """Learn how departures, (n, spans, values), of cars that do not change go together."""
-        every = np.concatenate([one[np.isfinite(one).all(axis=(1, 2))] for one in healthy])
-        covariance = np.einsum("nsi,nsj->sij", every, every) / len(every)
-        size = np.sqrt(np.einsum("sii->si", covariance))
-        alike = covariance / size[:, :, None] / size[:, None, :]
-        self._size, self._inverse = size, np.linalg.inv(alike + 0.05 * np.eye(alike.shape[1]))
-
-    def tests(self, moved: Floats) -> Floats:
-        """Return each departure in its usual sizes, and the length of all, (n, tests)."""
-        unit = np.nan_to_num(moved) / self._size
-        far = np.sqrt(np.einsum("nsi,sij,nsj->ns", unit, self._inverse, unit))
-        every = np.concatenate((np.abs(unit), far[:, :, None]), axis=2)
-        return every.reshape(len(every), -1)
-
-
-def departures(t: Floats, values: Floats, since_s: float) -> Floats:
-    """Return means of the newest spans less means of all before, (n, spans, values); nan: none."""
-    step_s = float(np.median(np.diff(t)))
-    first = int(np.searchsorted(t, since_s))
-    sums = np.concatenate((np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)))
-    found = np.full((len(t), len(SPANS_S), values.shape[1]), np.nan)
-    for k, span_s in enumerate(SPANS_S):
-        span = round(span_s / step_s)
-        ends = np.arange(max(first, round(LEARN_S / step_s)) + span, len(t)) + 1
-        begins = ends - span
-        before = (sums[begins] - sums[first]) / (begins - first)[:, None]
-        found[ends - 1, k] = (sums[ends] - sums[begins]) / span - before
-    return found
-
-
-def _unit(values: Floats, learned: Floats) -> Floats:
-    """Return values in standard deviations from their middle, both of the learned rows."""
-    middle = values[learned].mean(axis=0)
-    return np.asarray((values - middle) / np.maximum(values[learned].std(axis=0), 1e-12))
-
-
-def _ridge(terms: Floats, targets: Floats, ridge: float) -> Floats:
-    square = terms.T @ terms + ridge * np.diag((terms**2).mean(axis=0))
-    return np.asarray(np.linalg.solve(square, terms.T @ targets))
-
-
-METHODS: dict[str, Callable[[], Method]] = {
-    "twin": Ours, "cusum": Cusum, "kalman": Kalman, "residual": Residual,
-}  # fmt: skip
+    t_s: float
+    effect: str
 
 
 class Calibrated:
@@ -256,18 +82,83 @@ class Calibrated:
         highest: Scores of the healthy drives, falling.
     """
 
-    def __init__(self, method: Method, healthy: Sequence[Drive]) -> None:
-        method.fit(healthy)
+    def __init__(self, method: Method, fit: Sequence[Drive], healthy: Sequence[Drive]) -> None:
+        method.fit(fit)
         self._method = method
-        most = np.array([method.tests(one)[1].max(axis=0) for one in healthy])
+        most = np.array([method.tests(one)[1].max(axis=0) for one in fit])
         self._scale = np.maximum(np.percentile(most, 90, axis=0), 1e-12)
-        self.highest: Floats = np.sort((most / self._scale).max(axis=1))[::-1]
+        scores = [float((method.tests(one)[1] / self._scale).max()) for one in healthy]
+        self.highest: Floats = np.sort(scores)[::-1]
 
-    def over(self, one: Drive, threshold: float) -> tuple[float, int] | None:
-        """Return when a drive's score first reaches a threshold, and by which test."""
+    def found(self, one: Drive, threshold: float) -> Found | None:
+        """Return what a drive's score first shows, if it reaches a threshold."""
         t, tests = self._method.tests(one)
-        scores = (tests / self._scale).max(axis=1)
-        if scores.max() < threshold:
+        over = np.flatnonzero((tests >= threshold * self._scale).any(axis=1))
+        if not len(over):
             return None
-        first = int(np.argmax(scores >= threshold))
-        return float(t[first]), int(np.argmax(tests[first] / self._scale))
+        name = self._method.name(one, tests[over[0]] / self._scale, threshold * self._scale)
+        return Found(float(t[over[0]]), name)
+
+
+def row(way: Calibrated, threshold: float, changed: Sequence[Drive]) -> tuple[str, str]:
+    """Return a line of the table, and one with each effect's time to notice."""
+    after, early, named, each = list[float](), 0, 0, list[str]()
+    for one in changed:
+        found = way.found(one, threshold)
+        early += found is not None and found.t_s <= SINCE_S
+        if found is None or found.t_s <= SINCE_S:
+            each.append(f"{one.name} {'not' if found is None else 'before'}")
+            continue
+        after.append(found.t_s - SINCE_S)
+        named += found.effect == one.name
+        each.append(f"{one.name} {after[-1]:.0f}")
+    hours = len(changed) * (SINCE_S - LEARN_S) / 3600.0
+    times = f"{np.median(after):5.0f} s {np.percentile(after, 95):5.0f} s" if after else " " * 15
+    line = f"{len(after):3} of {len(changed)}  {times}  {named:3} named"
+    return f"{line}, {early} false before in {hours:.1f} h", ", ".join(each)
+
+
+def stored(path: Path | None, make: Callable[[], Drive]) -> Drive:
+    """Return a drive that is stored there, or make and store it."""
+    if path is not None and path.exists():
+        return cast("Drive", pickle.loads(path.read_bytes()))
+    made = make()
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(pickle.dumps(made))
+    return made
+
+
+def main() -> None:
+    """Print a row a method, and threshold."""
+    parser = argparse.ArgumentParser(prog="python -m bench twin_peers", description=__doc__)
+    listed = [n for n, one in EFFECTS.items() if one.listed and CAR in one.smallest]
+    parser.add_argument("effects", nargs="*", default=[n for n in listed if n not in NEVER])
+    parser.add_argument("--seed", type=int, default=22)
+    parser.add_argument("--strength", type=float, default=2.0)
+    parser.add_argument(
+        "--fit", type=int, default=12, help="healthy drives that methods learn from"
+    )
+    parser.add_argument("--healthy", type=int, default=24, help="others, that set thresholds")
+    parser.add_argument("--keep", type=Path, help="folder in which drives are stored")
+    given = parser.parse_args()
+    predictor, drives = WatchedCar(load_car(CAR)), list[Drive]()
+    seeds = range(FIRST_HEALTHY, FIRST_HEALTHY + given.fit + given.healthy)
+    wanted = [*(("nothing", seed) for seed in seeds), *((n, given.seed) for n in given.effects)]
+    for name, seed in wanted:
+        path = given.keep and given.keep / f"{name}-{seed}-{given.strength:g}.pickle"
+        drives.append(stored(path, lambda: driven(predictor, name, given.strength, seed)))  # noqa: B023
+    fit, healthy, changed = (
+        drives[: given.fit], drives[given.fit : len(seeds)], drives[len(seeds) :]
+    )  # fmt: skip
+    ways = {name: Calibrated(make(), fit, healthy) for name, make in METHODS.items()}
+    for rank in RATES:
+        hours = given.healthy * (LASTS_S - LEARN_S) / 3600.0 / rank
+        print(f"\none false alarm in {hours:.1f} h after learning, on {given.healthy} drives")
+        for name, way in ways.items():
+            line, each = row(way, way.highest[rank - 1], changed)
+            print(f"{name:<10}{line}\n          {each}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -5,7 +5,9 @@ smoothed poses are better. After a change the car is another one: how it strays 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from scm.data_quality.prepare import screen, stretches
 from scm.errors import RecordingError
@@ -16,7 +18,7 @@ from scm.twin.evidence import Evidence
 from scm.twin.windows import EVERY_S, WatchedCar, WatchedNumber, Windows
 from scm.vehicles.car import Car
 
-SPAN_S = 10.0
+SPAN_S, PART_S = 10.0, 100.0  # parts are cut out at once: a cut reads all that it cuts from
 BEFORE_S, AFTER_S = 2.0, 1.0
 
 
@@ -132,13 +134,16 @@ def looks(recording: Recording, car: CarWatch) -> Iterator[Noticed | None]:
     """Look at a recorded car, span after span; yield the change that each shows, if it does."""
     times = [channel.t for channel in recording.channels.values() if len(channel.t)]
     begin_s = recording.begin_s if recording.begin_s is not None else min(t[0] for t in times)
-    first_s, end_s = begin_s, max(t[-1] for t in times)
-    while first_s < end_s:
-        last_s = first_s + SPAN_S
-        around = first_s - begin_s - BEFORE_S, last_s - begin_s + AFTER_S
+    end_s, recording = max(t[-1] for t in times) - begin_s, replace(recording, begin_s=begin_s)
+    for part_s in np.arange(0.0, end_s, PART_S):
         try:
-            noticed = car.look(part_of(recording, *around), first_s, last_s)
+            part = part_of(recording, part_s - BEFORE_S, part_s + PART_S + AFTER_S)
         except RecordingError:
-            noticed = None  # nothing was recorded there
-        yield noticed
-        first_s = last_s
+            continue  # nothing was recorded there
+        for first_s in np.arange(part_s, min(part_s + PART_S, end_s), SPAN_S):
+            last_s = first_s + SPAN_S
+            try:
+                around = part_of(part, first_s - BEFORE_S, last_s + AFTER_S)
+                yield car.look(around, begin_s + first_s, begin_s + last_s)
+            except RecordingError:
+                yield None
