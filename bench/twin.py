@@ -16,6 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.world import PERIOD_NS, tick, world_of
+from scm.clock import seconds
 from scm.errors import RecordingError
 from scm.recorder.drives import recordings_of_one
 from scm.recording.read import Recording
@@ -35,6 +37,7 @@ from tests.reality.recorded import record, write
 
 CAR, LASTS_S, FALSE_ALARM_H = "nigel", 600.0, 200.0
 CARS, MOST_OF_A_CORE = 20, 0.15
+FLEET, MOST_OF_WORLD, TICKS = 1000, 0.3, 50  # cars in lockstep, of the world's own time
 NEVER = ("surface_patch", "unit_error", "clock_drift")  # of a place, and no change of a car
 
 
@@ -80,6 +83,17 @@ def search(recording: Recording, change: Change, folder: Path) -> str:
         return f"{line}; {error}"
     action, reason = verdict(later, is_last=True)
     return f"{line}; {action}: {reason}"
+
+
+def world_s(cars: int) -> float:
+    """Return the processor time in which a city of so many cars drives a second."""
+    world, now = world_of(cars), iter(range(0, 10**15, PERIOD_NS))
+    for _ in range(TICKS):
+        tick(world, next(now), [])
+    begun_s = time.process_time()
+    for _ in range(TICKS):
+        tick(world, next(now), [])
+    return (time.process_time() - begun_s) / TICKS / seconds(PERIOD_NS)
 
 
 def main() -> None:
@@ -129,6 +143,11 @@ def main() -> None:
         )
     share = CARS * spent_s / driven_s
     print(f"{CARS} cars: {share:.2f} of a core, {share / MOST_OF_A_CORE:.2f} of the limit")
+    watched_s, own_s = FLEET * spent_s / driven_s, world_s(FLEET)
+    print(
+        f"{FLEET} cars in lockstep: {watched_s:.2f} s for a second, {watched_s / own_s:.1f} of the "
+        f"world's own {own_s:.2f} s; limit {MOST_OF_WORLD}"
+    )
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 Each has tests, whose scores `bench.twin_peers` scales and holds against one threshold.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
@@ -15,7 +16,8 @@ from bench.twin_kalman import NAMES, filtered
 from scm.arrays import Floats
 from scm.recording.read import Recording
 from scm.twin.detector import Detector, joined
-from scm.twin.windows import WatchedCar, Windows
+from scm.twin.watch import AFTER_S
+from scm.twin.windows import EVERY_S, WatchedCar, Windows
 from scm.vehicles.car import load_car
 
 LEARN_S, SETTLED_S = 200.0, 100.0
@@ -29,13 +31,11 @@ class Drive:
 
     Attributes:
         spans: Windows as the twin looked at them, ten seconds each.
-        ours: Highest score of the twin's detector in each, with its time, (n, 2).
     """
 
     name: str
     recording: Recording
     spans: tuple[Windows, ...]
-    ours: Floats
 
     @property
     def windows(self) -> Windows:
@@ -70,7 +70,12 @@ class Ours:
 
     def tests(self, one: Drive) -> tuple[Floats, Floats]:
         """Return times, (n,), and what each test shows then, (n, tests)."""
-        return one.ours[:, 0], one.ours[:, 1:]
+        detector, rows = Detector(math.inf), list[tuple[float, float]]()
+        for span in one.spans:
+            detector.update(span)
+            rows.append((span.begin_s[-1] + EVERY_S + AFTER_S, detector.highest))
+        t, scores = np.array(rows).T
+        return t, scores[:, None]
 
     def name(self, one: Drive, scores: Floats, thresholds: Floats) -> str:
         """Return the effect that the detector reports."""

@@ -141,7 +141,7 @@ def row_of(cars: int, stages: Stages) -> str:
     stages.spent_ms = dict.fromkeys(STAGES, 0.0)
     tick_ms = timed(lambda: tick(world, next(now), []), ticks)
     spent = {name.strip("_"): ms / ticks for name, ms in stages.spent_ms.items()}
-    messages = [out for out in world.outbox if isinstance(out, Message)]
+    messages = [out for out in tick(world, next(now), []) if isinstance(out, Message)]
     json_ms = timed(lambda: [encode(one) for one in messages], 5)
     vehicles, motion = everybody(world.cars, 0)
     ours_us = timed(lambda: world.contacts.step(vehicles, motion), 30) * 1e3

@@ -24,12 +24,14 @@ from scm.twin.windows import EVERY_S, Windows
 
 CLIPPED, WHOLE, INFORMATION = range(3)  # what windows show of a number
 LEARN, LEARN_WELL = 400, 1200  # windows: 200 and 600 s of driving
-EARLY = 1.5  # factor on the threshold between the two: 200 s show scatter by a third
+EARLY = 1.2  # factor on the threshold between the two: 200 s show scatter less well
 SPANS_S = (10.0, 20.0, 40.0, 80.0, 160.0, 320.0)
 MEMORY = 1200  # windows in which an onset is searched for
 FORGET = 1.0 / 14400.0  # of all before them, for each window: two hours
 LIMIT = 2.5  # standard deviations that a window counts for at most, over all streams
+LIMIT_OF_NUMBER = 3.0  # likewise, of what it shows of one number beyond what is usual
 LEVERAGE = 90.0  # percentile of the windows' information beyond which one counts no more
+ROUNDS = 20  # of an estimate that is bounded so
 TRUST = 0.05  # added to the misses' correlations: sensors are never as alike as a short drive shows
 TOGETHER = 80  # windows: longest span whose scatter 200 s can show
 LIKELY = 1.35  # of the log likelihood: 90 %
@@ -81,12 +83,14 @@ class Usual:
         size: Of each stream's misses, (streams,).
         weight: Inverse of the covariance of the misses over their sizes, (streams, streams).
         most: Information of one window that counts at most, (numbers,).
+        off: How far each number seems to be from the file's all the time, (numbers,).
         inflation: Variance of a span's score over that of independent windows, (spans, numbers).
     """
 
     size: Floats
     weight: Floats
     most: Floats
+    off: Floats
     inflation: Floats
 
 
@@ -249,12 +253,17 @@ def usual_of(windows: Windows) -> Usual:
     covariance = apart.T @ apart / len(apart) + TRUST * np.eye(len(size))
     spans, numbers = len(SPANS_S), windows.slopes.shape[2]
     usual = Usual(
-        size, np.linalg.inv(covariance), np.full(numbers, math.inf), np.ones((spans, numbers))
-    )
-    information = weighed(windows, usual)[INFORMATION]
+        size, np.linalg.inv(covariance), np.full(numbers, math.inf), np.zeros(numbers),
+        np.ones((spans, numbers)),
+    )  # fmt: skip
+    _, _, information = _scores(windows, usual)
     usual = replace(usual, most=np.percentile(information, LEVERAGE, axis=0))
-    shown = weighed(windows, usual)
-    return replace(usual, inflation=_inflation(shown[CLIPPED], shown[INFORMATION]))
+    near, _, information = _scores(windows, usual)
+    known, off = np.maximum(information.sum(axis=0), 1e-30), usual.off
+    for _ in range(ROUNDS):
+        off = _limited(near, information, off).sum(axis=0) / known
+    inflation = _inflation(_limited(near, information, off), information)
+    return replace(usual, off=off, inflation=inflation)
 
 
 def _inflation(score: Floats, information: Floats) -> Floats:
@@ -276,15 +285,28 @@ def _inflation(score: Floats, information: Floats) -> Floats:
 def weighed(windows: Windows, usual: Usual) -> Floats:
     """Return each window's scores and information of each number, (3, n, numbers).
 
-    In the first score, a window that strays far counts as if it strayed less: it may be a stone or
-    a bad pose. In the second it counts whole. None counts much more than others by what it shows.
+    In the first score, a window that strays far counts as if it strayed less, altogether and in
+    what it shows of one number: it may be a stone, a bad pose, or driving such as there was none
+    before. In the second it counts whole. None counts much more than others by what it shows.
     """
+    near, whole, information = _scores(windows, usual)
+    return np.stack((_limited(near, information, usual.off), whole, information))
+
+
+def _scores(windows: Windows, usual: Usual) -> tuple[Floats, Floats, Floats]:
+    """Return scores of windows that stray not too far altogether, whole ones, and information."""
     misses = windows.misses / usual.size
     slopes = windows.slopes / usual.size[:, None]
     far = np.sqrt(np.einsum("ni,ij,nj->n", misses, usual.weight, misses) / misses.shape[1])
-    clipped = misses * np.minimum(1.0, LIMIT / np.maximum(far, LIMIT))[:, None]
+    near = misses * np.minimum(1.0, LIMIT / np.maximum(far, LIMIT))[:, None]
     weighted = np.einsum("ij,njk->nik", usual.weight, slopes)
     information = np.einsum("nik,nik->nk", slopes, weighted)
     share = np.sqrt(np.minimum(1.0, usual.most / np.maximum(information, 1e-30)))
-    scores = (np.einsum("ni,nik->nk", each, weighted) for each in (clipped, misses))
-    return np.stack((*(score * share for score in scores), information * share**2))
+    near, whole = (share * np.einsum("ni,nik->nk", each, weighted) for each in (near, misses))
+    return near, whole, information * share**2
+
+
+def _limited(scores: Floats, information: Floats, off: Floats) -> Floats:
+    """Return scores that are at most so far from what the numbers' usual errors make of them."""
+    usual, most = off * information, LIMIT_OF_NUMBER * np.sqrt(information)
+    return np.asarray(usual + np.clip(scores - usual, -most, most))

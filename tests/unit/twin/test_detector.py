@@ -72,6 +72,10 @@ def test_nothing_is_reported_while_it_learns():
     assert detector.driven_s == EVERY_S * (LEARN - CHUNK)
 
 
+def test_a_few_seconds_that_stray_far_in_one_number_are_no_change():
+    assert changes_in(drive(1900, changed=4.0, since=1500, until=1508)) == []
+
+
 def test_single_bad_windows_are_no_change():
     windows = drive(2500)
     windows.misses[1500] = 500.0 * SIZE  # a pose of another car
