@@ -22,7 +22,7 @@ from scm.errors import RunError
 from scm.mismatch.fit.residual_windows import LENGTH_S
 from scm.twin.windows import EVERY_S, Windows
 
-CLIPPED, WHOLE, INFORMATION = range(3)  # what windows show of a number
+LIMITED, NEAR, WHOLE, INFORMATION = range(4)  # what windows show of a number
 LEARN, LEARN_WELL = 400, 1200  # windows: 200 and 600 s of driving
 EARLY = 1.2  # factor on the threshold between the two: 200 s show scatter less well
 SPANS_S = (10.0, 20.0, 40.0, 80.0, 160.0, 320.0)
@@ -191,28 +191,34 @@ class History:
             there = begins + self._gone >= LEARN  # what came before has to show as much
             there &= begins >= 0
             before = sums[:, begins[there]]
-            moved, variance = _moved(sums[:, ends[there]] - before, before, CLIPPED)
+            moved, variance = _moved(sums[:, ends[there]] - before, before, LIMITED)
             found[there, k] = moved / np.sqrt(self.usual.inflation[k] * variance)
         return found
 
     def change(self, scores: Floats) -> Change:
-        """Return the change that scores (numbers,) show; its onset is where that is likeliest."""
-        order = np.argsort(-np.abs(scores), kind="stable")
-        best = int(order[0])
+        """Return the change that scores (numbers,) show; its onset is where that is likeliest.
+
+        A plain change reaches what a window counts at most in many numbers alike: which one it is,
+        windows say that are limited altogether only.
+        """
+        first = int(np.argmax(np.abs(scores)))
         after = np.cumsum(self._shown[:, ::-1], axis=1)[:, ::-1]  # from each window on
         before = self._before[:, None] + after[:, :1] - after
-        moved, variance = _moved(after[..., best], before[..., best], CLIPPED)
-        likelihood = 0.5 * moved**2 / (self.usual.inflation[:, best].max() * variance)
+        moved, variance = _moved(after[..., first], before[..., first], LIMITED)
+        likelihood = 0.5 * moved**2 / (self.usual.inflation[:, first].max() * variance)
         onset = int(np.argmax(likelihood))
         near = np.flatnonzero(likelihood > likelihood[onset] - LIKELY)
-        first, last = self._t[near[0]] - EVERY_S, self._t[near[-1]] + LENGTH_S
+        low, high = self._t[near[0]] - EVERY_S, self._t[near[-1]] + LENGTH_S
+        moved, variance = _moved(after[:, onset], before[:, onset], NEAR)
+        shown = np.abs(moved) / np.sqrt(self.usual.inflation.max(axis=0) * variance)
+        best, *others = np.argsort(-shown, kind="stable")
         sizes, _ = _moved(after[:, onset], before[:, onset], WHOLE)
-        others = order[1:][np.abs(scores[order[1:]]) > ALIKE * abs(scores[best])][:MOST_ALIKE]
+        alike = [(int(k), float(sizes[k])) for k in others if shown[k] > ALIKE * shown[best]]
         return Change(
-            number=best, score=float(scores[best]), size=float(sizes[best]),
-            noticed_s=float(self._t[-1] + LENGTH_S),
-            onset_s=(float(self._t[onset]), float(first), float(last)),
-            alike=tuple((int(number), float(sizes[number])) for number in others),
+            number=int(best), score=float(np.copysign(np.abs(scores).max(), sizes[best])),
+            size=float(sizes[best]), noticed_s=float(self._t[-1] + LENGTH_S),
+            onset_s=(float(self._t[onset]), float(low), float(high)),
+            alike=tuple(alike[:MOST_ALIKE]),
         )  # fmt: skip
 
 
@@ -222,9 +228,9 @@ def _moved(after: Floats, before: Floats, score: int) -> tuple[Floats, Floats]:
     Where a span shows nothing of a number, it did not move, and its variance is infinite.
 
     Args:
-        after: What the later span shows, (3, ...), as `weighed` has it.
+        after: What the later span shows, (4, ...), as `weighed` has it.
         before: Likewise, the earlier one.
-        score: By which of the two scores.
+        score: By which of the scores.
     """
     is_shown = (after[INFORMATION] > 0.0) & (before[INFORMATION] > 0.0)
     late, early = (np.where(is_shown, each[INFORMATION], 1.0) for each in (after, before))
@@ -283,14 +289,15 @@ def _inflation(score: Floats, information: Floats) -> Floats:
 
 
 def weighed(windows: Windows, usual: Usual) -> Floats:
-    """Return each window's scores and information of each number, (3, n, numbers).
+    """Return each window's scores and information of each number, (4, n, numbers).
 
     In the first score, a window that strays far counts as if it strayed less, altogether and in
     what it shows of one number: it may be a stone, a bad pose, or driving such as there was none
-    before. In the second it counts whole. None counts much more than others by what it shows.
+    before. In the second it does so altogether, in the third it counts whole. None counts much more
+    than others by what it shows.
     """
     near, whole, information = _scores(windows, usual)
-    return np.stack((_limited(near, information, usual.off), whole, information))
+    return np.stack((_limited(near, information, usual.off), near, whole, information))
 
 
 def _scores(windows: Windows, usual: Usual) -> tuple[Floats, Floats, Floats]:
