@@ -28,7 +28,7 @@ from scm.vehicles.car import load_car
 from tests.reality.routes import TEMPERS
 
 MINUTES = (12.0, 20.0, 40.0)
-SETTINGS_H = (1.0, 2.0, 5.0, 20.0, 200.0)
+SETTINGS_H = (0.5, 1.0, 2.0, 5.0, 20.0, 200.0)
 STRETCH_S = 390.0  # alarms of one cause come together
 LOW_H = 0.5  # score beyond which the tail is fitted
 
@@ -102,7 +102,7 @@ def report(drives: Sequence[Healthy]) -> None:
         low, high = (driven_h / n if n else math.inf for n in (_most(alarms), _least(alarms)))
         measured = driven_h / alarms if alarms else math.inf
         print(
-            f"{stated_h:5.0f} h stated: {measured:6.2f} h ({low:.2f} to {high:.2f}), "
+            f"{stated_h:5.1f} h stated: {measured:6.2f} h ({low:.2f} to {high:.2f}), "
             f"{alarms:3} alarms, measured / stated {measured / stated_h:.2f}"
         )
     hourly, per_fold, peaks = tail(drives)
