@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scm.arrays import Floats
-from scm.twin.detector import CLIPPED, INFORMATION, Usual, weighed
+from scm.twin.detector import INFORMATION, NEAR, Usual, weighed
 from scm.twin.windows import WatchedNumber, Windows
 
 MOST = 1800  # windows: 15 minutes of driving
@@ -49,6 +49,6 @@ class Evidence:
         self.t_s = np.concatenate((self.t_s, windows.begin_s))[-MOST:]
         self.places = np.concatenate((self.places, windows.places))[-MOST:]
         self.cameras = np.concatenate((self.cameras, names))[-MOST:]
-        self.scores = np.concatenate((self.scores, shown[CLIPPED]))[-MOST:]
+        self.scores = np.concatenate((self.scores, shown[NEAR]))[-MOST:]
         self.information = np.concatenate((self.information, shown[INFORMATION]))[-MOST:]
         self.inflation = usual.inflation[SPAN]
