@@ -45,6 +45,7 @@ LONG = (
     "stop",
     "sumo",
     "twin",
+    "twin_causes",
     "twin_forecast",
     "twin_false_alarms",
     "twin_peers",

@@ -20,7 +20,7 @@ from scm.errors import CarError, RecordingError, ScmError
 from scm.recorder.driven import CarMessages, recording_of
 from scm.recording.read import Recording
 from scm.records.twins import TwinChange, TwinVersion
-from scm.twin.causes import ELSEWHERE, OWN, Witness, cause_in_words, located
+from scm.twin.causes import ELSEWHERE, Witness, cause_in_words, located, witness
 from scm.twin.investigation import Compared, Explained, compare, explain
 from scm.twin.memory import CarMemory
 from scm.twin.versions import (
@@ -53,7 +53,6 @@ BY_EYE, FEWEST_SEEN = "eye", 50  # poses of a first look, for the Eye to be a wi
 SEARCHED_BEFORE_S, SEARCHED_AFTER_S = 120.0, 90.0  # of a change, for a search
 MOST_AFTER_S, LEAST_AFTER_S = 300.0, 40.0
 LOCATED_NS = nanoseconds(300.0)  # after a change was noticed, whose it is may still come out
-SAME_S = 10.0  # changes that began within that may be one
 FAILURES = (ScmError, OSError, BrokenExecutor)
 """Of searches and comparisons, which never end the part."""
 
@@ -225,16 +224,8 @@ class TwinCar:
         """
         if self._watch is None:
             return None
-        own = [
-            seconds(one.since_ns)
-            for one in self.changes
-            if one.cause in OWN and abs(seconds(one.since_ns) - since_s) > SAME_S
-        ]
-        first_s = max((t_s for t_s in own if t_s < since_s), default=-math.inf)
-        last_s = min((t_s for t_s in own if t_s > since_s), default=math.inf)
-        if self is of:
-            last_s = math.inf
-        return Witness(self._watch.evidence, seconds(self._begin_ns), first_s, last_s)
+        begin_s = seconds(self._begin_ns)
+        return witness(self._watch.evidence, begin_s, self.changes, since_s, is_own=self is of)
 
     def locate(self, cars: Iterable["TwinCar"]) -> list[Outgoing]:
         """Say whose each new change is, by what all cars drove."""

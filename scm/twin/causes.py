@@ -12,7 +12,7 @@ remain as they were, and what would decide is another car, or this one elsewhere
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -35,6 +35,7 @@ OF_CAMERAS = ("camera_tilt", "pose_scale", "pose_latency", "clock_offset", "cloc
 RADII_M = (0.2, 0.35, 0.6)
 GRID_M = 0.2  # between the middles of places
 JUDGED_AFTER_S = 60.0  # since a change: whoever came to a place once may as well have changed there
+SAME_S = 10.0  # changes that began within that may be one
 FEWEST = 10  # windows of a place that a car drove through
 NEAR_M, NEAR_WAY = 0.12, 0.5  # windows so near, and in about the same direction, are alike
 AS_MANY = 3.0  # windows of all its driving, that count where none was nearby
@@ -53,6 +54,25 @@ class Witness:
     begin_s: float
     first_s: float = -math.inf
     last_s: float = math.inf
+
+
+def witness(
+    evidence: Evidence, begin_s: float, changes: Iterable[TwinChange], since_s: float, *,
+    is_own: bool,
+) -> Witness:  # fmt: skip
+    """Return what a car shows about a change, from its own last change before it to its next.
+
+    Args:
+        evidence: Of the car.
+        begin_s: Zero of the evidence's clock, on the city's.
+        changes: Of the car; those whose own they are count.
+        since_s: When the change began, on the city's clock.
+        is_own: Whether it is this car's: its later ones do not end it.
+    """
+    own = [seconds(one.since_ns) for one in changes if one.cause in OWN]
+    first_s = max((t_s for t_s in own if t_s < since_s - SAME_S), default=-math.inf)
+    last_s = min((t_s for t_s in own if t_s > since_s + SAME_S), default=math.inf)
+    return Witness(evidence, begin_s, first_s, math.inf if is_own else last_s)
 
 
 @dataclass(frozen=True, slots=True)

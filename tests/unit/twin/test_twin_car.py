@@ -157,7 +157,7 @@ def test_change_is_searched_for_named_and_its_car_file_adopted_and_stored(change
     assert status.version == 1
     assert status.state == "watching"  # by what the memory has of the car since it changed
     assert "gyro better on new driving" in status.versions[1].reason
-    assert city.events == ["car_changed", "change_located", "change_explained", "version"]
+    assert city.events == ["car_changed", "change_explained", "version"]
     assert [name for name, _ in city.executor.calls][:2] == ["explain", "compare"]
     recording, car_file, out, *_ = city.executor.calls[0][1]
     assert car_file == "nigel"
