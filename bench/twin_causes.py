@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from scm.arrays import Floats
-from scm.clock import nanoseconds, seconds
+from scm.clock import seconds
 from scm.errors import RecordingError
 from scm.recorder.drives import recordings_of_one
 from scm.recording.read import Recording
@@ -27,7 +27,7 @@ from scm.recording.span import part_of
 from scm.records.twins import TwinChange
 from scm.twin.causes import OWN, located, witness
 from scm.twin.detector import threshold_of
-from scm.twin.watch import AFTER_S, BEFORE_S, SPAN_S, CarWatch, Noticed
+from scm.twin.watch import AFTER_S, BEFORE_S, SPAN_S, CarWatch
 from scm.twin.windows import WatchedCar
 from scm.vehicles.car import load_car
 from tests.reality.cases import FAULTS, apply, draw_effects, nominal, scattered
@@ -115,7 +115,7 @@ def judged(
             except RecordingError:
                 continue
             if one is not None and name not in noticed:
-                noticed[name] = first_s, change_of(one)
+                noticed[name] = first_s, one.as_change()
         for name, (when_s, change) in noticed.items():
             if first_s - when_s in LATER_S:
                 since_s = seconds(change.since_ns)
@@ -129,16 +129,6 @@ def judged(
                 change = located(change, name, cars) or change  # noqa: PLW2901
                 noticed[name] = when_s, change
                 yield name, first_s - when_s, change
-
-
-def change_of(noticed: Noticed) -> TwinChange:
-    """Return a change as the part reports it, on the recording's clock."""
-    since_ns, low_ns, high_ns = map(nanoseconds, noticed.change.onset_s)
-    return TwinChange(
-        noticed_ns=nanoseconds(noticed.change.noticed_s), since_ns=since_ns, since_low_ns=low_ns,
-        since_high_ns=high_ns, effect=noticed.number.effect, parameter=noticed.number.name,
-        size=noticed.change.size, unit=noticed.number.unit, score=abs(noticed.change.score),
-    )  # fmt: skip
 
 
 def judge(change: TwinChange, kinds: Sequence[str], *, is_first: bool) -> str:

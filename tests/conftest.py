@@ -34,6 +34,7 @@ AT_ANY_PACE = {
         "pages/test_shell",
         "pages/test_signals_of_a_town",
         "pages/test_signals_page",
+        "pages/test_twins_page",
         "pages/test_vehicle_page",
         "test_mismatch_report",
         "test_own_car_example",

@@ -80,7 +80,7 @@ def _of_change(change: "TwinChange") -> list[str]:
 
 def _cause(cause: "TwinCause") -> str:
     if cause.x_m is not None:
-        return f"{cause.kind} ({cause.x_m:.2f}, {cause.y_m:.2f}), {cause.radius_m} m"
+        return f"{cause.kind} ({cause.x_m:.2f}, {cause.y_m:.2f}), {cause.radius_m:.1f} m"
     return f"{cause.kind} {cause.camera}".rstrip()
 
 

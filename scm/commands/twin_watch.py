@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from scm.command import Command
 
+LEAST_SHOWN = 0.05  # of probabilities
+
 if TYPE_CHECKING:
     from scm.twin.watch import CarWatch, Noticed
     from scm.twin.windows import WatchedNumber
@@ -31,11 +33,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.recorder.drives import recordings_of
     from scm.twin.detector import threshold_of
-    from scm.twin.watch import CarWatch, watch
+    from scm.twin.watch import CarWatch, Noticed, watch
     from scm.twin.windows import WatchedCar
     from scm.vehicles.car import load_car
 
     threshold, failures = threshold_of(arguments.false_alarm_h), list[str]()
+    watched = dict[str, tuple[CarWatch, list[Noticed]]]()
     found = recordings_of(arguments.recording, arguments.data, arguments.vehicle, failures.append)
     cars = dict[str, WatchedCar]()
     for recording in found:
@@ -43,11 +46,13 @@ def _run(arguments: argparse.Namespace) -> int:
         if name not in cars:
             cars[name] = WatchedCar(load_car(name, trusted=arguments.car is not None))
         one = CarWatch(cars[name], threshold)
-        changes = watch(recording, one)
-        who = recording.name if len(found) > 1 else arguments.recording
+        one.evidence.most = sys.maxsize
+        watched[recording.name] = one, watch(recording, one)
+    for vehicle, (one, changes) in watched.items():
+        who = vehicle if len(found) > 1 else arguments.recording
         print(f"{who}: {_summary(one, len(changes))}")
         for noticed in changes:
-            print("\n".join(_lines(noticed)))
+            print("\n".join([*_lines(noticed), *_whose(noticed, vehicle, watched)]))
     for failure in failures:
         print(f"scm twin watch: {failure}", file=sys.stderr)
     return 0
@@ -77,6 +82,34 @@ def _lines(noticed: "Noticed") -> list[str]:
         f" {change.noticed_s:.0f} s, score {abs(change.score):.1f}",
         f"    as by {', or '.join(like)}",
     ]
+
+
+def _whose(
+    noticed: "Noticed", vehicle: str, watched: "dict[str, tuple[CarWatch, list[Noticed]]]"
+) -> list[str]:
+    """Return whose a change is by all cars of the run, in words; nothing of a car alone."""
+    from scm.clock import seconds
+    from scm.twin.causes import cause_in_words, located, witness
+
+    change = noticed.as_change()
+    cars = {
+        name: witness(
+            one.evidence, 0.0, [other.as_change() for other in changes], seconds(change.since_ns),
+            is_own=name == vehicle,
+        )
+        for name, (one, changes) in watched.items()
+    }  # fmt: skip
+    found = located(change, vehicle, cars) if len(watched) > 1 else None
+    if found is None:
+        return []
+    shares = ", ".join(
+        f"{one.kind} {100.0 * one.probability:.0f} %"
+        for one in found.causes
+        if one.probability >= LEAST_SHOWN
+    )
+    if found.cause == "undecided":
+        return [f"    whose it is, is undecided: {shares}. {found.decide_by}"]
+    return [f"    {cause_in_words(found, vehicle)} ({shares})"]
 
 
 def _amount(number: "WatchedNumber", size: float) -> str:

@@ -33,7 +33,7 @@ from scm.twin.versions import (
     meaning,
     verdict,
 )
-from scm.twin.watch import AFTER_S, BEFORE_S, SPAN_S, CarWatch, Noticed
+from scm.twin.watch import AFTER_S, BEFORE_S, SPAN_S, CarWatch
 from scm.twin.windows import WatchedCar
 from scm.v2x.exchange import Call, Outgoing, PersistedState
 from scm.v2x.message import Message, Refused
@@ -52,6 +52,8 @@ MOST_CHANGES = 20
 BY_EYE, FEWEST_SEEN = "eye", 50  # poses of a first look, for the Eye to be a witness
 SEARCHED_BEFORE_S, SEARCHED_AFTER_S = 120.0, 90.0  # of a change, for a search
 MOST_AFTER_S, LEAST_AFTER_S = 300.0, 40.0
+LOCATE_NS = nanoseconds(30.0)  # between two judgements of whose a change is
+MOST_WITNESSES = 30  # those that drove most
 LOCATED_NS = nanoseconds(300.0)  # after a change was noticed, whose it is may still come out
 FAILURES = (ScmError, OSError, BrokenExecutor)
 """Of searches and comparisons, which never end the part."""
@@ -124,7 +126,7 @@ class TwinCar:
         self._search: Future[Explained] | None = None
         self._comparison: Future[Compared] | None = None
         self._requested: tuple[int, Compared] | None = None  # of a version
-        self._searched_until = 0.0, 0.0
+        self._searched_until, self._located_ns = (0.0, 0.0), 0
 
     @property
     def waits_ns(self) -> int:
@@ -132,6 +134,11 @@ class TwinCar:
         behind_s = self._memory.last_s - self._watched_s - SPAN_S
         arrived_ns = self.newest_ns - self.next_ns - DUE_NS
         return max(arrived_ns, nanoseconds(behind_s)) if behind_s >= 0.0 else arrived_ns
+
+    @property
+    def driven_s(self) -> float:
+        """How long it was driven and watched."""
+        return self._driven_s
 
     def receive(self, message: Message, now_ns: int) -> None:
         """Store what the car sent, or what was seen of it."""
@@ -206,7 +213,7 @@ class TwinCar:
             return []
         self._trial = None
         out = self._stored(self.versions.reject(CHANGED_AGAIN))
-        change = _change(noticed, self._begin_ns)
+        change = noticed.as_change(self._begin_ns)
         self.changes.append(change)
         ago_s = seconds(change.noticed_ns - change.since_ns)
         like = ", or ".join(dict.fromkeys((change.effect, *change.alike)))
@@ -229,14 +236,21 @@ class TwinCar:
 
     def locate(self, cars: Iterable["TwinCar"]) -> list[Outgoing]:
         """Say whose each new change is, by what all cars drove."""
-        out, cars = list[Outgoing](), tuple(cars)
+        if 0 <= self.newest_ns - self._located_ns < LOCATE_NS:
+            return []
+        out = list[Outgoing]()
+        others = sorted((one for one in cars if one is not self), key=lambda one: -one.driven_s)
+        cars = (self, *others[:MOST_WITNESSES])
         for change in tuple(self.changes):
             if self.newest_ns - change.noticed_ns > LOCATED_NS:
                 continue
             since_s = seconds(change.since_ns)
             witnesses = {one.name: one.witness(self, since_s) for one in cars}
             found = located(change, self.name, {n: w for n, w in witnesses.items() if w})
-            if found is None or found == change:
+            if found is None:
+                continue  # too little was driven since
+            self._located_ns = self.newest_ns
+            if found == change:
                 continue
             out += self._now(change, found)
             if found.cause not in (change.cause, "undecided"):
@@ -467,14 +481,3 @@ def _forget(messages: CarMessages, before_ns: int) -> None:
         for camera, poses in messages.seen.items()
     }
     messages.hit_ns = [t_ns for t_ns in messages.hit_ns if t_ns >= before_ns]
-
-
-def _change(noticed: Noticed, begin_ns: int) -> TwinChange:
-    change = noticed.change
-    since_ns, low_ns, high_ns = (begin_ns + nanoseconds(t_s) for t_s in change.onset_s)
-    return TwinChange(
-        noticed_ns=begin_ns + nanoseconds(change.noticed_s), since_ns=since_ns,
-        since_low_ns=low_ns, since_high_ns=high_ns, effect=noticed.number.effect,
-        parameter=noticed.number.name, size=change.size, unit=noticed.number.unit,
-        score=abs(change.score), alike=tuple(number.effect for number, _ in noticed.alike),
-    )  # fmt: skip

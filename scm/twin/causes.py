@@ -36,6 +36,7 @@ RADII_M = (0.2, 0.35, 0.6)
 GRID_M = 0.2  # between the middles of places
 JUDGED_AFTER_S = 60.0  # since a change: whoever came to a place once may as well have changed there
 SAME_S = 10.0  # changes that began within that may be one
+MOST_OF_IT = 80.0  # percentile of how far from its middle a place was driven through
 FEWEST = 10  # windows of a place that a car drove through
 NEAR_M, NEAR_WAY = 0.12, 0.5  # windows so near, and in about the same direction, are alike
 AS_MANY = 3.0  # windows of all its driving, that count where none was nearby
@@ -81,8 +82,9 @@ class _Rows:
 
     Attributes:
         after: Which began since the change, (n,).
-        score, information: Over the spread, (n, numbers); what the car strayed there before the
-            change is left out of the score.
+        score: Over its spread, of those since the change, less what the car strayed there before,
+            (later, numbers).
+        information: Likewise, of all, (n, numbers).
     """
 
     is_changed: bool
@@ -133,7 +135,8 @@ def cause_in_words(change: TwinChange, vehicle: str) -> str:
         case "tag":
             return f"The tag of {vehicle} is not where it was on the car"
         case "place":
-            return f"Not {vehicle} changed but the floor, within {first.radius_m} m of {_at(first)}"
+            where = f"within {first.radius_m:.1f} m of {_at(first)}"
+            return f"Not {vehicle} changed but the floor, {where}"
         case "camera":
             camera = f"Camera {first.camera}" if first.camera else "The camera"
             return f"{camera} sees cars elsewhere than before: {vehicle} did not change"
@@ -224,30 +227,34 @@ def _rows(
     after, places = t_s[counts] >= since_s[0], evidence.places[counts]
     score = evidence.scores[counts][:, columns] / spread
     information = evidence.information[counts][:, columns] / spread
-    usual = _usually(places, ~after, score, information)
-    return _Rows(
-        is_changed, after, places, evidence.cameras[counts], score - usual * information,
-        information,
-    )  # fmt: skip
+    usual = _usually(places, after, score[~after], information[~after])
+    left = score[after] - usual * information[after]
+    return _Rows(is_changed, after, places, evidence.cameras[counts], left, information)
 
 
-def _usually(places: Floats, before: Bools, score: Floats, information: Floats) -> Floats:
-    """Return what each number would be by the windows before the change nearby, (n, numbers).
+def _usually(places: Floats, after: Bools, score: Floats, information: Floats) -> Floats:
+    """Return what each number would be by the windows before the change nearby, (later, numbers).
 
     A car strays on some bends more than on others: what it strayed there before is no change.
+
+    Args:
+        places: Of all windows, (n, 2).
+        after: Which began since the change, (n,).
+        score: Of each before it, (earlier, numbers).
+        information: Likewise.
     """
-    if not before.any():
-        return np.zeros_like(score)
+    if after.all():
+        return np.zeros((len(places), score.shape[1]))
     way = np.gradient(places, axis=0) if len(places) > 1 else np.zeros_like(places)
     way = way / np.maximum(np.hypot(*way.T), 1e-6)[:, None]
-    apart = np.column_stack((places / NEAR_M, way / NEAR_WAY))
-    square = ((apart[:, None] - apart[None, before]) ** 2).sum(axis=2)
-    weight = np.exp(-0.5 * square)
-    level = score[before].sum(axis=0) / np.maximum(information[before].sum(axis=0), 1e-30)
-    least = AS_MANY * information[before].mean(axis=0)
+    where = np.column_stack((places / NEAR_M, way / NEAR_WAY))
+    now, then = where[after], where[~after]
+    half = 0.5 * (now**2).sum(axis=1)[:, None] + 0.5 * (then**2).sum(axis=1)
+    weight = np.exp(now @ then.T - half)  # of half of the squared distance
+    level = score.sum(axis=0) / np.maximum(information.sum(axis=0), 1e-30)
+    least = AS_MANY * information.mean(axis=0)
     return np.asarray(
-        (weight @ score[before] + least * level)
-        / np.maximum(weight @ information[before] + least, 1e-30)
+        (weight @ score + least * level) / np.maximum(weight @ information + least, 1e-30)
     )
 
 
@@ -281,7 +288,7 @@ def _joint(rows: Sequence[_Rows], affected: Sequence[Bools], usual: Sequence[Boo
     for one, these, those in zip(rows, affected, usual, strict=True):
         now, then = (which.astype(float) @ one.information for which in (these, those))
         share = then / np.maximum(now + then, 1e-30)
-        score += share * (these.astype(float) @ one.score)
+        score += share * (these[:, one.after].astype(float) @ one.score)
         information += share * now
     fit = score**2 / np.maximum(information, 1e-30)
     return np.asarray(0.5 * fit**2 / (1.0 + fit) - 0.5 * np.log1p(fit))
@@ -320,8 +327,9 @@ def _of_places(
     best = int(np.argmax(evidence.max(axis=1)))
     pairs = zip(rows, there, strict=True)
     driven = np.concatenate([one.places[inside[best] & one.after] for one, inside in pairs])
-    x_m, y_m = driven.mean(axis=0).tolist()  # of a circle that reaches beyond the lanes, the lanes
-    return _mean(evidence.ravel()), (x_m, y_m, float(places[best, 2]))
+    middle = driven.mean(axis=0)  # of a circle that reaches beyond the lanes, the lanes
+    radius_m = float(np.percentile(np.hypot(*(driven - middle).T), MOST_OF_IT))
+    return _mean(evidence.ravel()), (*middle.tolist(), radius_m)
 
 
 def _inside(driven: Floats, places: Floats) -> Bools:

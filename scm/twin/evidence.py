@@ -25,6 +25,7 @@ class Evidence:
         cameras: By which the car was seen there, (n,); empty: not known.
         scores, information: Of each number, (n, numbers).
         inflation: Variance of sums of scores over that of independent windows, (numbers,).
+        most: Windows that are remembered.
     """
 
     numbers: Sequence[WatchedNumber]
@@ -34,6 +35,7 @@ class Evidence:
     scores: Floats
     information: Floats
     inflation: Floats
+    most: int = MOST
 
     @classmethod
     def none(cls, numbers: Sequence[WatchedNumber]) -> "Evidence":
@@ -46,9 +48,9 @@ class Evidence:
         """Add new windows; the oldest are forgotten."""
         shown = weighed(windows, usual)
         names = np.full(len(windows.begin_s), camera, dtype=np.str_)
-        self.t_s = np.concatenate((self.t_s, windows.begin_s))[-MOST:]
-        self.places = np.concatenate((self.places, windows.places))[-MOST:]
-        self.cameras = np.concatenate((self.cameras, names))[-MOST:]
-        self.scores = np.concatenate((self.scores, shown[NEAR]))[-MOST:]
-        self.information = np.concatenate((self.information, shown[INFORMATION]))[-MOST:]
+        self.t_s = np.concatenate((self.t_s, windows.begin_s))[-self.most :]
+        self.places = np.concatenate((self.places, windows.places))[-self.most :]
+        self.cameras = np.concatenate((self.cameras, names))[-self.most :]
+        self.scores = np.concatenate((self.scores, shown[NEAR]))[-self.most :]
+        self.information = np.concatenate((self.information, shown[INFORMATION]))[-self.most :]
         self.inflation = usual.inflation[SPAN]

@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scm.clock import nanoseconds
 from scm.data_quality.prepare import screen, stretches
 from scm.errors import RecordingError
 from scm.recording.read import Recording
 from scm.recording.span import part_of
+from scm.records.twins import TwinChange
 from scm.twin.detector import Change, Detector, Usual
 from scm.twin.evidence import Evidence
 from scm.twin.windows import EVERY_S, WatchedCar, WatchedNumber, Windows
@@ -36,6 +38,17 @@ class Noticed:
     number: WatchedNumber
     alike: tuple[tuple[WatchedNumber, float], ...]
     driven_s: float
+
+    def as_change(self, begin_ns: int = 0) -> TwinChange:
+        """Return it as a record; `begin_ns` is zero of the recording's clock."""
+        change = self.change
+        since_ns, low_ns, high_ns = (begin_ns + nanoseconds(t_s) for t_s in change.onset_s)
+        return TwinChange(
+            noticed_ns=begin_ns + nanoseconds(change.noticed_s), since_ns=since_ns,
+            since_low_ns=low_ns, since_high_ns=high_ns, effect=self.number.effect,
+            parameter=self.number.name, size=change.size, unit=self.number.unit,
+            score=abs(change.score), alike=tuple(number.effect for number, _ in self.alike),
+        )  # fmt: skip
 
 
 class CarWatch:

@@ -108,7 +108,7 @@ def test_changes_are_shown_and_another_version_is_put_in_force(
         look_at(visited, "twin_undecided")
         page.goto(f"{running.url}/twins/n4")
         page.wait_for_selector(
-            ".change h2 >> text=Not the car: the floor within 0.35 m of (1.2, 0.4)"
+            ".change h2 >> text=Not the car: the floor within 0.3 m of (1.2, 0.4)"
         )
         look_at(visited, "twin_floor")
         page.goto(f"{running.url}/map")

@@ -102,7 +102,7 @@ def undecided(vehicle="n2", now_ns=NOW_NS):
 
 def floor_changed(vehicle="n4", now_ns=NOW_NS):
     """Return a car that noticed a patch of the floor."""
-    place = TwinCause(kind="place", probability=0.973, x_m=1.2, y_m=0.4, radius_m=0.35)
+    place = TwinCause(kind="place", probability=0.973, x_m=1.2, y_m=0.4, radius_m=0.3)
     found = change(
         900, now_ns, effect="rolling_resistance", parameter="coefficient", size=0.012, unit="1",
         alike=(), search="elsewhere", cause="place", causes=(place,),

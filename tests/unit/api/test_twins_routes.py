@@ -52,7 +52,7 @@ def test_rows_say_what_changed_in_short(client, hear):
     assert (fourth["search"], fourth["newest"]) == (
         "elsewhere", "the floor at (1.2, 0.4), not the car"
     )  # fmt: skip
-    assert (fourth["x_m"], fourth["y_m"], fourth["radius_m"]) == (1.2, 0.4, 0.35)
+    assert (fourth["x_m"], fourth["y_m"], fourth["radius_m"]) == (1.2, 0.4, 0.3)
 
 
 @pytest.mark.parametrize(

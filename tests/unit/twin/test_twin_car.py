@@ -109,7 +109,7 @@ class City:
 
 def by_the_floor(monkeypatch):
     """Let each change be of a place."""
-    place = TwinCause(kind="place", probability=0.99, x_m=1.0, y_m=2.0, radius_m=0.35)
+    place = TwinCause(kind="place", probability=0.99, x_m=1.0, y_m=2.0, radius_m=0.3)
     monkeypatch.setattr(
         twin_car, "located", lambda change, *_: replace(change, cause="place", causes=(place,))
     )
@@ -129,7 +129,7 @@ def test_change_of_the_floor_is_not_searched_for_in_the_car(changed, tmp_path, m
     assert (change.search, change.cause) == ("elsewhere", "place")
     assert city.executor.calls == []
     (event,) = [one for one in city.out if getattr(one, "name", "") == "change_located"]
-    assert event.text == "Not n1 changed but the floor, within 0.35 m of (1.0, 2.0)"
+    assert event.text == "Not n1 changed but the floor, within 0.3 m of (1.0, 2.0)"
 
 
 def test_version_found_for_a_change_that_proves_to_be_the_floor_s_is_rejected(

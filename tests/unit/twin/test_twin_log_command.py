@@ -19,7 +19,7 @@ CHANGE = TwinChange(
     report="twin-n3-1800000000", cause="car",
     causes=(
         TwinCause(kind="car", probability=0.92),
-        TwinCause(kind="place", probability=0.06, x_m=1.2, y_m=0.4, radius_m=0.35),
+        TwinCause(kind="place", probability=0.06, x_m=1.2, y_m=0.4, radius_m=0.3),
         TwinCause(kind="camera", probability=0.02, camera="north"),
     ),
 )  # fmt: skip
@@ -50,7 +50,7 @@ def test_changes_and_versions_are_printed_with_what_differs(store, capsys):
     assert lines[0] == (
         "changed since 2027-01-15 08:00:00 (-1.0 to +1.0 s), noticed 2027-01-15 08:00:11: named"
     )
-    assert lines[1] == "  of car: car 92 %, place (1.20, 0.40), 0.35 m 6 %"
+    assert lines[1] == "  of car: car 92 %, place (1.20, 0.40), 0.3 m 6 %"
     assert lines[2] == "  The wheels turn too little."
     assert lines[3] == "  steer_gain, 97 %: gain 0.85 (0.83 to 0.87)"
     assert lines[5] == "version 1: adopted, found 2027-01-15 08:01:40, by twin: position better"

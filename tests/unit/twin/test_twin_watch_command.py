@@ -1,6 +1,7 @@
 """`scm twin watch` in words."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -26,6 +27,19 @@ def test_change_is_printed_with_when_and_what(recorded, capsys):
     assert re.match(r"  changed at 3(29|30|31)\.\d s \(", lines[1])
     assert "    as by gyro_bias (bias_rad_s +0.0" in lines[2]
     assert " rad/s)" in lines[2]
+
+
+def test_change_of_one_car_of_two_is_its_own(monkeypatch, capsys):
+    def earlier(name, t, values):
+        return biased(name, t + 20.0, values)
+
+    cars = [made_drive(seconds=LASTS_S, sense=earlier), made_drive(seconds=LASTS_S)]
+    named = [replace(one, name=name) for one, name in zip(cars, ("n1", "n2"), strict=True)]
+    monkeypatch.setattr("scm.recorder.drives.recordings_of", lambda *_: named)
+    assert main(["twin", "watch", "drive.mcap"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in lines if "driven for" in line] == ["n1", "n2"]
+    assert "    n1 itself changed: no other car that drove since did (car 100 %)" in lines
 
 
 def test_short_recording_is_too_short_to_learn_from(root, capsys):

@@ -12,7 +12,7 @@ export const SEARCHES = {
   failed: ["search failed", ""],
 };
 
-const at = ({ x_m, y_m, radius_m }) => `the floor within ${radius_m} m of (${x_m.toFixed(1)}, ${y_m.toFixed(1)})`;
+const at = ({ x_m, y_m, radius_m }) => `the floor within ${radius_m.toFixed(1)} m of (${x_m.toFixed(1)}, ${y_m.toFixed(1)})`;
 
 /** Whose a change may be. */
 export const CAUSES = {
