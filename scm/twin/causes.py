@@ -34,6 +34,7 @@ OF_TAGS = ("pose_point", "pose_heading")
 OF_CAMERAS = ("camera_tilt", "pose_scale", "pose_latency", "clock_offset", "clock_drift")
 RADII_M = (0.2, 0.35, 0.6)
 GRID_M = 0.2  # between the middles of places
+MOST_PLACES = 200  # those that the car was at most
 JUDGED_AFTER_S = 60.0  # since a change: whoever came to a place once may as well have changed there
 SAME_S = 10.0  # changes that began within that may be one
 MOST_OF_IT = 80.0  # percentile of how far from its middle a place was driven through
@@ -342,10 +343,7 @@ def _places(driven: Floats) -> Floats:
     """Return places that a car drove through: x, y and radius, (places, 3) [m]."""
     if len(driven) < FEWEST:
         return np.empty((0, 3))
-    axes = [
-        np.arange(low, high + GRID_M, GRID_M)
-        for low, high in zip(driven.min(0), driven.max(0), strict=True)
-    ]
-    middles = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    cells, counts = np.unique(np.round(driven / GRID_M), axis=0, return_counts=True)
+    middles = GRID_M * cells[np.argsort(-counts, kind="stable")[:MOST_PLACES]]
     found = np.concatenate([np.column_stack((middles, np.full(len(middles), r))) for r in RADII_M])
     return cast("Floats", found[_inside(driven, found).sum(axis=1) >= FEWEST])
