@@ -76,6 +76,19 @@ class WallClock:
         return wake.wait(remaining_s) if remaining_s > 0.0 else wake.is_set()
 
 
+class ProcessorClock:
+    """This process's processor time: what is done in it does not depend on other processes."""
+
+    def now_ns(self) -> int:
+        """Return the processor time of all threads so far [ns]."""
+        return time.process_time_ns()
+
+    def wait_until(self, t_ns: int, wake: threading.Event) -> bool:
+        """Return whether `wake` is set: this time does not pass while one waits."""
+        del t_ns
+        return wake.is_set()
+
+
 class StepClock:
     """A clock that moves only when it is set, for lockstep runs and tests."""
 

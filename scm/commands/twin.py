@@ -25,7 +25,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=300.0,
         metavar="S",
-        help="for the search for what changed (%(default)g)",
+        help="processor time for a search for what changed (%(default)g)",
     )
 
 

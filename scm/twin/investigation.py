@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 from msgspec import structs
 
-from scm.clock import WallClock
+from scm.clock import ProcessorClock
 from scm.data_quality.prepare import prepare
 from scm.errors import RecordingError, ScmError
 from scm.mismatch.budget import Budget
@@ -63,6 +63,9 @@ class Explained:
     since_s: tuple[float, float, float] | None
     car_file: Path | None
     abilities: tuple[TwinParameter, ...] = ()
+
+
+CUT = " The search ended before everything was examined."
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,12 +147,13 @@ def explain(
         out: Folder of the report; the recording is written into it.
         made: Car file to be written, if one is found.
         onset_s: Between which moments the change was noticed to begin, on the recording's clock.
-        budget_s: For the search.
+        budget_s: For the search, of processor time: on a busy computer it takes longer, and finds
+            the same.
 
     Raises:
         ScmError: when the recording or the car file cannot be used, or nothing can be written.
     """
-    budget = Budget(budget_s, WallClock())
+    budget = Budget(budget_s, ProcessorClock())
     write(recording, out / RECORDING)
     car = load_car(car_file)
     found = diagnose_car([recording], car, budget=budget)
@@ -165,7 +169,7 @@ def explain(
         effects=tuple(_as_message(one) for one in effects),
         between=() if question is None else question.between,
         drive_this="" if question is None else question.drive_this,
-        text=_in_words(found.diagnosis, effects),
+        text=_in_words(found.diagnosis, effects) + (CUT if found.diagnosis.unanswered else ""),
         since_s=_since(effects),
         car_file=made if is_found else None,
         abilities=compared_abilities(car, load_car(made)) if is_found else (),

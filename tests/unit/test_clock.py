@@ -4,7 +4,15 @@ import threading
 
 import pytest
 
-from scm.clock import NS_PER_MS, NS_PER_S, StepClock, WallClock, nanoseconds, seconds
+from scm.clock import (
+    NS_PER_MS,
+    NS_PER_S,
+    ProcessorClock,
+    StepClock,
+    WallClock,
+    nanoseconds,
+    seconds,
+)
 
 
 def test_spans_convert_both_ways():
@@ -53,6 +61,16 @@ def test_a_wall_clock_is_woken_early():
 def test_a_time_that_has_passed_is_not_waited_for():
     clock = WallClock()
     assert clock.wait_until(clock.now_ns() - NS_PER_S, threading.Event()) is False
+
+
+def test_a_processor_clock_counts_work_and_no_waiting():
+    clock, wake = ProcessorClock(), threading.Event()
+    began_ns = clock.now_ns()
+    while clock.now_ns() < began_ns + 20 * NS_PER_MS:
+        pass
+    assert clock.wait_until(clock.now_ns() + 60 * NS_PER_S, wake) is False
+    wake.set()
+    assert clock.wait_until(0, wake) is True
 
 
 def test_a_step_clock_stands_still():

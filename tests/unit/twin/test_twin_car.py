@@ -283,6 +283,13 @@ def test_search_names_the_effect_dates_it_and_writes_report_recording_and_car(tm
     }
 
 
+def test_search_that_ran_out_of_time_says_so(tmp_path):
+    drive, made = made_drive(seconds=30.0, sense=biased(15.0)), tmp_path / "1.toml"
+    found = explain(drive, "nigel", tmp_path / "report", made, (14.0, 16.0), 0.01)
+    assert found.text.endswith(" The search ended before everything was examined.")
+    assert found.car_file is None
+
+
 @pytest.mark.parametrize(
     ("course", "since_s", "counts"),
     [
