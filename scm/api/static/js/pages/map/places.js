@@ -28,10 +28,10 @@ function drawPlace(paper, view, { x_m, y_m, radius_m }) {
   if (2 * radius >= LEAST_PX) {
     paper.setLineDash([]);
     paper.font = "600 12px system-ui, sans-serif";
-    [paper.textAlign, paper.textBaseline] = ["center", "bottom"];
+    [paper.textAlign, paper.textBaseline] = ["center", "middle"];
     [paper.lineWidth, paper.strokeStyle, paper.fillStyle] = [3, RIM, EDGE];
-    paper.strokeText("floor changed", x, y - radius - 3);
-    paper.fillText("floor changed", x, y - radius - 3);
+    paper.strokeText("floor changed", x, y);
+    paper.fillText("floor changed", x, y);
   }
   paper.restore();
 }
