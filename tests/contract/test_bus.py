@@ -294,8 +294,16 @@ def test_events_of_a_station_that_left_are_not_sent_to_late_joiners(city):
 
 
 def test_a_stream_is_not_kept_for_late_joiners(city):
-    sender = city.bus("traffic")
-    sender.publish(spat())
+    sender, received = city.bus("traffic"), Mailbox(10)
+    city.bus("record").subscribe(Spat, {}, received)
+
+    def arrives():
+        sender.publish(spat())
+        return bool(received.drain())
+
+    settles(city, arrives)
+    while not nothing_more(city, received):
+        pass  # else one may still be on its way
     mailbox = Mailbox(10)
     city.bus("api").subscribe(Spat, {}, mailbox)
     assert nothing_more(city, mailbox)

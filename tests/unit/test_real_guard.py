@@ -445,6 +445,20 @@ def the_path_bends_as_the_wish_steers(g):
 
 
 @claim
+def a_car_that_brakes_less_is_stopped_earlier_and_never_later_than_given(g):
+    near, nearer = track(x=2.4), track(x=2.65)
+    for assumed, reasons in (([], ()), ([0.05], ("fence",)), ([2.0], ()), ([0.05, None], ())):
+        made = seeing(g, near, crawl=0.0)
+        for decel_mps2 in assumed:
+            made.assume_decel(decel_mps2)
+        assert made.pass_on(drive(1.0), T0).reasons == reasons
+    assert seeing(g, nearer, crawl=0.0, decel_mps2=5.0).pass_on(drive(1.0), T0).reasons == ()
+    made = seeing(g, nearer, crawl=0.0)
+    made.assume_decel(5.0)
+    assert made.pass_on(drive(1.0), T0).reasons == ("fence",)
+
+
+@claim
 def outside_it_may_only_crawl_back_in(g):
     for x, yaw, back in ((2.9, 0.0, -1.0), (2.9, math.pi, 1.0), (0.0, 0.0, 1.0)):
         made = seeing(g, track(x=x, yaw=yaw))
