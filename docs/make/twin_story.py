@@ -126,7 +126,7 @@ def draw(events: Sequence[CityEvent], status: TwinStatus, reported: CarMessages,
 
 
 class Reports(BasePart):
-    """Reports again what the twin part last said of each car."""
+    """Sends the newest status of each car again."""
 
     name, role, period_ns = "twin", "part", NS_PER_S
     subscriptions: Sequence[Subscription] = ()
