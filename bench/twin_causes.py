@@ -25,9 +25,10 @@ from scm.recorder.drives import recordings_of_one
 from scm.recording.read import Recording
 from scm.recording.span import part_of
 from scm.records.twins import TwinChange
-from scm.twin.causes import OWN, located, witness
+from scm.twin.causes import OWN, Witness, located, witness
 from scm.twin.detector import threshold_of
-from scm.twin.watch import AFTER_S, BEFORE_S, SPAN_S, CarWatch
+from scm.twin.places import PlaceWatch
+from scm.twin.watch import AFTER_S, BEFORE_S, SPAN_S, SPANS_A_PLACE, CarWatch
 from scm.twin.windows import WatchedCar
 from scm.vehicles.car import load_car
 from tests.reality.cases import FAULTS, apply, draw_effects, nominal, scattered
@@ -103,11 +104,11 @@ def judged(
     recordings: list[Recording], predictor: WatchedCar
 ) -> Iterator[tuple[str, float, TwinChange]]:
     """Yield the first change of each car, judged some time after it was noticed [s]."""
-    watches = {
-        f"n{k}": CarWatch(predictor, threshold_of(FALSE_ALARM_H)) for k in range(len(recordings))
-    }
+    threshold = threshold_of(FALSE_ALARM_H)
+    places = PlaceWatch(threshold)
+    watches = {f"n{k}": CarWatch(predictor, threshold, places) for k in range(len(recordings))}
     noticed = dict[str, tuple[float, TwinChange]]()
-    for first_s in np.arange(0.0, LASTS_S, SPAN_S).tolist():
+    for k, first_s in enumerate(np.arange(0.0, LASTS_S, SPAN_S).tolist()):
         for (name, watch), recording in zip(watches.items(), recordings, strict=True):
             part = part_of(recording, first_s - BEFORE_S, first_s + SPAN_S + AFTER_S)
             try:
@@ -116,6 +117,12 @@ def judged(
                 continue
             if one is not None and name not in noticed:
                 noticed[name] = first_s, one.as_change()
+        if not k % SPANS_A_PLACE:
+            cars = {name: Witness(watch.evidence, 0.0) for name, watch in watches.items()}
+            found = places.look(cars, first_s + SPAN_S)
+            if found is not None:
+                print(f"  {first_s + SPAN_S:.0f} s: {found.in_words()}", flush=True)
+                noticed.setdefault(found.vehicles[0], (first_s, found.as_change()))
         for name, (when_s, change) in noticed.items():
             if first_s - when_s in LATER_S:
                 since_s = seconds(change.since_ns)

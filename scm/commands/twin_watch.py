@@ -33,26 +33,29 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from scm.recorder.drives import recordings_of
     from scm.twin.detector import threshold_of
-    from scm.twin.watch import CarWatch, Noticed, watch
+    from scm.twin.places import PlaceWatch
+    from scm.twin.watch import CarWatch, watch_all
     from scm.twin.windows import WatchedCar
     from scm.vehicles.car import load_car
 
     threshold, failures = threshold_of(arguments.false_alarm_h), list[str]()
-    watched = dict[str, tuple[CarWatch, list[Noticed]]]()
     found = recordings_of(arguments.recording, arguments.data, arguments.vehicle, failures.append)
-    cars = dict[str, WatchedCar]()
+    places, cars, watches = PlaceWatch(threshold), dict[str, WatchedCar](), dict[str, CarWatch]()
     for recording in found:
         name = arguments.car or recording.vehicle
         if name not in cars:
             cars[name] = WatchedCar(load_car(name, trusted=arguments.car is not None))
-        one = CarWatch(cars[name], threshold)
+        one = watches[recording.name] = CarWatch(cars[name], threshold, places)
         one.evidence.most = sys.maxsize
-        watched[recording.name] = one, watch(recording, one)
-    for vehicle, (one, changes) in watched.items():
+    changes = watch_all({one.name: (one, watches[one.name]) for one in found}, places)
+    watched = {name: (one, changes[name]) for name, one in watches.items()}
+    for vehicle, (one, noticed) in watched.items():
         who = vehicle if len(found) > 1 else arguments.recording
-        print(f"{who}: {_summary(one, len(changes))}")
-        for noticed in changes:
-            print("\n".join([*_lines(noticed), *_whose(noticed, vehicle, watched)]))
+        print(f"{who}: {_summary(one, len(noticed))}")
+        for change in noticed:
+            print("\n".join([*_lines(change), *_whose(change, vehicle, watched)]))
+    for place in places.found:
+        print(f"at {place.noticed_s:.0f} s: {place.in_words()}")
     for failure in failures:
         print(f"scm twin watch: {failure}", file=sys.stderr)
     return 0

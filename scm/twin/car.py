@@ -23,6 +23,7 @@ from scm.records.twins import TwinChange, TwinVersion
 from scm.twin.causes import ELSEWHERE, Witness, cause_in_words, located, witness
 from scm.twin.investigation import Compared, Explained, compare, explain
 from scm.twin.memory import CarMemory
+from scm.twin.places import PlaceWatch
 from scm.twin.versions import (
     BY_TWIN,
     PROBATION_S,
@@ -66,6 +67,7 @@ class Setup:
     Attributes:
         threshold: Score from which on a change is reported.
         predictor: Returns what predicts cars of a file.
+        places: Where the floor changed.
         executor: Runs searches and comparisons.
         data: Folder for reports and car files; None: nothing is searched for.
         budget_s: For a search.
@@ -73,6 +75,7 @@ class Setup:
 
     threshold: float
     predictor: Callable[[str], WatchedCar]
+    places: PlaceWatch
     executor: Executor
     data: Path | None
     budget_s: float
@@ -160,8 +163,8 @@ class TwinCar:
             if self.newest_ns - self.next_ns >= DUE_NS:
                 self._remember()
             if self._watch is None:
-                file = self.versions.in_force.file
-                self._watch = CarWatch(self._setup.predictor(file), self._setup.threshold)
+                setup, file = self._setup, self.versions.in_force.file
+                self._watch = CarWatch(setup.predictor(file), setup.threshold, setup.places)
             if self._memory.last_s >= self._watched_s + SPAN_S:
                 out += self._watch_on(self._watch)
             self._reason = ""
@@ -214,19 +217,23 @@ class TwinCar:
         self._trial = None
         out = self._stored(self.versions.reject(CHANGED_AGAIN))
         change = noticed.as_change(self._begin_ns)
-        self.changes.append(change)
         ago_s = seconds(change.noticed_ns - change.since_ns)
         like = ", or ".join(dict.fromkeys((change.effect, *change.alike)))
         text = (
             f"{self.name} is not what {self.car} says any more, since {ago_s:.0f} s: as by {like}"
         )
-        return [*out, self._change_stored(change), self._event("car_changed", text, "warning")]
+        return [*out, *self.add(change, "car_changed", text)]
 
-    def witness(self, of: "TwinCar", since_s: float) -> Witness | None:
+    def add(self, change: TwinChange, event: str, text: str) -> list[Outgoing]:
+        """Add a change that was noticed."""
+        self.changes.append(change)
+        return [self._change_stored(change), self._event(event, text, "warning")]
+
+    def witness(self, of: "TwinCar | None", since_s: float) -> Witness | None:
         """Return what the car shows about a change, and between which of its own that counts.
 
         Args:
-            of: The car that changed.
+            of: The car that changed; None: none did.
             since_s: On the city's clock.
         """
         if self._watch is None:

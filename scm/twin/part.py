@@ -10,12 +10,13 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import TypeVar
 
-from scm.clock import NS_PER_MS, NS_PER_S
+from scm.clock import NS_PER_MS, NS_PER_S, seconds
 from scm.records.twins import TwinChange, TwinVersion
 from scm.runtime.part import BasePart, Service, Subscription
-from scm.twin.car import NAME, Setup, TwinCar
+from scm.twin.car import LOCATE_NS, NAME, Setup, TwinCar
 from scm.twin.detector import threshold_of
 from scm.twin.investigation import Worker
+from scm.twin.places import PlaceWatch
 from scm.twin.windows import WatchedCar
 from scm.v2x.exchange import Answer, Incoming, Outgoing
 from scm.v2x.message import Message, Refused
@@ -30,6 +31,7 @@ from scm.vehicles.car import load_car
 R = TypeVar("R", TwinVersion, TwinChange)
 FALSE_ALARM_H = 200.0
 BUDGET_S = 300.0
+MOST_CARS = 100  # that show where the floor changed
 GONE_NS = 600 * NS_PER_S  # after so long without a report, a car is forgotten
 
 
@@ -61,7 +63,10 @@ class TwinPart(BasePart):
         self._predictors: dict[str, WatchedCar] = {}
         self._executor = executor or Worker()
         threshold = threshold_of(false_alarm_h)
-        self._setup = Setup(threshold, self._predictor, self._executor, data, budget_s)
+        self._places, self._judged_ns = PlaceWatch(threshold), 0
+        self._setup = Setup(
+            threshold, self._predictor, self._places, self._executor, data, budget_s
+        )  # fmt: skip
         self._versions, self._changes = _by_car(versions or {}), _by_car(changes or {})
         self._status_ns = -NS_PER_S
 
@@ -80,7 +85,7 @@ class TwinPart(BasePart):
         waiting = [one for one in self._cars.values() if one.waits_ns >= 0]
         if waiting:
             car = max(waiting, key=lambda one: one.waits_ns)
-            out += [*car.look(), *car.locate(self._cars.values())]
+            out += [*car.look(), *car.locate(self._cars.values()), *self._find_place()]
         for one in self._cars.values():
             out += one.work()
         if now_ns - self._status_ns >= NS_PER_S:
@@ -89,6 +94,21 @@ class TwinPart(BasePart):
             detail = f"{len(self._cars)} cars watched, {changed} changed"
             out.append(PartStatus(station=NAME, t_ns=now_ns, detail=detail))
         return out
+
+    def _find_place(self) -> list[Outgoing]:
+        """Say where the floor changed, by what all cars missed there."""
+        newest_ns = max(one.newest_ns for one in self._cars.values())
+        if 0 <= newest_ns - self._judged_ns < LOCATE_NS:
+            return []
+        self._judged_ns = newest_ns
+        most = sorted(self._cars.values(), key=lambda one: -one.driven_s)[:MOST_CARS]
+        now_s = seconds(newest_ns)
+        witnesses = {one.name: one.witness(None, now_s) for one in most}
+        found = self._places.look({n: one for n, one in witnesses.items() if one}, now_s)
+        if found is None:
+            return []
+        plainest = self._cars[found.vehicles[0]]
+        return plainest.add(found.as_change(), "place_changed", found.in_words())
 
     def finish(self, now_ns: int) -> list[Outgoing]:
         """End the worker, whatever it does."""

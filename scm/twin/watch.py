@@ -4,24 +4,29 @@ Each span is predicted with what was recorded before it and a second of what com
 smoothed poses are better. After a change the car is another one: how it strays is learned anew.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 
 from scm.clock import nanoseconds
 from scm.data_quality.prepare import screen, stretches
 from scm.errors import RecordingError
+from scm.mismatch.fit.residual_windows import LENGTH_S
 from scm.recording.read import Recording
 from scm.recording.span import part_of
 from scm.records.twins import TwinChange
+from scm.twin.causes import Witness
 from scm.twin.detector import Change, Detector, Usual
 from scm.twin.evidence import Evidence
+from scm.twin.places import PlaceWatch
 from scm.twin.windows import EVERY_S, WatchedCar, WatchedNumber, Windows
 from scm.vehicles.car import Car
 
 SPAN_S, PART_S = 10.0, 100.0  # parts are cut out at once: a cut reads all that it cuts from
 BEFORE_S, AFTER_S = 2.0, 1.0
+SPANS_A_PLACE = 3  # after so many, places are looked at: each half minute
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +62,7 @@ class CarWatch:
     Args:
         predictor: Of cars of its version; several cars may share it.
         threshold: Score from which on a change is reported.
+        places: Where the floor changed: by what the car misses there, it did not.
 
     Attributes:
         driven_s: How long it was driven and seen.
@@ -64,8 +70,10 @@ class CarWatch:
         highest: Score that the newest span reaches, to be held against the threshold.
     """
 
-    def __init__(self, predictor: WatchedCar, threshold: float) -> None:
-        self._predictor, self._threshold = predictor, threshold
+    def __init__(
+        self, predictor: WatchedCar, threshold: float, places: PlaceWatch | None = None
+    ) -> None:
+        self._predictor, self._threshold, self._places = predictor, threshold, places
         self._detector = Detector(threshold)
         self._streams: tuple[str, ...] | None = None
         self._usual: Usual | None = None
@@ -97,7 +105,8 @@ class CarWatch:
         change, self.highest = None, 0.0
         for windows in self._windows(recording, first_s, last_s):
             self.driven_s += EVERY_S * len(windows.begin_s)
-            change = change or self._detector.update(windows)
+            off = windows if self._places is None else self._places.off(windows)
+            change = change or self._detector.update(off)
             self._remember(windows, camera)
             self.highest = max(self.highest, self._detector.highest)
         if change is None:
@@ -141,6 +150,29 @@ class CarWatch:
 def watch(recording: Recording, car: CarWatch) -> list[Noticed]:
     """Return the changes of a recorded car, in the order in which they would have been noticed."""
     return [noticed for noticed in looks(recording, car) if noticed is not None]
+
+
+def watch_all(
+    cars: Mapping[str, tuple[Recording, CarWatch]], places: PlaceWatch
+) -> dict[str, list[Noticed]]:
+    """Watch the recorded cars of one run side by side, and the places where they drive.
+
+    Args:
+        cars: By name; they share `places`, which has what changed there afterwards.
+        places: Where they drive.
+
+    Returns:
+        The changes of each car, in the order in which they would have been noticed.
+    """
+    changes: dict[str, list[Noticed]] = {name: [] for name in cars}
+    for k, spans in enumerate(zip_longest(*(looks(*one) for one in cars.values())), 1):
+        for name, noticed in zip(cars, spans, strict=True):
+            changes[name] += [] if noticed is None else [noticed]
+        shown = {name: one.evidence for name, (_, one) in cars.items() if len(one.evidence.t_s)}
+        if shown and not k % SPANS_A_PLACE:
+            now_s = max(float(one.t_s[-1]) for one in shown.values()) + LENGTH_S
+            places.look({name: Witness(one, 0.0) for name, one in shown.items()}, now_s)
+    return changes
 
 
 def looks(recording: Recording, car: CarWatch) -> Iterator[Noticed | None]:
