@@ -70,7 +70,7 @@ class PlaceChange:
 
     def in_words(self) -> str:
         """Return it in a sentence."""
-        where = f"within {self.radius_m:.1f} m of ({self.x_m:.1f}, {self.y_m:.1f})"
+        where = f"within {self.radius_m:.2g} m of ({self.x_m:.1f}, {self.y_m:.1f})"
         ago_s = self.noticed_s - self.since_s[0]
         *others, last = self.vehicles
         cars = f"{', '.join(others)} and {last}" if others else last
@@ -179,10 +179,9 @@ def _scores(rows: list[_Rows], inside: list[Bools], since_s: float) -> Floats:
     size, spread, also = _pooled(*_moves(rows, inside, since_s))
     steps = MOST_STEPS * np.array([one.step for one in rows[0].numbers])
     every = [np.ones((1, len(one.t_s)), dtype=bool) for one in rows]
-    everywhere, its_spread, _ = _pooled(*_moves(rows, every, since_s))
-    least = float(np.max(np.abs(everywhere) / its_spread))
+    *_, everywhere = _pooled(*_moves(rows, every, since_s))
     score = np.abs(size) / spread
-    counts = (also >= ALSO) & (np.abs(size) < steps) & (score > least)
+    counts = (also >= ALSO) & (np.abs(size) < steps) & (score > everywhere.max())
     return np.asarray(np.where(counts, score, 0.0))
 
 

@@ -9,7 +9,8 @@ from scm.clock import NS_PER_MS, NS_PER_S
 from scm.records.twins import TwinVersion
 from scm.twin import detector
 from scm.twin.part import GONE_NS, TwinPart
-from scm.v2x.exchange import Incoming
+from scm.twin.places import PlaceChange, PlaceWatch
+from scm.v2x.exchange import Incoming, PersistedState
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.part_status import PartStatus
 from scm.v2x.messages.twin_status import TwinStatus
@@ -79,6 +80,35 @@ def test_change_of_one_car_is_its_own_where_another_drives_as_before(changed):
     (change,) = statuses["n1"].changes
     assert (change.cause, change.causes[0].kind, change.decide_by) == ("car", "car", "")
     assert statuses["n2"].changes == ()
+
+
+def test_place_is_an_event_and_a_change_of_the_car_that_shows_it_most(changed, monkeypatch):
+    """What all cars show is stubbed: each half minute it is judged by those that drove."""
+    looks = []
+
+    def look(_, cars, now_s):
+        looks.append((now_s, sorted(cars)))
+        if len(cars) < 2 or len(looks) > 4:
+            return None
+        number = next(iter(cars.values())).evidence.numbers[0]
+        return PlaceChange(
+            1.0, 0.5, 0.35, number, 0.01, 12.0, now_s, (now_s - 40.0, 0.0, now_s), ("n2", "n1")
+        )
+
+    monkeypatch.setattr(PlaceWatch, "look", look)
+    other = reports(made_drive(seconds=LASTS_S), name="n2")
+    both = [[*one, *two] for one, two in zip(changed[:600], other[:600], strict=True)]
+    out, _ = run(TwinPart(), both)
+    assert all(then[0] - now[0] >= 30.0 for now, then in pairwise(looks))
+    event, *_ = [one for one in out if isinstance(one, CityEvent)]
+    assert (event.name, event.vehicle) == ("place_changed", "n2")
+    assert event.text == (
+        "n2 and n1 drive otherwise within 0.35 m of (1.0, 0.5), since 40 s: as by drive_delay"
+    )
+    stored = [one.key for one in out if isinstance(one, PersistedState)]
+    assert stored[0].startswith("change/n2/")
+    (status, *_) = [one for one in reversed(out) if isinstance(one, TwinStatus) and one.changes]
+    assert (status.vehicle, status.changes[0].effect) == ("n2", "drive_delay")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,156 @@
+"""A floor that changed at a place is noticed by all cars that drive there, and nothing else is."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scm.clock import nanoseconds
+from scm.twin.causes import Witness
+from scm.twin.evidence import Evidence
+from scm.twin.places import NEW_S, PlaceWatch
+from scm.twin.windows import EVERY_S, WatchedNumber, Windows
+
+SINCE_S, LAP_S, THRESHOLD = 300.0, 20.0, 9.0
+NUMBERS = tuple(
+    WatchedNumber(effect, "size", "1", equation, {}, 0.5)
+    for effect, equation in (
+        ("rolling_resistance", "drive"),
+        ("grade", "body"),
+        ("gyro_bias", "sensor"),
+    )
+)
+SIZE = 3.0  # standard deviations of a window, which shows 1 of each number
+BEND = (0.0, 1.0)  # the north of the circle that all drive
+
+
+def drives(seed, missed=lambda t_s, x, y: 0.0, lasts_s=400.0, number=0):
+    """Return what a car shows that goes round a circle of 1 m."""
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(0.0, lasts_s, EVERY_S)
+    angle = math.tau * t_s / LAP_S + seed
+    places = np.column_stack((np.cos(angle), np.sin(angle)))
+    scores = rng.standard_normal((len(t_s), len(NUMBERS)))
+    scores[:, number] += missed(t_s, *places.T)
+    names = np.full(len(t_s), "west")
+    return Evidence(
+        NUMBERS, t_s, places, names, scores, np.ones_like(scores), np.ones(len(NUMBERS))
+    )
+
+
+def at_bend(x, y):
+    return np.hypot(x - BEND[0], y - BEND[1]) < 0.4
+
+
+def spilled(t_s, x, y):
+    return SIZE * ((t_s >= SINCE_S) & at_bend(x, y))
+
+
+def everywhere(t_s, x, y):
+    return SIZE * (t_s >= SINCE_S)
+
+
+def look(*cars, now_s=400.0, watch=None):
+    watch = watch or PlaceWatch(THRESHOLD)
+    return watch.look({f"n{k}": Witness(car, 0.0) for k, car in enumerate(cars)}, now_s)
+
+
+FELT = tuple(drives(k, spilled) for k in (1, 2, 3))
+HEALTHY = tuple(drives(k) for k in (4, 5, 6))
+
+
+def test_place_is_noticed_with_where_since_when_and_by_whom():
+    found = look(*FELT, HEALTHY[0], now_s=360.0)
+    assert math.hypot(found.x_m - BEND[0], found.y_m - BEND[1]) < 0.3
+    assert found.since_s[1] <= SINCE_S <= found.since_s[2]
+    assert found.since_s[2] - found.since_s[1] < 40.0
+    assert (found.number.effect, sorted(found.vehicles)) == (
+        "rolling_resistance",
+        ["n0", "n1", "n2"],
+    )
+    assert found.size == pytest.approx(SIZE, rel=0.3)
+    change = found.as_change()
+    assert (change.effect, change.noticed_ns, change.cause) == (
+        "rolling_resistance", nanoseconds(360.0), "undecided",
+    )  # fmt: skip
+    assert change.since_low_ns <= change.since_ns <= change.since_high_ns
+    assert found.in_words().endswith("s: as by rolling_resistance")
+    assert " and n" in found.in_words()
+
+
+def test_nothing_is_noticed_before_nor_where_nothing_changed():
+    assert look(*FELT, now_s=SINCE_S) is None
+    assert look(*HEALTHY) is None
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        drives(1, lambda *at: 2.0 * spilled(*at)),  # as it never drove before, in one bend
+        drives(1, lambda *at: 2.0 * everywhere(*at)),
+    ],
+)
+def test_what_one_car_shows_is_no_place(changed):
+    assert look(changed, *HEALTHY) is None
+    assert look(changed) is None
+
+
+def test_what_is_everywhere_is_no_place():
+    more = [drives(k, lambda *at: everywhere(*at) + 0.5 * spilled(*at)) for k in (1, 2, 3)]
+    assert look(*(drives(k, everywhere) for k in (1, 2, 3))) is None
+    assert look(*more) is None  # as a slope, which shows at its ends most
+
+
+def test_car_that_changed_itself_meanwhile_still_shows_the_place():
+    changed = drives(1, lambda *at: spilled(*at) + everywhere(*at))
+    found = look(changed, drives(2, spilled, lasts_s=2.0), *FELT[1:])
+    assert math.hypot(found.x_m - BEND[0], found.y_m - BEND[1]) < 0.3
+
+
+def test_where_a_car_never_was_before_it_shows_no_change():
+    """Two cars drive in the south first: they cannot say how the bend was."""
+    late = []
+    for one in FELT[:2]:
+        before = (one.t_s < SINCE_S) & (one.places[:, 1] > 0.0)
+        late.append(replace(one, **{
+            name: getattr(one, name)[~before]
+            for name in ("t_s", "places", "cameras", "scores", "information")
+        }))  # fmt: skip
+    assert look(*late) is None
+
+
+def test_floor_biases_no_gyro():
+    assert look(*(drives(k, spilled, number=2) for k in (1, 2, 3))) is None
+
+
+def test_place_is_noticed_once_and_its_end_later():
+    def for_a_while(t_s, x, y):
+        return spilled(t_s, x, y) * (t_s < SINCE_S + NEW_S + 60.0)
+
+    cars = [drives(k, for_a_while, 1200.0) for k in (1, 2, 3)]
+    watch = PlaceWatch(THRESHOLD)
+    times = np.arange(240.0, 1200.0, 30.0)
+    found = [one for now_s in times if (one := look(*cars, now_s=now_s, watch=watch))]
+    assert [one.size > 0.0 for one in found] == [True, False]
+    assert found[0].noticed_s < SINCE_S + 90.0
+    assert found[1].since_s[1] <= SINCE_S + NEW_S + 60.0 <= found[1].since_s[2]
+
+
+def test_cars_are_watched_off_the_places_that_changed():
+    watch = PlaceWatch(THRESHOLD)
+    there = np.array([BEND, (0.0, -1.0)])
+    windows = Windows(np.zeros(2), there, ("gyro",), np.zeros((2, 1)), np.zeros((2, 1, 3)))
+    assert len(watch.off(windows).begin_s) == 2
+    look(*FELT, watch=watch)
+    assert watch.off(windows).places.tolist() == [[0.0, -1.0]]
+
+
+def test_cars_of_another_kind_are_left_out_and_those_of_another_version_are_not():
+    def of(numbers):
+        return replace(FELT[1], numbers=numbers)
+
+    other = tuple(replace(one, effect="tyre_grip") for one in NUMBERS)
+    version = tuple(replace(one, numbers={("car", "x"): 1.0}) for one in NUMBERS)
+    assert look(FELT[0], of(other)) is None
+    assert look(FELT[0], of(version)) is not None
