@@ -11,7 +11,7 @@ once). Of each change that is noticed it is judged one, two and four minutes lat
 import argparse
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,6 +45,7 @@ EFFECTS = {
     "camera": (),
     "everywhere": ("rolling_resistance", "grade"),
 }
+FEWEST_THROUGH, LEAST_THROUGH_S = 2, 10.0  # cars that drive through a patch, and for how long
 PERCEIVED, WEST_M = 0.025, -0.6
 """Smallest change of scale that 90 s can show; x of what lies below the western of two cameras."""
 
@@ -52,7 +53,10 @@ PERCEIVED, WEST_M = 0.025, -0.6
 def scene(
     kinds: Sequence[str], cars: int, rng: np.random.Generator, folder: Path
 ) -> tuple[list[Recording], str]:
-    """Return what cars drove while one or more things changed at once, and what these were."""
+    """Return what cars drove while one or more things changed at once, and what these were.
+
+    A patch that fewer than two cars drive through is drawn again, with all of its scene.
+    """
     since_s = float(rng.uniform(*SINCE_S))
     usual = [scattered(nominal(CAR), rng) for _ in range(cars)]
     drawn, words = dict[str, tuple[Any, ...]](), list[str]()
@@ -61,7 +65,7 @@ def scene(
         drawn[kind] = draw_effects(names, CAR, STRENGTH, rng)
         words += names
     scale = float(np.exp(rng.uniform(*STRENGTH) * PERCEIVED))
-    found = list[Recording]()
+    found, patched = list[Recording](), 0
     for k, before in enumerate(usual):
         mine = [one for kind in kinds if k == 0 or kind not in OWN for one in drawn[kind]]
         numbers, faults = (
@@ -70,10 +74,21 @@ def scene(
         drive = record(CAR, numbers, faults, LASTS_S, rng)
         if "camera" in kinds:
             drive = replace(drive, poses=by_one_camera(sunk(drive.poses, since_s, scale)))
+        if "place" in kinds:
+            patched += is_through(drive.poses, since_s, drawn["place"][0][2].parameters)
         write(drive, CAR, before, folder / str(k))
         found += recordings_of_one(folder / str(k))
+    if "place" in kinds and patched < FEWEST_THROUGH:
+        return scene(kinds, cars, rng, folder)
     words += [f"seen {scale:.3f} times as large"] if "camera" in kinds else []
     return found, f"{', '.join(words)} since {since_s:.0f} s"
+
+
+def is_through(poses: Floats, since_s: float, patch: Mapping[str, float]) -> bool:
+    """Return whether a car drove through a patch again and again."""
+    away = np.hypot(poses[:, 1] - patch["x_m"], poses[:, 2] - patch["y_m"])
+    there = (poses[:, 0] >= since_s) & (away < patch["radius_m"])
+    return bool(np.ptp(poses[:, 0]) * there.mean() > LEAST_THROUGH_S)
 
 
 def sunk(poses: Floats, since_s: float, scale: float) -> Floats:

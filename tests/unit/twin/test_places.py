@@ -97,15 +97,27 @@ def test_what_one_car_shows_is_no_place(changed):
 
 
 def test_what_is_everywhere_is_no_place():
-    more = [drives(k, lambda *at: everywhere(*at) + 0.5 * spilled(*at)) for k in (1, 2, 3)]
+    more = [drives(k, lambda *at: everywhere(*at) + spilled(*at)) for k in (1, 2, 3)]
     assert look(*(drives(k, everywhere) for k in (1, 2, 3))) is None
     assert look(*more) is None  # as a slope, which shows at its ends most
 
 
-def test_car_that_changed_itself_meanwhile_still_shows_the_place():
-    changed = drives(1, lambda *at: spilled(*at) + everywhere(*at))
-    found = look(changed, drives(2, spilled, lasts_s=2.0), *FELT[1:])
+def test_car_that_changed_itself_meanwhile_shows_the_place_only_if_it_felt_it():
+    both = drives(1, lambda *at: spilled(*at) + everywhere(*at))
+    found = look(both, *FELT[1:], HEALTHY[0])
     assert math.hypot(found.x_m - BEND[0], found.y_m - BEND[1]) < 0.3
+    assert "n0" in found.vehicles
+    assert sorted(look(drives(1, everywhere), *FELT).vehicles) == ["n1", "n2", "n3"]
+
+
+def test_floor_does_not_change_by_more_than_floors_do():
+    small = tuple(replace(one, step=0.05) for one in NUMBERS)
+    assert look(*(replace(one, numbers=small) for one in FELT)) is None
+
+
+def test_what_a_car_drove_before_it_changed_itself_does_not_count():
+    cars = {f"n{k}": Witness(one, 0.0, first_s=SINCE_S) for k, one in enumerate(FELT)}
+    assert PlaceWatch(THRESHOLD).look(cars, 400.0) is None
 
 
 def test_where_a_car_never_was_before_it_shows_no_change():
@@ -117,7 +129,7 @@ def test_where_a_car_never_was_before_it_shows_no_change():
             name: getattr(one, name)[~before]
             for name in ("t_s", "places", "cameras", "scores", "information")
         }))  # fmt: skip
-    assert look(*late) is None
+    assert look(*late, watch=PlaceWatch(5.0)) is None
 
 
 def test_floor_biases_no_gyro():
@@ -135,6 +147,16 @@ def test_place_is_noticed_once_and_its_end_later():
     assert [one.size > 0.0 for one in found] == [True, False]
     assert found[0].noticed_s < SINCE_S + 90.0
     assert found[1].since_s[1] <= SINCE_S + NEW_S + 60.0 <= found[1].since_s[2]
+
+
+def test_what_spreads_around_a_place_is_the_same():
+    def spreading(t_s, x, y):
+        wide = (t_s >= SINCE_S + 150.0) & (np.hypot(x - BEND[0], y - BEND[1]) < 0.8)
+        return spilled(t_s, x, y) + 2.0 * SIZE * wide
+
+    cars, watch = [drives(k, spreading, 800.0) for k in (1, 2, 3)], PlaceWatch(THRESHOLD)
+    times = np.arange(240.0, 800.0, 30.0)
+    assert sum(look(*cars, now_s=now_s, watch=watch) is not None for now_s in times) == 1
 
 
 def test_cars_are_watched_off_the_places_that_changed():
