@@ -48,6 +48,8 @@ CHANGES, VERSIONS = "change", "version"  # begin the keys of records
 CHANGED_AGAIN = "the car changed again before it was confirmed"
 LOOK_NS, BEFORE_NS = nanoseconds(SPAN_S), nanoseconds(BEFORE_S)
 DUE_NS = nanoseconds(SPAN_S + AFTER_S)
+LATE_NS, LATELY_NS = nanoseconds(30.0), nanoseconds(120.0)
+"""With more cars than can be looked at, what waits for longer is left out; how long that counts."""
 LEAP_NS = nanoseconds(2.0)  # of a clock: what was recorded before does not belong to what follows
 MOST_CHANGES = 20
 BY_EYE, FEWEST_SEEN = "eye", 50  # poses of a first look, for the Eye to be a witness
@@ -130,6 +132,7 @@ class TwinCar:
         self._comparison: Future[Compared] | None = None
         self._requested: tuple[int, Compared] | None = None  # of a version
         self._searched_until, self._located_ns = (0.0, 0.0), 0
+        self._left_out_ns = first.t_ns - LATELY_NS
 
     @property
     def waits_ns(self) -> int:
@@ -137,6 +140,11 @@ class TwinCar:
         behind_s = self._memory.last_s - self._watched_s - SPAN_S
         arrived_ns = self.newest_ns - self.next_ns - DUE_NS
         return max(arrived_ns, nanoseconds(behind_s)) if behind_s >= 0.0 else arrived_ns
+
+    @property
+    def is_left_out(self) -> bool:
+        """Whether some of its driving was left out lately."""
+        return self.newest_ns - self._left_out_ns < LATELY_NS
 
     @property
     def driven_s(self) -> float:
@@ -154,6 +162,9 @@ class TwinCar:
                 if self._trial is not None:
                     self._trial.since_s = self._watched_s
             self.newest_ns, self.arrived_ns = message.t_ns, now_ns
+            if self.newest_ns - self.next_ns > LATE_NS:
+                self.next_ns, self._left_out_ns = self.newest_ns - DUE_NS, self.newest_ns
+                self._messages.forget(self.next_ns - BEFORE_NS)
         self._messages.add(message)
 
     def look(self) -> list[Outgoing]:
@@ -181,7 +192,7 @@ class TwinCar:
             first_s = seconds(first_ns - self._begin_ns)
             self._memory.add(self._recording(), first_s, first_s + SPAN_S, self._camera())
         finally:
-            _forget(self._messages, self.next_ns - BEFORE_NS)
+            self._messages.forget(self.next_ns - BEFORE_NS)
 
     def _recording(self) -> Recording:
         """Return the messages that are stored as a recording.
@@ -477,14 +488,3 @@ def _why(failure: Exception) -> str:
 
 def _slug(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", name.lower())
-
-
-def _forget(messages: CarMessages, before_ns: int) -> None:
-    """Forget what a car sent before a time, and what was seen of it."""
-    messages.reports = [one for one in messages.reports if one.t_ns >= before_ns]
-    messages.sensors = [one for one in messages.sensors if one.t_ns >= before_ns]
-    messages.seen = {
-        camera: [one for one in poses if one.t_ns >= before_ns]
-        for camera, poses in messages.seen.items()
-    }
-    messages.hit_ns = [t_ns for t_ns in messages.hit_ns if t_ns >= before_ns]

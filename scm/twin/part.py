@@ -92,6 +92,8 @@ class TwinPart(BasePart):
             self._status_ns = now_ns
             changed = sum(bool(one.changes) for one in self._cars.values())
             detail = f"{len(self._cars)} cars watched, {changed} changed"
+            if left_out := sum(one.is_left_out for one in self._cars.values()):
+                detail += f", {left_out} not all the time: they are too many"
             out.append(PartStatus(station=NAME, t_ns=now_ns, detail=detail))
         return out
 

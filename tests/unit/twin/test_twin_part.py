@@ -1,6 +1,6 @@
 """The twin part gets what cars report, and reports since when one has changed."""
 
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import pytest
 from msgspec.structs import replace
@@ -19,6 +19,7 @@ from tests.unit.mismatch.made_drive import made_drive, nigel
 from tests.unit.twin.reported import (
     BEGAN_NS,
     BIAS,
+    EVERY_S,
     LASTS_S,
     LEARNED,
     SINCE_S,
@@ -145,6 +146,18 @@ def test_clock_that_jumps_is_no_change_and_nothing_piles_up(changed):
     assert len(part._cars["n1"]._messages.reports) < 800
     part.step(BEGAN_NS + 10 * HOUR_NS + GONE_NS, [])
     assert part._cars == {}
+
+
+def test_of_too_many_cars_each_is_watched_for_a_part_of_the_time(changed):
+    """It is looked at each 45 s, as if there were 450 cars, one of which is looked at a step."""
+    part = TwinPart()
+    out, _ = run(part, [list(chain(*changed[k : k + 450])) for k in (0, 450, 900)])
+    assert len(part._cars["n1"]._messages.reports) < 30.0 / EVERY_S
+    details = [one.detail for one in out if isinstance(one, PartStatus)]
+    assert details[-1] == "1 cars watched, 0 changed, 1 not all the time: they are too many"
+    last = [one for one in out if isinstance(one, TwinStatus)][-1]
+    assert (last.reason, last.state) == ("", "learning")
+    assert 20.0 < last.driven_s < 31.0
 
 
 def test_car_that_was_away_comes_back_with_its_version(changed):
