@@ -148,7 +148,7 @@ def judged(
                     )
                     for other, watch in watches.items()
                 }  # fmt: skip
-                change = located(change, name, cars) or change  # noqa: PLW2901
+                change = located(change, name, cars, places.beyond(change)) or change  # noqa: PLW2901
                 noticed[name] = when_s, change
                 yield name, first_s - when_s, change
 

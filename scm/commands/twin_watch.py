@@ -10,6 +10,7 @@ from scm.command import Command
 LEAST_SHOWN = 0.05  # of probabilities
 
 if TYPE_CHECKING:
+    from scm.twin.places import PlaceWatch
     from scm.twin.watch import CarWatch, Noticed
     from scm.twin.windows import WatchedNumber
 
@@ -53,7 +54,7 @@ def _run(arguments: argparse.Namespace) -> int:
         who = vehicle if len(found) > 1 else arguments.recording
         print(f"{who}: {_summary(one, len(noticed))}")
         for change in noticed:
-            print("\n".join([*_lines(change), *_whose(change, vehicle, watched)]))
+            print("\n".join([*_lines(change), *_whose(change, vehicle, watched, places)]))
     for place in places.found:
         print(f"at {place.noticed_s:.0f} s: {place.in_words()}")
     for failure in failures:
@@ -88,7 +89,10 @@ def _lines(noticed: "Noticed") -> list[str]:
 
 
 def _whose(
-    noticed: "Noticed", vehicle: str, watched: "dict[str, tuple[CarWatch, list[Noticed]]]"
+    noticed: "Noticed",
+    vehicle: str,
+    watched: "dict[str, tuple[CarWatch, list[Noticed]]]",
+    places: "PlaceWatch",
 ) -> list[str]:
     """Return whose a change is by all cars of the run, in words; nothing of a car alone."""
     from scm.clock import seconds
@@ -102,7 +106,7 @@ def _whose(
         )
         for name, (one, changes) in watched.items()
     }  # fmt: skip
-    found = located(change, vehicle, cars) if len(watched) > 1 else None
+    found = located(change, vehicle, cars, places.beyond(change)) if len(watched) > 1 else None
     if found is None:
         return []
     shares = ", ".join(

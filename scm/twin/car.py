@@ -264,7 +264,8 @@ class TwinCar:
                 continue
             since_s = seconds(change.since_ns)
             witnesses = {one.name: one.witness(self, since_s) for one in cars}
-            found = located(change, self.name, {n: w for n, w in witnesses.items() if w})
+            shown = {n: w for n, w in witnesses.items() if w}
+            found = located(change, self.name, shown, self._setup.places.beyond(change))
             if found is None:
                 continue  # too little was driven since
             self._located_ns = self.newest_ns

@@ -12,7 +12,7 @@ remain as they were, and what would decide is another car, or this one elsewhere
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -28,6 +28,7 @@ from scm.twin.windows import EVERY_S, WatchedNumber
 
 PRIOR = {"car": 0.45, "tag": 0.1, "place": 0.2, "camera": 0.1, "everywhere": 0.15}
 SURE, POSSIBLE, NEAR = 0.9, 0.1, 0.01  # probabilities; nearer than that are the same
+IsOff = Callable[[Floats], Bools]
 OWN: tuple[Kind, ...] = ("car", "tag")
 ELSEWHERE: tuple[Kind, ...] = ("place", "camera")
 OF_TAGS = ("pose_point", "pose_heading")
@@ -40,6 +41,7 @@ SAME_S = 10.0  # changes that began within that may be one
 MOST_OF_IT = 80.0  # percentile of how far from its middle a place was driven through
 FEWEST = 10  # windows of a place that a car drove through
 NEAR_M, NEAR_WAY = 0.12, 0.5  # windows so near, and in about the same direction, are alike
+AS_WELL = 8.0  # of the weight of a change off known places: then there was one
 AS_MANY = 3.0  # windows of all its driving, that count where none was nearby
 
 
@@ -96,13 +98,36 @@ class _Rows:
     information: Floats
 
 
-def located(change: TwinChange, vehicle: str, cars: Mapping[str, Witness]) -> TwinChange | None:
+@dataclass(frozen=True, slots=True)
+class _Weighed:
+    """What may have caused a change.
+
+    Attributes:
+        weight: Of each kind, the logarithm of its probability, but for what all have in common.
+        place: Which it would be: x, y, radius [m].
+        camera: Likewise.
+    """
+
+    weight: dict[Kind, float]
+    place: tuple[float, float, float] | None
+    camera: str
+
+    @property
+    def likeliest(self) -> Kind:
+        """Return the kind that weighs most."""
+        return max(self.weight, key=lambda kind: self.weight[kind])
+
+
+def located(
+    change: TwinChange, vehicle: str, cars: Mapping[str, Witness], is_off: IsOff | None = None
+) -> TwinChange | None:
     """Return a change with whose it is, or None where the car that changed shows too little of it.
 
     Args:
         change: Of the car.
         vehicle: Its name.
         cars: All that drove lately.
+        is_off: As in `causes_of`.
     """
     since_s = [
         seconds(t_ns) for t_ns in (change.since_ns, change.since_low_ns, change.since_high_ns)
@@ -113,7 +138,7 @@ def located(change: TwinChange, vehicle: str, cars: Mapping[str, Witness]) -> Tw
     driven_s = EVERY_S * float(np.sum(own.begin_s + own.evidence.t_s >= since_s[0]))
     if driven_s < JUDGED_AFTER_S:
         return None
-    causes = causes_of(vehicle, since_s, cars)
+    causes = causes_of(vehicle, since_s, cars, is_off)
     own_s = [one.probability for one in causes if one.kind in OWN]
     is_sure = max(causes[0].probability, sum(own_s) if causes[0].kind in OWN else 0.0) >= SURE
     cause = causes[0].kind if is_sure else "undecided"
@@ -173,17 +198,45 @@ def _decided_by(
 
 
 def causes_of(
-    vehicle: str, since_s: Sequence[float], cars: Mapping[str, Witness]
-) -> tuple[TwinCause, ...]:
+    vehicle: str, since_s: Sequence[float], cars: Mapping[str, Witness],
+    is_off: IsOff | None = None,
+) -> tuple[TwinCause, ...]:  # fmt: skip
     """Return what may have caused a change of a car, the likeliest first.
+
+    A car that changed when the floor did shows both. What it shows off the places that are known
+    to have changed counts then, if that is anything.
 
     Args:
         vehicle: That changed.
         since_s: When, on the city's clock: likeliest, and its interval.
         cars: All of the city, this one among them.
+        is_off: Returns which windows lie off the places that are known to have changed.
     """
     numbers = cars[vehicle].evidence.numbers
     rows = [_rows(name == vehicle, one, since_s, numbers) for name, one in cars.items()]
+    found = _weighed(rows, numbers)
+    if found.likeliest == "place" and is_off is not None:
+        off = _weighed([_off(one, is_off(one.places)) for one in rows], numbers)
+        found = off if off.weight[off.likeliest] > AS_WELL else found
+    top = max(found.weight.values())
+    total = sum(math.exp(value - top) for value in found.weight.values())
+    x_m, y_m, radius_m = (None, None, None) if found.place is None else found.place
+    causes = [
+        TwinCause(
+            kind=kind,
+            probability=math.exp(value - top) / total,
+            x_m=x_m if kind == "place" else None,
+            y_m=y_m if kind == "place" else None,
+            radius_m=radius_m if kind == "place" else None,
+            camera=found.camera if kind == "camera" else "",
+        )
+        for kind, value in found.weight.items()
+    ]
+    return tuple(sorted(causes, key=lambda one: -one.probability))
+
+
+def _weighed(rows: Sequence[_Rows], numbers: Sequence[WatchedNumber]) -> _Weighed:
+    """Return how likely each cause is by the windows of all cars."""
     own = next(one for one in rows if one.is_changed)
     of_tags, of_cameras, of_sensors = _kinds(numbers)
     by_car = _evidence([own], [own.after])
@@ -198,21 +251,16 @@ def causes_of(
         "everywhere": _mean(everywhere[~of_sensors]),
     }
     weight = {kind: math.log(PRIOR[kind]) + value for kind, value in found.items()}
-    top = max(weight.values())
-    total = sum(math.exp(value - top) for value in weight.values())
-    x_m, y_m, radius_m = (None, None, None) if place is None else place
-    causes = [
-        TwinCause(
-            kind=kind,
-            probability=math.exp(value - top) / total,
-            x_m=x_m if kind == "place" else None,
-            y_m=y_m if kind == "place" else None,
-            radius_m=radius_m if kind == "place" else None,
-            camera=camera if kind == "camera" else "",
-        )
-        for kind, value in weight.items()
-    ]
-    return tuple(sorted(causes, key=lambda one: -one.probability))
+    return _Weighed(weight, place, camera)
+
+
+def _off(rows: _Rows, off: Bools) -> _Rows:
+    """Return some windows of a car."""
+    after = rows.after
+    return _Rows(
+        rows.is_changed, after[off], rows.places[off], rows.cameras[off], rows.score[off[after]],
+        rows.information[off],
+    )  # fmt: skip
 
 
 def _rows(

@@ -8,7 +8,7 @@ drove as it never did before, is no place.
 
 import math
 from collections import deque
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,7 +107,16 @@ class PlaceWatch:
 
     def off(self, windows: Windows) -> Windows:
         """Return the windows of a car that lie off all places that changed."""
-        return windows.those(~_at_any(windows.places, self.found))
+        return windows.those(self.is_off(windows.places))
+
+    def beyond(self, change: TwinChange) -> Callable[[Floats], Bools] | None:
+        """Return `is_off` for a change of a car; None for one of a place."""
+        of_places = (nanoseconds(one.noticed_s) for one in self.found)
+        return self.is_off if self.found and change.noticed_ns not in of_places else None
+
+    def is_off(self, places: Floats) -> Bools:
+        """Return which windows (n, 2) lie off all places that changed, (n,)."""
+        return ~_at_any(places, self.found)
 
 
 def _at_any(places: Floats, changed: Collection[PlaceChange]) -> Bools:

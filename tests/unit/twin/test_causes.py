@@ -119,6 +119,24 @@ def test_car_that_was_not_watched_before_is_no_witness():
     assert found == pytest.approx(alone, abs=1e-6)
 
 
+def test_car_that_changed_when_the_floor_did_is_judged_off_that_place():
+    def both(t_s, x, y):
+        return 4.0 * in_bend(t_s, x, y) + since(t_s, x, y)
+
+    def is_off(places):
+        return np.hypot(*(places - BEND).T) > 0.85
+
+    def judged(first, is_off=None):
+        others = [drives(k, lambda *at: 4.0 * in_bend(*at)) for k in (2, 3)]
+        cars = {f"n{k}": Witness(car, 0.0) for k, car in enumerate([first, *others])}
+        return causes_of("n0", (SINCE_S, SINCE_S - 2.0, SINCE_S + 2.0), cars, is_off)[0].kind
+
+    changed, felt = drives(1, both), drives(1, lambda *at: 4.0 * in_bend(*at))
+    assert judged(changed) == "place"
+    assert judged(changed, is_off) == "car"
+    assert judged(felt, is_off) == "place"
+
+
 def test_no_floor_moves_a_tag():
     first, *_ = causes(drives(1, since, POINT))
     assert (first.kind, first.probability > 0.9) == ("tag", True)

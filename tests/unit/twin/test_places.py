@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace as replace_struct
 
 from scm.clock import nanoseconds
 from scm.twin.causes import Witness
@@ -166,6 +167,16 @@ def test_cars_are_watched_off_the_places_that_changed():
     assert len(watch.off(windows).begin_s) == 2
     look(*FELT, watch=watch)
     assert watch.off(windows).places.tolist() == [[0.0, -1.0]]
+
+
+def test_change_of_a_car_is_judged_beyond_the_places_that_changed_and_theirs_are_not():
+    watch = PlaceWatch(THRESHOLD)
+    found = look(*FELT)
+    assert watch.beyond(found.as_change()) is None  # no place changed yet
+    look(*FELT, watch=watch)
+    assert watch.beyond(found.as_change()) is None
+    of_a_car = replace_struct(found.as_change(), noticed_ns=1)
+    assert watch.beyond(of_a_car)(np.array([BEND])).tolist() == [False]
 
 
 def test_cars_of_another_kind_are_left_out_and_those_of_another_version_are_not():
