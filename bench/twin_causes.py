@@ -12,7 +12,7 @@ import argparse
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -115,14 +115,28 @@ def camera_of(recording: Recording, first_s: float) -> str:
     return "west" if there.any() and float(np.mean(x.values[there] < 0.0)) > 0.5 else "east"
 
 
+@dataclass(slots=True)
+class Judged:
+    """A change, as it is judged by now.
+
+    Attributes:
+        when_s: It was noticed then.
+        is_place: Whether it was noticed by all cars together.
+    """
+
+    vehicle: str
+    when_s: float
+    change: TwinChange
+    is_place: bool = False
+
+
 def judged(
     recordings: list[Recording], predictor: WatchedCar
-) -> Iterator[tuple[str, float, TwinChange]]:
-    """Yield the first change of each car, judged some time after it was noticed [s]."""
+) -> Iterator[tuple[Judged, float]]:  # fmt: skip
+    """Yield the first change of each car and those of places, some time after each [s]."""
     threshold = threshold_of(FALSE_ALARM_H)
-    places = PlaceWatch(threshold)
+    places, noticed = PlaceWatch(threshold), list[Judged]()
     watches = {f"n{k}": CarWatch(predictor, threshold, places) for k in range(len(recordings))}
-    noticed = dict[str, tuple[float, TwinChange]]()
     for k, first_s in enumerate(np.arange(0.0, LASTS_S, SPAN_S).tolist()):
         for (name, watch), recording in zip(watches.items(), recordings, strict=True):
             part = part_of(recording, first_s - BEFORE_S, first_s + SPAN_S + AFTER_S)
@@ -130,27 +144,27 @@ def judged(
                 one = watch.look(part, first_s, first_s + SPAN_S, camera_of(recording, first_s))
             except RecordingError:
                 continue
-            if one is not None and name not in noticed:
-                noticed[name] = first_s, one.as_change()
+            if one and not any(had.vehicle == name and not had.is_place for had in noticed):
+                noticed.append(Judged(name, first_s, one.as_change()))
         if not k % SPANS_A_PLACE:
             cars = {name: Witness(watch.evidence, 0.0) for name, watch in watches.items()}
             found = places.look(cars, first_s + SPAN_S)
             if found is not None:
                 print(f"  {first_s + SPAN_S:.0f} s: {found.in_words()}", flush=True)
-                noticed.setdefault(found.vehicles[0], (first_s, found.as_change()))
-        for name, (when_s, change) in noticed.items():
-            if first_s - when_s in LATER_S:
-                since_s = seconds(change.since_ns)
+                noticed.append(Judged(found.vehicles[0], first_s, found.as_change(), is_place=True))
+        for each in noticed:
+            if first_s - each.when_s in LATER_S:
+                since_s = seconds(each.change.since_ns)
                 cars = {
-                    other: witness(
-                        watch.evidence, 0.0, [noticed[other][1]] if other in noticed else (),
-                        since_s, is_own=other == name,
+                    name: witness(
+                        watch.evidence, 0.0, [o.change for o in noticed if o.vehicle == name],
+                        since_s, is_own=name == each.vehicle,
                     )
-                    for other, watch in watches.items()
+                    for name, watch in watches.items()
                 }  # fmt: skip
-                change = located(change, name, cars, places.beyond(change)) or change  # noqa: PLW2901
-                noticed[name] = when_s, change
-                yield name, first_s - when_s, change
+                is_off = places.beyond(each.change)
+                each.change = located(each.change, each.vehicle, cars, is_off) or each.change
+                yield each, first_s - each.when_s
 
 
 def judge(change: TwinChange, kinds: Sequence[str], *, is_first: bool) -> str:
@@ -188,11 +202,14 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as folder:
                 recordings, what = scene(kind.split("+"), given.cars, rng, Path(folder))
             print(f"{kind} {number}: {what}", flush=True)
-            for name, later_s, change in judged(recordings, predictor):
-                verdict = judge(change, kind.split("+"), is_first=name == "n0")
+            kinds, found = kind.split("+"), set[str]()
+            for one, later_s in judged(recordings, predictor):
+                verdict = judge(one.change, kinds, is_first=one.vehicle == "n0")
                 results[kind, later_s, verdict] += 1
-                of = f"{name} {change.effect}, {later_s:.0f} s later"
-                print(f"  {of} {verdict}: {in_words(change)}", flush=True)
+                found |= {one.change.cause} if verdict == "right" else set()
+                of = f"{one.vehicle} {one.change.effect}, {later_s:.0f} s later"
+                print(f"  {of} {verdict}: {in_words(one.change)}", flush=True)
+            print(f"  found: {', '.join(sorted(found)) or 'nothing'}", flush=True)
     for (kind, later_s, verdict), count in sorted(results.items()):
         print(f"{kind:<12}{later_s:4.0f} s after it was noticed: {count} {verdict}")
 
