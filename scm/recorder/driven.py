@@ -96,6 +96,16 @@ class CarMessages:
                 whom = (message.mode, message.epoch, message.car, message.seq)
                 self.reports.append(Report(*at, *whom, message.throttle, message.steering))
 
+    def forget(self, before_ns: int) -> None:
+        """Remove what the car sent before a time, and what was seen of it; commands stay."""
+        self.reports = [one for one in self.reports if one.t_ns >= before_ns]
+        self.sensors = [one for one in self.sensors if one.t_ns >= before_ns]
+        self.seen = {
+            camera: [one for one in poses if one.t_ns >= before_ns]
+            for camera, poses in self.seen.items()
+        }
+        self.hit_ns = [t_ns for t_ns in self.hit_ns if t_ns >= before_ns]
+
     @property
     def lost(self) -> int:
         """Number of the car's reports missing between the first and the last."""

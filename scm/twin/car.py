@@ -19,8 +19,9 @@ from scm.clock import nanoseconds, seconds
 from scm.errors import CarError, RecordingError, ScmError
 from scm.recorder.driven import CarMessages, recording_of
 from scm.recording.read import Recording
-from scm.records.twins import TwinChange, TwinVersion
+from scm.records.twins import TwinChange, TwinDrive, TwinVersion
 from scm.twin.causes import ELSEWHERE, Witness, cause_in_words, located, witness
+from scm.twin.drives import PENDING, Reaches, is_recent
 from scm.twin.investigation import Compared, Explained, compare, explain
 from scm.twin.memory import CarMemory
 from scm.twin.versions import (
@@ -44,6 +45,7 @@ from scm.v2x.messages.version_request import VersionRequest
 
 NAME = "twin"
 CHANGES, VERSIONS = "change", "version"  # begin the keys of records
+RESTARTED = "the twin part was started again: what cars drove before is forgotten"
 CHANGED_AGAIN = "the car changed again before it was confirmed"
 LOOK_NS, BEFORE_NS = nanoseconds(SPAN_S), nanoseconds(BEFORE_S)
 DUE_NS = nanoseconds(SPAN_S + AFTER_S)
@@ -53,6 +55,7 @@ BY_EYE, FEWEST_SEEN = "eye", 50  # poses of a first look, for the Eye to be a wi
 SEARCHED_BEFORE_S, SEARCHED_AFTER_S = 120.0, 90.0  # of a change, for a search
 MOST_AFTER_S, LEAST_AFTER_S = 300.0, 40.0
 LOCATE_NS = nanoseconds(30.0)  # between two judgements of whose a change is
+SENT_NS = nanoseconds(10.0)  # likewise, while a car drives to decide it
 MOST_WITNESSES = 30  # those that drove most
 LOCATED_NS = nanoseconds(300.0)  # after a change was noticed, whose it is may still come out
 FAILURES = (ScmError, OSError, BrokenExecutor)
@@ -178,7 +181,7 @@ class TwinCar:
             first_s = seconds(first_ns - self._begin_ns)
             self._memory.add(self._recording(), first_s, first_s + SPAN_S, self._camera())
         finally:
-            _forget(self._messages, self.next_ns - BEFORE_NS)
+            self._messages.forget(self.next_ns - BEFORE_NS)
 
     def _recording(self) -> Recording:
         """Return the messages that are stored as a recording.
@@ -220,7 +223,7 @@ class TwinCar:
         text = (
             f"{self.name} is not what {self.car} says any more, since {ago_s:.0f} s: as by {like}"
         )
-        return [*out, self._change_stored(change), self._event("car_changed", text, "warning")]
+        return [*out, self._change_stored(change), self.event("car_changed", text, "warning")]
 
     def witness(self, of: "TwinCar", since_s: float) -> Witness | None:
         """Return what the car shows about a change, and between which of its own that counts.
@@ -234,19 +237,27 @@ class TwinCar:
         begin_s = seconds(self._begin_ns)
         return witness(self._watch.evidence, begin_s, self.changes, since_s, is_own=self is of)
 
-    def locate(self, cars: Iterable["TwinCar"]) -> list[Outgoing]:
-        """Say whose each new change is, by what all cars drove."""
-        if 0 <= self.newest_ns - self._located_ns < LOCATE_NS:
+    def locate(self, cars: Iterable["TwinCar"], reaches: Reaches) -> list[Outgoing]:
+        """Say whose each new change is, by what all cars drove.
+
+        Args:
+            cars: Of the city.
+            reaches: Returns whether a car can be sent through a point.
+        """
+        states = {one.drive.state for one in self.changes if one.drive is not None}
+        every_ns = SENT_NS if "under_way" in states else LOCATE_NS
+        if 0 <= self.newest_ns - self._located_ns < every_ns:
             return []
         out = list[Outgoing]()
         others = sorted((one for one in cars if one is not self), key=lambda one: -one.driven_s)
         cars = (self, *others[:MOST_WITNESSES])
         for change in tuple(self.changes):
-            if self.newest_ns - change.noticed_ns > LOCATED_NS:
+            is_new = self.newest_ns - change.noticed_ns <= LOCATED_NS
+            if not is_new and not is_recent(change.drive, self.newest_ns):
                 continue
             since_s = seconds(change.since_ns)
-            witnesses = {one.name: one.witness(self, since_s) for one in cars}
-            found = located(change, self.name, {n: w for n, w in witnesses.items() if w})
+            shown = {one.name: one.witness(self, since_s) for one in cars}
+            found = located(change, self.name, {n: w for n, w in shown.items() if w}, reaches)
             if found is None:
                 continue  # too little was driven since
             self._located_ns = self.newest_ns
@@ -255,12 +266,23 @@ class TwinCar:
             out += self._now(change, found)
             if found.cause not in (change.cause, "undecided"):
                 text = cause_in_words(found, self.name)
-                out.append(self._event("change_located", text, "warning"))
+                out.append(self.event("change_located", text, "warning"))
                 made = self.versions.candidate
                 if found.cause in ELSEWHERE and made is not None and made.report == found.report:
                     self._trial = None
                     out += self._rejected(text)
         return [*out, self.status()] if out else []
+
+    def remembers(self, change: TwinChange) -> bool:
+        """Return whether what the car drove before a change is still known."""
+        if self._watch is None or not len(self._watch.evidence.t_s):
+            return False
+        first_s = seconds(self._begin_ns) + self._watch.evidence.t_s[0]
+        return bool(first_s < seconds(change.since_low_ns))
+
+    def change_drive(self, change: TwinChange, drive: TwinDrive) -> list[Outgoing]:
+        """Report how far the drive that decides a change is."""
+        return [*self._now(change, structs.replace(change, drive=drive)), self.status()]
 
     def work(self) -> list[Outgoing]:
         """Go on with searching for the cause of a change, and with comparing versions."""
@@ -326,7 +348,7 @@ class TwinCar:
                 named, since_ns=since_ns, since_low_ns=low_ns, since_high_ns=high_ns
             )
         text = f"{self.name} changed: {named.text}"
-        out = [*self._now(change, named), self._event("change_explained", text, "warning")]
+        out = [*self._now(change, named), self.event("change_explained", text, "warning")]
         is_newest = named is self.changes[-1]
         if found.car_file is not None and is_newest and named.cause not in ELSEWHERE:
             made = self.versions.propose(found, named.report, self.newest_ns)
@@ -384,7 +406,7 @@ class TwinCar:
         if rejected is None:
             return []
         text = f"{self.name}: version {rejected.number} is rejected: {reason}"
-        return [*self._stored(rejected), self._event("version_rejected", text), self.status()]
+        return [*self._stored(rejected), self.event("version_rejected", text), self.status()]
 
     def answer(self, request: VersionRequest) -> tuple[Message, list[Outgoing]]:
         """Put a version in force; return the reply and what else to send."""
@@ -409,10 +431,10 @@ class TwinCar:
         text = f"{self.name} {way} version {number}: {request.reason or 'no reason given'}"
         means = meaning(self.versions.in_force.abilities) if number > before else []
         stored = [item for one in changed for item in self._stored(one)]
-        events = [self._event("version", text, level)]
+        events = [self.event("version", text, level)]
         if means:
             text = f"{self.name} {'; '.join(means)}"
-            events.append(self._event("abilities_changed", text, "warning"))
+            events.append(self.event("abilities_changed", text, "warning"))
         return self.status(), [*stored, *events, self.status()]
 
     def refused(self) -> list[Outgoing]:
@@ -445,9 +467,10 @@ class TwinCar:
             return []
         return [PersistedState("twins", f"{VERSIONS}/{self.name}/{version.number}", version)]
 
-    def _event(
+    def event(
         self, name: str, text: str, severity: Literal["info", "warning"] = "info"
     ) -> CityEvent:
+        """Return an event of the car."""
         return CityEvent(
             severity=severity, source=NAME, t_ns=self.newest_ns, name=name, vehicle=self.name,
             text=text,
@@ -456,6 +479,10 @@ class TwinCar:
 
 def _interrupted(change: TwinChange) -> TwinChange:
     """Return a change of an earlier process, whose memory is gone."""
+    drive = change.drive
+    if drive is not None and drive.state in ("open", *PENDING):
+        drive = structs.replace(drive, state="failed", reason=RESTARTED)
+        change = structs.replace(change, drive=drive)
     if change.search not in ("driving", "searching"):
         return change
     text = "The twin part was started again before its cause was found."
@@ -470,14 +497,3 @@ def _why(failure: Exception) -> str:
 
 def _slug(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", name.lower())
-
-
-def _forget(messages: CarMessages, before_ns: int) -> None:
-    """Forget what a car sent before a time, and what was seen of it."""
-    messages.reports = [one for one in messages.reports if one.t_ns >= before_ns]
-    messages.sensors = [one for one in messages.sensors if one.t_ns >= before_ns]
-    messages.seen = {
-        camera: [one for one in poses if one.t_ns >= before_ns]
-        for camera, poses in messages.seen.items()
-    }
-    messages.hit_ns = [t_ns for t_ns in messages.hit_ns if t_ns >= before_ns]

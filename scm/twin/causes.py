@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scm.arrays import Bools, Floats
 from scm.clock import seconds
 from scm.records.twins import Kind, TwinCause, TwinChange
+from scm.twin.drives import Reaches, anywhere, deciding_drive, drive_in_words, next_drive
 from scm.twin.evidence import Evidence
 from scm.twin.windows import EVERY_S, WatchedNumber
 
@@ -96,13 +97,16 @@ class _Rows:
     information: Floats
 
 
-def located(change: TwinChange, vehicle: str, cars: Mapping[str, Witness]) -> TwinChange | None:
+def located(
+    change: TwinChange, vehicle: str, cars: Mapping[str, Witness], reaches: Reaches = anywhere
+) -> TwinChange | None:
     """Return a change with whose it is, or None where the car that changed shows too little of it.
 
     Args:
         change: Of the car.
         vehicle: Its name.
         cars: All that drove lately.
+        reaches: Returns whether a car can be sent through a point.
     """
     since_s = [
         seconds(t_ns) for t_ns in (change.since_ns, change.since_low_ns, change.since_high_ns)
@@ -117,14 +121,16 @@ def located(change: TwinChange, vehicle: str, cars: Mapping[str, Witness]) -> Tw
     own_s = [one.probability for one in causes if one.kind in OWN]
     is_sure = max(causes[0].probability, sum(own_s) if causes[0].kind in OWN else 0.0) >= SURE
     cause = causes[0].kind if is_sure else "undecided"
-    decide_by = "" if is_sure else _decided_by(causes, vehicle, since_s[0], cars)
+    open_ = {} if is_sure else {one.kind: one for one in causes if one.probability >= POSSIBLE}
+    drive = next_drive(change, deciding_drive(change, open_, vehicle, cars, reaches))
+    decide_by = "" if is_sure or drive is None else drive_in_words(drive, vehicle)
     pairs = zip(causes, change.causes, strict=False)
     if change.causes and all(
         one.kind == then.kind and abs(one.probability - then.probability) < NEAR
         for one, then in pairs
     ):
         causes = change.causes
-    return replace(change, cause=cause, causes=causes, decide_by=decide_by)
+    return replace(change, cause=cause, causes=causes, decide_by=decide_by, drive=drive)
 
 
 def cause_in_words(change: TwinChange, vehicle: str) -> str:
@@ -147,29 +153,6 @@ def cause_in_words(change: TwinChange, vehicle: str) -> str:
 
 def _at(cause: TwinCause) -> str:
     return f"({cause.x_m:.1f}, {cause.y_m:.1f})"
-
-
-def _decided_by(
-    causes: Sequence[TwinCause], vehicle: str, since_s: float, cars: Mapping[str, Witness]
-) -> str:
-    """Return which car would have to drive where to decide between causes."""
-    open_ = {one.kind: one for one in causes if one.probability >= POSSIBLE}
-    driven = {
-        name: float(np.sum(one.evidence.t_s + one.begin_s >= since_s))
-        for name, one in cars.items()
-        if name != vehicle
-    }
-    other = min(driven, key=lambda name: driven[name]) if driven else "another car"
-    is_own = any(kind in open_ for kind in OWN)
-    if "place" in open_ and is_own:
-        return f"Let {other} drive through {_at(open_['place'])}, and {vehicle} elsewhere."
-    if "place" in open_:
-        return f"Let {vehicle} drive farther away from {_at(open_['place'])}."
-    if "camera" in open_ and is_own and open_["camera"].camera:
-        return f"Let {other} drive where camera {open_['camera'].camera} sees it."
-    if is_own and len(open_.keys() - OWN):
-        return f"Let {other} drive for a minute."
-    return f"Let {vehicle} drive on."
 
 
 def causes_of(

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from scm.clock import NS_PER_S
-from scm.errors import MapError
+from scm.errors import LeaseError, MapError
 from scm.geometry import Pose2
 from scm.maps.route import OnLane
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
@@ -81,7 +81,10 @@ class Trips:
         Raises:
             MapError: when the lanes do not exist or cannot be reached, or the car would hit a wall
                 on its way to its lane.
+            LeaseError: when the request may replace only a trip that the car is not on.
         """
+        if request.replaces:
+            self._check_trip(index, request.replaces)
         place, roads = self._nearest_lane(vehicle, pose), self._drivers.lane_graph.roads
         length_m: float | None = None
         passes: tuple[tuple[str, float], ...] = ()
@@ -98,6 +101,15 @@ class Trips:
         trip = self._note(index, vehicle, route, length_m, now_ns, request.request_id)
         trip.passes, trip.speed_mps, trip.then = passes, request.speed_mps, request.then
         return RouteReply(vehicle=vehicle, trip_id=trip.trip_id, route=route, length_m=length_m)
+
+    def _check_trip(self, index: int, trip_id: str) -> None:
+        """Raise LeaseError unless a car is on a trip, or stands since its end."""
+        trip = self._trips.get(index)
+        if trip is None or trip.trip_id != trip_id:
+            on = "no trip" if trip is None else f"trip {trip.trip_id!r}"
+            raise LeaseError(f"it is on {on}, expected {trip_id!r}")
+        if not (self._under_way[index] or self._drivers.arrived[index]):
+            raise LeaseError(f"somebody drove it since its trip {trip_id!r}")
 
     def end(self, index: int, now_ns: int) -> None:
         """End a car's trip with a last report: somebody else drives it now."""
