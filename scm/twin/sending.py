@@ -111,7 +111,8 @@ class Sending:
         if not self._is_needed(change.drive):
             detail = f"{request.send} drives about already: it needs no goal"
             return Refused(code="invalid", detail=detail), []
-        return car.status(), self._now(car, change, state="waiting", by=request.by)
+        out = self._now(car, change, state="waiting", by=request.by)
+        return car.status(), out
 
     def step(self, cars: Mapping[str, TwinCar], now_ns: int) -> list[Outgoing]:
         """Send what waits and may go, and end what was driven, decided, or takes too long."""
