@@ -181,7 +181,7 @@ class Sending:
         self, car: TwinCar, change: TwinChange, drive: TwinDrive, now_ns: int
     ) -> list[Outgoing]:
         vehicle, (before, _) = drive.vehicle, self._trips[drive.vehicle]
-        home = before.route[-1] if before.arrived_ns is not None else ""
+        home = self._lane_of(vehicle) if before.arrived_ns is not None else ""
         trip_id = f"twin-{car.name}-{vehicle}-{now_ns}"
         way: tuple[tuple[str, ...], int] | None = (), 1
         if drive.x_m is not None and drive.y_m is not None:
@@ -268,21 +268,26 @@ class Sending:
         self, vehicle: str, point: Point, home: str = ""
     ) -> tuple[tuple[str, ...], int] | None:
         """Return which lanes lead a car through a point, and how often; None: none does."""
-        state, roads = self._states.get(vehicle), self._roads
-        if state is None or roads is None:
-            return None
-        begin = roads.nearest(Pose2(state.x_m, state.y_m, state.yaw_rad))
-        if begin is None:
+        begin, roads = self._lane_of(vehicle), self._roads
+        if not begin or roads is None:
             return None
         for lane in _lanes_at(roads, point):
             via = (lane, home) if home and home != lane else (lane,)
             for laps in (LAPS, 2):  # a lane on which it is counts as passed
                 try:
-                    roads.route(begin.lane, via, laps)
+                    roads.route(begin, via, laps)
                 except MapError:
                     continue
                 return via, laps
         return None
+
+    def _lane_of(self, vehicle: str) -> str:
+        """Return the lane that a car is on; empty: none, or it is not known."""
+        state = self._states.get(vehicle)
+        if state is None or self._roads is None:
+            return ""
+        found = self._roads.nearest(Pose2(state.x_m, state.y_m, state.yaw_rad))
+        return "" if found is None else found.lane
 
     def _failed(self, car: TwinCar, change: TwinChange, reason: str) -> list[Outgoing]:
         return self._now(car, change, state="failed", reason=reason)

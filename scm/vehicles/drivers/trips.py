@@ -38,6 +38,8 @@ class _ActiveTrip:
     """The requested lanes, laps written out, and the distance at which each of them ends."""
     speed_mps: float | None = None
     then: Literal["stop", "circulate"] = "stop"
+    is_ended: bool = False
+    """Whether somebody else drove the car since."""
 
 
 class Trips:
@@ -103,18 +105,20 @@ class Trips:
         return RouteReply(vehicle=vehicle, trip_id=trip.trip_id, route=route, length_m=length_m)
 
     def _check_trip(self, index: int, trip_id: str) -> None:
-        """Raise LeaseError unless a car is on a trip, or stands since its end."""
+        """Raise LeaseError unless a car is on a trip, or stands since it arrived."""
         trip = self._trips.get(index)
         if trip is None or trip.trip_id != trip_id:
             on = "no trip" if trip is None else f"trip {trip.trip_id!r}"
             raise LeaseError(f"it is on {on}, expected {trip_id!r}")
-        if not (self._under_way[index] or self._drivers.arrived[index]):
+        if trip.is_ended:
             raise LeaseError(f"somebody drove it since its trip {trip_id!r}")
 
     def end(self, index: int, now_ns: int) -> None:
         """End a car's trip with a last report: somebody else drives it now."""
         if self._under_way[index]:
             self._unsent.append(self._report(index, now_ns))
+        if index in self._trips:
+            self._trips[index].is_ended = True
         self._halt(index)
 
     def _halt(self, index: int) -> None:

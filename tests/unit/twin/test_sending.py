@@ -304,3 +304,15 @@ def test_place_beside_all_lanes_cannot_be_reached(point, reaches):
     off_lane.receive(state("n5", x_m=1.4, y_m=1.4))
     assert not off_lane.sending.reach_for("n3")("n5", point)
     assert not Sending().reach_for("n3")("n5", point)  # no map yet
+
+
+@pytest.mark.parametrize("was", ["open", "waiting", "under_way"])
+def test_restart_repeats_no_drive(was):
+    town = Town("idle", state=was, sent=1)
+    stored = tuple(town.car.changes)
+    town.car = TwinCar(state("n3"), town.now_ns, town.car._setup, changes=stored)
+    town.cars["n3"], town.sending = town.car, Sending("idle")
+    town.receive(WorldDefinition(t_ns=0, seed=0, map=MAP), state("n5"), trip())
+    assert town.step() == town.step() == []
+    assert town.drive.state == "failed"
+    assert "what cars drove before is forgotten" in town.drive.reason

@@ -36,14 +36,15 @@ function Send({ vehicle, drive, onClose, onChanged }) {
     event.preventDefault();
     const body = { send: drive.vehicle, by: "dashboard", reason: event.target.elements.reason.value };
     onClose();
-    const done = () => `${drive.vehicle} is sent to decide whose ${vehicle}'s change is.`;
+    const done = () => `${drive.vehicle} is sent as soon as it is idle.`;
     if (await requestChange("POST", `/twins/${vehicle}/drive`, body, done)) onChanged();
   };
   return html`
     <${Dialog} title="Send ${drive.vehicle} to decide whose ${vehicle}'s change is?" onClose=${onClose}>
       <p>
-        It goes ${drive.x_m === null ? "round" : `through (${drive.x_m.toFixed(1)}, ${drive.y_m.toFixed(1)}) some times`}
-        as soon as it has no other goal and nobody drives it. Then it goes on as before; if it stood, it goes back to its lane.
+        As soon as it has no other goal and nobody drives it, it drives
+        ${" "}${drive.x_m === null ? "about" : `through (${drive.x_m.toFixed(1)}, ${drive.y_m.toFixed(1)}) some times`},
+        for three minutes at most. Then it goes on as before; if it stood, it goes back to its lane.
       </p>
       <form onSubmit=${submit}>
         <input name="reason" maxlength="500" placeholder="Reason (optional)" aria-label="Reason" data-first />
