@@ -95,6 +95,6 @@ def test_undecided_change_is_decided_by_the_car_that_is_sent(monkeypatch):
     assert list(dict.fromkeys(states)) == ["open", "waiting", "under_way", "driven"]
     assert (changes[-1].cause, changes[-1].decide_by) == ("car", "")
     of_n2 = [one for one in trips if one.vehicle == "n2"]
-    _, there, sent, back = dict.fromkeys(one.trip_id for one in of_n2)
+    there, sent, back = dict.fromkeys(one.trip_id for one in of_n2)
     assert (there, back) == ("there", f"{sent}-back")  # sent once
     assert (of_n2[-1].route[-1], of_n2[-1].then) == ("west_loop", "stop")
