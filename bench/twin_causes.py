@@ -25,8 +25,9 @@ from scm.recorder.drives import recordings_of_one
 from scm.recording.read import Recording
 from scm.recording.span import part_of
 from scm.records.twins import TwinChange
-from scm.twin.causes import OWN, Witness, located, witness
+from scm.twin.causes import located
 from scm.twin.detector import threshold_of
+from scm.twin.evidence import OWN, Witness, witness
 from scm.twin.places import PlaceWatch
 from scm.twin.watch import AFTER_S, BEFORE_S, SPAN_S, SPANS_A_PLACE, CarWatch
 from scm.twin.windows import WatchedCar
@@ -162,8 +163,7 @@ def judged(
                     )
                     for name, watch in watches.items()
                 }  # fmt: skip
-                is_off = places.beyond(each.change)
-                each.change = located(each.change, each.vehicle, cars, is_off) or each.change
+                each.change = located(each.change, each.vehicle, cars, places) or each.change
                 yield each, first_s - each.when_s
 
 

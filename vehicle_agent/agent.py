@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from scm import registry
 from scm.clock import NS_PER_MS, NS_PER_S
-from scm.errors import MapError, RunError
+from scm.errors import LeaseError, MapError, RunError
 from scm.log import event
 from scm.records.city_map import CityMap
 from scm.runtime.part import IsWanted, Service, Subscription
@@ -331,12 +331,15 @@ class AgentPart:
         if self._session is None:
             return Refused(code="offline", detail=f"{self.name} is not in the city")
         is_foreign = self._link.standing == "foreign"
-        if is_foreign and self._session.guard.output(now_ns).mode in ("drive", "hold"):
+        is_commanded = is_foreign and self._session.guard.output(now_ns).mode in ("drive", "hold")
+        if is_commanded or (is_foreign and request.replaces):
             return Refused(code="owned", detail=f"{self.name} is driven by somebody else")
         try:
             reply = self._session.begin(request, now_ns)
         except MapError as error:
             return Refused(code="invalid", detail=str(error))
+        except LeaseError as error:
+            return Refused(code="owned", detail=f"{self.name}: {error}")
         if is_foreign:
             self._link.regain()  # a car without a route stands still
         return reply

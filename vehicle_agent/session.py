@@ -6,6 +6,7 @@ receive -> advance the body to now -> decide -> guard -> command the body -> rep
 import logging
 
 from scm.clock import NS_PER_MS, NS_PER_S
+from scm.errors import LeaseError
 from scm.log import event
 from scm.maps.route import roads_of
 from scm.records.city_map import CityMap
@@ -108,7 +109,15 @@ class CitySession:
         self._contact_number = contact.number
 
     def begin(self, request: RouteRequest, now_ns: int) -> RouteReply:
-        """Start a trip; MapError when the lanes do not allow it."""
+        """Start a trip.
+
+        Raises:
+            MapError: when the lanes do not allow it.
+            LeaseError: when the request may replace only a trip that the car is not on, or the car
+                must not drive.
+        """
+        if request.replaces and self._changed.unfit:
+            raise LeaseError(f"it does not drive: {self._changed.unfit}")
         return self.trips.begin(request, self._body.motion().pose, now_ns)
 
     def switch_lights(

@@ -93,6 +93,9 @@ _REQUESTS: dict[str, Callable[[Facts], str]] = {
     "StopRequest": lambda request: (
         "stop the city" if request["engaged"] else "release the city stop"
     ),
+    "TwinSendRequest": lambda request: (
+        f"send {request['send']} to decide whose {request['vehicle']}'s change is"
+    ),
     "VersionRequest": _version,
 }
 

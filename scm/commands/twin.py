@@ -27,6 +27,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="processor time for a search for what changed (%(default)g)",
     )
+    parser.add_argument(
+        "--send",
+        choices=("agreed", "idle"),
+        default="agreed",
+        help="send cars to where they decide whose a change is: when an operator has agreed, or "
+        "whenever they are idle (%(default)s)",
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -44,6 +51,7 @@ def _run(arguments: argparse.Namespace) -> int:
             if state is None
             else records(state, "twins", f"twin/{VERSIONS}", TwinVersion),
             changes={} if state is None else records(state, "twins", f"twin/{CHANGES}", TwinChange),
+            send=arguments.send,
         )
         return run_part(part, arguments, state)
 

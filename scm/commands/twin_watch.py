@@ -96,7 +96,8 @@ def _whose(
 ) -> list[str]:
     """Return whose a change is by all cars of the run, in words; nothing of a car alone."""
     from scm.clock import seconds
-    from scm.twin.causes import cause_in_words, located, witness
+    from scm.twin.causes import cause_in_words, located
+    from scm.twin.evidence import witness
 
     change = noticed.as_change()
     cars = {
@@ -106,7 +107,7 @@ def _whose(
         )
         for name, (one, changes) in watched.items()
     }  # fmt: skip
-    found = located(change, vehicle, cars, places.beyond(change)) if len(watched) > 1 else None
+    found = located(change, vehicle, cars, places) if len(watched) > 1 else None
     if found is None:
         return []
     shares = ", ".join(

@@ -69,10 +69,22 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="leave out parts, separated by commas, if the computer is too slow: "
         "eye, camera, record, observer, misbehaviour; see docs/performance.md",
     )
+    _twin_arguments(parser)
+    parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")
+
+
+def _twin_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--twin", action="store_true", help="watch every car, and report since when one has changed"
     )
-    parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")
+    parser.add_argument(
+        "--twin-sends",
+        choices=("agreed", "idle"),
+        default="agreed",
+        metavar="WHEN",
+        help="with --twin: send cars to where they decide whose a change is: when an operator has "
+        "`agreed`, or whenever they are `idle` (%(default)s)",
+    )
 
 
 def options_of(arguments: argparse.Namespace) -> "CityOptions":

@@ -97,8 +97,7 @@ class CarMessages:
                 self.reports.append(Report(*at, *whom, message.throttle, message.steering))
 
     def forget(self, before_ns: int) -> None:
-        """Remove what the car sent before a time, and what was seen of it."""
-        self.commands = [one for one in self.commands if one.t_ns >= before_ns]
+        """Remove what the car sent before a time, and what was seen of it; commands stay."""
         self.reports = [one for one in self.reports if one.t_ns >= before_ns]
         self.sensors = [one for one in self.sensors if one.t_ns >= before_ns]
         self.seen = {

@@ -86,6 +86,34 @@ class TwinCause(msgspec.Struct, kw_only=True, frozen=True):
     camera: Annotated[str, Meta(examples=["north"])] = ""
 
 
+class TwinDrive(msgspec.Struct, kw_only=True, frozen=True):
+    """The drive that would decide whose a change is, and how far it is.
+
+    Attributes:
+        vehicle: Which car would have to drive; empty: another one than all that are watched.
+        x_m: Through where, in the map frame; null: it does not matter.
+        y_m: Likewise.
+        camera: That sees cars there, if it is what is to be decided about; empty: none.
+        state: `open`: nobody has agreed yet; `waiting`: it is sent as soon as it has no other goal;
+            `under_way`; `driven`; `failed`: why, says `reason`.
+        reason: Why it waits or failed; empty: it does not.
+        t_ns: Since when it is in that state, on the clock of the reports of the car that changed
+            [ns].
+        by: Who agreed.
+        sent: How often a car was sent to decide this change.
+    """
+
+    vehicle: Annotated[str, Meta(description="A car's name.", examples=["n5"])]
+    t_ns: TNs
+    x_m: PlaceM = None
+    y_m: PlaceM = None
+    camera: Annotated[str, Meta(examples=["north"])] = ""
+    state: Literal["open", "waiting", "under_way", "driven", "failed"] = "open"
+    reason: ReasonText = ""
+    by: RequestedBy = ""
+    sent: Annotated[int, Meta(examples=[1])] = 0
+
+
 class TwinChange(msgspec.Struct, kw_only=True, frozen=True):
     """A change of a car.
 
@@ -111,6 +139,7 @@ class TwinChange(msgspec.Struct, kw_only=True, frozen=True):
         cause: Whose change it is, of `causes`, or `undecided`.
         causes: The likeliest first.
         decide_by: Which car would have to drive where to decide the cause; empty: it is decided.
+        drive: That drive, and whether it is under way; null: none is known, or none was needed.
     """
 
     noticed_ns: TNs
@@ -132,6 +161,7 @@ class TwinChange(msgspec.Struct, kw_only=True, frozen=True):
     cause: Kind | Literal["undecided"] = "undecided"
     causes: tuple[TwinCause, ...] = ()
     decide_by: Annotated[str, Meta(examples=["Let n5 drive through (1.2, 0.4)."])] = ""
+    drive: TwinDrive | None = None
 
 
 class TwinError(msgspec.Struct, kw_only=True, frozen=True):
@@ -243,6 +273,21 @@ class VersionBody(Body, kw_only=True, frozen=True):
     version: Annotated[
         int,
         Meta(ge=0, le=9999, description="its number; 0: the file that it came with", examples=[0]),
+    ]
+    by: By = ""
+    reason: Reason = ""
+
+
+class SendBody(Body, kw_only=True, frozen=True):
+    """Which car is sent to where it decides whose a change is."""
+
+    send: Annotated[
+        str,
+        Meta(
+            pattern=r"^[a-z0-9_-]{1,32}$",
+            description="the car to send, as the change's `drive` says",
+            examples=["n5"],
+        ),
     ]
     by: By = ""
     reason: Reason = ""

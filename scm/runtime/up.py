@@ -71,6 +71,8 @@ class CityOptions:
         ros2: Whether ROS 2 nodes shall see the city.
         demand: Table of trips; None: no further cars come.
         twin: Whether every car is watched for changes.
+        twin_sends: When the twin sends cars to where they decide whose a change is: `agreed`: when
+            an operator has agreed; `idle`: whenever they are.
         without: Parts to leave out, of `OPTIONAL`.
         radio: Radio parameters in place of the map's, `key=value` each.
     """
@@ -95,6 +97,7 @@ class CityOptions:
     ros2: bool = False
     demand: Path | None = None
     twin: bool = False
+    twin_sends: str = "agreed"
     without: tuple[str, ...] = ()
     radio: tuple[str, ...] = ()
 
@@ -305,7 +308,7 @@ def _parts(plan: _Plan) -> list[Job]:
     if plan.options.demand is not None:
         jobs.append(demand(plan.options.demand))
     if plan.options.twin:
-        data = ("--data", str(plan.options.record_dir))
+        data = ("--data", str(plan.options.record_dir), "--send", plan.options.twin_sends)
         jobs.append(part("twin", "watches cars: since when one has changed", *data, *stored))
     if plan.options.ros2:
         jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))

@@ -8,7 +8,7 @@ import math
 import re
 from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -16,12 +16,21 @@ from typing import Literal
 from msgspec import structs
 
 from scm.clock import nanoseconds, seconds
-from scm.errors import CarError, RecordingError, ScmError
+from scm.errors import CarError, RecordingError
 from scm.recorder.driven import CarMessages, recording_of
 from scm.recording.read import Recording
-from scm.records.twins import TwinChange, TwinVersion
-from scm.twin.causes import ELSEWHERE, Witness, cause_in_words, located, witness
-from scm.twin.investigation import Compared, Explained, compare, explain
+from scm.records.twins import TwinChange, TwinDrive, TwinVersion
+from scm.twin.causes import ELSEWHERE, cause_in_words, located
+from scm.twin.drives import Reaches, interrupted, is_recent
+from scm.twin.evidence import Witness, witness
+from scm.twin.investigation import (
+    FAILURES,
+    Compared,
+    Explained,
+    compare,
+    explain,
+    why_failed,
+)
 from scm.twin.memory import CarMemory
 from scm.twin.places import PlaceWatch
 from scm.twin.versions import (
@@ -56,10 +65,9 @@ BY_EYE, FEWEST_SEEN = "eye", 50  # poses of a first look, for the Eye to be a wi
 SEARCHED_BEFORE_S, SEARCHED_AFTER_S = 120.0, 90.0  # of a change, for a search
 MOST_AFTER_S, LEAST_AFTER_S = 300.0, 40.0
 LOCATE_NS = nanoseconds(30.0)  # between two judgements of whose a change is
+SENT_NS = nanoseconds(10.0)  # likewise, while a car drives to decide it
 MOST_WITNESSES = 30  # those that drove most
 LOCATED_NS = nanoseconds(300.0)  # after a change was noticed, whose it is may still come out
-FAILURES = (ScmError, OSError, BrokenExecutor)
-"""Of searches and comparisons, which never end the part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +128,7 @@ class TwinCar:
         self.name, self.car, self._setup = first.vehicle, first.car, setup
         self._begin_ns = self.next_ns = self.newest_ns = first.t_ns
         self.arrived_ns = now_ns
-        self.changes = deque(map(_interrupted, changes), maxlen=MOST_CHANGES)
+        self.changes = deque(map(interrupted, changes), maxlen=MOST_CHANGES)
         self.versions = CarVersions(first.car, versions)
         self._messages, self._memory = CarMessages(), CarMemory()
         self._watch: CarWatch | None = None
@@ -238,7 +246,7 @@ class TwinCar:
     def add(self, change: TwinChange, event: str, text: str) -> list[Outgoing]:
         """Add a change that was noticed."""
         self.changes.append(change)
-        return [self._change_stored(change), self._event(event, text, "warning")]
+        return [self._change_stored(change), self.event(event, text, "warning")]
 
     def witness(self, of: "TwinCar | None", since_s: float) -> Witness | None:
         """Return what the car shows about a change, and between which of its own that counts.
@@ -252,20 +260,28 @@ class TwinCar:
         begin_s = seconds(self._begin_ns)
         return witness(self._watch.evidence, begin_s, self.changes, since_s, is_own=self is of)
 
-    def locate(self, cars: Iterable["TwinCar"]) -> list[Outgoing]:
-        """Say whose each new change is, by what all cars drove."""
-        if 0 <= self.newest_ns - self._located_ns < LOCATE_NS:
+    def locate(self, cars: Iterable["TwinCar"], reaches: Reaches) -> list[Outgoing]:
+        """Say whose each new change is, by what all cars drove.
+
+        Args:
+            cars: Of the city.
+            reaches: Returns whether a car can be sent through a point.
+        """
+        states = {one.drive.state for one in self.changes if one.drive is not None}
+        every_ns = SENT_NS if "under_way" in states else LOCATE_NS
+        if 0 <= self.newest_ns - self._located_ns < every_ns:
             return []
         out = list[Outgoing]()
         others = sorted((one for one in cars if one is not self), key=lambda one: -one.driven_s)
         cars = (self, *others[:MOST_WITNESSES])
         for change in tuple(self.changes):
-            if self.newest_ns - change.noticed_ns > LOCATED_NS:
+            is_new = self.newest_ns - change.noticed_ns <= LOCATED_NS
+            if not is_new and not is_recent(change.drive, self.newest_ns):
                 continue
             since_s = seconds(change.since_ns)
-            witnesses = {one.name: one.witness(self, since_s) for one in cars}
-            shown = {n: w for n, w in witnesses.items() if w}
-            found = located(change, self.name, shown, self._setup.places.beyond(change))
+            shown = {one.name: one.witness(self, since_s) for one in cars}
+            cars_shown = {n: w for n, w in shown.items() if w}
+            found = located(change, self.name, cars_shown, self._setup.places, reaches)
             if found is None:
                 continue  # too little was driven since
             self._located_ns = self.newest_ns
@@ -274,12 +290,23 @@ class TwinCar:
             out += self._now(change, found)
             if found.cause not in (change.cause, "undecided"):
                 text = cause_in_words(found, self.name)
-                out.append(self._event("change_located", text, "warning"))
+                out.append(self.event("change_located", text, "warning"))
                 made = self.versions.candidate
                 if found.cause in ELSEWHERE and made is not None and made.report == found.report:
                     self._trial = None
                     out += self._rejected(text)
         return [*out, self.status()] if out else []
+
+    def remembers(self, change: TwinChange) -> bool:
+        """Return whether what the car drove before a change is still known."""
+        if self._watch is None or not len(self._watch.evidence.t_s):
+            return False
+        first_s = seconds(self._begin_ns) + self._watch.evidence.t_s[0]
+        return bool(first_s < seconds(change.since_low_ns))
+
+    def change_drive(self, change: TwinChange, drive: TwinDrive) -> list[Outgoing]:
+        """Report how far the drive that decides a change is."""
+        return [*self._now(change, structs.replace(change, drive=drive)), self.status()]
 
     def work(self) -> list[Outgoing]:
         """Go on with searching for the cause of a change, and with comparing versions."""
@@ -332,7 +359,7 @@ class TwinCar:
         try:
             found = search.result()
         except FAILURES as error:
-            failed = structs.replace(change, search="failed", text=_why(error), report="")
+            failed = structs.replace(change, search="failed", text=why_failed(error), report="")
             return self._now(change, failed)
         state = "named" if found.effects else "undecided" if found.between else "unexplained"
         named = structs.replace(
@@ -345,7 +372,7 @@ class TwinCar:
                 named, since_ns=since_ns, since_low_ns=low_ns, since_high_ns=high_ns
             )
         text = f"{self.name} changed: {named.text}"
-        out = [*self._now(change, named), self._event("change_explained", text, "warning")]
+        out = [*self._now(change, named), self.event("change_explained", text, "warning")]
         is_newest = named is self.changes[-1]
         if found.car_file is not None and is_newest and named.cause not in ELSEWHERE:
             made = self.versions.propose(found, named.report, self.newest_ns)
@@ -381,7 +408,7 @@ class TwinCar:
         try:
             compared = comparison.result()
         except FAILURES as error:
-            return self._rejected(f"not compared: {_why(error)}") if is_last else []
+            return self._rejected(f"not compared: {why_failed(error)}") if is_last else []
         if candidate is None:
             if not is_worse(compared):
                 return []
@@ -403,7 +430,7 @@ class TwinCar:
         if rejected is None:
             return []
         text = f"{self.name}: version {rejected.number} is rejected: {reason}"
-        return [*self._stored(rejected), self._event("version_rejected", text), self.status()]
+        return [*self._stored(rejected), self.event("version_rejected", text), self.status()]
 
     def answer(self, request: VersionRequest) -> tuple[Message, list[Outgoing]]:
         """Put a version in force; return the reply and what else to send."""
@@ -428,10 +455,10 @@ class TwinCar:
         text = f"{self.name} {way} version {number}: {request.reason or 'no reason given'}"
         means = meaning(self.versions.in_force.abilities) if number > before else []
         stored = [item for one in changed for item in self._stored(one)]
-        events = [self._event("version", text, level)]
+        events = [self.event("version", text, level)]
         if means:
             text = f"{self.name} {'; '.join(means)}"
-            events.append(self._event("abilities_changed", text, "warning"))
+            events.append(self.event("abilities_changed", text, "warning"))
         return self.status(), [*stored, *events, self.status()]
 
     def refused(self) -> list[Outgoing]:
@@ -464,27 +491,14 @@ class TwinCar:
             return []
         return [PersistedState("twins", f"{VERSIONS}/{self.name}/{version.number}", version)]
 
-    def _event(
+    def event(
         self, name: str, text: str, severity: Literal["info", "warning"] = "info"
     ) -> CityEvent:
+        """Return an event of the car."""
         return CityEvent(
             severity=severity, source=NAME, t_ns=self.newest_ns, name=name, vehicle=self.name,
             text=text,
         )  # fmt: skip
-
-
-def _interrupted(change: TwinChange) -> TwinChange:
-    """Return a change of an earlier process, whose memory is gone."""
-    if change.search not in ("driving", "searching"):
-        return change
-    text = "The twin part was started again before its cause was found."
-    return structs.replace(change, search="failed", text=text)
-
-
-def _why(failure: Exception) -> str:
-    if isinstance(failure, BrokenExecutor):
-        return "The process that worked on it was killed."
-    return str(failure)
 
 
 def _slug(name: str) -> str:

@@ -12,7 +12,7 @@ remain as they were, and what would decide is another car, or this one elsewhere
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -23,13 +23,14 @@ from numpy.typing import NDArray
 from scm.arrays import Bools, Floats
 from scm.clock import seconds
 from scm.records.twins import Kind, TwinCause, TwinChange
-from scm.twin.evidence import Evidence
+from scm.twin.drives import Reaches, anywhere, deciding_drive, drive_in_words, next_drive
+from scm.twin.evidence import OWN, Witness
+from scm.twin.places import EFFECTS, PlaceWatch
 from scm.twin.windows import EVERY_S, WatchedNumber
 
 PRIOR = {"car": 0.45, "tag": 0.1, "place": 0.2, "camera": 0.1, "everywhere": 0.15}
 SURE, POSSIBLE, NEAR = 0.9, 0.1, 0.01  # probabilities; nearer than that are the same
 IsOff = Callable[[Floats], Bools]
-OWN: tuple[Kind, ...] = ("car", "tag")
 ELSEWHERE: tuple[Kind, ...] = ("place", "camera")
 OF_TAGS = ("pose_point", "pose_heading")
 OF_CAMERAS = ("camera_tilt", "pose_scale", "pose_latency", "clock_offset", "clock_drift")
@@ -37,46 +38,11 @@ RADII_M = (0.2, 0.35, 0.6)
 GRID_M = 0.2  # between the middles of places
 MOST_PLACES = 200  # those that the car was at most
 JUDGED_AFTER_S = 60.0  # since a change: whoever came to a place once may as well have changed there
-SAME_S = 10.0  # changes that began within that may be one
 MOST_OF_IT = 80.0  # percentile of how far from its middle a place was driven through
 FEWEST = 10  # windows of a place that a car drove through
 NEAR_M, NEAR_WAY = 0.12, 0.5  # windows so near, and in about the same direction, are alike
 AS_WELL = 8.0  # of the weight of a change off known places: then there was one
 AS_MANY = 3.0  # windows of all its driving, that count where none was nearby
-
-
-@dataclass(frozen=True, slots=True)
-class Witness:
-    """A car whose windows count.
-
-    Attributes:
-        begin_s: Zero of the evidence's clock, on the city's [s].
-        first_s, last_s: Windows before and after count no more: it changed by itself there.
-    """
-
-    evidence: Evidence
-    begin_s: float
-    first_s: float = -math.inf
-    last_s: float = math.inf
-
-
-def witness(
-    evidence: Evidence, begin_s: float, changes: Iterable[TwinChange], since_s: float, *,
-    is_own: bool,
-) -> Witness:  # fmt: skip
-    """Return what a car shows about a change, from its own last change before it to its next.
-
-    Args:
-        evidence: Of the car.
-        begin_s: Zero of the evidence's clock, on the city's.
-        changes: Of the car; those whose own they are count.
-        since_s: When the change began, on the city's clock.
-        is_own: Whether it is this car's: its later ones do not end it.
-    """
-    own = [seconds(one.since_ns) for one in changes if one.cause in OWN]
-    first_s = max((t_s for t_s in own if t_s < since_s - SAME_S), default=-math.inf)
-    last_s = min((t_s for t_s in own if t_s > since_s + SAME_S), default=math.inf)
-    return Witness(evidence, begin_s, first_s, math.inf if is_own else last_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,15 +85,17 @@ class _Weighed:
 
 
 def located(
-    change: TwinChange, vehicle: str, cars: Mapping[str, Witness], is_off: IsOff | None = None
-) -> TwinChange | None:
+    change: TwinChange, vehicle: str, cars: Mapping[str, Witness],
+    places: PlaceWatch | None = None, reaches: Reaches = anywhere,
+) -> TwinChange | None:  # fmt: skip
     """Return a change with whose it is, or None where the car that changed shows too little of it.
 
     Args:
         change: Of the car.
         vehicle: Its name.
         cars: All that drove lately.
-        is_off: As in `causes_of`.
+        places: Whose change it may be; None: none was watched.
+        reaches: Returns whether a car can be sent through a point.
     """
     since_s = [
         seconds(t_ns) for t_ns in (change.since_ns, change.since_low_ns, change.since_high_ns)
@@ -138,18 +106,23 @@ def located(
     driven_s = EVERY_S * float(np.sum(own.begin_s + own.evidence.t_s >= since_s[0]))
     if driven_s < JUDGED_AFTER_S:
         return None
-    causes = causes_of(vehicle, since_s, cars, is_off)
+    is_of_place = places is not None and places.has_found(change)
+    is_off = None if places is None or is_of_place else places.is_off
+    effects = EFFECTS if is_of_place else None
+    causes = causes_of(vehicle, since_s, cars, is_off, effects)
     own_s = [one.probability for one in causes if one.kind in OWN]
     is_sure = max(causes[0].probability, sum(own_s) if causes[0].kind in OWN else 0.0) >= SURE
     cause = causes[0].kind if is_sure else "undecided"
-    decide_by = "" if is_sure else _decided_by(causes, vehicle, since_s[0], cars)
+    open_ = {} if is_sure else {one.kind: one for one in causes if one.probability >= POSSIBLE}
+    drive = next_drive(change, deciding_drive(change, open_, vehicle, cars, reaches))
+    decide_by = "" if is_sure or drive is None else drive_in_words(drive, vehicle)
     pairs = zip(causes, change.causes, strict=False)
     if change.causes and all(
         one.kind == then.kind and abs(one.probability - then.probability) < NEAR
         for one, then in pairs
     ):
         causes = change.causes
-    return replace(change, cause=cause, causes=causes, decide_by=decide_by)
+    return replace(change, cause=cause, causes=causes, decide_by=decide_by, drive=drive)
 
 
 def cause_in_words(change: TwinChange, vehicle: str) -> str:
@@ -174,32 +147,9 @@ def _at(cause: TwinCause) -> str:
     return f"({cause.x_m:.1f}, {cause.y_m:.1f})"
 
 
-def _decided_by(
-    causes: Sequence[TwinCause], vehicle: str, since_s: float, cars: Mapping[str, Witness]
-) -> str:
-    """Return which car would have to drive where to decide between causes."""
-    open_ = {one.kind: one for one in causes if one.probability >= POSSIBLE}
-    driven = {
-        name: float(np.sum(one.evidence.t_s + one.begin_s >= since_s))
-        for name, one in cars.items()
-        if name != vehicle
-    }
-    other = min(driven, key=lambda name: driven[name]) if driven else "another car"
-    is_own = any(kind in open_ for kind in OWN)
-    if "place" in open_ and is_own:
-        return f"Let {other} drive through {_at(open_['place'])}, and {vehicle} elsewhere."
-    if "place" in open_:
-        return f"Let {vehicle} drive farther away from {_at(open_['place'])}."
-    if "camera" in open_ and is_own and open_["camera"].camera:
-        return f"Let {other} drive where camera {open_['camera'].camera} sees it."
-    if is_own and len(open_.keys() - OWN):
-        return f"Let {other} drive for a minute."
-    return f"Let {vehicle} drive on."
-
-
 def causes_of(
     vehicle: str, since_s: Sequence[float], cars: Mapping[str, Witness],
-    is_off: IsOff | None = None,
+    is_off: IsOff | None = None, effects: Collection[str] | None = None,
 ) -> tuple[TwinCause, ...]:  # fmt: skip
     """Return what may have caused a change of a car, the likeliest first.
 
@@ -211,8 +161,10 @@ def causes_of(
         since_s: When, on the city's clock: likeliest, and its interval.
         cars: All of the city, this one among them.
         is_off: Returns which windows lie off the places that are known to have changed.
+        effects: By whose numbers it is judged; None: by all.
     """
-    numbers = cars[vehicle].evidence.numbers
+    every = cars[vehicle].evidence.numbers
+    numbers = [one for one in every if effects is None or one.effect in effects]
     rows = [_rows(name == vehicle, one, since_s, numbers) for name, one in cars.items()]
     found = _weighed(rows, numbers)
     if found.likeliest == "place" and is_off is not None:

@@ -1,15 +1,20 @@
 """What the windows of one car show of each watched number: the detector's scores, with places."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scm.arrays import Floats
+from scm.clock import seconds
+from scm.records.twins import Kind, TwinChange
 from scm.twin.detector import INFORMATION, NEAR, Usual, weighed
 from scm.twin.windows import WatchedNumber, Windows
 
+OWN: tuple[Kind, ...] = ("car", "tag")  # causes of a change that are the car's
+SAME_S = 10.0  # changes that began within that may be one
 MOST = 1800  # windows: 15 minutes of driving
 SPAN = 2  # of the detector's, whose scatter stands for that of a place's windows: 40 s
 
@@ -54,3 +59,37 @@ class Evidence:
         self.scores = np.concatenate((self.scores, shown[NEAR]))[-self.most :]
         self.information = np.concatenate((self.information, shown[INFORMATION]))[-self.most :]
         self.inflation = usual.inflation[SPAN]
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """A car whose windows count.
+
+    Attributes:
+        begin_s: Zero of the evidence's clock, on the city's [s].
+        first_s, last_s: Windows before and after count no more: it changed by itself there.
+    """
+
+    evidence: Evidence
+    begin_s: float
+    first_s: float = -math.inf
+    last_s: float = math.inf
+
+
+def witness(
+    evidence: Evidence, begin_s: float, changes: Iterable[TwinChange], since_s: float, *,
+    is_own: bool,
+) -> Witness:  # fmt: skip
+    """Return what a car shows about a change, from its own last change before it to its next.
+
+    Args:
+        evidence: Of the car.
+        begin_s: Zero of the evidence's clock, on the city's.
+        changes: Of the car; those whose own they are count.
+        since_s: When the change began, on the city's clock.
+        is_own: Whether it is this car's: its later ones do not end it.
+    """
+    own = [seconds(one.since_ns) for one in changes if one.cause in OWN]
+    first_s = max((t_s for t_s in own if t_s < since_s - SAME_S), default=-math.inf)
+    last_s = min((t_s for t_s in own if t_s > since_s + SAME_S), default=math.inf)
+    return Witness(evidence, begin_s, first_s, math.inf if is_own else last_s)

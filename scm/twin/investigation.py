@@ -35,6 +35,8 @@ from scm.twin.abilities import compared_abilities
 from scm.twin.memory import write
 from scm.vehicles.car import load_car
 
+FAILURES = (ScmError, OSError, BrokenExecutor)
+"""Of searches and comparisons, which never end the part."""
 HORIZON_S = 3.0
 APART_S = 20.0  # between a change as it was noticed and as the search dates it
 BETTER = 0.95  # of an error: what a new version has to reach in one at least
@@ -249,3 +251,10 @@ def _better(part: PartErrors) -> tuple[str, ...]:
         name for name, now in part.after.items()
         if name in part.before and got_worse(swapped, name, now, by=1.0 / BETTER)
     )  # fmt: skip
+
+
+def why_failed(failure: Exception) -> str:
+    """Return why a search or a comparison failed, in words."""
+    if isinstance(failure, BrokenExecutor):
+        return "The process that worked on it was killed."
+    return str(failure)

@@ -17,15 +17,19 @@ from scm.twin.car import LOCATE_NS, NAME, Setup, TwinCar
 from scm.twin.detector import threshold_of
 from scm.twin.investigation import Worker
 from scm.twin.places import PlaceWatch
+from scm.twin.sending import Sending, SendWhen
 from scm.twin.windows import WatchedCar
 from scm.v2x.exchange import Answer, Incoming, Outgoing
 from scm.v2x.message import Message, Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.trip import Trip
+from scm.v2x.messages.twin_send_request import TwinSendRequest
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.version_request import VersionRequest
+from scm.v2x.messages.world_definition import WorldDefinition
 from scm.vehicles.car import load_car
 
 R = TypeVar("R", TwinVersion, TwinChange)
@@ -43,21 +47,22 @@ class TwinPart(BasePart):
         data: Folder for reports and car files; None: what changed is not searched for.
         budget_s: For a search.
         executor: Runs searches; None: one process that goes after the city's.
+        send: When cars are sent to where they decide whose a change is.
         versions, changes: As an earlier process left them, by key.
     """
 
     name, role, period_ns = NAME, "part", 100 * NS_PER_MS
     subscriptions: Sequence[Subscription] = (
         Subscription(VehicleState), Subscription(VehicleSensors), Subscription(EyePose),
-        Subscription(CityEvent),
+        Subscription(CityEvent), Subscription(Trip), Subscription(WorldDefinition),
     )  # fmt: skip
-    services: Sequence[Service] = (Service(VersionRequest),)
+    services: Sequence[Service] = (Service(VersionRequest), Service(TwinSendRequest))
 
     def __init__(
         self, false_alarm_h: float = FALSE_ALARM_H, data: Path | None = None,
         budget_s: float = BUDGET_S, executor: Executor | None = None,
         versions: Mapping[str, TwinVersion] | None = None,
-        changes: Mapping[str, TwinChange] | None = None,
+        changes: Mapping[str, TwinChange] | None = None, send: SendWhen = "agreed",
     ) -> None:  # fmt: skip
         self._cars: dict[str, TwinCar] = {}
         self._predictors: dict[str, WatchedCar] = {}
@@ -68,6 +73,7 @@ class TwinPart(BasePart):
             threshold, self._predictor, self._places, self._executor, data, budget_s
         )  # fmt: skip
         self._versions, self._changes = _by_car(versions or {}), _by_car(changes or {})
+        self._sending = Sending(send)
         self._status_ns = -NS_PER_S
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -76,7 +82,7 @@ class TwinPart(BasePart):
         for item in inbox:
             if item.call is not None:
                 out += self._replied(item)
-            elif isinstance(item.message, VersionRequest):
+            elif isinstance(item.message, VersionRequest | TwinSendRequest):
                 out += self._answered(item, item.message)
             else:
                 self._receive(item.message, now_ns)
@@ -85,9 +91,11 @@ class TwinPart(BasePart):
         waiting = [one for one in self._cars.values() if one.waits_ns >= 0]
         if waiting:
             car = max(waiting, key=lambda one: one.waits_ns)
-            out += [*car.look(), *car.locate(self._cars.values()), *self._find_place()]
+            reaches = self._sending.reach_for(car.name)
+            out += [*car.look(), *car.locate(self._cars.values(), reaches), *self._find_place()]
         for one in self._cars.values():
             out += one.work()
+        out += self._sending.step(self._cars, now_ns)
         if now_ns - self._status_ns >= NS_PER_S:
             self._status_ns = now_ns
             changed = sum(bool(one.changes) for one in self._cars.values())
@@ -120,6 +128,7 @@ class TwinPart(BasePart):
 
     def _receive(self, message: Message, now_ns: int) -> None:
         name = getattr(message, "vehicle", None)
+        self._sending.receive(message, now_ns)
         if isinstance(message, VehicleState):
             one = self._cars.get(message.vehicle)
             if one is None or one.car != message.car:
@@ -127,20 +136,26 @@ class TwinPart(BasePart):
                 changes = self._changes.pop(message.vehicle, ())
                 one = TwinCar(message, now_ns, self._setup, versions, changes)
                 self._cars[message.vehicle] = one
-        if name in self._cars:
+        if name in self._cars and not isinstance(message, Trip):
             self._cars[name].receive(message, now_ns)
 
     def _leave(self, car: TwinCar) -> None:
         """Remember what outlives a car's absence."""
         self._versions[car.name] = list(car.versions.newest)
         self._changes[car.name] = list(car.changes)
+        self._sending.forget(car.name)
 
-    def _answered(self, item: Incoming, request: VersionRequest) -> list[Outgoing]:
+    def _answered(
+        self, item: Incoming, request: VersionRequest | TwinSendRequest
+    ) -> list[Outgoing]:
         one = self._cars.get(request.vehicle)
         if one is None:
             detail = f"{request.vehicle} is not watched: it sent nothing lately"
             return [Answer(item, Refused(code="not_found", detail=detail))]
-        reply, more = one.answer(request)
+        if isinstance(request, TwinSendRequest):
+            reply, more = self._sending.agree(one, request)
+        else:
+            reply, more = one.answer(request)
         return [*more, Answer(item, reply)]
 
     def _replied(self, item: Incoming) -> list[Outgoing]:
@@ -148,7 +163,7 @@ class TwinPart(BasePart):
         if isinstance(item.message, Refused) and isinstance(request, VersionRequest):
             one = self._cars.get(request.vehicle)
             return [] if one is None else one.refused()
-        return []
+        return self._sending.reply(item, self._cars)
 
     def _predictor(self, car: str) -> WatchedCar:
         if car not in self._predictors:

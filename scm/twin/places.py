@@ -8,7 +8,7 @@ drove as it never did before, is no place.
 
 import math
 from collections import deque
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from scm.arrays import Bools, Floats
 from scm.clock import nanoseconds
 from scm.records.twins import TwinChange
-from scm.twin.causes import Witness
+from scm.twin.evidence import Witness
 from scm.twin.windows import WatchedNumber, Windows
 
 MOST = 50  # places that are remembered
@@ -109,10 +109,9 @@ class PlaceWatch:
         """Return the windows of a car that lie off all places that changed."""
         return windows.those(self.is_off(windows.places))
 
-    def beyond(self, change: TwinChange) -> Callable[[Floats], Bools] | None:
-        """Return `is_off` for a change of a car; None for one of a place."""
-        of_places = (nanoseconds(one.noticed_s) for one in self.found)
-        return self.is_off if self.found and change.noticed_ns not in of_places else None
+    def has_found(self, change: TwinChange) -> bool:
+        """Return whether a change is of a place, not of a car."""
+        return any(change.noticed_ns == nanoseconds(one.noticed_s) for one in self.found)
 
     def is_off(self, places: Floats) -> Bools:
         """Return which windows (n, 2) lie off all places that changed, (n,)."""
@@ -188,7 +187,9 @@ def _scores(rows: list[_Rows], inside: list[Bools], since_s: float) -> Floats:
     size, spread, also = _pooled(*_moves(rows, inside, since_s))
     steps = MOST_STEPS * np.array([one.step for one in rows[0].numbers])
     every = [np.ones((1, len(one.t_s)), dtype=bool) for one in rows]
-    *_, everywhere = _pooled(*_moves(rows, every, since_s))
+    moved, variance = _moves(rows, every, since_s)
+    shown = moved / np.sqrt(variance)
+    everywhere = np.maximum(_rest(shown), _rest(-shown))
     score = np.abs(size) / spread
     counts = (also >= ALSO) & (np.abs(size) < steps) & (score > everywhere.max())
     return np.asarray(np.where(counts, score, 0.0))
@@ -280,8 +281,15 @@ def _pooled(moved: Floats, variance: Floats) -> tuple[Floats, Floats, Floats]:
     weight = 1.0 / variance
     total = np.maximum(weight.sum(axis=0), 1e-30)
     size = (moved * weight).sum(axis=0) / total
-    shown = np.sign(size) * moved * weight
-    plainest = np.argmax(np.sign(size) * moved * np.sqrt(weight), axis=0)[None]
-    rest = np.where(np.arange(len(moved))[:, None, None] == plainest, 0.0, 1.0)
-    known = np.maximum((rest * weight).sum(axis=0), 1e-30)
-    return size, 1.0 / np.sqrt(total), (rest * shown).sum(axis=0) / np.sqrt(known)
+    return size, 1.0 / np.sqrt(total), _rest(np.sign(size) * moved / np.sqrt(variance))
+
+
+def _rest(shown: Floats) -> Floats:
+    """Return what all cars but the plainest show, (...): none less by moving the other way.
+
+    Args:
+        shown: By each, in standard deviations, (cars, ...).
+    """
+    same = np.maximum(shown, 0.0)
+    rest = np.maximum((same**2).sum(axis=0) - same.max(axis=0) ** 2, 0.0)
+    return np.asarray(np.sqrt(rest))

@@ -17,9 +17,8 @@ from scm.mismatch.fit.residual_windows import LENGTH_S
 from scm.recording.read import Recording
 from scm.recording.span import part_of
 from scm.records.twins import TwinChange
-from scm.twin.causes import Witness
 from scm.twin.detector import Change, Detector, Usual
-from scm.twin.evidence import Evidence
+from scm.twin.evidence import Evidence, Witness
 from scm.twin.places import PlaceWatch
 from scm.twin.windows import EVERY_S, WatchedCar, WatchedNumber, Windows
 from scm.vehicles.car import Car

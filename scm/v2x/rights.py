@@ -58,6 +58,7 @@ EVERY_REQUEST = (
     "v/*/remove",
     "v/*/park",
     "v/*/twin/version",
+    "v/*/twin/send",
     "parking/bay",
     "world/spawn",
     "world/boxes",
@@ -194,9 +195,16 @@ _OF_PART: dict[str, Rights] = {
     ),
     "twin": Rights(
         publishes=("v/*/twin",),
-        subscribes=("v/*/state", "v/*/sensors", "eye/*/pose/*", "event/*/*"),
-        requests=("v/*/twin/version",),
-        services=("v/*/twin/version",),
+        subscribes=(
+            "v/*/state",
+            "v/*/sensors",
+            "v/*/trip",
+            "world/def",
+            "eye/*/pose/*",
+            "event/*/*",
+        ),
+        requests=("v/*/twin/version", "v/*/cmd/route"),
+        services=("v/*/twin/version", "v/*/twin/send"),
     ),
     "demand": Rights(
         publishes=("demand/status",),

@@ -16,6 +16,7 @@ from scm.traffic.monitor.part import MonitorPart
 from scm.traffic.observation.part import ObserverPart
 from scm.traffic.parking.part import ParkingPart
 from scm.traffic.signals.part import TrafficPart
+from scm.twin.part import TwinPart
 from scm.v2x.exchange import Call
 from scm.v2x.key import key_of, prefix, selector
 from scm.v2x.message import Message, Request
@@ -102,6 +103,7 @@ def city(tmp_path_factory):
             MisbehaviourPart(city_map),
             ParkingPart(city_map),
             DemandPart(city_map, load_demand(table), 0.0),
+            TwinPart(),
             AgentPart("n2", session="s1"),
         )
     ]
@@ -115,7 +117,7 @@ def city(tmp_path_factory):
 
 NAMES = (
     *("world", "traffic", "monitor", "eye", "api", "record", "camera"),
-    *("observer", "misbehaviour", "parking", "demand", "n2"),
+    *("observer", "misbehaviour", "parking", "demand", "twin", "n2"),
 )
 
 
@@ -150,6 +152,10 @@ def test_a_driver_may_publish_what_agents_that_park_map_and_drive_by_a_network_d
         for kind in (AutonomyStatus, AutonomyPlan, Costmap, OccupancyMap, NetworkView)
     ]
     assert all(covers(key, rights_of("driver", "park-n1").publishes) for key in keys)
+
+
+def test_twin_may_send_cars():
+    assert covers("v/n5/cmd/route", rights_of("part", "twin").requests)
 
 
 def test_an_operator_may_ask_every_request_that_is_no_car_s_own():

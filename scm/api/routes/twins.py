@@ -1,6 +1,7 @@
 """Twins: since when a car is not what its file says, what changed, and the file in force.
 
-The twin part decides on versions; a person may put another one in force.
+The twin part decides on versions; a person may put another one in force, and let a car be sent to
+where it decides whose a change is.
 """
 
 from typing import Annotated
@@ -15,7 +16,8 @@ from scm.api.problem import RefusedError
 from scm.api.roles import OPERATOR, VIEWER, Signer
 from scm.api.schemas import answer, answer_page
 from scm.api.twin_rows import twin_of, twin_rows
-from scm.records.twins import Twin, TwinRow, VersionBody
+from scm.records.twins import SendBody, Twin, TwinRow, VersionBody
+from scm.v2x.messages.twin_send_request import TwinSendRequest
 from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.version_request import VersionRequest
 
@@ -57,6 +59,25 @@ def router(city: City) -> APIRouter:
             request_id=key,
             vehicle=vehicle,
             version=body.version,
+            by=signer(body.by),
+            reason=body.reason,
+        )
+        return json_response(twin_of(city.call(request, TwinStatus)))
+
+    @routes.post(
+        "/{vehicle}/drive",
+        summary="Send the car that would decide whose another car's change is",
+        dependencies=[OPERATOR],
+        responses=answer(Twin),
+    )
+    def send_car(
+        vehicle: Vehicle, body: Json[SendBody], signer: Signer, key: IdempotencyKey = ""
+    ) -> Response:
+        _status(city.view.picture(), vehicle)
+        request = TwinSendRequest(
+            request_id=key,
+            vehicle=vehicle,
+            send=body.send,
             by=signer(body.by),
             reason=body.reason,
         )

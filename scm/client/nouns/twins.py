@@ -41,3 +41,16 @@ class TwinsNoun(Noun):
             by: who requests it, for the log; empty: the caller
             reason: why, for the log
         """
+
+    @operation("POST", "/api/v1/twins/{vehicle}/drive")
+    def send_car(
+        self, vehicle: str, *, send: str, by: str = "", reason: str = "", idempotency_key: str = ""
+    ) -> Twin:
+        """Send the car that would decide whose another car's change is.
+
+        Args:
+            vehicle: a car's name
+            send: the car to send, as the change's `drive` says
+            by: who requests it, for the log; empty: the caller
+            reason: why, for the log
+        """

@@ -29,6 +29,8 @@ class RouteRequest(Request, kw_only=True, frozen=True):
         laps: How often to pass `via`.
         speed_mps: Desired speed on free road; None: the lanes' limits.
         then: What to do on arrival: `stop` there, or `circulate` so as not to block the lane.
+        replaces: Id of the only trip that this one may replace: a car that is on another, or that
+            somebody else drives or drove since, refuses with `owned`. Empty: any.
     """
 
     KEY: ClassVar[str] = "v/{vehicle}/cmd/route"
@@ -40,6 +42,7 @@ class RouteRequest(Request, kw_only=True, frozen=True):
     laps: int = 1
     speed_mps: float | None = None
     then: Literal["stop", "circulate"] = "stop"
+    replaces: str = ""
 
 
 MESSAGE = RouteRequest

@@ -112,6 +112,7 @@ class TripDriver:
 
         Raises:
             MapError: when the lanes do not exist or cannot be reached.
+            LeaseError: when the request may replace only a trip that the car is not on.
         """
         reply = self._trips.begin(OWN, self._vehicle, request, pose, now_ns)
         self.off_lane = ""

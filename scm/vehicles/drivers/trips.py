@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from scm.clock import NS_PER_S
-from scm.errors import MapError
+from scm.errors import LeaseError, MapError
 from scm.geometry import Pose2
 from scm.maps.route import OnLane
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
@@ -38,6 +38,8 @@ class _ActiveTrip:
     """The requested lanes, laps written out, and the distance at which each of them ends."""
     speed_mps: float | None = None
     then: Literal["stop", "circulate"] = "stop"
+    is_ended: bool = False
+    """Whether somebody else drove the car since."""
 
 
 class Trips:
@@ -81,7 +83,10 @@ class Trips:
         Raises:
             MapError: when the lanes do not exist or cannot be reached, or the car would hit a wall
                 on its way to its lane.
+            LeaseError: when the request may replace only a trip that the car is not on.
         """
+        if request.replaces:
+            self._check_trip(index, request.replaces)
         place, roads = self._nearest_lane(vehicle, pose), self._drivers.lane_graph.roads
         length_m: float | None = None
         passes: tuple[tuple[str, float], ...] = ()
@@ -99,10 +104,21 @@ class Trips:
         trip.passes, trip.speed_mps, trip.then = passes, request.speed_mps, request.then
         return RouteReply(vehicle=vehicle, trip_id=trip.trip_id, route=route, length_m=length_m)
 
+    def _check_trip(self, index: int, trip_id: str) -> None:
+        """Raise LeaseError unless a car is on a trip, or stands since it arrived."""
+        trip = self._trips.get(index)
+        if trip is None or trip.trip_id != trip_id:
+            on = "no trip" if trip is None else f"trip {trip.trip_id!r}"
+            raise LeaseError(f"it is on {on}, expected {trip_id!r}")
+        if trip.is_ended:
+            raise LeaseError(f"somebody drove it since its trip {trip_id!r}")
+
     def end(self, index: int, now_ns: int) -> None:
         """End a car's trip with a last report: somebody else drives it now."""
         if self._under_way[index]:
             self._unsent.append(self._report(index, now_ns))
+        if index in self._trips:
+            self._trips[index].is_ended = True
         self._halt(index)
 
     def _halt(self, index: int) -> None:

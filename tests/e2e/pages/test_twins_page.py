@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from scm.clock import NS_PER_MS
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.v2x.exchange import Answer, Incoming, Outgoing
+from scm.v2x.messages.twin_send_request import TwinSendRequest
 from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.version_request import VersionRequest
 from tests.e2e.pages.test_map_page import is_drawn
@@ -25,21 +26,24 @@ class TwinStub(BasePart):
 
     name, role, period_ns = "twin", "part", 200 * NS_PER_MS
     subscriptions: Sequence[Subscription] = ()
-    services: Sequence[Service] = (Service(VersionRequest),)
+    services: Sequence[Service] = (Service(VersionRequest), Service(TwinSendRequest))
 
     def __init__(self) -> None:
         self.requests: list[Any] = []
-        self.status = watched("n1", NOW_NS)
+        self.status, self.undecided = watched("n1", NOW_NS), undecided("n2", NOW_NS)
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Report; answer requests."""
         del now_ns
         answers = [Answer(item, self._use(item.message)) for item in inbox]
-        return [*answers, self.status, undecided("n2", NOW_NS), blind("n3", NOW_NS),
+        return [*answers, self.status, self.undecided, blind("n3", NOW_NS),
                 floor_changed("n4", NOW_NS)]  # fmt: skip
 
     def _use(self, request: Any) -> TwinStatus:
         self.requests.append(request)
+        if isinstance(request, TwinSendRequest):
+            self.undecided = undecided("n2", NOW_NS, state="under_way", by=request.by, sent=1)
+            return self.undecided
         by = {"by": request.by, "reason": request.reason}
         first, second, third = self.status.versions
         first = replace(first, state="adopted", **by)
@@ -103,9 +107,18 @@ def test_changes_are_shown_and_another_version_is_put_in_force(
         page.goto(f"{running.url}/twins/n2")
         page.wait_for_selector(".change h2 >> text=Looks like steer trim or gyro bias")
         page.wait_for_selector(".decides >> text=Drive a circle")
-        page.wait_for_selector(".decides >> text=Let n1 drive for a minute.")
+        page.wait_for_selector(".decides >> text=Let n1 drive through (1.2, 0.4)")
         page.wait_for_selector("dd >> text=undecided: the car itself 62 %, the floor everywhere")
         look_at(visited, "twin_undecided")
+        page.click(".decides button >> text=Send n1")
+        page.fill("dialog input[name=reason]", "it stands about")
+        judge(visited, "dialog")
+        photograph(visited, "twin_send_dialog")
+        page.keyboard.press("Enter")
+        page.wait_for_selector(".decides >> text=n1 is under way, sent by dashboard")
+        look_at(visited, "twin_under_way")
+        request = stub.requests[-1]
+        assert (request.vehicle, request.send, request.reason) == ("n2", "n1", "it stands about")
         page.goto(f"{running.url}/twins/n4")
         page.wait_for_selector(
             ".change h2 >> text=Not the car: the floor within 0.3 m of (1.2, 0.4)"

@@ -6,6 +6,7 @@ from scm.clock import NS_PER_S
 from scm.records.twins import (
     TwinCause,
     TwinChange,
+    TwinDrive,
     TwinEffect,
     TwinError,
     TwinParameter,
@@ -85,8 +86,8 @@ def watched(vehicle="n1", now_ns=NOW_NS, **more):
     return TwinStatus(vehicle=vehicle, **known | more)
 
 
-def undecided(vehicle="n2", now_ns=NOW_NS):
-    """Return a car whose change two effects explain alike."""
+def undecided(vehicle="n2", now_ns=NOW_NS, **drive):
+    """Return a car whose change two effects explain alike, and whose it is n1 would decide."""
     found = change(
         480, now_ns, search="undecided", between=("steer_trim", "gyro_bias"), drive_this=QUESTION,
         text="It may be steer_trim or gyro_bias.", report="twin-n2-480",
@@ -95,7 +96,9 @@ def undecided(vehicle="n2", now_ns=NOW_NS):
             TwinCause(kind="everywhere", probability=0.34),
             TwinCause(kind="camera", probability=0.04),
         ),
-        decide_by="Let n1 drive for a minute.",
+        decide_by=f"Let n1 drive through (1.2, 0.4), and {vehicle} elsewhere.",
+        drive=TwinDrive(**{"vehicle": "n1", "x_m": 1.2, "y_m": 0.4,
+                           "t_ns": now_ns - 20 * NS_PER_S} | drive),
     )  # fmt: skip
     return watched(vehicle, now_ns, changes=(found,), version=0, versions=(ORIGINAL,))
 

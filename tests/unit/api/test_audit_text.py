@@ -43,6 +43,10 @@ EXAMPLES = {
     ),
     "SpawnRequest": ({"vehicle": "n9", "car": "nigel"}, "add n9, a nigel"),
     "StopRequest": ({"engaged": True}, "stop the city"),
+    "TwinSendRequest": (
+        {"vehicle": "n9", "send": "n5", "by": "ada"},
+        "send n5 to decide whose n9's change is",
+    ),
     "VersionRequest": (
         {"vehicle": "n9", "version": 2, "by": "ada"},
         "predict n9 by version 2 of its file",

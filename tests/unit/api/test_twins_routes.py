@@ -10,6 +10,7 @@ from scm.clock import NS_PER_S
 from scm.records.twins import Twin, TwinCause
 from scm.v2x.message import Refused
 from scm.v2x.messages.presence import Presence
+from scm.v2x.messages.twin_send_request import TwinSendRequest
 from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.version_request import VersionRequest
 from tests.unit.api.conftest import Client, bearer
@@ -100,7 +101,10 @@ def test_car_that_is_gone_for_long_is_forgotten(client, hear):
 def test_car_without_a_status_is_refused_with_what_to_do(client, hear, snapshot, is_watched):
     hear(1.0, snapshot(n1=(0, 0, 0)), *([PART] if is_watched else []))
     body = {"version": 0}
-    for method, path, sent in (("GET", "", {}), ("PUT", "/version", {"json": body})):
+    put, post = {"json": body}, {"json": {"send": "n2"}}
+    for method, path, sent in (
+        ("GET", "", {}), ("PUT", "/version", put), ("POST", "/drive", post)
+    ):  # fmt: skip
         unknown = client(method, f"{URL}/n7{path}", **sent)
         assert (unknown.status_code, unknown.json()["detail"]) == (
             404, "there is no car named 'n7'",
@@ -126,6 +130,24 @@ def test_version_is_put_in_force_in_the_name_of_who_requests_it(client, hear, fa
     assert texts == {"predict a car by another version of its file (n1)"}
 
 
+def test_car_is_sent_in_the_name_of_who_agrees(client, hear, fake_city):
+    hear(1.0, undecided())
+    assert client("GET", f"{URL}/n2").json()["changes"][0]["drive"]["state"] == "open"
+    fake_city.answers[TwinSendRequest] = undecided(state="waiting", by="ada")
+    body = {"send": "n1", "by": "ada", "reason": "it stands about"}
+    answer = client("POST", f"{URL}/n2/drive", json=body, headers={"Idempotency-Key": "k1"})
+    assert (answer.status_code, answer.json()["changes"][0]["drive"]["by"]) == (200, "ada")
+    (request,) = fake_city.asked
+    sent = (request.vehicle, request.send, request.by, request.reason, request.request_id)
+    assert sent == ("n2", "n1", "ada", "it stands about", "k1")
+    detail = "no change of n2 waits to be decided by 'n9', expected n1"
+    fake_city.answers[TwinSendRequest] = Refused(code="not_found", detail=detail)
+    refused = client("POST", f"{URL}/n2/drive", json={"send": "n9"})
+    assert (refused.status_code, refused.json()["detail"]) == (404, detail)
+    for wrong in ({}, {"send": "N 9"}, {"send": "n1", "vehicle": "n2"}):
+        assert client("POST", f"{URL}/n2/drive", json=wrong).status_code == 422
+
+
 def test_unknown_version_is_refused_as_the_part_does(client, hear, fake_city):
     hear(1.0, watched())
     detail = "n1 has no version 9; it has 0 to 2"
@@ -136,12 +158,16 @@ def test_unknown_version_is_refused_as_the_part_does(client, hear, fake_city):
         assert client("PUT", f"{URL}/n1/version", json=wrong).status_code == 422
 
 
-def test_version_needs_an_operator(keyed_app, hear, key_of, fake_city):
+@pytest.mark.parametrize(
+    ("method", "path", "body"),
+    [("PUT", "version", {"version": 1}), ("POST", "drive", {"send": "n2"})],
+)
+def test_change_needs_an_operator(keyed_app, hear, key_of, fake_city, method, path, body):
     hear(1.0, watched())
-    fake_city.answers[VersionRequest] = watched()
+    fake_city.answers |= {VersionRequest: watched(), TwinSendRequest: watched()}
     client, codes = Client(keyed_app), []
     for role in ("viewer", "operator"):
         headers = bearer(key_of(role))
-        answer = client("PUT", f"{URL}/n1/version", json={"version": 1}, headers=headers)
+        answer = client(method, f"{URL}/n1/{path}", json=body, headers=headers)
         codes.append(answer.status_code)
     assert codes == [403, 200]

@@ -8,8 +8,8 @@ import pytest
 from msgspec.structs import replace as replace_struct
 
 from scm.clock import nanoseconds
-from scm.twin.causes import Witness
-from scm.twin.evidence import Evidence
+from scm.twin.causes import located
+from scm.twin.evidence import Evidence, Witness
 from scm.twin.places import NEW_S, PlaceWatch
 from scm.twin.windows import EVERY_S, WatchedNumber, Windows
 
@@ -20,6 +20,7 @@ NUMBERS = tuple(
         ("rolling_resistance", "drive"),
         ("grade", "body"),
         ("gyro_bias", "sensor"),
+        ("pose_scale", "sensor"),
     )
 )
 SIZE = 3.0  # standard deviations of a window, which shows 1 of each number
@@ -163,20 +164,27 @@ def test_what_spreads_around_a_place_is_the_same():
 def test_cars_are_watched_off_the_places_that_changed():
     watch = PlaceWatch(THRESHOLD)
     there = np.array([BEND, (0.0, -1.0)])
-    windows = Windows(np.zeros(2), there, ("gyro",), np.zeros((2, 1)), np.zeros((2, 1, 3)))
+    windows = Windows(np.zeros(2), there, ("gyro",), np.zeros((2, 1)), np.zeros((2, 1, 4)))
     assert len(watch.off(windows).begin_s) == 2
     look(*FELT, watch=watch)
     assert watch.off(windows).places.tolist() == [[0.0, -1.0]]
 
 
-def test_change_of_a_car_is_judged_beyond_the_places_that_changed_and_theirs_are_not():
-    watch = PlaceWatch(THRESHOLD)
-    found = look(*FELT)
-    assert watch.beyond(found.as_change()) is None  # no place changed yet
-    look(*FELT, watch=watch)
-    assert watch.beyond(found.as_change()) is None
-    of_a_car = replace_struct(found.as_change(), noticed_ns=1)
-    assert watch.beyond(of_a_car)(np.array([BEND])).tolist() == [False]
+def test_change_of_a_place_is_judged_by_what_floors_do_and_that_of_a_car_is_not():
+    """A camera changed as well, and shows more than the spill does."""
+
+    def seen(t_s, x, y):
+        return 9.0 * ((t_s >= SINCE_S) & (x < 0.0))
+
+    cars = [replace(drives(k, spilled), cameras=np.where(one.places[:, 0] < 0.0, "west", "east"))
+            for k, one in enumerate(FELT, 1)]  # fmt: skip
+    for one in cars:
+        one.scores[:, 3] += seen(one.t_s, *one.places.T)
+    shown, watch = {f"n{k}": Witness(one, 0.0) for k, one in enumerate(cars)}, PlaceWatch(THRESHOLD)
+    change = watch.look(shown, 400.0).as_change()
+    assert located(change, "n0", shown, watch).cause == "place"
+    of_a_car = replace_struct(change, noticed_ns=change.noticed_ns - 1)
+    assert located(of_a_car, "n0", shown, watch).cause == "camera"
 
 
 def test_cars_of_another_kind_are_left_out_and_those_of_another_version_are_not():

@@ -251,6 +251,21 @@ def test_while_another_drives_a_route_is_refused(inside):
     assert answer.reply.code == "owned"
 
 
+def test_a_route_for_idle_cars_is_refused_until_the_car_has_its_lease_again(inside):
+    inside.step(command(EPOCH + 1, throttle=0.0))
+    inside.steps(1.5)  # nobody commands it any more
+    answer = one(inside.step(RouteRequest(vehicle="n7", replaces="n7-1")), Answer)
+    assert answer.reply.code == "owned"
+    assert inside.part._link.standing == "foreign"
+
+
+def test_a_route_that_may_replace_one_trip_replaces_no_other(inside):
+    answer = one(inside.step(RouteRequest(vehicle="n7", replaces="n7-9")), Answer)
+    assert (answer.reply.code, "it is on trip 'n7-1'" in answer.reply.detail) == ("owned", True)
+    answer = one(inside.step(RouteRequest(vehicle="n7", replaces="n7-1")), Answer)
+    assert isinstance(answer.reply, RouteReply)
+
+
 def test_given_back_before_a_wall_it_stands_and_says_why(inside):
     inside.step(command(EPOCH + 1, throttle=0.0))
     inside.steps(1.5)

@@ -11,6 +11,7 @@ from scm.records.twins import TwinParameter, TwinVersion
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
 from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import load_car
@@ -89,6 +90,8 @@ def test_car_stands_while_a_version_says_that_it_cannot_turn():
         texts = [one.text for one in events if one.name == "limits_changed"]
         assert len(texts) == 1
         assert "n1 does not drive: version 1 of its car file: it turns on a radius" in texts[0]
+        refused = city.call(RouteRequest(vehicle="n1", replaces="n1-1"))
+        assert (refused.code, "it does not drive: version 1" in refused.detail) == ("owned", True)
         city.publish(status(number=0))
         states, events = run(2.0)
         assert states[-1].speed_mps > 0.1

@@ -292,6 +292,18 @@ def test_a_leased_car_cannot_be_sent_by_somebody_else(city):
     assert city.ask(RouteRequest(vehicle="n1")).code == "owned"
 
 
+def test_a_car_that_was_driven_or_sent_since_refuses_to_replace_it(city):
+    city.ask(SpawnRequest(vehicle="n1", spawn="a"))
+    city.ask(RouteRequest(vehicle="n1", via=("west_loop",), request_id="t"))
+    wrong = city.ask(RouteRequest(vehicle="n1", replaces="n1-1"))
+    assert (wrong.code, wrong.detail) == ("owned", "n1: it is on trip 't', expected 'n1-1'")
+    lease = city.lease()
+    city.ask(LeaseRequest(vehicle="n1", owner="ann", verb="release", epoch=lease.epoch))
+    assert city.ask(RouteRequest(vehicle="n1", replaces="t")).code == "owned"
+    assert city.ask(RouteRequest(vehicle="n1", request_id="u")).trip_id == "u"
+    assert city.ask(RouteRequest(vehicle="n1", replaces="u")).trip_id
+
+
 def test_a_theft_is_told_with_its_reason(city):
     city.ask(SpawnRequest(vehicle="n1"))
     city.lease()

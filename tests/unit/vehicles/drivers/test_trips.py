@@ -3,7 +3,7 @@
 import pytest
 
 from scm.clock import NS_PER_MS
-from scm.errors import MapError
+from scm.errors import LeaseError, MapError
 from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.maps.route import Roads
@@ -121,6 +121,20 @@ def test_a_lane_whose_end_is_reached_is_passed(trips, start):
     reply = trips.begin(RouteRequest(vehicle="n7", via=("west_loop",)), start, 0)
     trips.driver.batch.done_m[OWN] = reply.length_m
     assert [trip.via for trip in trips.reports(0)] == [()]
+
+
+def test_a_request_that_may_replace_one_trip_replaces_no_other(trips, start):
+    request = RouteRequest(vehicle="n7", via=("west_loop",), request_id="t", replaces="n7-1")
+    assert trips.begin(request, start, 0).trip_id == "t"
+    with pytest.raises(LeaseError, match="it is on trip 't', expected 'n7-1'"):
+        trips.begin(request, start, 0)
+    trips._trips.end(OWN, 0)
+    with pytest.raises(LeaseError, match="somebody drove it since its trip 't'"):
+        trips.begin(RouteRequest(vehicle="n7", replaces="t"), start, 0)
+    assert trips.begin(RouteRequest(vehicle="n7"), start, 0)
+    trips._trips.forget(OWN)
+    with pytest.raises(LeaseError, match="it is on no trip"):
+        trips.begin(RouteRequest(vehicle="n7", replaces="t"), start, 0)
 
 
 def test_spread_reports_keep_to_their_own_turn(trips, start):

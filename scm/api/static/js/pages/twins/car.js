@@ -38,7 +38,9 @@ export function Car({ name }) {
       ${changes.length > 0 && html`<${TimeLine} car=${body} />`}
     </section>
     <section class="changes" aria-label="Changes">
-      ${changes.map((one) => html`<${Change} key=${one.noticed_ns} change=${one} now_ns=${body.t_ns} />`)}
+      ${changes.map((one) => html`
+        <${Change} key=${one.noticed_ns} vehicle=${name} change=${one} now_ns=${body.t_ns} onChanged=${again} />
+      `)}
       ${!changes.length && html`<div class="panel"><p class="empty">No change was noticed.</p></div>`}
     </section>
     <${Versions} car=${body} onChanged=${again} />

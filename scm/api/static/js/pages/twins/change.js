@@ -3,11 +3,12 @@ import { amounts, nameOf, percent } from "scm/shared/amounts.js";
 import { clock, moment, span, spaced } from "scm/shared/format.js";
 import { html } from "scm/shared/html.js";
 import { ago } from "scm/shared/twins.js";
+import { Deciding } from "scm/pages/twins/deciding.js";
 import { CAUSES, changeInWords, hasReport, SEARCHES } from "scm/pages/twins/words.js";
 
 const LEAST_SHOWN = 0.05; // of probabilities
 
-export function Change({ change, now_ns }) {
+export function Change({ vehicle, change, now_ns, onChanged }) {
   const [word, meaning] = SEARCHES[change.search];
   const [size] = amounts(change.parameter, [change.size], { unit: change.unit });
   const isNamed = change.effects.length > 0;
@@ -29,7 +30,7 @@ export function Change({ change, now_ns }) {
       </dl>
       ${change.effects.map((effect) => html`<${Effect} key=${effect.name} effect=${effect} />`)}
       ${change.drive_this && html`<p class="decides"><b>Drive this to decide${ofWhat(change)}:</b> ${change.drive_this}</p>`}
-      ${change.decide_by && html`<p class="decides"><b>To decide whose it is:</b> ${change.decide_by}</p>`}
+      <${Deciding} vehicle=${vehicle} change=${change} now_ns=${now_ns} onChanged=${onChanged} />
       ${hasReport(change) && html`<p><a href="/mismatch/${change.report}">Report of the search${change.drive_this ? ", with this drive" : ""}</a></p>`}
     </article>
   `;
