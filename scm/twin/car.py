@@ -23,14 +23,7 @@ from scm.records.twins import TwinChange, TwinDrive, TwinVersion
 from scm.twin.causes import ELSEWHERE, cause_in_words, located
 from scm.twin.drives import Reaches, interrupted, is_recent
 from scm.twin.evidence import Witness, witness
-from scm.twin.investigation import (
-    FAILURES,
-    Compared,
-    Explained,
-    compare,
-    explain,
-    why_failed,
-)
+from scm.twin.investigation import FAILURES, Compared, Explained, compare, explain, why_failed
 from scm.twin.memory import CarMemory
 from scm.twin.places import PlaceWatch
 from scm.twin.versions import (
@@ -335,7 +328,8 @@ class TwinCar:
             text = f"It changed again after {last_s - since_s:.0f} s: too soon to search."
             return self._now(change, structs.replace(change, search="failed", text=text))
         number = self.versions.newest[-1].number + 1
-        report = f"twin-{_slug(self.name)}-{seconds(change.since_ns):.0f}"
+        name = re.sub(r"[^a-z0-9]+", "-", self.name.lower())
+        report = f"twin-{name}-{seconds(change.since_ns):.0f}"
         low_s, high_s = (
             seconds(t_ns - self._begin_ns) for t_ns in (change.since_low_ns, change.since_high_ns)
         )
@@ -499,7 +493,3 @@ class TwinCar:
             severity=severity, source=NAME, t_ns=self.newest_ns, name=name, vehicle=self.name,
             text=text,
         )  # fmt: skip
-
-
-def _slug(name: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", name.lower())
