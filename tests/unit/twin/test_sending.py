@@ -7,6 +7,7 @@ from scm.clock import NS_PER_S
 from scm.maps.load import load_map
 from scm.records.twins import TwinDrive
 from scm.twin.car import Setup, TwinCar
+from scm.twin.places import PlaceWatch
 from scm.twin.sending import BUSY_NS, LAPS, LASTS_NS, TRIP_KNOWN_NS, WAITS_NS, Sending
 from scm.v2x.exchange import Call, Incoming
 from scm.v2x.message import Refused
@@ -48,7 +49,7 @@ class Town:
 
     def __init__(self, when="agreed", of=None, **drive):
         self.sending, self.now_ns = Sending(when), 100 * NS_PER_S
-        setup = Setup(1.0, lambda car: None, None, None, 0.0)
+        setup = Setup(1.0, lambda car: None, PlaceWatch(1.0), None, None, 0.0)
         self.car = TwinCar(state("n3"), self.now_ns, setup)
         self.car.remembers = lambda change: True
         self.car.newest_ns = self.now_ns
