@@ -73,8 +73,8 @@ class PlaceChange:
         where = f"within {self.radius_m:.2g} m of ({self.x_m:.1f}, {self.y_m:.1f})"
         ago_s = self.noticed_s - self.since_s[0]
         *others, last = self.vehicles
-        cars = f"{', '.join(others)} and {last}" if others else last
-        return f"{cars} drive otherwise {where}, since {ago_s:.0f} s: as by {self.number.effect}"
+        cars = f"{', '.join(others)} and {last} drive" if others else f"{last} drives"
+        return f"{cars} otherwise {where}, since {ago_s:.0f} s: as by {self.number.effect}"
 
 
 class PlaceWatch:
