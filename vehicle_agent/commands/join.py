@@ -33,7 +33,35 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--after-s", type=float, default=0.0, metavar="S", help="when it becomes so (%(default)g)"
     )
+    _reality_arguments(parser)
     _real_arguments(parser)
+
+
+def _reality_arguments(parser: argparse.ArgumentParser) -> None:
+    reality = parser.add_argument_group(
+        "a car of the independent reality", "in a clone of the repository; see docs/trials.md"
+    )
+    reality.add_argument(
+        "--body", choices=("simulated", "reality"), default="simulated",
+        help="what simulates the car (%(default)s)",
+    )  # fmt: skip
+    reality.add_argument("--engine", default="own", help="that moves it (%(default)s)")
+    reality.add_argument(
+        "--conceal", default="", metavar="EFFECT",
+        help="that it gets after --after-s, unreported; drawn: any",
+    )  # fmt: skip
+    reality.add_argument(
+        "--course", choices=("step", "ramp", "intermittent"), default="step",
+        help="how it comes (%(default)s)",
+    )  # fmt: skip
+    reality.add_argument(
+        "--lasts-s", type=float, default=120.0, metavar="S",
+        help="until a ramp is complete, or what came is gone (%(default)g)",
+    )  # fmt: skip
+    reality.add_argument(
+        "--strength", type=float, default=2.0,
+        help="in multiples of the smallest size that 90 s of driving can show (%(default)g)",
+    )  # fmt: skip
 
 
 def _body_of(arguments: argparse.Namespace) -> "str | BodyKind":
@@ -41,16 +69,38 @@ def _body_of(arguments: argparse.Namespace) -> "str | BodyKind":
     from scm.errors import RunError
     from vehicle_agent.body import BodyKind
 
-    if arguments.becomes is None:
+    is_other = arguments.body == "reality"
+    if arguments.becomes is None and not is_other:
+        if arguments.conceal:
+            raise RunError("--conceal: only a car of --body reality conceals something")
         return "nigel" if arguments.serial else "simulated"
+    option = "--body" if is_other else "--becomes"
     if arguments.serial:
-        raise RunError("--becomes: a car that is simulated changes so, no real one (--serial)")
-    if not 0.0 <= arguments.after_s < math.inf:
-        raise RunError(f"--after-s: expected 0 or more, got {arguments.after_s:g}")
+        raise RunError(f"{option}: a car that is simulated changes so, no real one (--serial)")
+    if is_other and arguments.becomes is not None:
+        raise RunError("--becomes: not with --body reality, whose cars change by --conceal")
+    for name in ("after_s", "lasts_s", "strength"):
+        value = getattr(arguments, name)
+        if not 0.0 <= value < math.inf:
+            raise RunError(f"--{name.replace('_', '-')}: expected 0 or more, got {value:g}")
+    if is_other:
+        return _of_reality(arguments)
     from vehicle_agent.bodies.simulated import Change, SimulatedBody
 
     change = Change(arguments.becomes, arguments.after_s)
     return BodyKind("remote", lambda car, seed, _: SimulatedBody(car, seed, change))
+
+
+def _of_reality(arguments: argparse.Namespace) -> "BodyKind":
+    """Return a car of the reality; what is not possible is refused before it joins."""
+    from vehicle_agent.bodies.reality import changing
+    from vehicle_agent.body import BodyKind
+
+    body = changing(
+        arguments.car, arguments.seed, arguments.engine, arguments.conceal, arguments.course,
+        arguments.strength, arguments.after_s, arguments.lasts_s,
+    )  # fmt: skip
+    return BodyKind("remote", lambda *_: body)
 
 
 def _real_arguments(parser: argparse.ArgumentParser) -> None:
