@@ -7,7 +7,7 @@ driving. Nothing of the scene reaches the parts but what cars and cameras do.
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -246,9 +246,13 @@ class _Listener:
             return
         new = car.adopted[-1]
         files = [car.versions[number].file for number in (new.after, new.number)]
+        try:
+            recording = recording_of(seen_by_eye(messages), Path(name), name, BEGIN_NS)
+        except ScmError:
+            return  # it was not driven since
+        recording = replace(recording, begin_s=0.0)
         for begins_s in np.arange(new.t_s, new.t_s + LATER_S, CHUNK_S).tolist():
             try:
-                recording = recording_of(seen_by_eye(messages), Path(name), name, BEGIN_NS)
                 done = compare(part_of(recording, begins_s, begins_s + CHUNK_S), *files)
             except ScmError:
                 continue  # it stood, or the city ended
