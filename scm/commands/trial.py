@@ -78,6 +78,9 @@ def _live_arguments(parser: argparse.ArgumentParser) -> None:
     live.add_argument("--hours", type=float, default=2.0, help="of its time (%(default)g)")
     live.add_argument("--map", default="driving_school", help="(%(default)s)")
     live.add_argument(
+        "--budget-s", type=float, default=300.0, help="of processor time, a search (%(default)g)"
+    )
+    live.add_argument(
         "--no-search", action="store_true", help="notice and attribute changes, name none"
     )
 
@@ -114,7 +117,7 @@ def _run_live(arguments: argparse.Namespace) -> int:
     city = CityRequest(
         seed=arguments.seed, cars=arguments.cars, hours=arguments.hours, engine=arguments.engine,
         strength=(low, high), healthy=arguments.kind == "none", map=arguments.map,
-        search=not arguments.no_search,
+        search=not arguments.no_search, budget_s=arguments.budget_s,
     )  # fmt: skip
     cities = 1 if arguments.cases is None else arguments.cases
     trial = run.LiveTrial(city, cities)

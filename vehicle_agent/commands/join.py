@@ -2,11 +2,11 @@
 
 import argparse
 import gc
-import math
 import threading
 from typing import TYPE_CHECKING
 
 from scm.command import Command, credentials_argument, credentials_of, spawn_argument
+from vehicle_agent.becoming import becomes_arguments, change_of, not_below_0
 
 if TYPE_CHECKING:
     from vehicle_agent.body import BodyKind
@@ -26,13 +26,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="glued onto its roof; default: as its --calibration says, else as the city gives it",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="of the sensors' noise (%(default)s)")
-    parser.add_argument(
-        "--becomes", metavar="FILE", help="car file that is true of it later, unreported: for "
-        "trying scm twin",
-    )  # fmt: skip
-    parser.add_argument(
-        "--after-s", type=float, default=0.0, metavar="S", help="when it becomes so (%(default)g)"
-    )
+    becomes_arguments(parser)
     _reality_arguments(parser)
     _real_arguments(parser)
 
@@ -79,15 +73,11 @@ def _body_of(arguments: argparse.Namespace) -> "str | BodyKind":
         raise RunError(f"{option}: a car that is simulated changes so, no real one (--serial)")
     if is_other and arguments.becomes is not None:
         raise RunError("--becomes: not with --body reality, whose cars change by --conceal")
-    for name in ("after_s", "lasts_s", "strength"):
-        value = getattr(arguments, name)
-        if not 0.0 <= value < math.inf:
-            raise RunError(f"--{name.replace('_', '-')}: expected 0 or more, got {value:g}")
     if is_other:
         return _of_reality(arguments)
-    from vehicle_agent.bodies.simulated import Change, SimulatedBody
+    change = change_of(arguments)
+    from vehicle_agent.bodies.simulated import SimulatedBody
 
-    change = Change(arguments.becomes, arguments.after_s)
     return BodyKind("remote", lambda car, seed, _: SimulatedBody(car, seed, change))
 
 
@@ -96,6 +86,7 @@ def _of_reality(arguments: argparse.Namespace) -> "BodyKind":
     from vehicle_agent.bodies.reality import changing
     from vehicle_agent.body import BodyKind
 
+    not_below_0(arguments, "after_s", "lasts_s", "strength")
     body = changing(
         arguments.car, arguments.seed, arguments.engine, arguments.conceal, arguments.course,
         arguments.strength, arguments.after_s, arguments.lasts_s,

@@ -3,6 +3,7 @@
 A city that was played is not played again: a trial that was interrupted goes on with the others.
 """
 
+import math
 from concurrent.futures import Executor, as_completed
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -52,6 +53,8 @@ def check(trial: LiveTrial) -> None:
     low, high = city.strength
     if not 0.0 < low <= high:
         raise RunError(f"--strength: expected two numbers above 0 that rise, got {low:g} {high:g}")
+    if not 0.0 < city.budget_s < math.inf:
+        raise RunError(f"--budget-s: expected more than 0, got {city.budget_s:g}")
     reality("scenes")
     engine_of(city.engine)
 

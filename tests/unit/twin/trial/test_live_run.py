@@ -144,6 +144,7 @@ def test_faults_of_a_camera_and_of_a_tag_are_in_its_poses():
         (["--cars", "99"], "--cars: expected 1 to 10"),
         (["--cases", "0"], "--cases: expected at least 1"),
         (["--strength", "3", "2"], "--strength: expected two numbers above 0 that rise"),
+        (["--budget-s", "0"], "--budget-s: expected more than 0"),
         (["--kind", "pair"], "--kind: expected mixed or none with --live"),
         (["--family", "drawn"], "--family: not with --live"),
     ],
