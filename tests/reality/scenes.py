@@ -27,13 +27,12 @@ from tests.reality.sensing import FAULTS
 
 OWN, ALL = ("car", "tag"), ""
 EFFECTS_OF = {
-    "car": ("steer_trim", "drive_gain", "rolling_resistance", "payload", "steer_gain"),
     "tag": ("pose_point",),
     "place": ("surface_patch",),
     "camera": ("pose_scale",),
     "everywhere": ("rolling_resistance", "grade"),
 }
-"""Of each kind the effects that may set in; of a car, `of_cars` has more."""
+"""Of each kind the effects that may set in; those of one car: `of_cars`."""
 OF_CARS = {"drive", "steering", "tyre", "body"}
 SENSED = ("gyro_bias", "gyro_scale", "encoder_loss", "wheel_radius")
 NOT_OF_A_CAR = {"grade", "wind", "surface_patch"}

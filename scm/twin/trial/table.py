@@ -59,7 +59,8 @@ def each(judged: Judged) -> list[str]:
         parts = [f"after {one.noticed_s:.0f} s", f"whose {one.cause}"]
         parts += [f"onset {one.onset_off_s:+.1f} s"] if one.onset_off_s is not None else []
         parts += [f"onset {one.onset_off:+.2f} of the ramp"] if one.onset_off is not None else []
-        parts += [f"named {one.named}"] if one.named else []
+        when = "" if one.named_s is None else f" {one.named_s:.0f} s after it began"
+        parts += [f"named {one.named}{when}"] if one.named else []
         parts += [f"version {one.version} {one.later}".rstrip()] if one.version else []
         found.append(f"{line}{', '.join(parts)}: {one.text}")
     for alarm in judged.false_alarms:

@@ -1,16 +1,20 @@
 """A car of the independent reality as an agent's body: its numbers change, which nobody reports."""
 
+import math
+
 import numpy as np
 import pytest
 
 from scm.clock import NS_PER_S
 from scm.errors import RunError
 from scm.geometry import Pose2
+from scm.vehicles.car import load_car
 from tests.reality.motion import Moving
 from tests.reality.numbers import nominal
 from vehicle_agent.__main__ import main
 from vehicle_agent.bodies import reality as of_reality
 from vehicle_agent.bodies.reality import RealityBody, changing
+from vehicle_agent.bodies.simulated import SimulatedBody
 
 TICK_NS = NS_PER_S // 50
 BEGIN_NS = 100 * NS_PER_S
@@ -85,6 +89,23 @@ def test_commands_of_20_hz_and_of_an_agent_move_a_car_alike():
         drive(body, 2.0)
         ends.append(body.pose.x)
     assert ends[0] == pytest.approx(ends[1], abs=2e-4)
+
+
+def test_it_drives_as_our_own_car_whose_wheels_have_a_motor_each(tmp_path):
+    head, section, rest = load_car("nigel").path.read_text("utf-8").partition("[drive]")
+    path = tmp_path / "nigel.toml"
+    comment, _, rest = rest.partition("\n")
+    path.write_text(f"{head}{section}{comment}\naxle_lock = {{ value = 1.0 }}\n{rest}", "utf-8")
+    given, ends = nominal("nigel"), []
+    theirs = RealityBody("nigel", Moving, lambda *_: given, np.random.default_rng(0))
+    for body in (theirs, SimulatedBody(str(path), 0)):
+        body.place(Pose2(0.0, 0.0, 0.0), BEGIN_NS)
+        for tick in range(1, 301):
+            body.command(0.7, 0.5 if tick < 150 else -0.5)
+            body.advance(BEGIN_NS + tick * TICK_NS)
+        ends.append(body.motion().pose)
+    assert math.hypot(ends[0].x - ends[1].x, ends[0].y - ends[1].y) < 0.003
+    assert ends[0].yaw == pytest.approx(ends[1].yaw, abs=0.003)
 
 
 @pytest.mark.parametrize(
