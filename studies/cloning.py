@@ -97,10 +97,9 @@ def run(
         parts: list[Part] = [world, cameras, driver]
         place: Put = partial(world.world.host, VEHICLE, CAR, begin, 0)
         if engine != "city":
-            from studies.reality_body import RealityBody  # noqa: PLC0415  needs a clone
+            from studies.reality_body import concealing  # noqa: PLC0415  needs a clone
 
-            lasts_s = STARTS_S + laps * lane.length_m / SLOWEST_MPS
-            body = RealityBody(engine, concealed, lasts_s, case.generator("reality"))
+            body = concealing(engine, concealed, case.generator("reality"))
             remote = BodyKind("remote", lambda *_: body)
             parts = [world, AgentPart(VEHICLE, CAR, as_text(begin), body=remote), *parts[1:]]
             place = lambda: body  # noqa: E731

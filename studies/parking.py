@@ -116,9 +116,9 @@ def run(
         if engine == "city":
             put = partial(world.world.host, VEHICLE, CAR, begin, 0)
             return _park(case, [world, noisy_agent], agent, put, target, cross)
-        from studies.reality_body import RealityBody  # noqa: PLC0415  needs a clone
+        from studies.reality_body import concealing  # noqa: PLC0415  needs a clone
 
-        body = RealityBody(engine, concealed, LASTS_S, case.generator("reality"))
+        body = concealing(engine, concealed, case.generator("reality"))
         driven = AgentPart(VEHICLE, CAR, as_text(begin), body=BodyKind("remote", lambda *_: body))
         parts = [world, driven, noisy_agent]
         return _park(case, parts, agent, lambda: body, target, cross)

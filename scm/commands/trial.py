@@ -1,4 +1,7 @@
-"""`scm trial`: effects concealed in an independent simulation, diagnosed blind, then scored."""
+"""`scm trial`: effects concealed in an independent simulation, diagnosed blind, then scored.
+
+With `--live`, cars of that simulation change in a running city, and the twin part is scored.
+"""
 
 import argparse
 import sys
@@ -14,18 +17,22 @@ if TYPE_CHECKING:
 
     from scm.progress import Progress
 
+CASES, STRENGTH, LIVE_STRENGTH = 40, (1.0, 4.0), (2.0, 3.0)
+
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     from scm.mismatch.trial.run import ENGINES, FAMILIES, HALVES, KINDS
 
     parser.add_argument("--seed", type=int, default=0, help="of all randomness (%(default)s)")
-    parser.add_argument("--cases", type=int, default=40, help="how many (%(default)s)")
+    parser.add_argument(
+        "--cases", type=int, help=f"how many ({CASES}); with --live: how many cities (1)"
+    )
     parser.add_argument(
         "--kind", choices=KINDS, default="mixed", help="what to conceal (%(default)s)"
     )
     parser.add_argument(
-        "--strength", type=float, nargs=2, default=(1.0, 4.0), metavar=("LOW", "HIGH"),
-        help="size of effects, in multiples of the smallest that a drive can show (1 4)",
+        "--strength", type=float, nargs=2, metavar=("LOW", "HIGH"),
+        help="size of effects, in multiples of the smallest that can be shown (1 4; --live: 2 3)",
     )  # fmt: skip
     parser.add_argument(
         "--engine",
@@ -54,6 +61,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="score the stored diagnoses of --out again, without new ones",
     )
+    _live_arguments(parser)
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
     where.add_argument(
@@ -61,15 +69,67 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _live_arguments(parser: argparse.ArgumentParser) -> None:
+    live = parser.add_argument_group(
+        "live", "cars change in a running city; --kind mixed or none, --engine, --seed as above"
+    )
+    live.add_argument("--live", action="store_true", help="score scm twin instead of scm mismatch")
+    live.add_argument("--cars", type=int, default=6, help="of each city (%(default)s)")
+    live.add_argument("--hours", type=float, default=2.0, help="of its time (%(default)g)")
+    live.add_argument("--map", default="driving_school", help="(%(default)s)")
+    live.add_argument(
+        "--budget-s", type=float, default=300.0, help="of processor time, a search (%(default)g)"
+    )
+    live.add_argument(
+        "--no-search", action="store_true", help="notice and attribute changes, name none"
+    )
+
+
 def _run(arguments: argparse.Namespace) -> int:
     from scm.clock import WallClock
     from scm.progress import Progress
 
+    if arguments.live:
+        return _run_live(arguments)
     out = arguments.out or Path("runs") / f"trial-{_title(arguments)}"
     with closing(Progress(sys.stderr, WallClock())) as progress:
         lines = _table(arguments, out, progress)
     print("\n".join(lines))
     print(f"\nwritten to {out}: recordings, labels and their seals, each diagnosis, this table")
+    return 0
+
+
+def _run_live(arguments: argparse.Namespace) -> int:
+    from scm.clock import WallClock
+    from scm.errors import RunError
+    from scm.mismatch.trial.run import processes
+    from scm.progress import Progress
+    from scm.twin.trial import run
+    from scm.twin.trial.city import CityRequest
+
+    for option, usual in (("trials", None), ("scheduler", None), ("family", "own"), ("only", "")):
+        if getattr(arguments, option) != usual:
+            raise RunError(f"--{option}: not with --live")
+    if arguments.kind not in ("mixed", "none"):
+        raise RunError(f"--kind: expected mixed or none with --live, got {arguments.kind}")
+    out = arguments.out or Path("runs") / f"trial-live-{arguments.seed}"
+    low, high = arguments.strength or LIVE_STRENGTH
+    city = CityRequest(
+        seed=arguments.seed, cars=arguments.cars, hours=arguments.hours, engine=arguments.engine,
+        strength=(low, high), healthy=arguments.kind == "none", map=arguments.map,
+        search=not arguments.no_search, budget_s=arguments.budget_s,
+    )  # fmt: skip
+    cities = 1 if arguments.cases is None else arguments.cases
+    trial = run.LiveTrial(city, cities)
+    if arguments.kept:
+        rows = run.judged_again(out)
+    else:
+        run.check(trial)
+        workers = min(arguments.workers, cities) if cities > 1 else 0
+        with closing(Progress(sys.stderr, WallClock())) as progress, processes(workers) as executor:
+            rows = run.run(trial, out, executor, progress.step)
+    print("\n".join(rows))
+    print(f"\nwritten to {out}: labels and their seals, what cities found, result.json, this table")
     return 0
 
 
@@ -98,9 +158,10 @@ def _diagnosed(
         return run.on_shipped_cases(
             folder, out, by_engine, only, executor=executor, notify=progress.step
         )
-    low, high = arguments.strength
+    low, high = arguments.strength or STRENGTH
+    cases = CASES if arguments.cases is None else arguments.cases
     plan = CaseRequest(
-        seed=arguments.seed, cases=arguments.cases, kind=arguments.kind,
+        seed=arguments.seed, cases=cases, kind=arguments.kind,
         engine=arguments.engine, strength=(low, high), family=arguments.family,
         half=arguments.half,
     )  # fmt: skip

@@ -204,9 +204,7 @@ class TwinCar:
         messages = self._messages
         if self._is_seen is None:
             self._is_seen = sum(map(len, messages.seen.values())) >= FEWEST_SEEN
-        if self._is_seen:
-            reports = [report._replace(source=BY_EYE) for report in messages.reports]
-            messages = replace(messages, reports=reports)
+        messages = seen_by_eye(messages) if self._is_seen else messages
         return recording_of(messages, Path(NAME), self.name, self._begin_ns)
 
     def _camera(self) -> str:
@@ -493,3 +491,9 @@ class TwinCar:
             severity=severity, source=NAME, t_ns=self.newest_ns, name=name, vehicle=self.name,
             text=text,
         )  # fmt: skip
+
+
+def seen_by_eye(messages: CarMessages) -> CarMessages:
+    """Return a car's messages as those of one of which only the Eye knows where it is."""
+    reports = [report._replace(source=BY_EYE) for report in messages.reports]
+    return replace(messages, reports=reports)

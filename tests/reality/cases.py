@@ -228,11 +228,27 @@ def _turns_both_ways(drive: Drive) -> bool:
 
 
 def _label(kind, car, effects, ordinary, file_numbers, drive):
+    return {
+        **described(effects, car),
+        "kind": kind,
+        "ordinary": ordinary_of(ordinary, file_numbers),
+        "span": drive.span,
+        "vmax": drive.fastest,
+        "route": drive.shape,
+    }
+
+
+def ordinary_of(numbers: dict[str, float], file_numbers: dict[str, float]) -> dict[str, float]:
+    """Return the numbers in which a car differs from its file, by the file's keys."""
+    moved = [name for name in (*SCATTER, *TOGETHER) if numbers[name] != file_numbers[name]]
+    return {KEYS[name]: numbers[name] for name in moved}
+
+
+def described(effects: list[tuple[str, float, Drawn]], car: str) -> dict:
+    """Return what a label says of effects."""
     known = [EFFECTS[name] for name, _, _ in effects]
-    moved = [name for name in (*SCATTER, *TOGETHER) if ordinary[name] != file_numbers[name]]
     return {
         "case": "+".join(effect.name for effect in known) or "nothing",
-        "kind": kind,
         "names": [effect.name for effect in known],
         "car": car,
         "equation": "+".join(effect.equation for effect in known),
@@ -243,10 +259,6 @@ def _label(kind, car, effects, ordinary, file_numbers, drive):
         "strength": [strength for _, strength, _ in effects],
         "law": "; ".join(drawn.law for _, _, drawn in effects if drawn.law),
         "listed": bool(known) and all(effect.listed for effect in known),
-        "ordinary": {KEYS[name]: ordinary[name] for name in moved},
-        "span": drive.span,
-        "vmax": drive.fastest,
-        "route": drive.shape,
     }
 
 
@@ -254,6 +266,16 @@ def seal(label: dict, salt: str) -> str:
     """Return the hash that commits to a label without giving it away."""
     text = json.dumps({"salt": salt, "label": label}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def write_label(out: Path, name: str, label: dict, rng: np.random.Generator) -> str:
+    """Write the label of a case with a salt; return its seal."""
+    salt = rng.bytes(16).hex()
+    labels = out / "labels"
+    labels.mkdir(exist_ok=True)
+    text = json.dumps({"salt": salt, "label": label}, sort_keys=True, indent=1)
+    (labels / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+    return seal(label, salt)
 
 
 def write_cases(
@@ -278,12 +300,7 @@ def write_cases(
         name = f"case_{k:03d}"
         for drive_name, drive in drives.items():
             write(drive, stated_car, numbers, out / name / drive_name, moving)
-        salt = rng.bytes(16).hex()
-        labels = out / "labels"
-        labels.mkdir(exist_ok=True)
-        text = json.dumps({"salt": salt, "label": label}, sort_keys=True, indent=1)
-        (labels / f"{name}.json").write_text(text + "\n", encoding="utf-8")
-        sealed.append(f"{seal(label, salt)}  {name}")
+        sealed.append(f"{write_label(out, name, label, rng)}  {name}")
         say(f"{k + 1} of {len(kinds)}")
     (out / "sealed.txt").write_text("\n".join(sealed) + "\n", encoding="utf-8")
 

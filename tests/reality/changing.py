@@ -6,6 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 
+def share_of(t, since, until, back=math.inf):
+    """Return how far a change is at times, 0 to 1, that goes on from one to another, then back."""
+    return np.clip((t - since) / max(until - since, 1e-9), 0.0, 1.0) * (t < back)
+
+
 @dataclass(frozen=True)
 class Changing:
     """Two sets of numbers, and when the one turns into the other [s]; both the same: a step.
@@ -21,8 +26,7 @@ class Changing:
 
     def share(self, t):
         """Return how far the change is at times, 0 to 1."""
-        done = np.clip((t - self.since) / max(self.until - self.since, 1e-9), 0.0, 1.0)
-        return done * (t < self.back)
+        return share_of(t, self.since, self.until, self.back)
 
     def at(self, t):
         """Return all numbers at a time."""

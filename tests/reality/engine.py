@@ -132,7 +132,7 @@ class Engine(ABC):
     def command(self, k, throttle, steering):
         """Give command `k`, drive until the next one is due, and return the new rows."""
         self.throttle[k], self.steering[k] = throttle, steering
-        count = motion.ROWS_PER_COMMAND
+        count = motion.rows_per_command(self.numbers)
         out = np.empty((count, len(motion.ROW)))
         for row in range(count):
             self._row(k * count + row, out[row])

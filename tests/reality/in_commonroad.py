@@ -271,8 +271,8 @@ def advance(numbers, state, wheels, x, given, throttle, steering, shake, first, 
     shafts = np.empty((4, 3))
     for k in range(steps):
         t = (first + k) * STEP_S
-        motion.steer(c, s, t, motion.held(steering, t - c.steer_delay), motion.held(shake, t))
-        u = motion.drive(c, s, t, motion.held(throttle, t - c.drive_delay))
+        motion.steer(c, s, t, motion.held(c, steering, t - c.steer_delay), motion.held(c, shake, t))
+        u = motion.drive(c, s, t, motion.held(c, throttle, t - c.drive_delay))
         along, across, twist = motion.outside_force(c, s, t)
         slow = abs(s.throttle) < 0.005
         for i in range(4):

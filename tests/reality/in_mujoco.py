@@ -73,8 +73,8 @@ def push(numbers, state, wheels, places, qpos, qvel, forces, t, throttle, steeri
     """Advance steering, drive and wheels by one step, and lay all forces on the bodies."""
     c, s = numbers[0], state[0]
     see(c, s, qpos, qvel)
-    motion.steer(c, s, t, motion.held(steering, t - c.steer_delay), motion.held(shake, t))
-    u = motion.drive(c, s, t, motion.held(throttle, t - c.drive_delay))
+    motion.steer(c, s, t, motion.held(c, steering, t - c.steer_delay), motion.held(c, shake, t))
+    u = motion.drive(c, s, t, motion.held(c, throttle, t - c.drive_delay))
     along, across, twist = motion.outside_force(c, s, t)
     slow, tan = abs(s.throttle) < 0.005, math.tan(s.angle)
     cos_yaw, sin_yaw = math.cos(s.yaw), math.sin(s.yaw)

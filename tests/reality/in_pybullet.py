@@ -82,8 +82,8 @@ def _act(numbers, state, wheels, loads, spins, t, throttle, steering, shake, out
         out: Two angles, four torques, four dry frictions, force east and north, and a moment.
     """
     c, s = numbers[0], state[0]
-    motion.steer(c, s, t, motion.held(steering, t - c.steer_delay), motion.held(shake, t))
-    u = motion.drive(c, s, t, motion.held(throttle, t - c.drive_delay))
+    motion.steer(c, s, t, motion.held(c, steering, t - c.steer_delay), motion.held(c, shake, t))
+    u = motion.drive(c, s, t, motion.held(c, throttle, t - c.drive_delay))
     along, across, out[12] = motion.outside_force(c, s, t)
     slow, tan = abs(s.throttle) < 0.005, math.tan(s.angle)
     for i in range(4):

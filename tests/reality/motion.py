@@ -23,7 +23,7 @@ FIRST_ORDER, SECOND_ORDER, LOADED = 1, 2, 3
 SMOOTH, MIDPOINT = 1, 1
 
 STEP = EQUATIONS["step"]
-ROW_S, COMMAND_S, ROWS_PER_COMMAND = STEP * 10, STEP * 200, 20
+ROW_S, COMMAND_S = STEP * 10, EQUATIONS["command"]
 TYRE_STIFFNESS, TYRE_DAMPING = 2.0e4, 10.0
 YIELD_LAG = 0.001  # of wheels that give way: what damps a stiff rod
 WARM_S = 60.0
@@ -362,9 +362,9 @@ def under_axle(c, s):
 
 
 @njit(cache=True)
-def held(commands, t):
+def held(c, commands, t):
     """Return the command of the last row at or before `t`; zero before the first."""
-    row = math.floor(t / COMMAND_S + 1e-6)
+    row = math.floor(t / c.command + 1e-6)
     return commands[min(row, len(commands) - 1)] if row >= 0 else 0.0
 
 
@@ -379,8 +379,8 @@ def advance(numbers, state, wheels, throttle, steering, shake, first, rows):
     for row in range(rows):
         for k in range(steps):
             t = ((first + row) * steps + k) * c.step
-            steer(c, s, t, held(steering, t - c.steer_delay), held(shake, t))
-            u = drive(c, s, t, held(throttle, t - c.drive_delay))
+            steer(c, s, t, held(c, steering, t - c.steer_delay), held(c, shake, t))
+            u = drive(c, s, t, held(c, throttle, t - c.drive_delay))
             move(c, s, wheels, t, u)
         out[row, 0] = (first + row + 1) * steps * c.step
         out[row, 1], out[row, 2] = under_axle(c, s)
@@ -391,8 +391,13 @@ def advance(numbers, state, wheels, throttle, steering, shake, first, rows):
     return out
 
 
+def rows_per_command(numbers):
+    """Return how many rows a command is in force."""
+    return round(float(numbers["command"][0]) / ROW_S)
+
+
 class Moving:
-    """A car on the floor that is driven by commands of 20 Hz; any family's.
+    """A car on the floor that is driven by commands, usually of 20 Hz; any family's.
 
     Args:
         numbers: Of the car, effects among them.
@@ -419,7 +424,8 @@ class Moving:
     def command(self, k, throttle, steering):
         """Give command `k`, drive until the next one is due, and return the new rows."""
         self.throttle[k], self.steering[k] = throttle, steering
+        count = rows_per_command(self.numbers)
         return advance(
             self.numbers, self.state, self.wheels, self.throttle, self.steering, self.shake,
-            k * ROWS_PER_COMMAND, ROWS_PER_COMMAND,
+            k * count, count,
         )  # fmt: skip

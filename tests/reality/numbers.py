@@ -77,11 +77,12 @@ NEUTRAL = {
 }  # fmt: skip
 
 # Which equations a car has, as places in `family.ASPECTS`, and their own numbers; here the usual.
+# `command`: for how long each command is in force [s].
 EQUATIONS = {
     "tyre": 0.0, "combined_slip": 0.0, "suspension": 0.0, "motor": 0.0, "servo": 0.0,
     "friction": 0.0, "body": 0.0, "step": 0.00025, "tyre_shape": 1.5, "tyre_bend": 0.0,
     "side_tyre_shape": 1.5, "side_tyre_bend": 0.0, "winding_lag": 0.002, "current_limit": 1.0,
-    "servo_lag": 0.01, "servo_load": 0.0, "stribeck": 0.0,
+    "servo_lag": 0.01, "servo_load": 0.0, "stribeck": 0.0, "command": 0.05,
 }  # fmt: skip
 
 # How far ordinary cars of one type differ, relative standard deviations.

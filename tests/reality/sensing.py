@@ -34,6 +34,16 @@ def column(rows, name, t):
     return values[low] * (1.0 - part) + values[low + 1] * part
 
 
+def seen(f, x, y, yaw):
+    """Return a pose as a camera and a tag with faults show it, but for the camera's delay."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    x += cos * f["point_x"] - sin * f["point_y"]
+    y += sin * f["point_x"] + cos * f["point_y"]
+    depth = (1.0 + f["tilt_x"] * x + f["tilt_y"] * y) / f["scale"]
+    depth /= 1.0 + f["scale_per_x"] * abs(x)
+    return x / depth, y / depth, yaw + f["heading"]
+
+
 class Camera:
     """The overhead camera: when it sees, and what it says the pose is."""
 
@@ -58,12 +68,7 @@ class Camera:
                 if len(rows) < 2
                 else (float(column(rows, name, t)) for name in ("x", "y", "yaw"))
             )
-            cos, sin = math.cos(yaw), math.sin(yaw)
-            x += cos * f["point_x"] - sin * f["point_y"]
-            y += sin * f["point_x"] + cos * f["point_y"]
-            depth = (1.0 + f["tilt_x"] * x + f["tilt_y"] * y) / f["scale"]
-            depth /= 1.0 + f["scale_per_x"] * abs(x)
-            pose = np.array((x / depth, y / depth, yaw + f["heading"])) + self.noise[self.next]
+            pose = np.array(seen(f, x, y, yaw)) + self.noise[self.next]
             if self.rounded[0] > 0.0:
                 pose = self.rounded * np.round(pose / self.rounded)
             self.poses[self.next] = pose

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 from scm.clock import NS_PER_MS
 from scm.command import Command, credentials_argument, credentials_of, spawn_argument
+from vehicle_agent.becoming import becomes_arguments, change_of
 from vehicle_agent.emulate.sketches import DEADBAND, SKETCHES, Sketch
 
 if TYPE_CHECKING:
     from threading import Event
 
     from scm.clock import Clock
+    from vehicle_agent.bodies.simulated import Change
     from vehicle_agent.emulate.device import Device
 
 POLL_NS = 2 * NS_PER_MS
@@ -47,6 +49,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--deadband", type=float, default=DEADBAND,
         help="share of the throttle that does not turn the motor (%(default)s)",
     )  # fmt: skip
+    becomes_arguments(parser)
     parser.add_argument(
         "--faults", nargs="+", default=[], metavar="FAULT",
         help="what goes wrong: noise=HZ flip=P lose=P cut=P, reset=HZ or reset@T, brownout, unplug",
@@ -65,6 +68,9 @@ def _run(arguments: argparse.Namespace) -> int:
         raise RunError("--lidar-link: expected --connect as well: it sees a city's map")
     if not 0.0 <= arguments.deadband < 1.0:
         raise RunError(f"--deadband: got {arguments.deadband}, expected 0 to 1")
+    if arguments.becomes is not None and arguments.connect is None:
+        raise RunError("--becomes: expected --connect as well: without a city no car moves")
+    change = change_of(arguments)
     clock, sketch, stop = WallClock(), SKETCHES[arguments.baud_of], stop_on_signal()
     device = _device(arguments, sketch, clock)
     print(
@@ -75,7 +81,7 @@ def _run(arguments: argparse.Namespace) -> int:
         if arguments.connect is None:
             _serve(device, clock, stop)
         else:
-            _join(arguments, device, sketch, clock, stop)
+            _join(arguments, device, sketch, clock, stop, change)
     finally:
         device.close()
     return 0
@@ -106,8 +112,9 @@ def _serve(device: "Device", clock: "Clock", stop: "Event") -> None:
 
 
 def _join(
-    arguments: argparse.Namespace, device: "Device", sketch: Sketch, clock: "Clock", stop: "Event"
-) -> None:
+    arguments: argparse.Namespace, device: "Device", sketch: Sketch, clock: "Clock", stop: "Event",
+    change: "Change | None",
+) -> None:  # fmt: skip
     from scm.runtime.live import run
     from scm.v2x.bus_zenoh import ZenohBus
     from scm.v2x.key import check_name
@@ -120,7 +127,7 @@ def _join(
     station = check_name(station_of(check_name(arguments.name, "--name")), "--name")
     check_name(arguments.city, "--city")
     credentials = credentials_of(arguments, station)
-    wheels = Wheels(sketch.at_setup, arguments.car, arguments.deadband)
+    wheels = Wheels(sketch.at_setup, arguments.car, arguments.deadband, change)
     scanner = None
     if arguments.lidar_link is not None:
         scanner = Scanner(Cable(arguments.lidar_link), load_car(arguments.car), arguments.seed)

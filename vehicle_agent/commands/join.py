@@ -2,11 +2,11 @@
 
 import argparse
 import gc
-import math
 import threading
 from typing import TYPE_CHECKING
 
 from scm.command import Command, credentials_argument, credentials_of, spawn_argument
+from vehicle_agent.becoming import becomes_arguments, change_of, not_below_0
 
 if TYPE_CHECKING:
     from vehicle_agent.body import BodyKind
@@ -26,14 +26,36 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="glued onto its roof; default: as its --calibration says, else as the city gives it",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="of the sensors' noise (%(default)s)")
-    parser.add_argument(
-        "--becomes", metavar="FILE", help="car file that is true of it later, unreported: for "
-        "trying scm twin",
-    )  # fmt: skip
-    parser.add_argument(
-        "--after-s", type=float, default=0.0, metavar="S", help="when it becomes so (%(default)g)"
-    )
+    becomes_arguments(parser)
+    _reality_arguments(parser)
     _real_arguments(parser)
+
+
+def _reality_arguments(parser: argparse.ArgumentParser) -> None:
+    reality = parser.add_argument_group(
+        "a car of the independent reality", "in a clone of the repository; see docs/trials.md"
+    )
+    reality.add_argument(
+        "--body", choices=("simulated", "reality"), default="simulated",
+        help="what simulates the car (%(default)s)",
+    )  # fmt: skip
+    reality.add_argument("--engine", default="own", help="that moves it (%(default)s)")
+    reality.add_argument(
+        "--conceal", default="", metavar="EFFECT",
+        help="that it gets after --after-s, unreported; drawn: any",
+    )  # fmt: skip
+    reality.add_argument(
+        "--course", choices=("step", "ramp", "intermittent"), default="step",
+        help="how it comes (%(default)s)",
+    )  # fmt: skip
+    reality.add_argument(
+        "--lasts-s", type=float, default=120.0, metavar="S",
+        help="until a ramp is complete, or what came is gone (%(default)g)",
+    )  # fmt: skip
+    reality.add_argument(
+        "--strength", type=float, default=2.0,
+        help="in multiples of the smallest size that 90 s of driving can show (%(default)g)",
+    )  # fmt: skip
 
 
 def _body_of(arguments: argparse.Namespace) -> "str | BodyKind":
@@ -41,16 +63,35 @@ def _body_of(arguments: argparse.Namespace) -> "str | BodyKind":
     from scm.errors import RunError
     from vehicle_agent.body import BodyKind
 
-    if arguments.becomes is None:
+    is_other = arguments.body == "reality"
+    if arguments.becomes is None and not is_other:
+        if arguments.conceal:
+            raise RunError("--conceal: only a car of --body reality conceals something")
         return "nigel" if arguments.serial else "simulated"
+    option = "--body" if is_other else "--becomes"
     if arguments.serial:
-        raise RunError("--becomes: a car that is simulated changes so, no real one (--serial)")
-    if not 0.0 <= arguments.after_s < math.inf:
-        raise RunError(f"--after-s: expected 0 or more, got {arguments.after_s:g}")
-    from vehicle_agent.bodies.simulated import Change, SimulatedBody
+        raise RunError(f"{option}: a car that is simulated changes so, no real one (--serial)")
+    if is_other and arguments.becomes is not None:
+        raise RunError("--becomes: not with --body reality, whose cars change by --conceal")
+    if is_other:
+        return _of_reality(arguments)
+    change = change_of(arguments)
+    from vehicle_agent.bodies.simulated import SimulatedBody
 
-    change = Change(arguments.becomes, arguments.after_s)
     return BodyKind("remote", lambda car, seed, _: SimulatedBody(car, seed, change))
+
+
+def _of_reality(arguments: argparse.Namespace) -> "BodyKind":
+    """Return a car of the reality; what is not possible is refused before it joins."""
+    from vehicle_agent.bodies.reality import changing
+    from vehicle_agent.body import BodyKind
+
+    not_below_0(arguments, "after_s", "lasts_s", "strength")
+    body = changing(
+        arguments.car, arguments.seed, arguments.engine, arguments.conceal, arguments.course,
+        arguments.strength, arguments.after_s, arguments.lasts_s,
+    )  # fmt: skip
+    return BodyKind("remote", lambda *_: body)
 
 
 def _real_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ import math
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.geometry import Pose2
 from scm.records.city_map import CityMap
-from vehicle_agent.bodies.simulated import SimulatedBody
+from vehicle_agent.bodies.simulated import Change, SimulatedBody
 from vehicle_agent.body import Motion
 from vehicle_agent.emulate.firmware import Firmware
 from vehicle_agent.emulate.sketches import DEADBAND, Outputs
@@ -53,11 +53,15 @@ class Wheels:
         straight: The pins with its wheels straight ahead.
         car: Car file's name.
         deadband: Duty below which the motor does not turn.
+        change: After which it is another car, as with a weaker motor; None: it stays as it is.
     """
 
-    def __init__(self, straight: Outputs, car: str = "nigel", deadband: float = DEADBAND) -> None:
+    def __init__(
+        self, straight: Outputs, car: str = "nigel", deadband: float = DEADBAND,
+        change: Change | None = None,
+    ) -> None:  # fmt: skip
         self._straight, self._deadband = straight, deadband
-        self._body = SimulatedBody(car, 0)
+        self._body = SimulatedBody(car, 0, change)
         self._steering = 0.0
         self._now_ns: int | None = None
 

@@ -91,6 +91,15 @@ def open_label(folder: Path, case: str, digest: str) -> Label:
     Raises:
         RecordingError: when it is not the label that was sealed.
     """
+    return label_of(case, opened(folder, case, digest))
+
+
+def opened(folder: Path, case: str, digest: str) -> Mapping[str, Any]:
+    """Read the fields of one label and check them against its seal.
+
+    Raises:
+        RecordingError: when it is not the label that was sealed.
+    """
     path = folder / "labels" / f"{case}.json"
     held = json.loads(path.read_text(encoding="utf-8"))
     text = json.dumps({"salt": held["salt"], "label": held["label"]}, sort_keys=True)
@@ -98,7 +107,8 @@ def open_label(folder: Path, case: str, digest: str) -> Label:
     if got != digest:
         msg = f"{path}: not what was sealed: expected SHA-256 {digest}, got {got}"
         raise RecordingError(msg)
-    return label_of(case, held["label"])
+    fields: Mapping[str, Any] = held["label"]
+    return fields
 
 
 def label_of(case: str, fields: Mapping[str, Any]) -> Label:

@@ -16,6 +16,8 @@ from scm.v2x.messages.emulated_pose import EmulatedPose
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.v2x.messages.world_snapshot import SnapshotVehicle, WorldSnapshot
 from scm.v2x.rights import rights_of
+from scm.vehicles.car import load_car
+from vehicle_agent.bodies.simulated import Change
 from vehicle_agent.emulate.part import EmulatorPart, place_of, station_of
 from vehicle_agent.emulate.sketches import SKETCHES, Outputs
 from vehicle_agent.emulate.wheels import Wheels, throttle_of, wheel_angle
@@ -225,3 +227,18 @@ def test_a_guarded_city_lets_it_say_the_truth_and_no_vehicle_hear_it():
     assert [prefix("city") + pattern for pattern in rights.subscribes] == received_bytes
     assert not any(fnmatchcase(key, pattern) for pattern in rights_of("vehicle", "n7").subscribes)
     assert any(fnmatchcase(key, pattern) for pattern in rights_of("part", "eye").subscribes)
+
+
+def test_it_becomes_a_car_with_a_weaker_motor(tmp_path):
+    text = load_car("nigel").path.read_text("utf-8")
+    weak = tmp_path / "weak.toml"
+    text = text.replace("terms = [", 'terms = ["drive_gain",', 1)
+    head, _, rest = text.partition("[drive]")
+    rest = rest.partition("\n")[2]
+    weak.write_text(f"{head}[drive]\ngain = {{ value = 0.5 }}\n{rest}", "utf-8")
+    wheels = Wheels(TWO.at_setup, change=Change(str(weak), 3.0))
+    wheels.place(Pose2(0.0, 0.0, 0.0), 0)
+    now_ns = drive(wheels, 0, 2.9, pins(0.7))
+    before_mps = wheels.motion().speed
+    drive(wheels, now_ns, 3.0, pins(0.7))
+    assert wheels.motion().speed < 0.7 * before_mps

@@ -19,7 +19,7 @@ from tests.reality.numbers import GRAVITY, file_of, nominal
 from tests.reality.recorded import record
 from tests.reality.sensing import FAULTS
 
-COMMAND = motion.ROWS_PER_COMMAND
+COMMAND = round(motion.COMMAND_S / motion.ROW_S)
 
 
 @pytest.fixture(scope="module", params=["commonroad", "pybullet", "mujoco"])

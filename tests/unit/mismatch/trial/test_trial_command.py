@@ -14,7 +14,7 @@ def test_options_have_sensible_values_unasked():
     arguments = build_parser().parse_args(["trial"])
     assert (arguments.kind, arguments.engine, arguments.workers) == ("mixed", "own", 2)
     assert (arguments.family, arguments.half) == ("own", None)
-    assert tuple(arguments.strength) == (1.0, 4.0)
+    assert (arguments.cases, arguments.strength, arguments.live) == (None, None, False)
 
 
 def test_a_half_of_usual_families_is_refused(tmp_path, capsys):
