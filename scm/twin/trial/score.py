@@ -107,7 +107,7 @@ def judge_city(case: str, label: Mapping[str, Any], found: CityFound, judged: Ju
         moments = moments_of(name, label["changes"], found.lasted_s)
         of_moment = _matched(car, moments, found.begin_ns)
         for moment in moments:
-            changes = of_moment.get(id(moment), [])
+            changes = of_moment.get(id(moment)) or _by_others(moment, found)
             judged.outcomes.append(_outcome(case, name, moment, moments, changes, car, found))
         for change in of_moment.get(0, []):
             judged.false_alarms.append(
@@ -152,6 +152,17 @@ def _matched(
         key = id(before[-1]) if before else 0
         found.setdefault(key, []).append(car.changes[noticed_ns])
     return found
+
+
+def _by_others(moment: _Moment, found: CityFound) -> list[TwinChange]:
+    """Return the change of a place that another car reported, for all that drive there."""
+    reported = (one for car in found.cars.values() for one in car.changes.values())
+    there = [
+        one for one in reported
+        if -EARLY_S <= seconds(one.noticed_ns - found.begin_ns) - moment.at_s <= WITHIN_S
+        and one.cause == "place" and any(_is_there(one, true) for true in moment.changes)
+    ]  # fmt: skip
+    return sorted(there, key=lambda one: one.noticed_ns)[:1]
 
 
 def _outcome(

@@ -32,15 +32,18 @@ def reported(noticed_s=640.0, since_s=601.0, names=(), cause="undecided", at=Non
     )  # fmt: skip
 
 
-def judged_of(truth, changes, adopted=(), versions=()):
-    """Return how one car that drives half of the time is judged."""
+def judged_of(truth, changes, adopted=(), versions=(), by_others=()):
+    """Return how a car that drives half of the time is judged, and one beside it if it reports."""
     car = CarFound(
         driven=[(0.0, 0.0), (LASTED_S, 0.5 * LASTED_S)],
         changes={one.noticed_ns: one for one in changes},
         versions={one.number: one for one in versions}, adopted=list(adopted),
     )  # fmt: skip
     judged = Judged()
-    found = CityFound(begin_ns=BEGIN_NS, lasted_s=LASTED_S, cars={"n1": car})
+    cars = {"n1": car}
+    if by_others:
+        cars["n2"] = CarFound(changes={one.noticed_ns: one for one in by_others})
+    found = CityFound(begin_ns=BEGIN_NS, lasted_s=LASTED_S, cars=cars)
     judge_city("case_000", {"changes": truth}, found, judged)
     return judged
 
@@ -106,6 +109,16 @@ def test_alarm_of_nothing_is_false_whenever_it_comes():
         judged = judged_of([true(of=of)], [reported(noticed_s)])
         assert [alarm.at_s for alarm in judged.false_alarms] == [noticed_s]
     assert any("2.40 an hour" in line for line in lines(judged))
+
+
+@pytest.mark.parametrize(("at", "noticed"), [(1.1, True), (2.5, False)])
+def test_place_is_noticed_for_all_cars_by_the_one_that_reports_it(at, noticed):
+    spill = [true("place", name="surface_patch")]
+    judged = judged_of(spill, [], by_others=[reported(cause="place", at=at)])
+    mine, other = judged.outcomes
+    assert (mine.noticed_s is not None, other.cause) == (noticed, "right" if noticed else "wrong")
+    undecided = judged_of(spill, [], by_others=[reported()])
+    assert undecided.outcomes[0].noticed_s is None
 
 
 def test_that_something_is_gone_again_is_a_change():
