@@ -31,6 +31,7 @@ class Evidence:
         scores, information: Of each number, (n, numbers).
         inflation: Variance of sums of scores over that of independent windows, (numbers,).
         most: Windows that are remembered.
+        is_steady: Whether the car strays as it did when that was learned by which they are weighed.
     """
 
     numbers: Sequence[WatchedNumber]
@@ -41,6 +42,7 @@ class Evidence:
     information: Floats
     inflation: Floats
     most: int = MOST
+    is_steady: bool = True
 
     @classmethod
     def none(cls, numbers: Sequence[WatchedNumber]) -> "Evidence":

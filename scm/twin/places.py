@@ -16,6 +16,7 @@ import numpy as np
 from scm.arrays import Bools, Floats
 from scm.clock import nanoseconds
 from scm.records.twins import TwinChange
+from scm.twin.detector import LEARN
 from scm.twin.evidence import Witness
 from scm.twin.windows import WatchedNumber, Windows
 
@@ -95,10 +96,11 @@ class PlaceWatch:
         """Return the place that changed most, if one did since it last changed.
 
         Args:
-            cars: Of the city.
+            cars: Of the city; one that has just changed itself shows no place.
             now_s: On its clock; what was driven later does not count.
         """
-        rows = [_rows(name, one, self.found, now_s) for name, one in cars.items()]
+        steady = {name: one for name, one in cars.items() if one.evidence.is_steady}
+        rows = [_rows(name, one, self.found, now_s) for name, one in steady.items()]
         new = [one for one in self.found if now_s - one.noticed_s < NEW_S]
         found = _changed(rows, new, now_s, self._threshold)
         if found is not None:
@@ -250,7 +252,8 @@ def _moves(rows: list[_Rows], inside: list[Bools], since_s: float) -> tuple[Floa
         rest = [_sums(one, ~there & which & one.is_usual) for which in (after, before)]
         mean = USUAL / max(int(before.sum()), 1)  # so many windows as they usually are
         usual = then + mean * _sums(one, (before & one.is_usual)[None])
-        usual = np.where((there & before).sum(axis=1)[:, None] < FEWEST, 0.0, usual)
+        is_known = (there & before).sum(axis=1)[:, None] >= FEWEST
+        usual = np.where(is_known & (before.sum() >= LEARN), usual, 0.0)
         count += (there & after).sum(axis=1)[:, None]
         here, shift = _change(now, usual), _change(*rest)  # by place, and elsewhere
         moved.append(here[0] - shift[0])

@@ -25,6 +25,7 @@ from scm.vehicles.car import Car
 
 SPAN_S, PART_S = 10.0, 100.0  # parts are cut out at once: a cut reads all that it cuts from
 BEFORE_S, AFTER_S = 2.0, 1.0
+ANEW_S = 360.0  # of driving after a change: until then it is judged by what was before
 SPANS_A_PLACE = 3  # after so many, places are looked at: each half minute
 
 
@@ -78,7 +79,7 @@ class CarWatch:
         self._usual: Usual | None = None
         self._early = list[tuple[Windows, str]]()  # until it is known how the car strays
         self.evidence = Evidence.none(predictor.watched)
-        self.driven_s = self.highest = 0.0
+        self.driven_s = self.highest = self._changed_s = 0.0
 
     @property
     def car(self) -> Car:
@@ -110,6 +111,7 @@ class CarWatch:
             self.highest = max(self.highest, self._detector.highest)
         if change is None:
             return None
+        self.evidence.is_steady, self._changed_s = False, self.driven_s
         driven_s = self._detector.driven_s
         self._detector = Detector(self._threshold)
         watched = self._predictor.watched
@@ -119,9 +121,14 @@ class CarWatch:
     def _remember(self, windows: Windows, camera: str) -> None:
         """Add windows to the evidence, weighed by how the car strays; early ones when it is known.
 
-        After a change they are weighed as before it, until it is known how the car strays now.
+        All are weighed by what was learned first: otherwise they could not be compared. Some time
+        after a change, they begin anew, weighed by how the car strays now.
         """
-        self._usual = self._detector.usual or self._usual
+        usual = self._detector.usual
+        is_over = not self.evidence.is_steady and self.driven_s - self._changed_s > ANEW_S
+        if self._usual is None or (is_over and usual is not None):
+            most, self._usual = self.evidence.most, usual
+            self.evidence = replace(Evidence.none(self._predictor.watched), most=most)
         self._early.append((windows, camera))
         if self._usual is not None:
             for early, by in self._early:

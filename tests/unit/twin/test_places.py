@@ -134,6 +134,23 @@ def test_where_a_car_never_was_before_it_shows_no_change():
     assert look(*late, watch=PlaceWatch(5.0)) is None
 
 
+def test_car_that_has_just_changed_itself_shows_no_place():
+    changed = [replace(one, is_steady=False) for one in FELT[:2]]
+    assert look(*changed, FELT[2]) is None
+    assert look(changed[0], *FELT[1:]).vehicles == ("n1", "n2")
+
+
+def test_cars_have_to_be_known_for_as_long_as_for_changes_of_their_own():
+    new = [
+        replace(one, **{
+            name: getattr(one, name)[one.t_s > SINCE_S - 100.0]
+            for name in ("t_s", "places", "cameras", "scores", "information")
+        })
+        for one in FELT
+    ]  # fmt: skip
+    assert look(*new) is None
+
+
 def test_floor_biases_no_gyro():
     assert look(*(drives(k, spilled, number=2) for k in (1, 2, 3))) is None
 

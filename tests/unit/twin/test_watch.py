@@ -1,13 +1,15 @@
 """A car's recording goes in, and since when it has changed comes out."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from scm.recording.read import Channel
 from scm.twin.detector import threshold_of
-from scm.twin.watch import CarWatch, watch
+from scm.twin.evidence import Evidence
+from scm.twin.watch import ANEW_S, CarWatch, watch
 from scm.twin.windows import WatchedCar
 from tests.unit.mismatch.made_drive import made_drive, nigel
 
@@ -78,3 +80,28 @@ def test_numbers_of_all_parts_of_a_car_are_watched(predictor):
 
 def test_fewer_false_alarms_take_a_higher_score():
     assert threshold_of(20.0) < threshold_of(200.0) < threshold_of(2000.0)
+
+
+def test_windows_are_weighed_by_what_was_learned_first_until_long_after_a_change(
+    predictor, monkeypatch
+):
+    """How a car strays is learned twice; windows weighed otherwise could not be compared."""
+    used, car = [], CarWatch(predictor, THRESHOLD)
+    monkeypatch.setattr(Evidence, "add", lambda evidence, windows, usual, by: used.append(usual))
+    detector = car._detector = SimpleNamespace(usual=None)
+
+    def drive(until_s, learned):
+        car.driven_s, detector.usual = until_s, learned
+        car._remember(None, "west")
+        return used[-1:]
+
+    assert drive(10.0, None) == []
+    assert drive(200.0, "first") == ["first"]
+    assert len(used) == 2
+    assert drive(600.0, "well") == ["first"]
+    car.evidence.is_steady, car._changed_s = False, 600.0
+    assert drive(610.0, None) == ["first"]
+    assert drive(600.0 + ANEW_S, "anew") == ["first"]
+    assert not car.evidence.is_steady
+    assert drive(601.0 + ANEW_S, "anew") == ["anew"]
+    assert car.evidence.is_steady
