@@ -137,7 +137,7 @@ def judged(
     """Yield the first change of each car and those of places, some time after each [s]."""
     threshold = threshold_of(FALSE_ALARM_H)
     places, noticed = PlaceWatch(threshold), list[Judged]()
-    watches = {f"n{k}": CarWatch(predictor, threshold, places) for k in range(len(recordings))}
+    watches = {f"n{k}": CarWatch(predictor, threshold) for k in range(len(recordings))}
     for k, first_s in enumerate(np.arange(0.0, LASTS_S, SPAN_S).tolist()):
         for (name, watch), recording in zip(watches.items(), recordings, strict=True):
             part = part_of(recording, first_s - BEFORE_S, first_s + SPAN_S + AFTER_S)

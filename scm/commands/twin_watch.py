@@ -46,7 +46,7 @@ def _run(arguments: argparse.Namespace) -> int:
         name = arguments.car or recording.vehicle
         if name not in cars:
             cars[name] = WatchedCar(load_car(name, trusted=arguments.car is not None))
-        one = watches[recording.name] = CarWatch(cars[name], threshold, places)
+        one = watches[recording.name] = CarWatch(cars[name], threshold)
         one.evidence.most = sys.maxsize
     changes = watch_all({one.name: (one, watches[one.name]) for one in found}, places)
     watched = {name: (one, changes[name]) for name, one in watches.items()}

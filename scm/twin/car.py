@@ -175,8 +175,8 @@ class TwinCar:
             if self.newest_ns - self.next_ns >= DUE_NS:
                 self._remember()
             if self._watch is None:
-                setup, file = self._setup, self.versions.in_force.file
-                self._watch = CarWatch(setup.predictor(file), setup.threshold, setup.places)
+                file = self.versions.in_force.file
+                self._watch = CarWatch(self._setup.predictor(file), self._setup.threshold)
             if self._memory.last_s >= self._watched_s + SPAN_S:
                 out += self._watch_on(self._watch)
             self._reason = ""

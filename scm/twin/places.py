@@ -18,10 +18,10 @@ from scm.clock import nanoseconds
 from scm.records.twins import TwinChange
 from scm.twin.detector import LEARN
 from scm.twin.evidence import Witness
-from scm.twin.windows import WatchedNumber, Windows
+from scm.twin.windows import WatchedNumber
 
 MOST = 50  # places that are remembered
-EFFECTS = ("rolling_resistance", "grade", "tyre_grip", "tyre_stiffness")  # what a floor does
+EFFECTS = ("rolling_resistance", "grade", "tyre_grip")  # what a floor does
 RADIUS_M = 0.35
 GRID_M = 0.2  # between the middles of places
 SINCE_S = (60.0, 120.0, 240.0, 480.0)
@@ -31,7 +31,7 @@ SHOWN = 2.5  # standard deviations: a car shows it
 ALSO = 4.0  # that all cars but the plainest have to show
 FEWEST = 6  # windows there, of all cars since, and of a car before
 USUAL = 3.0  # windows of all driving before, that count beside those there
-MOST_STEPS = 20.0  # that a floor changes by
+LEAST_STEPS, MOST_STEPS = 1.0, 20.0  # that a floor changes by, as far as it matters
 NEW_S = 600.0  # so long after one was noticed, what is seen around it is the same
 REACH_M = 0.5  # around a place that changed: the rest of it, and windows that touch it
 
@@ -106,10 +106,6 @@ class PlaceWatch:
         if found is not None:
             self.found.append(found)
         return found
-
-    def off(self, windows: Windows) -> Windows:
-        """Return the windows of a car that lie off all places that changed."""
-        return windows.those(self.is_off(windows.places))
 
     def has_found(self, change: TwinChange) -> bool:
         """Return whether a change is of a place, not of a car."""
@@ -187,13 +183,14 @@ def _changed(
 def _scores(rows: list[_Rows], inside: list[Bools], since_s: float) -> Floats:
     """Return how plainly each place changed by each number, (places, numbers); 0: it did not."""
     size, spread, also = _pooled(*_moves(rows, inside, since_s))
-    steps = MOST_STEPS * np.array([one.step for one in rows[0].numbers])
+    steps = np.array([one.step for one in rows[0].numbers])
     every = [np.ones((1, len(one.t_s)), dtype=bool) for one in rows]
     moved, variance = _moves(rows, every, since_s)
     shown = moved / np.sqrt(variance)
     everywhere = np.maximum(_rest(shown), _rest(-shown))
     score = np.abs(size) / spread
-    counts = (also >= ALSO) & (np.abs(size) < steps) & (score > everywhere.max())
+    is_likely = (np.abs(size) >= LEAST_STEPS * steps) & (np.abs(size) < MOST_STEPS * steps)
+    counts = (also >= ALSO) & is_likely & (score > everywhere.max())
     return np.asarray(np.where(counts, score, 0.0))
 
 

@@ -62,7 +62,6 @@ class CarWatch:
     Args:
         predictor: Of cars of its version; several cars may share it.
         threshold: Score from which on a change is reported.
-        places: Where the floor changed: by what the car misses there, it did not.
 
     Attributes:
         driven_s: How long it was driven and seen.
@@ -70,10 +69,8 @@ class CarWatch:
         highest: Score that the newest span reaches, to be held against the threshold.
     """
 
-    def __init__(
-        self, predictor: WatchedCar, threshold: float, places: PlaceWatch | None = None
-    ) -> None:
-        self._predictor, self._threshold, self._places = predictor, threshold, places
+    def __init__(self, predictor: WatchedCar, threshold: float) -> None:
+        self._predictor, self._threshold = predictor, threshold
         self._detector = Detector(threshold)
         self._streams: tuple[str, ...] | None = None
         self._usual: Usual | None = None
@@ -105,8 +102,7 @@ class CarWatch:
         change, self.highest = None, 0.0
         for windows in self._windows(recording, first_s, last_s):
             self.driven_s += EVERY_S * len(windows.begin_s)
-            off = windows if self._places is None else self._places.off(windows)
-            change = change or self._detector.update(off)
+            change = change or self._detector.update(windows)
             self._remember(windows, camera)
             self.highest = max(self.highest, self._detector.highest)
         if change is None:
@@ -164,8 +160,8 @@ def watch_all(
     """Watch the recorded cars of one run side by side, and the places where they drive.
 
     Args:
-        cars: By name; they share `places`, which has what changed there afterwards.
-        places: Where they drive.
+        cars: By name.
+        places: Where they drive; it has what changed there afterwards.
 
     Returns:
         The changes of each car, in the order in which they would have been noticed.

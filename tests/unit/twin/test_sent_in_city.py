@@ -32,7 +32,7 @@ class Shown:
 
     is_learning, driven_s, is_known = False, 0.0, False
 
-    def __init__(self, predictor, threshold, places):
+    def __init__(self, predictor, threshold):
         self._rng = np.random.default_rng(7)
         empty = np.empty((0, len(NUMBERS)))
         none = np.empty(0)
