@@ -109,6 +109,8 @@ def located(
     is_of_place = places is not None and places.has_found(change)
     is_off = None if places is None or is_of_place else places.is_off
     effects = EFFECTS if is_of_place else None
+    if is_of_place:  # a car that changed itself as well is no witness of it
+        cars = {n: one for n, one in cars.items() if one.evidence.is_steady or n == vehicle}
     causes = causes_of(vehicle, since_s, cars, is_off, effects)
     own_s = [one.probability for one in causes if one.kind in OWN]
     is_sure = max(causes[0].probability, sum(own_s) if causes[0].kind in OWN else 0.0) >= SURE

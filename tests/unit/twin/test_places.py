@@ -196,6 +196,19 @@ def test_change_of_a_place_is_judged_by_what_floors_do_and_that_of_a_car_is_not(
     assert located(of_a_car, "n0", shown, watch).cause == "camera"
 
 
+def test_car_that_changed_itself_is_no_witness_of_a_place():
+    changed = drives(4, lambda *at: 9.0 * everywhere(*at), number=1)
+    watch, both = PlaceWatch(THRESHOLD), {"n0": FELT[0], "n1": FELT[1]}
+    shown = {name: Witness(one, 0.0) for name, one in both.items()}
+    change = watch.look(shown, 400.0).as_change()
+    unsteady = replace(changed, is_steady=False)
+    causes = [
+        located(change, "n0", {**shown, "n2": Witness(one, 0.0)}, watch).cause
+        for one in (unsteady, changed)
+    ]
+    assert causes == ["place", "everywhere"]
+
+
 def test_cars_of_another_kind_are_left_out_and_those_of_another_version_are_not():
     def of(numbers):
         return replace(FELT[1], numbers=numbers)
