@@ -23,7 +23,8 @@ from scm.replay.numbers import (
     Numbers,
 )
 from scm.vehicles.car import Car
-from scm.vehicles.fleet import Fleet, VehicleStatus
+from scm.vehicles.fleet import Fleet
+from scm.vehicles.vehicle_status import VehicleStatus
 
 BEYOND_STEPS = 3  # behind the last edge, for which commands hold
 RECORDED_STATES = ("x", "y", *MOTION_VARIABLES, "yaw")

@@ -36,8 +36,8 @@ class CommandHistory:
         """Memory per car."""
         return (KNOTS * 3 + 1 + 2) * 8
 
-    def reset(self, row: int, throttle: float, steering: float | None) -> None:
-        """Restart with these past commands; None: the first command to come."""
+    def reset(self, row: int | Ints, throttle: float, steering: float | None) -> None:
+        """Restart cars with these past commands; None: the first command to come."""
         self._knots[row] = 0.0
         self._newest[row] = 0
         self._before[row] = throttle, math.nan if steering is None else steering

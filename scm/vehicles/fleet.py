@@ -6,15 +6,15 @@ centre on the ground; wheel order is front-left, front-right, rear-left, rear-ri
 
 import math
 from collections.abc import Sequence
-from enum import IntEnum
 from itertools import pairwise
+from typing import Any, cast
 
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import RunError, TermError, nearest
 from scm.geometry import Pose2
-from scm.vehicles.body14 import GRAVITY, STATUS_DIVERGED, STATUS_OK, STATUS_ROLLED, sprung_part
+from scm.vehicles.body14 import GRAVITY, sprung_part
 from scm.vehicles.car import Car
 from scm.vehicles.command_delay import COMMANDS, DELAYS, CommandHistory
 from scm.vehicles.compiler.kernel_file import compile_kernel
@@ -35,30 +35,12 @@ from scm.vehicles.fleet_rows import (
 from scm.vehicles.jit import plain
 from scm.vehicles.layout import columns_of, find_column, rows_of
 from scm.vehicles.physics_variables import VARIABLES
+from scm.vehicles.placing import directions
 from scm.vehicles.shape import Shape, shape_function
 from scm.vehicles.term import reads
+from scm.vehicles.vehicle_status import VehicleStatus
 
 SUBSTEP_S = 1e-3
-
-
-class VehicleStatus(IntEnum):
-    """The state of a car in the kernel."""
-
-    OK = STATUS_OK
-    DIVERGED = STATUS_DIVERGED
-    ROLLED = STATUS_ROLLED
-
-    @property
-    def sentence(self) -> str:
-        """The state in words."""
-        if self is VehicleStatus.OK:
-            return "The car drives."
-        if self is VehicleStatus.ROLLED:
-            return "The car rolled over: it is frozen where it last stood on its wheels."
-        return (
-            "The car's motion left every physical range, or a command was no number: it is frozen "
-            "where it last made sense."
-        )
 
 
 _TILES_A_THREAD = 8  # below, a second thread costs more than it does
@@ -246,17 +228,42 @@ class Fleet:
             self._history.reset(row, throttle, 0.0 if steer_angle is None else None)
         self._run(row, row + 1, 0, SUBSTEP_S)
 
-    def _roll(self, row: int, shape: Shape, speed: float, yaw_rate: float) -> None:
-        """Initialise a placed car's wheels: rolling without slip, under the static load."""
-        car, param = self._block[:, row], self._parameter
-        offset = self._offsets["wheel_speed"][0]
-        half = 0.5 * param(row, "track") * yaw_rate
+    def place_rows(self, rows: Ints, poses: Floats, speed: Floats) -> None:
+        """Restart many rows at once, poses (n, 3) and speeds (n,); see `place`.
+
+        Wheels are straight, lags and servo at rest. Where a row stands in the fleet, and which
+        others are placed with it, changes no bit of it.
+        """
+        self._block[:, rows] = 0.0
+        shape = self._shape_of(lambda key: self.parameters[rows, self._places[key]])
+        cog, (s, c) = shape.cog_to_rear_axle, directions(poses[:, 2])
+        for name, value in {
+            "x_cog": poses[:, 0] + c * cog, "y_cog": poses[:, 1] + s * cog,
+            "z_cog": shape.cog_height, "yaw": poses[:, 2], "vx_world": c * speed,
+            "vy_world": s * speed, "battery": self._nominal_battery(rows), "floor_grip": 1.0,
+            **self._states,
+        }.items():  # fmt: skip
+            self._set(rows, name, value)
+        for values in (self.contact_accel_x, self.contact_accel_y, self.contact_yaw_accel):
+            values[rows] = 0.0
+        self._roll(rows, shape, speed, 0.0)
+        self.status[rows] = VehicleStatus.OK
+        if self._history is not None:
+            self._history.reset(rows, 0.0, 0.0)
+        if len(rows):
+            first, last = (LANES * (int(row) // LANES) for row in (rows.min(), rows.max()))
+            self._run(first, min(last + LANES, self.capacity), 0, SUBSTEP_S)
+
+    def _roll(
+        self, row: int | Ints, shape: Shape, speed: float | Floats, yaw_rate: float
+    ) -> None:
+        """Initialise placed cars' wheels: rolling without slip, under the static load."""
+        half = 0.5 * self._parameter(row, "track") * yaw_rate
         rolling = np.array([speed - half, speed + half, speed - half, speed + half])
-        car[offset : offset + 4] = rolling / param(row, "wheel_radius")
-        front = shape.cog_to_rear_axle / param(row, "wheelbase")
-        offset = self._offsets["wheel_load"][0]
+        self._set(row, "wheel_speed", rolling / self._parameter(row, "wheel_radius"))
+        front = shape.cog_to_rear_axle / self._parameter(row, "wheelbase")
         shares = np.array([front, front, 1.0 - front, 1.0 - front])
-        car[offset : offset + 4] = 0.5 * shape.mass * GRAVITY * shares
+        self._set(row, "wheel_load", 0.5 * shape.mass * GRAVITY * shares)
 
     def copy_row(self, source: int, row: int | slice) -> None:
         """Copy a car with its numbers and its whole state to another row, or to several."""
@@ -472,13 +479,13 @@ class Fleet:
             raise RunError(msg)
         return self._variable_offsets[name]
 
-    def _parameter(self, row: int, name: str) -> float:
-        return float(self.parameters[row, self.parameter_names.index(name)])
+    def _parameter(self, row: int | Ints, name: str) -> Any:
+        return self.parameters[row, self.parameter_names.index(name)]
 
-    def _nominal_battery(self, row: int) -> float:
+    def _nominal_battery(self, row: int | Ints) -> float | Floats:
         key = "drive.battery_nominal_v"
         if "battery_nominal" in self.parameter_names:
-            return self._parameter(row, "battery_nominal")
+            return cast("Floats", self._parameter(row, "battery_nominal"))
         return self.car.value(key) if self.car.has(key) else 0.0
 
     def _view(self, name: str) -> Floats:
@@ -487,7 +494,7 @@ class Fleet:
             return self._block[offset, : self.capacity]
         return self._block[offset : offset + width, : self.capacity].T
 
-    def _set(self, row: int, name: str, value: float | Floats) -> None:
+    def _set(self, row: int | Ints, name: str, value: float | Floats) -> None:
         offset, width = self._offsets[name]
         self._block[offset : offset + width, row] = value
 

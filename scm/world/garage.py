@@ -12,8 +12,9 @@ from scm.geometry import Pose2
 from scm.log import event
 from scm.vehicles.battery_pack import Packs
 from scm.vehicles.car import Car, load_car
-from scm.vehicles.fleet import Fleet, VehicleStatus
+from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
+from scm.vehicles.vehicle_status import VehicleStatus
 from scm.world.solids import Hull, hull_of
 from scm.world.vehicle_arrays import VehicleArrays
 

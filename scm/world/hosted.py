@@ -10,9 +10,10 @@ from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
 from scm.v2x.etsi.path import LowFrequencySender
 from scm.vehicles.car import Car
-from scm.vehicles.fleet import Fleet, VehicleStatus
+from scm.vehicles.fleet import Fleet
 from scm.vehicles.guard import Guard
 from scm.vehicles.lights import OFF, Switches
+from scm.vehicles.vehicle_status import VehicleStatus
 from scm.world.lease import Lease
 from scm.world.vehicle_arrays import MODES, VehicleArrays
 

@@ -7,7 +7,7 @@ import numpy as np
 from scm.clock import NS_PER_S, seconds
 from scm.v2x.exchange import Outgoing
 from scm.v2x.messages.city_event import CityEvent
-from scm.vehicles.fleet import VehicleStatus
+from scm.vehicles.vehicle_status import VehicleStatus
 from scm.world import lease as rules
 from scm.world.alerts import city_event
 from scm.world.cars import lease_record

@@ -6,8 +6,9 @@ import pytest
 from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY, PARAMS
 from scm.vehicles.car import load_car
-from scm.vehicles.fleet import Fleet, VehicleStatus
+from scm.vehicles.fleet import Fleet
 from scm.vehicles.layout import columns_of
+from scm.vehicles.vehicle_status import VehicleStatus
 
 OUTPUTS = (
     "x", "y", "z", "roll", "pitch", "yaw", "speed", "lateral_speed", "yaw_rate", "accel_x",

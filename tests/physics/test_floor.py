@@ -13,8 +13,9 @@ from scm.records.floor import Floor, Patch, Plate, Ramp
 from scm.v2x.messages.boxes_request import BoxesRequest
 from scm.v2x.messages.route_request import RouteRequest
 from scm.vehicles.car import load_car
-from scm.vehicles.fleet import Fleet, VehicleStatus
+from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
+from scm.vehicles.vehicle_status import VehicleStatus
 from scm.world.requests import reply_to
 from scm.world.step import tick
 from scm.world.world import PERIOD_NS, World

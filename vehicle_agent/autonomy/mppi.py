@@ -32,7 +32,8 @@ from scm.clock import NS_PER_S
 from scm.errors import PathError, RunError
 from scm.geometry import Pose2
 from scm.vehicles.car import Car
-from scm.vehicles.fleet import SUBSTEP_S, Fleet, VehicleStatus
+from scm.vehicles.fleet import SUBSTEP_S, Fleet
+from scm.vehicles.vehicle_status import VehicleStatus
 from vehicle_agent.autonomy.band import PASSED_M, ahead_of, apart
 from vehicle_agent.autonomy.control import Command
 from vehicle_agent.autonomy.elastic_band import discs_of

@@ -26,7 +26,8 @@ from scm.recording.read import Channel, Recording
 from scm.replay.commands import FULL_SPEED
 from scm.replay.drive import STEP_S, Drive
 from scm.vehicles.car import Car
-from scm.vehicles.fleet import Fleet, VehicleStatus
+from scm.vehicles.fleet import Fleet
+from scm.vehicles.vehicle_status import VehicleStatus
 
 SCALES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)
 LONGEST_S = 300.0

@@ -29,10 +29,11 @@ from scm.replay.numbers import (
 from scm.replay.recorded_variables import VARIABLES
 from scm.vehicles.car import Car
 from scm.vehicles.compiler.vector_code import LANES, WIDTH
-from scm.vehicles.fleet import SUBSTEP_S, Fleet, VehicleStatus
+from scm.vehicles.fleet import SUBSTEP_S, Fleet
 from scm.vehicles.fleet_rows import COG, WHEELS, pool, whole_steps
 from scm.vehicles.jit import array_kernel
 from scm.vehicles.term import reads
+from scm.vehicles.vehicle_status import VehicleStatus
 
 ROWS, THREADS = LANES, 2
 COMMANDED = 10  # parts of a step, each with a command: a servo at its rate moves by when

@@ -6,7 +6,8 @@ import pytest
 from scm.errors import RunError, TermError
 from scm.geometry import Pose2
 from scm.vehicles.car import load_car
-from scm.vehicles.fleet import Fleet, VehicleStatus
+from scm.vehicles.fleet import Fleet
+from scm.vehicles.vehicle_status import VehicleStatus
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ from scm.errors import RunError, TermError
 from scm.geometry import Pose2
 from scm.vehicles.car import load_car
 from scm.vehicles.compiler.kernel_file import compile_kernel
-from scm.vehicles.fleet import Fleet, VehicleStatus
+from scm.vehicles.fleet import Fleet
+from scm.vehicles.vehicle_status import VehicleStatus
 from tests.every_effect import car_with
 
 

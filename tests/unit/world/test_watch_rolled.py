@@ -3,7 +3,7 @@
 from scm.geometry import Pose2
 from scm.maps.load import load_map
 from scm.v2x.messages.city_event import CityEvent
-from scm.vehicles.fleet import VehicleStatus
+from scm.vehicles.vehicle_status import VehicleStatus
 from scm.world.step import tick
 from scm.world.world import PERIOD_NS, World
 

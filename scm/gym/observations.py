@@ -1,0 +1,144 @@
+"""What an agent sees of its car: parts, each some columns with unit and range, joined in one array.
+
+To add one, write a function that returns a `Part` and name it in `PARTS`.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scm.arrays import Floats
+from scm.gym.course import AHEAD_M, BENDS, BESIDE_M, LIMIT_MPS, TURNED_RAD
+from scm.gym.worlds import READINGS, Worlds
+from scm.vehicles.noise import bases_of
+from scm.vehicles.rays.cast import cast
+from scm.vehicles.rays.grid import WallGrid
+from scm.vehicles.rays.scene import Scene
+from scm.maps.segments import wall_segments
+from scm.vehicles.sensor_noise import add_device_errors
+from scm.vehicles.sensors import imu, lidar
+
+Observation = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Some columns of an observation.
+
+    Attributes:
+        names: Of the columns, each with its unit at the end.
+        low, high: Their range; what lies beyond is clipped.
+        read: Returns them for all cars, (rows, columns).
+    """
+
+    names: tuple[str, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    read: Callable[[], Floats]
+
+
+def motion(worlds: Worlds) -> Part:
+    """Return the true motion of the rear axle, and the steering angle."""
+    fleet = worlds.fleet
+    columns = (fleet.speed, fleet.lateral_speed, fleet.yaw_rate, fleet.steer_angle)
+    most = (5.0, 2.0, 10.0, 1.0)
+    return Part(
+        ("speed_mps", "lateral_speed_mps", "yaw_rate_radps", "steer_angle_rad"),
+        tuple(-one for one in most), most, lambda: np.column_stack(columns),
+    )  # fmt: skip
+
+
+def action(worlds: Worlds) -> Part:
+    """Return the action in force."""
+    return Part(("throttle", "steering"), (-1.0,) * 2, (1.0,) * 2, lambda: worlds.actions)
+
+
+def lane(worlds: Worlds) -> Part:
+    """Return where the car is in its lane, the speed limit, and how the lane turns ahead."""
+    bends = tuple(f"lane_turn_{ahead:g}m_rad" for ahead in AHEAD_M)
+    most = (0.5, np.pi, 5.0, *(2.0 * np.pi,) * len(bends))
+    columns = [BESIDE_M, TURNED_RAD, LIMIT_MPS, *range(BENDS, BENDS + len(AHEAD_M))]
+    return Part(
+        ("beside_m", "turned_rad", "speed_limit_mps", *bends), tuple(-one for one in most), most,
+        lambda: worlds.course.known[:, columns],
+    )  # fmt: skip
+
+
+def inertial(worlds: Worlds) -> Part:
+    """Return what IMU and encoders of the car file read now: noise and bias of each episode."""
+    device, fleet = imu.device(worlds.car), worlds.fleet
+    rows, bias = np.arange(fleet.capacity), np.array(device.bias)
+    radius = worlds.car.value("body.wheel_radius_m")
+
+    def read() -> Floats:
+        steps = np.repeat(worlds.steps, worlds.agents)
+        exact = imu.measure(worlds.car, fleet, rows, None)
+        bases = bases_of(worlds.keys ^ READINGS, steps)
+        readings = add_device_errors(device, exact, bias, bases)
+        return np.column_stack((readings[:, :6], radius * fleet.wheel_speed[:, 2:]))
+
+    names = [f"accel_{axis}_mps2" for axis in "xyz"] + [f"gyro_{axis}_radps" for axis in "xyz"]
+    most = (50.0,) * 3 + (20.0,) * 3 + (5.0,) * 2
+    return Part(
+        (*names, "wheel_left_mps", "wheel_right_mps"), tuple(-one for one in most), most, read
+    )
+
+
+def ranges(worlds: Worlds, beams: int = 108) -> Part:
+    """Return what a level scanner sees of walls and boxes, evenly round the car, first ahead."""
+    car, fleet = worlds.car, worlds.fleet
+    nearest, farthest = car.vector("lidar.range_m")
+    ahead, left, _ = car.vector("lidar.position_m")
+    nobody = np.empty((0, 4)), np.empty(0, np.int64)
+    scene = Scene(WallGrid(wall_segments(worlds.city_map)), *nobody)
+    bearings = lidar.Bearings(0.0, 2.0 * np.pi / beams, beams)
+    own = np.arange(fleet.capacity)
+
+    def read() -> Floats:
+        c, s = np.cos(fleet.yaw), np.sin(fleet.yaw)
+        x, y = fleet.x + c * ahead - s * left, fleet.y + s * ahead + c * left
+        return cast(scene, np.column_stack((x, y, fleet.yaw)), own, bearings, farthest)
+
+    names = tuple(f"range_{beam}_m" for beam in range(beams))
+    return Part(names, (nearest,) * beams, (farthest,) * beams, read)
+
+
+PARTS: dict[str, Callable[[Worlds], Part]] = {
+    "motion": motion, "action": action, "lane": lane, "inertial": inertial,
+    "ranges": ranges, "ranges_360": partial(ranges, beams=360),
+}  # fmt: skip
+
+
+class Observations:
+    """What all agents see, in one array.
+
+    Args:
+        worlds: Of the agents.
+        parts: By name.
+
+    Attributes:
+        names: Of the columns.
+        low, high: Their range, (columns,).
+        values: What `update` saw, (rows, columns).
+    """
+
+    def __init__(self, worlds: Worlds, parts: Sequence[str]) -> None:
+        self._parts = [PARTS[name](worlds) for name in parts]
+        self.names = tuple(name for part in self._parts for name in part.names)
+        self.low, self.high = (
+            np.array([v for part in self._parts for v in getattr(part, side)], np.float32)
+            for side in ("low", "high")
+        )
+        self.values: Observation = np.zeros((worlds.fleet.capacity, len(self.names)), np.float32)
+
+    def update(self) -> Observation:
+        """Look at all cars; return the array, which the next call writes over."""
+        at = 0
+        for part in self._parts:
+            self.values[:, at : at + len(part.names)] = part.read()
+            at += len(part.names)
+        np.clip(self.values, self.low, self.high, out=self.values)
+        return self.values

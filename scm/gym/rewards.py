@@ -1,0 +1,37 @@
+"""What a car gains in a step: small functions of all worlds, each with its unit, (rows,)."""
+
+import numpy as np
+
+from scm.arrays import Floats
+from scm.gym.course import TURNED_RAD
+from scm.gym.worlds import Worlds
+
+
+def progress(worlds: Worlds) -> Floats:
+    """Return how far each car came along its lanes [m]."""
+    return worlds.moved_m
+
+
+def off_centre(worlds: Worlds) -> Floats:
+    """Return how far each is from the middle of its lane, as a share of half its width [1]."""
+    return np.abs(worlds.beside_m) / worlds.most_beside_m
+
+
+def turned(worlds: Worlds) -> Floats:
+    """Return how far each is turned from its lane's direction [rad]."""
+    return np.abs(worlds.course.known[:, TURNED_RAD])
+
+
+def steering_change(worlds: Worlds) -> Floats:
+    """Return how far each steers otherwise than in the step before [1]."""
+    return np.abs(worlds.actions[:, 1] - worlds.before[:, 1])
+
+
+def throttle_change(worlds: Worlds) -> Floats:
+    """Return how far the throttle of each is another than in the step before [1]."""
+    return np.abs(worlds.actions[:, 0] - worlds.before[:, 0])
+
+
+def failed(worlds: Worlds) -> Floats:
+    """Return 1 for each whose episode ends in this step, not by its time limit [1]."""
+    return worlds.ends().astype(float)

@@ -1,0 +1,80 @@
+"""What a task is: where its cars begin, what they see and do, what they gain, when it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from scm.arrays import Bools, Floats
+
+if TYPE_CHECKING:
+    from scm.gym.worlds import Worlds
+
+Reward = Callable[["Worlds"], Floats]
+End = Callable[["Worlds"], Bools]
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where an agent's car begins: anywhere along the lanes, drawn for each episode.
+
+    Attributes:
+        beside_m: At most so far from the middle of its lane.
+        turned_rad: At most so far from its lane's direction.
+        speed_mps: The slowest and the fastest.
+    """
+
+    beside_m: float = 0.0
+    turned_rad: float = 0.0
+    speed_mps: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One summand of the reward.
+
+    Attributes:
+        function: Returns it for each car, in its unit.
+        weight: Per unit.
+    """
+
+    function: Reward
+    weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A task.
+
+    Attributes:
+        name: Without map and version.
+        about: One sentence.
+        maps: It is offered on.
+        observations: By name, see `observations`.
+        rewards: Its summands.
+        ends: When a car's episode ends; it also does after `lasts_s`.
+        agents: Cars of a world.
+        lanes: By map, lanes to begin on; a map that is not there: any.
+        car: The car file.
+        period_s: Between two actions.
+    """
+
+    name: str
+    about: str
+    maps: tuple[str, ...]
+    observations: tuple[str, ...]
+    rewards: tuple[Term, ...]
+    ends: tuple[End, ...]
+    start: Start
+    lasts_s: float
+    agents: int = 1
+    lanes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    car: str = "nigel"
+    period_s: float = 0.05
+    version: int = 1
+
+    @property
+    def most_steps(self) -> int:
+        """Of an episode."""
+        return round(self.lasts_s / self.period_s)

@@ -1,0 +1,70 @@
+"""Which cars of many worlds touch a wall, or another car of their own world."""
+
+from itertools import combinations
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.records.city_map import CityMap
+from scm.vehicles.car import Car
+from scm.world.broad_phase import (
+    LEEWAY_M,
+    LOOK_AHEAD_S,
+    has_strayed,
+    list_walls,
+    mark,
+    obstacles_of,
+)
+from scm.world.solids import hull_of, obstacle_boxes, outline_of
+
+NO_BOXES = 2**31  # every body is a car
+
+
+class Touching:
+    """Finds who touches something.
+
+    Args:
+        city_map: Its walls and boxes never move, whatever hits them.
+        car: What all cars are.
+        worlds: How many, of `cars` cars each; a world's cars stand one after the other.
+    """
+
+    def __init__(self, city_map: CityMap, car: Car, worlds: int, cars: int) -> None:
+        self._obstacles = obstacles_of(obstacle_boxes(city_map))
+        rows = worlds * cars
+        self._outlines = np.tile(np.array(outline_of(hull_of(car))), (rows, 1))
+        within = np.array(list(combinations(range(cars), 2)), np.int64).reshape(-1, 2)
+        first = cars * np.arange(worlds)
+        self._pairs: Ints = (first[:, None, None] + within).reshape(-1, 2)
+        self._rows = np.arange(rows)
+        self._from, self._leeway = np.full((rows, 2), np.inf), np.zeros(rows)
+        self._walls: Ints = np.zeros((0, 2), np.int64)
+
+    def find(self, motion: Floats, *, present: Bools) -> Bools:
+        """Return which cars touch something now, (rows,).
+
+        Args:
+            motion: x, y, yaw and their rates of centres of gravity, map frame, (rows, 6).
+            present: Which cars are there at all.
+        """
+        if has_strayed(self._rows, self._rows, self._from, self._leeway, motion):
+            self._list_walls(motion)
+        pairs, marks = self._pairs, np.zeros(len(motion), np.bool_)
+        if len(pairs) and not present.all():
+            pairs = pairs[present[pairs].all(axis=1)]
+        boxes = self._obstacles.boxes
+        mark(marks, pairs, self._walls, motion, self._outlines, boxes, NO_BOXES)
+        return marks & present
+
+    def _list_walls(self, motion: Floats) -> None:
+        self._from = motion[:, :2].copy()
+        self._leeway = LEEWAY_M + LOOK_AHEAD_S * np.hypot(motion[:, 3], motion[:, 4])
+        reach = self._outlines[:, 4] + self._leeway
+        room = max(64, 4 * len(motion))
+        while True:
+            walls = np.empty((room, 2), np.int64)
+            count = list_walls(walls, motion, reach, self._obstacles)
+            if count <= room:
+                break
+            room = 2 * count
+        self._walls = walls[:count]

@@ -1,0 +1,150 @@
+"""Many worlds of one task, side by side: their cars are rows of one fleet.
+
+World after world, each with its agents' cars one after the other. A step is one call of the
+physics for all of them, and one of each compiled look at what came of it. An episode's draws follow
+from the world's seed and the episode's number alone, so that a world is the same bit by bit however
+many there are.
+"""
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.gym.course import BESIDE_M, DONE_M, Course
+from scm.gym.task import Task
+from scm.gym.touching import Touching
+from scm.maps.load import load_map
+from scm.vehicles.car import Car, load_car
+from scm.vehicles.fleet import Fleet
+from scm.vehicles.noise import Keys, bases_of, uniforms
+from scm.vehicles.vehicle_status import VehicleStatus
+
+SEEDS, CARS, READINGS = (np.uint64(n) for n in (0x5CA1AB1E5EEDED01, 0xCA25CA25CA25CA25, 0x5E4504))
+"""Constants that keep draws of different purpose apart."""
+
+
+class Worlds:
+    """Worlds of a task.
+
+    Args:
+        task: What is to be learned.
+        map_name: Where, by name or path.
+        car: A car file, by name or path; its cars are the agents'.
+        worlds: How many.
+        threads: For the physics.
+
+    Attributes:
+        fleet: All cars; row `world * agents + agent`.
+        course: Where they are along their lanes.
+        steps: Of each world, since its episode began, (worlds,).
+        present: Which cars take part, (rows,); the others are out, until the next episode.
+        touched: Which touch a wall or another car now, (rows,).
+        actions: In force, -1 to 1, throttle and steering, (rows, 2); `before`: of the step before.
+        moved_m: How far each car came along its lanes in this step, (rows,).
+
+    Raises:
+        ScmError: There is no such map or car, or it does not suit the task.
+    """
+
+    def __init__(
+        self, task: Task, map_name: str, car: str | Car, worlds: int, threads: int = 1
+    ) -> None:
+        self.task, self.count, self.agents = task, worlds, task.agents
+        rows = worlds * task.agents
+        self.city_map = load_map(map_name)
+        self.car = load_car(car) if isinstance(car, str) else car
+        self.fleet = Fleet(self.car, rows)
+        self.fleet.threads = threads
+        self.fleet.alive[:] = True
+        self.course = Course(self.city_map, rows, task.lanes.get(self.city_map.name, ()))
+        self._touching = Touching(self.city_map, self.car, worlds, task.agents)
+        self._every: Ints = np.arange(rows)
+        self._seeds: Keys = np.zeros(worlds, np.uint64)
+        self._episodes: Ints = np.full(worlds, -1, np.int64)
+        self.keys: Keys = np.zeros(rows, np.uint64)
+        self.steps: Ints = np.zeros(worlds, np.int64)
+        self.present: Bools = np.zeros(rows, np.bool_)
+        self.touched: Bools = np.zeros(rows, np.bool_)
+        self.actions, self.before = np.zeros((2, rows, 2))
+        self.moved_m, self._done_m = np.zeros((2, rows))
+        self.most_beside_m = self.course.half_width
+
+    def seed(self, worlds: Ints, seeds: Ints) -> None:
+        """Let some worlds (n,) begin anew with the first episode of seeds (n,)."""
+        self._seeds[worlds] = bases_of(np.full(len(seeds), SEEDS), np.asarray(seeds, np.int64))
+        self._episodes[worlds] = -1
+
+    def begin(self, which: Bools) -> None:
+        """Begin the next episode of some worlds, (worlds,)."""
+        worlds = np.flatnonzero(which)
+        self._episodes[worlds] += 1
+        bases = bases_of(self._seeds[worlds] ^ CARS, self._episodes[worlds])
+        agents = np.tile(np.arange(self.agents), len(worlds))
+        rows = np.repeat(worlds * self.agents, self.agents) + agents
+        self.keys[rows] = bases_of(np.repeat(bases, self.agents), agents)
+        draws, start = uniforms(self.keys[rows], 5), self.task.start
+        # evenly spread over the lanes, from where the world's draw says
+        where = np.repeat(uniforms(bases, 1)[:, 0], self.agents) + agents / self.agents
+        draws[:, 0] = where - np.floor(where)
+        poses = self.course.begin(rows, draws, start.beside_m, start.turned_rad)
+        low, high = start.speed_mps
+        self.fleet.alive[rows] = self.present[rows] = True
+        self.fleet.place_rows(rows, poses, low + (high - low) * draws[:, 4])
+        self.actions[rows] = self.before[rows] = 0.0
+        self.steps[worlds] = 0
+        self._look(rows)
+
+    def step(self, actions: Floats) -> None:
+        """Let all worlds go on for one period with actions (rows, 2); who is out stays out."""
+        self.before[:] = self.actions
+        np.clip(actions, -1.0, 1.0, out=self.actions)
+        self.fleet.throttle[:], self.fleet.steering[:] = self.actions.T
+        self.fleet.advance(self.task.period_s)
+        self.steps += 1
+        self._look(None)
+
+    def rewards(self) -> Floats:
+        """Return what each car gains in this step, (rows,); nothing for who is out."""
+        found = np.zeros(len(self.present))
+        for term in self.task.rewards:
+            found += term.weight * term.function(self)
+        return np.where(self.present, found, 0.0)
+
+    def ends(self) -> Bools:
+        """Return for which cars this step is the last, (rows,)."""
+        found = np.zeros(len(self.present), np.bool_)
+        for function in self.task.ends:
+            found |= function(self)
+        return found & self.present
+
+    def take_out(self, rows: Bools) -> None:
+        """Let cars (rows,) take part no more, until the next episode."""
+        self.present &= ~rows
+        self.fleet.alive[rows] = False
+
+    @property
+    def is_over(self) -> Bools:
+        """Which worlds have reached their time limit, (worlds,)."""
+        return self.steps >= self.task.most_steps
+
+    @property
+    def is_wrecked(self) -> Bools:
+        """Which cars rolled over, or left every physical range, (rows,)."""
+        return self.fleet.status != VehicleStatus.OK
+
+    @property
+    def beside_m(self) -> Floats:
+        """How far each car is from the middle of its lane, + = left, (rows,)."""
+        return self.course.known[:, BESIDE_M]
+
+    def _look(self, began: Ints | None) -> None:
+        """Find out where all cars are; `began` are the rows whose episode begins."""
+        fleet, course = self.fleet, self.course
+        course.follow(fleet.x, fleet.y, fleet.yaw)
+        done = course.known[:, DONE_M]
+        if began is None:
+            np.subtract(done, self._done_m, out=self.moved_m)
+        else:
+            self.moved_m[began] = 0.0
+        self._done_m[:] = done
+        self.touched = self._touching.find(fleet.planar_cogs(self._every), present=self.present)
+        self.most_beside_m = course.half_width
