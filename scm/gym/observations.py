@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from scm.arrays import Floats
 from scm.gym.course import AHEAD_M, BENDS, BESIDE_M, LIMIT_MPS, TURNED_RAD
+from scm.gym.radio import COLUMNS
 from scm.gym.worlds import READINGS, Worlds
 from scm.vehicles.noise import bases_of
 from scm.vehicles.rays.cast import cast
@@ -106,8 +107,25 @@ def ranges(worlds: Worlds, beams: int = 108) -> Part:
     return Part(names, (nearest,) * beams, (farthest,) * beams, read)
 
 
+def others(worlds: Worlds) -> Part:
+    """Return what the radio knows of each other car: place and direction seen from the own, age."""
+    radio = worlds.radio
+    count = worlds.agents - 1
+    names = ("ahead_m", "left_m", "cos_turn", "sin_turn", "speed_mps", "age_s")
+    most = (20.0, 20.0, 1.0, 1.0, 5.0, 10.0)
+
+    def read() -> Floats:
+        known = np.empty((0, 0)) if radio is None else radio.known
+        return known.reshape(len(worlds.present), COLUMNS * count)
+
+    return Part(
+        tuple(f"other_{k}_{name}" for k in range(count) for name in names),
+        tuple(-one for one in most) * count, most * count, read,
+    )  # fmt: skip
+
+
 PARTS: dict[str, Callable[[Worlds], Part]] = {
-    "motion": motion, "action": action, "lane": lane, "inertial": inertial,
+    "motion": motion, "action": action, "lane": lane, "inertial": inertial, "others": others,
     "ranges": ranges, "ranges_360": partial(ranges, beams=360),
 }  # fmt: skip
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.gym.course import BESIDE_M, DONE_M, Course
+from scm.gym.radio import Radio
 from scm.gym.task import Task
 from scm.gym.touching import Touching
 from scm.maps.load import load_map
@@ -35,6 +36,7 @@ class Worlds:
     Attributes:
         fleet: All cars; row `world * agents + agent`.
         course: Where they are along their lanes.
+        radio: What they know of each other; None: each is alone in its world.
         steps: Of each world, since its episode began, (worlds,).
         present: Which cars take part, (rows,); the others are out, until the next episode.
         touched: Which touch a wall or another car now, (rows,).
@@ -57,6 +59,7 @@ class Worlds:
         self.fleet.alive[:] = True
         self.course = Course(self.city_map, rows, task.lanes.get(self.city_map.name, ()))
         self._touching = Touching(self.city_map, self.car, worlds, task.agents)
+        self.radio = Radio(self.city_map, worlds, task.agents) if task.agents > 1 else None
         self._every: Ints = np.arange(rows)
         self._seeds: Keys = np.zeros(worlds, np.uint64)
         self._episodes: Ints = np.full(worlds, -1, np.int64)
@@ -91,6 +94,8 @@ class Worlds:
         self.fleet.place_rows(rows, poses, low + (high - low) * draws[:, 4])
         self.actions[rows] = self.before[rows] = 0.0
         self.steps[worlds] = 0
+        if self.radio is not None:
+            self.radio.forget(rows)
         self._look(rows)
 
     def step(self, actions: Floats) -> None:
@@ -148,3 +153,7 @@ class Worlds:
         self._done_m[:] = done
         self.touched = self._touching.find(fleet.planar_cogs(self._every), present=self.present)
         self.most_beside_m = course.half_width
+        if self.radio is not None:
+            steps = np.repeat(self.steps, self.agents)
+            motion = np.column_stack((fleet.x, fleet.y, fleet.yaw, fleet.speed))
+            self.radio.exchange(motion, self.task.period_s * steps, steps, self.keys, self.present)

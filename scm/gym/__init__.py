@@ -1,0 +1,56 @@
+"""The city as a training environment: Gymnasium's and PettingZoo's interfaces over one fleet.
+
+    names          a task with its map: driving_school/lap-v1
+    tasks          what is to be learned, one file each
+    task           what a task is made of
+    worlds         many worlds of a task, their cars rows of one fleet
+    course         where each car is along its lanes
+    touching       who touches a wall or another car
+    observations   what an agent sees of it
+    rewards, ends  what it gains, and when its episode ends
+    vector         as a Gymnasium vector environment
+    single         as a Gymnasium environment
+    radio          what cars of a world know of each other
+    parallel       several agents in one world, as a PettingZoo environment
+
+Needs the extra scm[gym].
+"""
+
+from typing import Any
+
+import gymnasium
+
+from scm.gym.names import ids
+from scm.gym.parallel import CityParallelEnv
+from scm.gym.single import CityEnv
+from scm.gym.vector import CityVectorEnv
+
+__all__ = ["CityEnv", "CityParallelEnv", "CityVectorEnv", "make_vec", "parallel_env"]
+
+
+def make_vec(name: str, num_envs: int = 1, **options: Any) -> CityVectorEnv:
+    """Return many worlds of a task; see `CityVectorEnv`.
+
+    Raises:
+        gymnasium.error.Error: There is no such task, or it is of several agents.
+        ScmError: There is no such map or car file.
+    """
+    return CityVectorEnv(name, num_envs, **options)
+
+
+def parallel_env(name: str, **options: Any) -> CityParallelEnv:
+    """Return one world of a task of several agents; see `CityParallelEnv`.
+
+    Raises:
+        gymnasium.error.Error: There is no such task.
+        ScmError: There is no such map or car file.
+    """
+    return CityParallelEnv(name, **options)
+
+
+for _name in ids():
+    if _name not in gymnasium.registry:
+        gymnasium.register(
+            _name, entry_point=CityEnv, vector_entry_point=CityVectorEnv,
+            kwargs={"name": _name},
+        )  # fmt: skip

@@ -1,0 +1,55 @@
+"""One world of a task as a Gymnasium environment: a vector environment of one."""
+
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+
+from scm.arrays import Floats
+from scm.gym.observations import Observation
+from scm.gym.vector import CityVectorEnv, Infos
+
+class CityEnv(gymnasium.Env[Observation, Floats]):
+    """One world of one task.
+
+    Args:
+        name: Of the task with its map, `driving_school/lap-v1`.
+        options: As `CityVectorEnv` takes them.
+
+    Attributes:
+        observation_names: Of the observation's columns, each with its unit.
+
+    Raises:
+        gymnasium.error.Error: There is no such task, or it is of several agents.
+        ScmError: There is no such car file.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+
+    def __init__(self, name: str, **options: Any) -> None:
+        self._one = CityVectorEnv(
+            name, 1, autoreset_mode=AutoresetMode.DISABLED, threads=1, **options
+        )
+        self.observation_names = self._one.observation_names
+        low, high = self._one.single_observation_space.low, self._one.single_observation_space.high
+        self.observation_space = spaces.Box(low, high)
+        self.action_space = spaces.Box(-1.0, 1.0, (2,))
+
+    def reset(
+        self, *, seed: int | None = None, options: Infos | None = None
+    ) -> tuple[Observation, Infos]:
+        """Begin the next episode; with a seed, its first."""
+        super().reset(seed=seed)
+        seen, infos = self._one.reset(seed=seed, options=options)
+        return seen[0], infos
+
+    def step(self, action: Floats) -> tuple[Observation, float, bool, bool, Infos]:
+        """Go on for one period with throttle and steering, -1 to 1."""
+        seen, reward, ended, over, infos = self._one.step(np.asarray(action)[None])
+        return seen[0], float(reward[0]), bool(ended[0]), bool(over[0]), infos
+
+    def close(self) -> None:
+        """Close it: it cannot be used any more."""
+        self._one.close()
