@@ -11,7 +11,7 @@ from pettingzoo import ParallelEnv
 from scm.arrays import Bools, Floats
 from scm.gym.names import task_of
 from scm.gym.observations import Observation, Observations
-from scm.gym.worlds import Worlds
+from scm.gym.worlds import Options, Worlds
 
 Infos = dict[str, dict[str, Any]]
 
@@ -23,7 +23,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):
 
     Args:
         name: Of the task with its map, `driving_school/crossing-v1`.
-        car: A car file other than the task's, by name or path.
+        options: Of `Options`: another car file, and what is drawn for each episode.
 
     Attributes:
         observation_names: Of the observation's columns, each with its unit.
@@ -35,11 +35,11 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "name": "scm"}
 
-    def __init__(self, name: str, car: str | None = None) -> None:
+    def __init__(self, name: str, **options: Any) -> None:
         task, map_name = task_of(name)
         self.metadata = {**self.metadata, "name": f"{task.name}-v{task.version}"}
         self.render_mode = None
-        self.worlds = Worlds(task, map_name, car or task.car, 1)
+        self.worlds = Worlds(task, map_name, 1, Options(**options))
         self._seen = Observations(self.worlds, task.observations)
         self.observation_names = self._seen.names
         self.possible_agents = [f"car_{number}" for number in range(task.agents)]

@@ -5,14 +5,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
+from gymnasium.error import ClosedEnvironmentError, Error, InvalidAction, ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from scm.arrays import Bools, Floats, Ints
 from scm.gym.names import task_of
 from scm.gym.observations import Observation, Observations
-from scm.gym.worlds import Worlds
+from scm.gym.worlds import Options, Worlds
 
 Infos = dict[str, Any]
 
@@ -24,9 +24,9 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         name: Of the task with its map, `driving_school/lap-v1`.
         num_envs: How many worlds.
         autoreset_mode: When a world whose episode ended begins its next one.
-        car: A car file other than the task's, by name or path.
         threads: For the physics; None: one a core.
         copy: Whether each observation is an array of its own; else the next step writes over it.
+        options: Of `Options`: another car file, and what is drawn for each episode.
 
     Attributes:
         observation_names: Of the observation's columns, each with its unit.
@@ -40,14 +40,17 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
 
     def __init__(
         self, name: str, num_envs: int = 1, *, autoreset_mode: AutoresetMode | str = "NextStep",
-        car: str | None = None, threads: int | None = None, copy: bool = True,
+        threads: int | None = None, copy: bool = True, **options: Any,
     ) -> None:  # fmt: skip
         task, map_name = task_of(name)
+        if task.agents > 1:
+            msg = f"{name} is of {task.agents} agents: make it by scm.gym.parallel_env"
+            raise Error(msg)
         self.num_envs, self._copy = num_envs, copy
         self._mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
         threads = threads or len(os.sched_getaffinity(0))
-        self.worlds = Worlds(task, map_name, car or task.car, num_envs, threads)
+        self.worlds = Worlds(task, map_name, num_envs, Options(**options), threads)
         self._seen = Observations(self.worlds, task.observations)
         self.observation_names = self._seen.names
         self.single_observation_space = spaces.Box(self._seen.low, self._seen.high)
@@ -76,8 +79,9 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
             first = int(self.np_random.integers(2**31))
             seed = [first + k for k in range(self.num_envs)]
         if seed is not None:
+            numbers = self._seeds(seed)
             given = np.array([one is not None for one in seed]) & which
-            self.worlds.seed(np.flatnonzero(given), self._seeds(seed)[given])
+            self.worlds.seed(np.flatnonzero(given), numbers[given])
         self.worlds.begin(which)
         self._ended[which], self._is_begun = False, True
         return self._observed(), {}

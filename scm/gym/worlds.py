@@ -6,15 +6,18 @@ from the world's seed and the episode's number alone, so that a world is the sam
 many there are.
 """
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.gym.course import BESIDE_M, DONE_M, Course
 from scm.gym.radio import Radio
+from scm.gym.randomise import Randomise, Ranges, with_effects
 from scm.gym.task import Task
 from scm.gym.touching import Touching
 from scm.maps.load import load_map
-from scm.vehicles.car import Car, load_car
+from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.noise import Keys, bases_of, uniforms
 from scm.vehicles.vehicle_status import VehicleStatus
@@ -23,14 +26,31 @@ SEEDS, CARS, READINGS = (np.uint64(n) for n in (0x5CA1AB1E5EEDED01, 0xCA25CA25CA
 """Constants that keep draws of different purpose apart."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What may differ from a task.
+
+    Attributes:
+        car: A car file, by name or path, such as one that `scm mismatch` found; None: the task's.
+        randomise: For each episode, every number that the car file gives a standard deviation is
+            drawn anew, from so many times that.
+        ranges: Likewise, further numbers by `section.key`, evenly from low to high; an effect that
+            the car lacks is added to it.
+    """
+
+    car: str | None = None
+    randomise: float = 0.0
+    ranges: Ranges = field(default_factory=dict)
+
+
 class Worlds:
     """Worlds of a task.
 
     Args:
         task: What is to be learned.
         map_name: Where, by name or path.
-        car: A car file, by name or path; its cars are the agents'.
         worlds: How many.
+        options: What may differ from the task.
         threads: For the physics.
 
     Attributes:
@@ -48,13 +68,14 @@ class Worlds:
     """
 
     def __init__(
-        self, task: Task, map_name: str, car: str | Car, worlds: int, threads: int = 1
+        self, task: Task, map_name: str, worlds: int, options: Options, threads: int = 1
     ) -> None:
         self.task, self.count, self.agents = task, worlds, task.agents
         rows = worlds * task.agents
         self.city_map = load_map(map_name)
-        self.car = load_car(car) if isinstance(car, str) else car
+        self.car = with_effects(load_car(options.car or task.car), options.ranges)
         self.fleet = Fleet(self.car, rows)
+        self._randomise = Randomise(self.fleet, options.randomise, options.ranges)
         self.fleet.threads = threads
         self.fleet.alive[:] = True
         self.course = Course(self.city_map, rows, task.lanes.get(self.city_map.name, ()))
@@ -91,6 +112,8 @@ class Worlds:
         poses = self.course.begin(rows, draws, start.beside_m, start.turned_rad)
         low, high = start.speed_mps
         self.fleet.alive[rows] = self.present[rows] = True
+        if self._randomise.is_any:
+            self._randomise.draw(rows, self.keys[rows])
         self.fleet.place_rows(rows, poses, low + (high - low) * draws[:, 4])
         self.actions[rows] = self.before[rows] = 0.0
         self.steps[worlds] = 0

@@ -1,0 +1,61 @@
+"""Every task keeps the contracts of Gymnasium or PettingZoo, and says what its agents see."""
+
+import re
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+import scm.gym
+from scm.gym.names import all_tasks, ids
+
+UNITS = re.compile(r".*_(m|mps|mps2|rad|radps|s)|throttle|steering|other_\d+_(cos|sin)_turn")
+OF_SEVERAL = [
+    f"{map_name}/{task.name}-v{task.version}"
+    for task in all_tasks().values()
+    for map_name in task.maps
+    if task.agents > 1
+]
+
+
+@pytest.mark.parametrize("name", ids())
+def test_gymnasium_finds_nothing_wrong(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gymnasium.make(name).unwrapped, skip_render_check=True)
+
+
+@pytest.mark.parametrize("name", OF_SEVERAL)
+def test_pettingzoo_finds_nothing_wrong(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        parallel_api_test(scm.gym.parallel_env(name), 150)
+        parallel_seed_test(lambda: scm.gym.parallel_env(name), 50)
+
+
+@pytest.mark.parametrize("name", ids())
+def test_observations_have_names_with_units_and_stay_in_their_space(name):
+    envs = gymnasium.make_vec(name, num_envs=8)
+    names = envs.observation_names
+    assert len(set(names)) == len(names) == envs.single_observation_space.shape[0]
+    assert not [one for one in names if not UNITS.fullmatch(one)]
+    envs.action_space.seed(1)
+    seen, _ = envs.reset(seed=1)
+    moved = np.zeros(len(names), bool)
+    for _ in range(60):
+        now, gain, *_ = envs.step(np.abs(envs.action_space.sample()))
+        assert envs.observation_space.contains(now)
+        assert np.isfinite(gain).all()
+        moved |= (now != seen).any(axis=0)
+    still = [one for one, does in zip(names, moved, strict=True) if not does]
+    assert still in ([], ["speed_limit_mps"])
+
+
+def test_each_task_is_described_and_its_maps_exist():
+    for name, task in all_tasks().items():
+        assert task.name == name
+        assert task.about.endswith(".")
+        assert task.maps
