@@ -59,7 +59,9 @@ def layers(key: jax.Array, *sizes: int) -> list[tuple[jax.Array, jax.Array]]:
     for at, (above, below) in enumerate(pairs):
         key, own = jax.random.split(key)
         scale = 0.01 if at == len(pairs) - 1 else np.sqrt(2.0)
-        made.append((scale * jax.nn.initializers.orthogonal()(own, (above, below)), jnp.zeros(below)))
+        made.append(
+            (scale * jax.nn.initializers.orthogonal()(own, (above, below)), jnp.zeros(below))
+        )
     return made
 
 
@@ -107,9 +109,7 @@ def learner(rate: float) -> tuple:
     return optimiser, learn
 
 
-def advantages(
-    driven: Driven, ended: np.ndarray, over: np.ndarray, last: np.ndarray
-) -> np.ndarray:
+def advantages(driven: Driven, ended: np.ndarray, over: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Return how much more than expected was gained from each step on."""
     found, trace = np.zeros_like(driven.gain), np.zeros(driven.gain.shape[1])
     for t in range(STEPS - 1, -1, -1):
@@ -170,9 +170,16 @@ def main() -> None:
                 params, state = learn(params, state, tuple(one[piece] for one in table))
         spent_s = time.perf_counter() - begun_s
         mean = np.mean(returns[-WORLDS:]) if returns else np.nan
-        print(f"{spent_s:6.1f} s {taken:10d} steps, {taken / spent_s:8.0f}/s, return {mean:7.3f}", flush=True)
-    flat = {f"{name}_{n}_{k}": np.asarray(one) for name in ("actor", "critic")
-            for n, layer in enumerate(params[name]) for k, one in enumerate(layer)}
+        print(
+            f"{spent_s:6.1f} s {taken:10d} steps, {taken / spent_s:8.0f}/s, return {mean:7.3f}",
+            flush=True,
+        )
+    flat = {
+        f"{name}_{n}_{k}": np.asarray(one)
+        for name in ("actor", "critic")
+        for n, layer in enumerate(params[name])
+        for k, one in enumerate(layer)
+    }
     np.savez(given.out, mean=usual.mean, square=usual.square, **flat)
 
 

@@ -4,7 +4,6 @@
     tasks          what is to be learned, one file each
     task           what a task is made of
     worlds         many worlds of a task, their cars rows of one fleet
-    course         where each car is along its lanes
     touching       who touches a wall or another car
     observations   what an agent sees of it
     rewards, ends  what it gains, and when its episode ends

@@ -17,7 +17,9 @@ PATTERN = re.compile(r"(?:scm/)?(?P<map>.+)[/-](?P<task>[a-z_]+)-v(?P<version>\d
 @cache
 def all_tasks() -> dict[str, Task]:
     """Return all tasks by name."""
-    modules = (import_module(f"{tasks.__name__}.{one.name}") for one in iter_modules(tasks.__path__))
+    modules = (
+        import_module(f"{tasks.__name__}.{one.name}") for one in iter_modules(tasks.__path__)
+    )
     return {module.TASK.name: module.TASK for module in modules}
 
 

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scm.arrays import Floats
-from scm.gym.course import AHEAD_M, BENDS, BESIDE_M, LIMIT_MPS, TURNED_RAD
 from scm.gym.radio import COLUMNS
 from scm.gym.worlds import READINGS, Worlds
+from scm.maps.segments import wall_segments
+from scm.vehicles.drivers.course import AHEAD_M, BENDS, BESIDE_M, LIMIT_MPS, TURNED_RAD
 from scm.vehicles.noise import bases_of
 from scm.vehicles.rays.cast import cast
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
-from scm.maps.segments import wall_segments
 from scm.vehicles.sensor_noise import add_device_errors
 from scm.vehicles.sensors import imu, lidar
 

@@ -47,9 +47,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):
         self.observation_spaces = {
             agent: spaces.Box(self._seen.low, self._seen.high) for agent in self.possible_agents
         }
-        self.action_spaces = {
-            agent: spaces.Box(-1.0, 1.0, (2,)) for agent in self.possible_agents
-        }
+        self.action_spaces = {agent: spaces.Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
         self._is_begun = self._is_closed = False
 
     def observation_space(self, agent: str) -> spaces.Box:

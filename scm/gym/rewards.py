@@ -3,8 +3,8 @@
 import numpy as np
 
 from scm.arrays import Floats
-from scm.gym.course import TURNED_RAD
 from scm.gym.worlds import Worlds
+from scm.vehicles.drivers.course import TURNED_RAD
 
 
 def progress(worlds: Worlds) -> Floats:

@@ -11,6 +11,7 @@ from scm.arrays import Floats
 from scm.gym.observations import Observation
 from scm.gym.vector import CityVectorEnv, Infos
 
+
 class CityEnv(gymnasium.Env[Observation, Floats]):
     """One world of one task.
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
-from scm.gym.course import BESIDE_M, DONE_M, Course
 from scm.gym.radio import Radio
 from scm.gym.randomise import Randomise, Ranges, with_effects
 from scm.gym.task import Task
 from scm.gym.touching import Touching
 from scm.maps.load import load_map
 from scm.vehicles.car import load_car
+from scm.vehicles.drivers.course import BESIDE_M, DONE_M, Course
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.noise import Keys, bases_of, uniforms
 from scm.vehicles.vehicle_status import VehicleStatus

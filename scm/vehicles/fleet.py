@@ -254,9 +254,7 @@ class Fleet:
             first, last = (LANES * (int(row) // LANES) for row in (rows.min(), rows.max()))
             self._run(first, min(last + LANES, self.capacity), 0, SUBSTEP_S)
 
-    def _roll(
-        self, row: int | Ints, shape: Shape, speed: float | Floats, yaw_rate: float
-    ) -> None:
+    def _roll(self, row: int | Ints, shape: Shape, speed: float | Floats, yaw_rate: float) -> None:
         """Initialise placed cars' wheels: rolling without slip, under the static load."""
         half = 0.5 * self._parameter(row, "track") * yaw_rate
         rolling = np.array([speed - half, speed + half, speed - half, speed + half])

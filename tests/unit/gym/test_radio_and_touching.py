@@ -66,6 +66,8 @@ def test_cars_touch_walls_and_others_of_their_own_world_only():
     assert touching.find(motion(free, wall, near, near), present=every).tolist() == [
         False, True, True, True,
     ]  # fmt: skip
-    assert not touching.find(motion(free, (2.0, 0.6, 0.0), near, (2.0, 0.7, 0.0)), present=every).any()
+    assert not touching.find(
+        motion(free, (2.0, 0.6, 0.0), near, (2.0, 0.7, 0.0)), present=every
+    ).any()
     gone = np.array([True, True, True, False])
     assert not touching.find(motion(free, (2.0, 0.6, 0.0), near, near), present=gone).any()

@@ -125,7 +125,9 @@ def test_reward_is_the_way_less_what_it_cost():
     assert not ended.any()
     way = envs.worlds.course.known[:, 3] - done
     half_lane = 0.5 * 0.257
-    assert gain == pytest.approx(way - 0.002 * np.abs(seen[:, 6]) / half_lane - 0.01 * 0.1, abs=1e-6)
+    assert gain == pytest.approx(
+        way - 0.002 * np.abs(seen[:, 6]) / half_lane - 0.01 * 0.1, abs=1e-6
+    )
     assert (way > 0.0).all()
 
 

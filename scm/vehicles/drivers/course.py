@@ -1,4 +1,4 @@
-"""The lanes that cars of many worlds drive along: where each begins, and where it is on them.
+"""The lanes that cars drive along: where each begins, and where it is on them.
 
 A course is the lanes from some on, without end: where they branch, a draw of the episode decides.
 Compiled, one call for all cars.
@@ -15,7 +15,6 @@ from scm.maps.route import Roads
 from scm.records.city_map import CityMap
 from scm.vehicles.drivers.driver_state import (
     AFTER,
-    BESIDE,
     CIRCULATE,
     COUNT,
     DONE,

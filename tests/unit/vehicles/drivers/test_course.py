@@ -7,7 +7,15 @@ import pytest
 
 from scm.errors import MapError
 from scm.geometry import Pose2
-from scm.gym.course import AHEAD_M, BENDS, BESIDE_M, DONE_M, LIMIT_MPS, TURNED_RAD, Course
+from scm.vehicles.drivers.course import (
+    AHEAD_M,
+    BENDS,
+    BESIDE_M,
+    DONE_M,
+    LIMIT_MPS,
+    TURNED_RAD,
+    Course,
+)
 from scm.maps.load import load_map
 from scm.maps.route import Roads
 
@@ -30,7 +38,7 @@ def test_cars_begin_on_the_lanes_evenly_and_know_where_they_are():
     roads = Roads(MAP)
     for x, y, yaw in poses.tolist():
         place = roads.nearest(Pose2(x, y, yaw))
-        assert abs(place.lateral_m) < 1e-6
+        assert abs(place.offset_m) < 1e-6
     assert np.abs(course.known[:, [BESIDE_M, TURNED_RAD, DONE_M]]).max() < 1e-9
     assert course.known[:, LIMIT_MPS] == pytest.approx(0.25)
     assert course.half_width == pytest.approx(0.1285)
