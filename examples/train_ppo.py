@@ -8,6 +8,7 @@ over their usual size. Source: Schulman et al., "Proximal policy optimization al
 
 import argparse
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -55,14 +56,10 @@ class Driven(NamedTuple):
 
 def layers(key: jax.Array, *sizes: int) -> list[tuple[jax.Array, jax.Array]]:
     """Return the weights of a network; its last layer begins near zero."""
-    made, pairs = [], list(zip(sizes[:-1], sizes[1:], strict=True))
-    for at, (above, below) in enumerate(pairs):
-        key, own = jax.random.split(key)
-        scale = 0.01 if at == len(pairs) - 1 else np.sqrt(2.0)
-        made.append(
-            (scale * jax.nn.initializers.orthogonal()(own, (above, below)), jnp.zeros(below))
-        )
-    return made
+    draw, pairs = jax.nn.initializers.orthogonal(np.sqrt(2.0)), list(pairwise(sizes))
+    keys = jax.random.split(key, len(pairs))
+    made = [(draw(own, pair), jnp.zeros(pair[1])) for own, pair in zip(keys, pairs, strict=True)]
+    return [*made[:-1], (0.01 * made[-1][0], made[-1][1])]
 
 
 def run(network: list[tuple[jax.Array, jax.Array]], seen: jax.Array) -> jax.Array:

@@ -1,4 +1,4 @@
-"""The worlds of a task as a Gymnasium vector environment: one array in, one out, no loop between."""
+"""The worlds of a task as a Gymnasium vector environment, without a loop over worlds."""
 
 import os
 from typing import Any, ClassVar

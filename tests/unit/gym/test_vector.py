@@ -1,4 +1,4 @@
-"""Many worlds at once: the same as one alone, begun anew as Gymnasium has it, and clear in errors."""
+"""Many worlds at once: each as if alone, begun anew by Gymnasium's rules, clear in its errors."""
 
 from dataclasses import replace
 
