@@ -18,6 +18,7 @@ BENCHMARKS = (
     "autonomy_times",
     "codec",
     "eye",
+    "gym",
     "camera",
     "cloning",
     "lidar",

@@ -1,6 +1,6 @@
 """Train a car to drive a task by proximal policy optimisation, on many worlds at once.
 
-    python examples/train_ppo.py driving_school/lap-v1 --out lap.npz
+    python examples/train_ppo.py driving_school/lap-v1 --out lap.onnx
 
 Needs scm[gym,learn]. One small network acts, one says what is to be gained; both see observations
 over their usual size. Source: Schulman et al., "Proximal policy optimization algorithms", 2017.
@@ -18,6 +18,7 @@ import numpy as np
 import optax
 
 import scm.gym
+from scm.gym.policy_file import write_policy
 
 HIDDEN, WORLDS, STEPS = 64, 512, 64
 ROUNDS, BATCHES = 4, 8  # over what was driven, and pieces of it
@@ -39,8 +40,12 @@ class Usual:
 
     def of(self, seen: np.ndarray) -> np.ndarray:
         """Return observations less their mean, over their spread."""
-        spread = np.sqrt(np.maximum(self.square - self.mean**2, 1e-4))
-        return np.clip((seen - self.mean) / spread, -10.0, 10.0).astype(np.float32)
+        return np.clip((seen - self.mean) / self.spread, -10.0, 10.0).astype(np.float32)
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Their standard deviation, or a little where they hardly differ."""
+        return np.sqrt(np.maximum(self.square - self.mean**2, 1e-4))
 
 
 class Driven(NamedTuple):
@@ -123,7 +128,7 @@ def main() -> None:
     parser.add_argument("task", nargs="?", default="driving_school/lap-v1")
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=Path("policy.npz"))
+    parser.add_argument("--out", type=Path, default=Path("policy.onnx"))
     given = parser.parse_args()
     envs = scm.gym.make_vec(given.task, WORLDS, copy=False)
     columns = envs.single_observation_space.shape[0]
@@ -171,13 +176,9 @@ def main() -> None:
             f"{spent_s:6.1f} s {taken:10d} steps, {taken / spent_s:8.0f}/s, return {mean:7.3f}",
             flush=True,
         )
-    flat = {
-        f"{name}_{n}_{k}": np.asarray(one)
-        for name in ("actor", "critic")
-        for n, layer in enumerate(params[name])
-        for k, one in enumerate(layer)
-    }
-    np.savez(given.out, mean=usual.mean, square=usual.square, **flat)
+    layers_of = [tuple(map(np.asarray, layer)) for layer in params["actor"]]
+    write_policy(given.out, layers_of, usual.mean, usual.spread, envs)
+    print(f"{given.out}: drive it by vehicle-agent drive {given.out} --vehicle NAME")
 
 
 if __name__ == "__main__":

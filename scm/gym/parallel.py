@@ -26,6 +26,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):
         options: Of `Options`: another car file, and what is drawn for each episode.
 
     Attributes:
+        name: As it was given.
         observation_names: Of the observation's columns, each with its unit.
 
     Raises:
@@ -38,7 +39,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):
     def __init__(self, name: str, **options: Any) -> None:
         task, map_name = task_of(name)
         self.metadata = {**self.metadata, "name": f"{task.name}-v{task.version}"}
-        self.render_mode = None
+        self.name, self.render_mode = name, None
         self.worlds = Worlds(task, map_name, 1, Options(**options))
         self._seen = Observations(self.worlds, task.observations)
         self.observation_names = self._seen.names

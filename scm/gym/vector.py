@@ -29,6 +29,7 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         options: Of `Options`: another car file, and what is drawn for each episode.
 
     Attributes:
+        name: As it was given.
         observation_names: Of the observation's columns, each with its unit.
 
     Raises:
@@ -46,7 +47,7 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         if task.agents > 1:
             msg = f"{name} is of {task.agents} agents: make it by scm.gym.parallel_env"
             raise Error(msg)
-        self.num_envs, self._copy = num_envs, copy
+        self.name, self.num_envs, self._copy = name, num_envs, copy
         self._mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
         threads = threads or len(os.sched_getaffinity(0))

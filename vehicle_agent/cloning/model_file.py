@@ -16,6 +16,7 @@ import onnxruntime
 from scm.arrays import Image
 from scm.errors import LearningError
 from vehicle_agent.cloning.network import CHANNELS
+from vehicle_agent.network_file import session_of
 
 KEY = "scm"
 INPUT, OUTPUT = "frame", "commands"
@@ -78,18 +79,7 @@ class Model:
     """
 
     def __init__(self, path: Path) -> None:
-        if not path.is_file():
-            raise LearningError(f"{path}: expected a trained network (.onnx), got no such file")
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 4
-        try:
-            self._session = onnxruntime.InferenceSession(
-                path.read_bytes(), options, providers=["CPUExecutionProvider"]
-            )
-        except Exception as cause:  # of classes that the library does not name
-            detail = str(cause).strip().splitlines()[-1]
-            raise LearningError(f"{path}: expected a trained network (.onnx): {detail}") from cause
+        self._session = session_of(path)
         self.metadata = _metadata_of(path, self._session.get_modelmeta().custom_metadata_map)
         self.channels = CHANNELS * self.metadata.stack
         self.size_px = _size_of(path, self._session, self.channels)

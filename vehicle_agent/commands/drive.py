@@ -1,14 +1,20 @@
-"""`vehicle-agent drive`: let a trained network drive a car by its front camera."""
+"""`vehicle-agent drive`: let a trained network or a policy drive a car."""
 
 import argparse
 import threading
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scm.command import Command, agent_arguments, credentials_of, place
 
+if TYPE_CHECKING:
+    from vehicle_agent.trained_driver import TrainedDriver
+
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("model", type=Path, metavar="FILE", help="the network, by train")
+    parser.add_argument(
+        "model", type=Path, metavar="FILE", help="the network, by train; or a policy, by scm.gym"
+    )
     parser.add_argument("--vehicle", required=True, metavar="NAME", help="the car to drive")
     parser.add_argument(
         "--throttle", type=float, metavar="SHARE",
@@ -33,7 +39,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from vehicle_agent.leaving import Leaving
 
     try:
-        from vehicle_agent.cloning.driving import NetworkPart
+        from vehicle_agent.policy.model import is_policy
     except ModuleNotFoundError as cause:
         msg = f"{cause.name} is not installed: pip install onnxruntime, or 'scm[learn]'"
         raise RunError(msg) from cause
@@ -46,27 +52,45 @@ def _run(arguments: argparse.Namespace) -> int:
     name = arguments.name or f"drive-{vehicle}"
     name = check_name(name if credentials is None else credentials.station, "--name")
     stop_requested, done, clock = stop_on_signal(), threading.Event(), WallClock()
-    part = NetworkPart(
-        name, vehicle, arguments.model, throttle, spawn=arguments.spawn,
-        ignore_signals=arguments.ignore_signals,
-    )  # fmt: skip
-    metadata = part.model.metadata
-    print(
-        f"{vehicle} is driven by {metadata.network}, learned on {metadata.map}, until Ctrl-C",
-        flush=True,
-    )
+    driver = _policy if is_policy(arguments.model) else _network
+    part, trained_on = driver(name, vehicle, arguments)
+    print(f"{vehicle} is driven by {trained_on}, until Ctrl-C", flush=True)
     with ZenohBus(
         arguments.city, name, arguments.connect, clock=clock, credentials=credentials
     ) as bus:
         run(Leaving(part, stop_requested, done), bus, clock, done, on_tick=True)
     if part.problem:
         raise LearningError(part.problem)
-    print(f"{part.frames} frames")
+    print(part.detail())
     return 0
 
 
+def _network(name: str, vehicle: str, arguments: argparse.Namespace) -> "tuple[TrainedDriver, str]":
+    from vehicle_agent.cloning.driving import NetworkPart
+
+    part = NetworkPart(
+        name, vehicle, arguments.model, arguments.throttle, spawn=arguments.spawn,
+        ignore_signals=arguments.ignore_signals,
+    )  # fmt: skip
+    metadata = part.model.metadata
+    return part, f"{metadata.network}, learned on {metadata.map}"
+
+
+def _policy(name: str, vehicle: str, arguments: argparse.Namespace) -> "tuple[TrainedDriver, str]":
+    from scm.errors import LearningError
+    from vehicle_agent.policy.driving import PolicyPart
+
+    if arguments.throttle is not None:
+        raise LearningError("--throttle: a policy has its own")
+    part = PolicyPart(
+        name, vehicle, arguments.model, spawn=arguments.spawn,
+        ignore_signals=arguments.ignore_signals,
+    )  # fmt: skip
+    return part, f"a policy for {part.policy.metadata.task}"
+
+
 COMMAND = Command(
-    help="let a trained network drive a car by its front camera",
+    help="let a trained network or a policy drive a car",
     example="vehicle-agent drive model.onnx --vehicle n1",
     arguments=_arguments,
     run=_run,

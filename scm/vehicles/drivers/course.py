@@ -89,7 +89,7 @@ class Course:
         if not chosen:
             msg = f"map {city_map.name}: expected a lane from which cars can drive on for ever"
             raise MapError(msg)
-        self._lanes = graph.arrays
+        self._lanes, self._numbers = graph.arrays, graph.numbers
         self._begins = np.array(chosen, np.int64)
         self._ends = np.cumsum(graph.arrays.length[chosen])
         self._half_widths = np.array([0.5 * lane.width_m for lane in city_map.lanes])
@@ -123,11 +123,35 @@ class Course:
         )  # fmt: skip
         return poses
 
+    def enter(self, row: int, lane: str, s: float, branches: float = 0.0) -> None:
+        """Let a car that is on a lane already follow it from there.
+
+        Args:
+            row: Which.
+            lane: Its name.
+            s: About how far along it the rear axle is [m].
+            branches: A draw, 0 to 1, that decides where the lanes branch.
+        """
+        _enter(self._lanes, self._state, row, self._numbers[lane], s, branches)
+
     def follow(self, x: Floats, y: Floats, yaw: Floats) -> None:
         """Find where all cars are, from where they were; `known` says it."""
         _follow(
             self._lanes, self._state, x, y, yaw, np.array(AHEAD_M), self._ids, self._at, self.known
         )
+
+
+@array_kernel
+def _enter(
+    lanes: LaneArrays, state: DriverState, row: int, lane: int, s: float, branches: float
+) -> None:
+    state.routes[row] = lane
+    state.ints[row, INDEX] = 0
+    state.ints[row, SEED] = int(branches * 2.0**31)
+    for column in range(state.floats.shape[1]):
+        state.floats[row, column] = 0.0
+    state.floats[row, S] = s
+    fill_window(lanes, state, row, lane)
 
 
 @array_kernel
@@ -142,13 +166,7 @@ def _begin(
             at += 1
         lane = begins[at]
         s = along - (ends[at - 1] if at else 0.0)
-        state.routes[row] = lane
-        state.ints[row, INDEX] = 0
-        state.ints[row, SEED] = int(draws[k, BRANCHES] * 2.0**31)
-        for column in range(state.floats.shape[1]):
-            state.floats[row, column] = 0.0
-        state.floats[row, S] = s
-        fill_window(lanes, state, row, lane)
+        _enter(lanes, state, row, lane, s, draws[k, BRANCHES])
         segment = lanes.segments[segment_at(lanes.segment_first, lanes.segments, lane, s)]
         beside = (2.0 * draws[k, BESIDE_DRAW] - 1.0) * beside_m
         turn = segment[CURVATURE] * (s - segment[AT])

@@ -1,0 +1,91 @@
+"""Trained policies as ONNX files that `vehicle-agent drive` can use.
+
+    input   observation   float32 (1, columns), as the environment gives it
+    output  action        float32 (1, 2): throttle and steering; beyond -1 to 1 they are clipped
+
+What scales observations belongs into the network. Write needs `onnx`.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+import scm
+from scm.arrays import Floats
+from scm.gym.parallel import CityParallelEnv
+from scm.gym.vector import CityVectorEnv
+from scm.records.policy import INPUT, OUTPUT, POLICY_KEY, PolicyMetadata
+
+OPSET, IR_VERSION = 17, 8
+
+
+def write_policy(
+    path: Path, layers: Sequence[tuple[Floats, Floats]], mean: Floats, spread: Floats,
+    env: CityVectorEnv | CityParallelEnv, clip: float = 10.0,
+) -> None:  # fmt: skip
+    """Write a network of dense layers with hyperbolic tangents between them.
+
+    Args:
+        path: Of the file.
+        layers: Weights (inputs, outputs) and biases (outputs,) of each.
+        mean: Of the observations, (columns,).
+        spread: Their standard deviations, (columns,).
+        env: That it was trained in.
+        clip: Most that a scaled observation is taken for.
+    """
+    columns = len(mean)
+    shown = {"mean": mean[None], "spread": spread[None]}
+    limits = {"low": np.array(-clip), "high": np.array(clip)}
+    nodes = [
+        helper.make_node("Sub", [INPUT, "mean"], ["centred"]),
+        helper.make_node("Div", ["centred", "spread"], ["scaled"]),
+        helper.make_node("Clip", ["scaled", "low", "high"], ["clipped"]),
+    ]
+    at = "clipped"
+    for k, (weights, bias) in enumerate(layers):
+        shown |= {f"weights_{k}": weights, f"bias_{k}": bias}
+        is_last = k == len(layers) - 1
+        out = OUTPUT if is_last else f"sum_{k}"
+        nodes.append(helper.make_node("Gemm", [at, f"weights_{k}", f"bias_{k}"], [out]))
+        if not is_last:
+            at = f"layer_{k}"
+            nodes.append(helper.make_node("Tanh", [out], [at]))
+    constants = [
+        numpy_helper.from_array(np.asarray(value, np.float32), name)
+        for name, value in {**shown, **limits}.items()
+    ]
+    ports = [
+        [helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, width])]
+        for name, width in ((INPUT, columns), (OUTPUT, 2))
+    ]
+    graph = helper.make_graph(nodes, "policy", *ports, constants)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)])
+    model.ir_version = IR_VERSION
+    onnx.checker.check_model(model)
+    _save(model, path, env)
+
+
+def describe_policy(path: Path, env: CityVectorEnv | CityParallelEnv) -> None:
+    """Add what the car's program must know to a policy that another program exported.
+
+    Its input has to be named `observation`, its output `action`.
+
+    Args:
+        path: Of the file; it is written anew.
+        env: That it was trained in.
+    """
+    _save(onnx.load(path), path, env)
+
+
+def _save(model: onnx.ModelProto, path: Path, env: CityVectorEnv | CityParallelEnv) -> None:
+    worlds = env.worlds
+    metadata = PolicyMetadata(
+        policy=1, task=env.name, observations=env.observation_names, car=worlds.task.car,
+        period_s=worlds.task.period_s, agents=worlds.agents, scm=scm.__version__,
+    )  # fmt: skip
+    helper.set_model_props(model, {POLICY_KEY: msgspec.json.encode(metadata).decode()})
+    onnx.save(model, path)

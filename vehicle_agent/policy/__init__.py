@@ -1,0 +1,8 @@
+"""Driving by a policy that was trained in `scm.gym`.
+
+    model       the policy as an ONNX file, with its metadata
+    senses      its observation, from what the car knows of itself, its map and its radio
+    driving     the policy behind the guard, as an agent
+
+Driving needs onnxruntime of the extra scm[learn].
+"""

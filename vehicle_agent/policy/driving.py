@@ -1,0 +1,74 @@
+"""The part that drives one car by a policy: what it knows of itself comes in, actions go out."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from scm.clock import nanoseconds
+from scm.errors import ScmError
+from scm.v2x.exchange import Incoming
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.v2x.messages.world_definition import WorldDefinition
+from vehicle_agent.autonomy.control import Command
+from vehicle_agent.policy.model import Policy
+from vehicle_agent.policy.senses import Senses
+from vehicle_agent.trained_driver import STAND, TrainedDriver
+
+
+class PolicyPart(TrainedDriver):
+    """A policy that drives one car.
+
+    Args:
+        name: Its station, which owns the lease.
+        vehicle: The car.
+        model: Path of the policy.
+        spawn: Place at which the car is put onto the map first, empty: any free one; None: it is
+            there.
+        session: Of its bus.
+        ignore_signals: Whether it drives on whatever they show.
+
+    Attributes:
+        actions: How many it took.
+
+    Raises:
+        LearningError: when the policy cannot be used.
+    """
+
+    def __init__(
+        self, name: str, vehicle: str, model: Path, spawn: str | None = None, session: str = "",
+        *, ignore_signals: bool = False,
+    ) -> None:  # fmt: skip
+        self.policy = Policy(model)
+        car = self.policy.metadata.car
+        super().__init__(name, vehicle, car, spawn, session, ignore_signals=ignore_signals)
+        self._period_ns = nanoseconds(self.policy.metadata.period_s)
+        self._senses: Senses | None = None
+        self._acted_ns, self._action, self._is_lost = -self._period_ns, STAND, False
+        self.actions = 0
+
+    def learn(self, world: WorldDefinition) -> None:
+        """Follow the lanes of another map."""
+        super().learn(world)
+        names = self.policy.metadata.observations
+        try:
+            self._senses = Senses(names, world.map, self._vehicle)
+        except ScmError as error:
+            self._senses, self.problem = None, str(error)
+
+    def look(self, inbox: Sequence[Incoming], now_ns: int) -> Command | None:
+        """Act once a period, by the newest that the car knows of itself."""
+        states = [item.message for item in inbox if isinstance(item.message, VehicleState)]
+        if not states or self._senses is None or now_ns - self._acted_ns < self._period_ns:
+            return None
+        seen = self._senses.look(states[-1], self._action)
+        self._is_lost = seen is None
+        if seen is None:
+            return STAND
+        self._acted_ns, self.actions = now_ns, self.actions + 1
+        self._action = self.policy(seen)
+        return self._action
+
+    def detail(self) -> str:
+        """Return how it drives, or what it waits for, in words."""
+        if self._is_lost:
+            return f"{self._vehicle} is beside all lanes: it stands"
+        return f"{self.actions} actions" if self.actions else f"waits for {self._vehicle}"
