@@ -3,7 +3,7 @@
     python -m bench gym [--worlds 1024] [--resets 1000000]
 
 A step is 50 ms, 50 substeps of the car with 14 degrees of freedom. highway-env and MetaDrive step
-their own cars, where they are installed (`scm[bench]`), one world in one process each, as they come.
+their own cars, where they are installed (`scm[bench]`): one world each.
 """
 
 import argparse

@@ -50,6 +50,6 @@ def parallel_env(name: str, **options: Any) -> CityParallelEnv:
 for _name in ids():
     if _name not in gymnasium.registry:
         gymnasium.register(
-            _name, entry_point=CityEnv, vector_entry_point=CityVectorEnv,
-            kwargs={"name": _name},
+            _name, entry_point="scm.gym.single:CityEnv",
+            vector_entry_point="scm.gym.vector:CityVectorEnv", kwargs={"name": _name},
         )  # fmt: skip

@@ -75,9 +75,8 @@ def inertial(worlds: Worlds) -> Part:
     radius = worlds.car.value("body.wheel_radius_m")
 
     def read() -> Floats:
-        steps = np.repeat(worlds.steps, worlds.agents)
         exact = imu.measure(worlds.car, fleet, rows, None)
-        bases = bases_of(worlds.keys ^ READINGS, steps)
+        bases = bases_of(worlds.keys ^ READINGS, worlds.row_steps)
         readings = add_device_errors(device, exact, bias, bases)
         return np.column_stack((readings[:, :6], radius * fleet.wheel_speed[:, 2:]))
 

@@ -1,6 +1,6 @@
 """One world of several agents as a PettingZoo parallel environment."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -16,7 +16,7 @@ from scm.gym.worlds import Options, Worlds
 Infos = dict[str, dict[str, Any]]
 
 
-class CityParallelEnv(ParallelEnv[str, Observation, Floats]):
+class CityParallelEnv(ParallelEnv[str, Observation, Floats]):  # type: ignore[misc]  # untyped
     """One world of one task; each of its cars is an agent.
 
     A car whose episode ended is taken away, and is an agent no more until the next reset.
@@ -34,11 +34,9 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):
         ScmError: There is no such map or car file.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "name": "scm"}
-
     def __init__(self, name: str, **options: Any) -> None:
         task, map_name = task_of(name)
-        self.metadata = {**self.metadata, "name": f"{task.name}-v{task.version}"}
+        self.metadata = {"render_modes": [], "name": f"{task.name}-v{task.version}"}
         self.name, self.render_mode = name, None
         self.worlds = Worlds(task, map_name, 1, Options(**options))
         self._seen = Observations(self.worlds, task.observations)

@@ -58,11 +58,11 @@ def write_policy(
         numpy_helper.from_array(np.asarray(value, np.float32), name)
         for name, value in {**shown, **limits}.items()
     ]
-    ports = [
+    seen, action = (
         [helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, width])]
         for name, width in ((INPUT, columns), (OUTPUT, 2))
-    ]
-    graph = helper.make_graph(nodes, "policy", *ports, constants)
+    )
+    graph = helper.make_graph(nodes, "policy", seen, action, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)])
     model.ir_version = IR_VERSION
     onnx.checker.check_model(model)

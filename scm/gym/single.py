@@ -1,10 +1,9 @@
 """One world of a task as a Gymnasium environment: a vector environment of one."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 
 from scm.arrays import Floats
@@ -27,16 +26,14 @@ class CityEnv(gymnasium.Env[Observation, Floats]):
         ScmError: There is no such car file.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
-
     def __init__(self, name: str, **options: Any) -> None:
+        self.metadata = {"render_modes": []}
         self._one = CityVectorEnv(
             name, 1, autoreset_mode=AutoresetMode.DISABLED, threads=1, **options
         )
         self.observation_names = self._one.observation_names
-        low, high = self._one.single_observation_space.low, self._one.single_observation_space.high
-        self.observation_space = spaces.Box(low, high)
-        self.action_space = spaces.Box(-1.0, 1.0, (2,))
+        self.observation_space = self._one.single_observation_space
+        self.action_space = self._one.single_action_space
 
     def reset(
         self, *, seed: int | None = None, options: Infos | None = None

@@ -1,7 +1,7 @@
 """The worlds of a task as a Gymnasium vector environment, without a loop over worlds."""
 
 import os
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -37,8 +37,6 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         ScmError: There is no such car file.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
-
     def __init__(
         self, name: str, num_envs: int = 1, *, autoreset_mode: AutoresetMode | str = "NextStep",
         threads: int | None = None, copy: bool = True, **options: Any,
@@ -49,7 +47,7 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
             raise Error(msg)
         self.name, self.num_envs, self._copy = name, num_envs, copy
         self._mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self._mode}
+        self.metadata = {"render_modes": [], "autoreset_mode": self._mode}
         threads = threads or len(os.sched_getaffinity(0))
         self.worlds = Worlds(task, map_name, num_envs, Options(**options), threads)
         self._seen = Observations(self.worlds, task.observations)

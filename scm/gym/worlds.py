@@ -152,12 +152,17 @@ class Worlds:
     @property
     def is_over(self) -> Bools:
         """Which worlds have reached their time limit, (worlds,)."""
-        return self.steps >= self.task.most_steps
+        return np.asarray(self.steps >= self.task.most_steps)
+
+    @property
+    def row_steps(self) -> Ints:
+        """Of each car, since its episode began, (rows,)."""
+        return np.repeat(self.steps, self.agents)
 
     @property
     def is_wrecked(self) -> Bools:
         """Which cars rolled over, or left every physical range, (rows,)."""
-        return self.fleet.status != VehicleStatus.OK
+        return np.asarray(self.fleet.status != VehicleStatus.OK)
 
     @property
     def beside_m(self) -> Floats:
@@ -177,6 +182,6 @@ class Worlds:
         self.touched = self._touching.find(fleet.planar_cogs(self._every), present=self.present)
         self.most_beside_m = course.half_width
         if self.radio is not None:
-            steps = np.repeat(self.steps, self.agents)
+            steps, now_s = self.row_steps, self.task.period_s * self.row_steps.astype(float)
             motion = np.column_stack((fleet.x, fleet.y, fleet.yaw, fleet.speed))
-            self.radio.exchange(motion, self.task.period_s * steps, steps, self.keys, self.present)
+            self.radio.exchange(motion, now_s, steps, self.keys, self.present)
