@@ -47,10 +47,8 @@ class Senses:
         known = {*OF_STATE, *OF_ACTION, *OF_LANE}
         unknown = [name for name in names if name not in known]
         if unknown:
-            msg = (
-                f"the policy observes {', '.join(unknown)}: expected of {', '.join(sorted(known))}"
-            )
-            raise LearningError(msg)
+            wrong, right = ", ".join(unknown), ", ".join(sorted(known))
+            raise LearningError(f"the policy observes {wrong}: a car knows {right}")
         self._names, self._roads = names, roads_of(city_map)
         self._course = Course(city_map, 1)
         self._branches = zlib.crc32(vehicle.encode()) / 2.0**32

@@ -7,6 +7,8 @@ import pytest
 
 from scm.errors import MapError
 from scm.geometry import Pose2
+from scm.maps.load import load_map
+from scm.maps.route import Roads
 from scm.vehicles.drivers.course import (
     AHEAD_M,
     BENDS,
@@ -16,8 +18,6 @@ from scm.vehicles.drivers.course import (
     TURNED_RAD,
     Course,
 )
-from scm.maps.load import load_map
-from scm.maps.route import Roads
 
 MAP = load_map("driving_school")
 ROUND_M = 6.92  # the only way round
@@ -38,7 +38,7 @@ def test_cars_begin_on_the_lanes_evenly_and_know_where_they_are():
     roads = Roads(MAP)
     for x, y, yaw in poses.tolist():
         place = roads.nearest(Pose2(x, y, yaw))
-        assert abs(place.offset_m) < 1e-6
+        assert abs(place.lateral) < 1e-6
     assert np.abs(course.known[:, [BESIDE_M, TURNED_RAD, DONE_M]]).max() < 1e-9
     assert course.known[:, LIMIT_MPS] == pytest.approx(0.25)
     assert course.half_width == pytest.approx(0.1285)
@@ -69,7 +69,7 @@ def test_only_lanes_that_were_chosen_are_begun_on():
     draws = [[share, 0.5, 0.5, 0.0] for share in np.linspace(0.0, 0.99, 20)]
     _, poses = begun(draws, lanes=("east_loop",))
     assert (poses[:, 0] > 1.4).all()
-    with pytest.raises(MapError, match="east_lop.*east_loop"):
+    with pytest.raises(MapError, match=r"east_lop.*east_loop"):
         Course(MAP, 1, ("east_lop",))
 
 
@@ -78,7 +78,7 @@ def test_where_lanes_branch_the_draw_decides():
     course = Course(town, 8, ("west_outer",))
     draws = np.array([[0.99, 0.5, 0.5, k / 8] for k in range(8)])
     course.begin(np.arange(8), draws, 0.0, 0.0)
-    following = course._state.lane_window[:, 2]  # noqa: SLF001
+    following = course._state.lane_window[:, 2]
     assert len(set(following.tolist())) == 2
 
 

@@ -1,0 +1,134 @@
+"""A policy that was written in training drives a car of the city, on the lanes that it knows."""
+
+import msgspec
+import numpy as np
+import onnx
+import pytest
+from msgspec.structs import replace
+
+import scm.gym
+from scm.errors import LearningError
+from scm.gym.policy_file import describe_policy, write_policy
+from scm.maps.load import load_map
+from scm.records.policy import POLICY_KEY
+from scm.runtime.lockstep import Lockstep
+from scm.runtime.part import Subscription
+from scm.traffic.signals.part import TrafficPart
+from scm.v2x.messages.part_status import PartStatus
+from scm.v2x.messages.vehicle_state import VehicleState
+from scm.vehicles.drivers.course import Course
+from scm.world.part import WorldPart
+from vehicle_agent.policy.driving import PolicyPart
+from vehicle_agent.policy.model import Policy, is_policy
+from vehicle_agent.policy.senses import Senses
+from vehicle_agent.trained_driver import STAND
+
+SCHOOL = load_map("driving_school")
+OPEN = replace(SCHOOL, junctions=(), stop_lines=(), lights=())
+ROUND_M = 6.92
+
+
+@pytest.fixture(scope="module")
+def envs():
+    return scm.gym.make_vec("driving_school/lap-v1", 4)
+
+
+@pytest.fixture(scope="module")
+def policy(envs, tmp_path_factory):
+    """Return the file of a policy of one layer: a linear law that follows its lane."""
+    path = tmp_path_factory.mktemp("policy") / "lane.onnx"
+    names = envs.observation_names
+    weights = np.zeros((len(names), 2))
+    for name, gain in {"beside_m": -8.0, "turned_rad": -2.0, "lane_turn_0.2m_rad": 1.7}.items():
+        weights[names.index(name), 1] = gain
+    columns = np.zeros(len(names)), np.ones(len(names))
+    write_policy(path, [(weights, np.array([0.8, 0.0]))], *columns, envs)
+    return path
+
+
+def driven(policy, city_map, lasts_s, vehicle="n1", car="nigel", **options):
+    """Return how far the car came, how far off its lane it was, and the part that drove it."""
+    part = PolicyPart("policy", vehicle, policy, **options)
+    world = WorldPart(city_map, 1, ((vehicle, car),) if "spawn" not in options else ())
+    course, off, began = Course(OPEN, 1), [], False
+    with Lockstep([TrafficPart(city_map), world, part]) as city:
+        states = city.subscribe(Subscription(VehicleState, {"vehicle": vehicle}))
+        for _ in range(round(lasts_s / 0.5)):
+            city.run_for(0.5)
+            for state in (item.message for item in states.drain()):
+                if not began:
+                    began = True
+                    senses = Senses(part.policy.metadata.observations, OPEN, vehicle)
+                    senses.look(state, STAND)
+                    course = senses._course
+                course.follow(*(np.array([v]) for v in (state.x_m, state.y_m, state.yaw_rad)))
+                off.append(course.known[0, 0])
+    return course.known[0, 3], np.abs(off).max(initial=0.0), part
+
+
+def test_policy_drives_round_as_it_did_in_training(envs, policy):
+    way_m, off_m, part = driven(policy, OPEN, 20.0)
+    assert (way_m, off_m) == (pytest.approx(4.2, abs=0.6), pytest.approx(0.0, abs=0.03))
+    assert part.actions == pytest.approx(20.0 / 0.06, rel=0.35)  # states come each 20 ms
+    action, seen = Policy(policy), envs.reset(seed=3)[0]
+    began_m = envs.worlds.course.known[:, 3].copy()
+    for _ in range(400):
+        seen = envs.step(np.array([list(action(row))[:2] for row in seen.astype(float)]))[0]
+    came_m = envs.worlds.course.known[:, 3] - began_m
+    assert came_m == pytest.approx(way_m, abs=0.6)
+
+
+def test_policy_stops_at_red(policy):
+    free_m, _, _ = driven(policy, SCHOOL, 12.0, ignore_signals=True)
+    way_m, _, part = driven(policy, SCHOOL, 12.0)
+    assert way_m < free_m - 0.5
+    assert part._waits_for.startswith("waits for green")
+
+
+def test_car_is_put_onto_the_map_if_requested(policy):
+    way_m, _, part = driven(policy, OPEN, 6.0, spawn="")
+    assert way_m > 0.5
+    assert part.detail().endswith("actions")
+
+
+def test_policy_drives_no_other_car_than_it_was_trained_on(policy):
+    _, _, part = driven(policy, OPEN, 2.0, car="f1tenth")
+    assert part.actions == 0
+    assert part.problem == "the network was trained on a nigel, n1 is a f1tenth"
+
+
+def test_policy_that_observes_what_no_car_knows_says_so(policy, tmp_path, envs):
+    path = tmp_path / "more.onnx"
+    model = onnx.load(policy)
+    (entry,) = model.metadata_props
+    metadata = msgspec.json.decode(entry.value)
+    metadata["observations"][0] = "fuel_m"
+    entry.value = msgspec.json.encode(metadata).decode()
+    onnx.save(model, path)
+    part = PolicyPart("policy", "n1", path)
+    with Lockstep([WorldPart(OPEN, 1, (("n1", "nigel"),)), part]) as city:
+        statuses = city.subscribe(Subscription(PartStatus, {"station": "policy"}))
+        city.run_for(2.0)
+        (*_, last) = [item.message for item in statuses.drain()]
+    assert last.detail.startswith("the policy observes fuel_m: a car knows beside_m, ")
+
+
+def test_file_that_is_no_policy_says_what_was_expected(policy, tmp_path, envs):
+    nothing, text = tmp_path / "none.onnx", tmp_path / "text.onnx"
+    text.write_text("hello")
+    bare = tmp_path / "bare.onnx"
+    model = onnx.load(policy)
+    del model.metadata_props[:]
+    onnx.save(model, bare)
+    for path, words in ((nothing, "no such file"), (text, "expected"), (bare, POLICY_KEY)):
+        assert not is_policy(path)
+        with pytest.raises(LearningError, match=words):
+            Policy(path)
+    describe_policy(bare, envs)
+    assert Policy(bare).metadata.observations == envs.observation_names
+    weights = np.full((len(envs.observation_names), 2), np.nan)
+    broken = tmp_path / "nan.onnx"
+    ones = np.ones(len(weights))
+    write_policy(broken, [(weights, np.zeros(2))], 0.0 * ones, ones, envs)
+    with pytest.raises(LearningError, match="are its weights NaN"):
+        Policy(broken)
