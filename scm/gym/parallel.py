@@ -92,15 +92,15 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):  # type: ignore[mi
         gained = self._of_agents(rewards.tolist())
         ended, out_of_time = self._of_agents(ends.tolist()), self._of_agents(over.tolist())
         infos: Infos = {agent: {} for agent in self.agents}
-        self._take_out(ends | over)
+        self._remove(ends | over)
         return seen, gained, ended, out_of_time, infos
 
     def close(self) -> None:
         """Close it: it cannot be used any more."""
         self._is_closed = True
 
-    def _take_out(self, rows: Bools) -> None:
-        self.worlds.take_out(rows)
+    def _remove(self, rows: Bools) -> None:
+        self.worlds.remove(rows)
         pairs = zip(self.possible_agents, rows.tolist(), strict=True)
         gone = {agent for agent, is_out in pairs if is_out}
         self.agents = [agent for agent in self.agents if agent not in gone]

@@ -144,7 +144,7 @@ class Worlds:
             found |= function(self)
         return found & self.present
 
-    def take_out(self, rows: Bools) -> None:
+    def remove(self, rows: Bools) -> None:
         """Let cars (rows,) take part no more, until the next episode."""
         self.present &= ~rows
         self.fleet.alive[rows] = False

@@ -5,11 +5,14 @@ smooth in the delay, exact where calls are regular and where there is no delay.
 """
 
 import math
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
+from scm.errors import TermError
 from scm.vehicles.jit import array_kernel
+from scm.vehicles.term import Term, reads
 
 KNOTS = 64  # stored instants per car
 SPACING_S = 8e-3  # minimum between two of them: 0.5 s in all, the longest delay
@@ -58,6 +61,33 @@ class CommandHistory:
             block, numbers, alive, self._knots, self._newest, self._before, self.block_rows,
             self.columns, first, last, span,
         )  # fmt: skip
+
+
+def history_of(
+    terms: Iterable[Term], places: Mapping[str, int], offsets: Mapping[str, tuple[int, int]],
+    capacity: int,
+) -> CommandHistory | None:  # fmt: skip
+    """Return the command history of a fleet if one of its effects reads delayed commands.
+
+    Args:
+        terms: The effects.
+        places: Rows of the fleet's numbers, by key.
+        offsets: Rows of its block, by name.
+        capacity: Of the fleet.
+
+    Raises:
+        TermError: when an effect reads a delayed command and the car has no such delay.
+    """
+    delayed = {name for term in terms for name in reads(term.function)} & DELAYS.keys()
+    if not delayed:
+        return None
+    for name in sorted(delayed):
+        if DELAYS[name] not in places:
+            msg = f"an effect reads {name}, but no effect has the parameter {DELAYS[name]}"
+            raise TermError(msg)
+    rows = [offsets[name][0] for name in (*COMMANDS, *DELAYS)]
+    columns = [places.get(key, -1) for key in DELAYS.values()]
+    return CommandHistory(capacity, np.array(rows), np.array(columns))
 
 
 @array_kernel

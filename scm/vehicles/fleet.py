@@ -16,7 +16,7 @@ from scm.errors import RunError, TermError, nearest
 from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY, sprung_part
 from scm.vehicles.car import Car
-from scm.vehicles.command_delay import COMMANDS, DELAYS, CommandHistory
+from scm.vehicles.command_delay import history_of
 from scm.vehicles.compiler.kernel_file import compile_kernel
 from scm.vehicles.compiler.vector_code import LANES
 from scm.vehicles.fleet_rows import (
@@ -37,7 +37,6 @@ from scm.vehicles.layout import columns_of, find_column, rows_of
 from scm.vehicles.physics_variables import VARIABLES
 from scm.vehicles.placing import directions
 from scm.vehicles.shape import Shape, shape_function
-from scm.vehicles.term import reads
 from scm.vehicles.vehicle_status import VehicleStatus
 
 SUBSTEP_S = 1e-3
@@ -104,7 +103,7 @@ class Fleet:
         self.alive: Bools = self._alive[:capacity]
         self._status: Ints = np.zeros(padded, dtype=np.int64)
         self.status: Ints = self._status[:capacity]
-        self._history = self._history_of(padded)
+        self._history = history_of(car.terms, self._places, self._offsets, padded)
         self.contact_accel_x, self.contact_accel_y, self.contact_yaw_accel = np.zeros((3, capacity))
         for name, variable in WRITTEN.items():
             setattr(self, name, self._view(variable))
@@ -452,23 +451,6 @@ class Fleet:
         if not 0 <= row < self.capacity:
             msg = f"fleet of {self.car.name}: no row {row}, expected 0 to {self.capacity - 1}"
             raise RunError(msg)
-
-    def _history_of(self, padded: int) -> CommandHistory | None:
-        """Return the command history if an effect reads delayed commands.
-
-        Raises:
-            TermError: when an effect reads a delayed command and the car has no such delay.
-        """
-        delayed = {name for term in self.car.terms for name in reads(term.function)} & DELAYS.keys()
-        if not delayed:
-            return None
-        for name in sorted(delayed):
-            if DELAYS[name] not in self._places:
-                msg = f"an effect reads {name}, but no effect has the parameter {DELAYS[name]}"
-                raise TermError(msg)
-        offsets = [self._offsets[name][0] for name in (*COMMANDS, *DELAYS)]
-        columns = [self._places.get(key, -1) for key in DELAYS.values()]
-        return CommandHistory(padded, np.array(offsets), np.array(columns))
 
     def _offset_of(self, name: str) -> int:
         if name not in self._variable_offsets:
