@@ -39,7 +39,7 @@ def drives(seed, is_affected=lambda t_s, x, y: False, number=ROLLING, usually=No
         scores[:, ROLLING] += usually(*places.T)
     cameras = np.where(places[:, 0] < 0.0, "west", "east")
     return Evidence(
-        NUMBERS, t_s, places, cameras, scores, np.ones_like(scores), np.ones(len(NUMBERS))
+        NUMBERS, t_s, places, cameras, scores, np.ones_like(scores), scores, np.ones(len(NUMBERS))
     )
 
 

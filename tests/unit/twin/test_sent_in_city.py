@@ -37,7 +37,14 @@ class Shown:
         empty = np.empty((0, len(NUMBERS)))
         none = np.empty(0)
         self.evidence = Evidence(
-            NUMBERS, none, np.empty((0, 2)), none.astype(str), empty, empty, np.ones(len(NUMBERS))
+            NUMBERS,
+            none,
+            np.empty((0, 2)),
+            none.astype(str),
+            empty,
+            empty,
+            empty,
+            np.ones(len(NUMBERS)),
         )
         self._add(np.arange(BEFORE_S, SINCE_S, 2.0))
 
