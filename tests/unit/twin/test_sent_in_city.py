@@ -68,6 +68,7 @@ class Shown:
         one.t_s, one.places = np.append(one.t_s, times_s), np.vstack((one.places, places))
         one.cameras = np.append(one.cameras, np.full(len(times_s), ""))
         one.scores = np.vstack((one.scores, scores))
+        one.whole = one.scores
         one.information = np.vstack((one.information, np.ones_like(scores)))
 
 
