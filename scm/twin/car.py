@@ -9,7 +9,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -24,7 +24,7 @@ from scm.twin.causes import ELSEWHERE, cause_in_words, located
 from scm.twin.drives import Reaches, interrupted, is_recent
 from scm.twin.evidence import Witness, witness
 from scm.twin.investigation import FAILURES, Compared, Explained, compare, explain, why_failed
-from scm.twin.memory import CarMemory
+from scm.twin.memory import CarMemory, seen_by_eye
 from scm.twin.places import PlaceWatch
 from scm.twin.versions import (
     BY_TWIN,
@@ -54,7 +54,7 @@ LATE_NS, LATELY_NS = nanoseconds(30.0), nanoseconds(120.0)
 """With more cars than can be looked at, what waits for longer is left out; how long that counts."""
 LEAP_NS = nanoseconds(2.0)  # of a clock: what was recorded before does not belong to what follows
 MOST_CHANGES = 20
-BY_EYE, FEWEST_SEEN = "eye", 50  # poses of a first look, for the Eye to be a witness
+FEWEST_SEEN = 50  # poses of a first look, for the Eye to be a witness
 SEARCHED_BEFORE_S, SEARCHED_AFTER_S = 120.0, 90.0  # of a change, for a search
 MOST_AFTER_S, LEAST_AFTER_S = 300.0, 40.0
 LOCATE_NS = nanoseconds(30.0)  # between two judgements of whose a change is
@@ -316,6 +316,11 @@ class TwinCar:
 
     def _search_for(self, change: TwinChange, data: Path) -> list[Outgoing]:
         """Start the search for the cause of a change, when the car was driven long enough since."""
+        if change.cause == "undecided" and self._setup.places.has_found(change):
+            if self.newest_ns - change.noticed_ns <= LOCATED_NS:
+                return []  # whose it is may still come out
+            text = "Several cars noticed it at one place; whose change it is was not decided."
+            return self._now(change, structs.replace(change, search="failed", text=text))
         since_s = seconds(change.since_ns - self._begin_ns)
         later = (one for one in self.changes if one.since_ns > change.since_ns)
         ends = next((seconds(one.since_low_ns - self._begin_ns) for one in later), None)
@@ -491,9 +496,3 @@ class TwinCar:
             severity=severity, source=NAME, t_ns=self.newest_ns, name=name, vehicle=self.name,
             text=text,
         )  # fmt: skip
-
-
-def seen_by_eye(messages: CarMessages) -> CarMessages:
-    """Return a car's messages as those of one of which only the Eye knows where it is."""
-    reports = [report._replace(source=BY_EYE) for report in messages.reports]
-    return replace(messages, reports=reports)

@@ -132,6 +132,23 @@ def test_change_of_the_floor_is_not_searched_for_in_the_car(changed, tmp_path, m
     assert event.text == "Not n1 changed but the floor, within 0.3 m of (1.0, 2.0)"
 
 
+def test_change_noticed_at_a_place_is_not_searched_for_while_it_is_undecided_whose_it_is(
+    changed, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(twin_car.PlaceWatch, "has_found", lambda *_: True)
+    city = City(tmp_path)
+    (change,) = city.run(changed).changes
+    assert (change.search, change.cause, city.executor.calls) == ("driving", "undecided", [])
+
+    monkeypatch.setattr(twin_car, "LOCATED_NS", NS_PER_S)
+    city = City(tmp_path)
+    (change,) = city.run(changed).changes
+    assert (change.search, city.executor.calls) == ("failed", [])
+    assert change.text == (
+        "Several cars noticed it at one place; whose change it is was not decided."
+    )
+
+
 def test_version_found_for_a_change_that_proves_to_be_the_floor_s_is_rejected(
     changed, tmp_path, monkeypatch
 ):
