@@ -15,6 +15,7 @@ from scm.records.twins import TwinCause, TwinEffect, TwinError, TwinParameter
 from scm.runtime.priority import NICER
 from scm.twin import car as twin_car
 from scm.twin import detector
+from scm.twin.abilities import compared_abilities
 from scm.twin.investigation import AtOnce, Compared, Explained, Worker, _is_of, explain
 from scm.twin.part import TwinPart
 from scm.v2x.exchange import Answer, Call, Incoming, PersistedState
@@ -22,6 +23,7 @@ from scm.v2x.message import Refused
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.twin_status import TwinStatus
 from scm.v2x.messages.version_request import VersionRequest
+from scm.vehicles.car import load_car
 from tests.unit.mismatch.made_drive import made_drive, nigel
 from tests.unit.twin.reported import (
     BEGAN_NS,
@@ -298,6 +300,8 @@ def test_search_names_the_effect_dates_it_and_writes_report_recording_and_car(tm
     assert {"report.json", "report.html", "recording"} <= {
         one.name for one in (tmp_path / "report").iterdir()
     }
+    sure = compared_abilities(nigel(), load_car(made))
+    assert found.abilities[1].high > sure[1].high + 1e-4  # it strayed by 0.5 mm on unseen driving
 
 
 def test_search_that_ran_out_of_time_says_so(tmp_path):
