@@ -42,6 +42,10 @@ AT_ANY_PACE = {
     )
 }
 """Files of `tests/e2e` that nothing binds to real time: their cities run in lockstep, or not."""
+BESIDE_TYPES = tuple(
+    f"tests/unit/{name}/" for name in ("twin", "v2x", "vehicle_agent", "vehicles", "world")
+)
+"""Folders of the tests that come last."""
 
 
 def is_bound_to_real_time(nodeid: str) -> bool:
@@ -60,14 +64,19 @@ settings.load_profile("busy_machine")
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark every test of `tests/e2e` as such; first those bound to real time, then the others.
 
-    Last come those of the whole tree: one that checks its types takes a core for a minute, and
-    would hardly get one beside the cities.
+    The check of types takes a core for a minute, and would hardly get one beside the cities; last,
+    it would keep one busy alone. So enough tests follow it to keep the others at work.
     """
+
+    def turn(item: pytest.Item) -> int:
+        is_last = item.nodeid.startswith(BESIDE_TYPES)
+        return 1 if item.path.name == "test_project.py" else 2 * is_last
+
     items.sort(
         key=lambda item: (
             not is_bound_to_real_time(item.nodeid),
             "e2e" not in item.path.parts,
-            item.path.name == "test_project.py",
+            turn(item),
         )
     )
     for item in items:

@@ -2,14 +2,21 @@
 
 Cars drawn from the file's standard deviations and correlations drive straight at the throttle of
 ordinary driving, lose it as their guard stops them, and drive circles at full steering.
+
+Their spread is what a fit does not know of the numbers. But no numbers make a simulator the car,
+and a fit may have ended in a wrong minimum: so the interval has a part of model discrepancy, too
+(Kennedy and O'Hagan, 2001), which is how far the file strays on driving that no fit has seen.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from scm.arrays import Floats
 from scm.geometry import Pose2
+from scm.mismatch.findings import Fit, PartErrors
+from scm.mismatch.validate.explain import NINETY
 from scm.records.twins import TwinParameter
 from scm.vehicles.car import Car
 from scm.vehicles.fleet import Fleet
@@ -20,6 +27,7 @@ CRUISE_THROTTLE = 0.8  # of ordinary driving, as drivers drive
 SPED_UP_S, STOPPED_S, CIRCLED_S = 3.0, 3.0, 3.0
 STEP_S = 0.02
 INTERVAL = (5.0, 50.0, 95.0)  # percentiles
+WHEEL, POSITION = "wheel_m", "position_m"  # errors of free runs
 APART_M = 50.0
 
 
@@ -65,23 +73,48 @@ def _radius(car: Car, count: int, seed: int, steering: float) -> Floats:
     return np.abs(fleet.speed[:count]) / rate
 
 
-def compared_abilities(before: Car, now: Car) -> tuple[TwinParameter, ...]:
-    """Return what a car can do by a new file, with 90 % intervals, and by the one before."""
+def compared_abilities(before: Car, now: Car, fit: Fit | None = None) -> tuple[TwinParameter, ...]:
+    """Return what a car can do by a new file, with 90 % intervals, and by the one before.
+
+    Args:
+        before: The file before.
+        now: The new one.
+        fit: How well it follows driving, some of which no fit has seen; None: nobody knows.
+    """
     then, new = abilities_of(before), abilities_of(now)
-    return tuple(
-        _parameter(name, unit, getattr(then, field), getattr(new, field))
-        for name, unit, field in (
-            ("cruise_mps", "m/s", "speed"),
-            ("stopping_m", "m", "stopping"),
-            ("turning_radius_m", "m", "radius"),
-        )
+    away_m, lasts_s = (0.0, 1.0) if fit is None else (strayed_m(fit.confirm), fit.horizon_s)
+    return (
+        _parameter("cruise_mps", "m/s", then.speed, new.speed, away_m / lasts_s),
+        _parameter("stopping_m", "m", then.stopping, new.stopping, away_m),
+        _parameter("turning_radius_m", "m", then.radius, new.radius),
     )
 
 
-def _parameter(name: str, unit: str, then: Floats, now: Floats) -> TwinParameter:
-    low, value, high = np.percentile(now, INTERVAL).tolist()
-    before = float(np.median(then))
-    return TwinParameter(name=name, value=value, low=low, high=high, unit=unit, before=before)
+def strayed_m(part: PartErrors) -> float:
+    """Return how far along its way a car strays in free runs, beyond noise; root mean square [m].
+
+    By its wheels, where they are counted: what poses show is mostly their noise.
+    """
+    name = WHEEL if WHEEL in part.after else POSITION
+    square = part.after.get(name, 0.0) ** 2 - part.noise_floor.get(name, 0.0) ** 2
+    return math.sqrt(max(square, 0.0))
+
+
+def _parameter(
+    name: str, unit: str, then: Floats, now: Floats, discrepancy: float = 0.0
+) -> TwinParameter:
+    """Return an ability about what the file says.
+
+    The median of cars drawn lies off it: numbers that cannot be negative, as friction, are cut,
+    and those that make good for them are not. `discrepancy` is a standard deviation.
+    """
+    low, middle, high = np.percentile(now, INTERVAL).tolist()
+    value, before, more = float(now[0]), float(then[0]), NINETY * discrepancy
+    return TwinParameter(
+        name=name, value=value, unit=unit, before=before,
+        low=max(value - math.hypot(middle - low, more), 0.0),
+        high=value + math.hypot(high - middle, more),
+    )  # fmt: skip
 
 
 def _drive(fleet: Fleet, lasts_s: float) -> None:

@@ -9,28 +9,30 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from msgspec import structs
 
 from scm.clock import nanoseconds, seconds
+from scm.disturbances import Disturbances
 from scm.errors import CarError, RecordingError
-from scm.recorder.driven import CarMessages, recording_of
+from scm.recorder.driven import SIMULATED, CarMessages, recording_of
 from scm.recording.read import Recording
 from scm.records.twins import TwinChange, TwinDrive, TwinVersion
 from scm.twin.causes import ELSEWHERE, cause_in_words, located
 from scm.twin.drives import Reaches, interrupted, is_recent
 from scm.twin.evidence import Witness, witness
 from scm.twin.investigation import FAILURES, Compared, Explained, compare, explain, why_failed
-from scm.twin.memory import CarMemory
+from scm.twin.memory import CarMemory, seen_by_eye
 from scm.twin.places import PlaceWatch
 from scm.twin.versions import (
     BY_TWIN,
     PROBATION_S,
     SEEN_S,
     CarVersions,
+    Trial,
     in_words,
     is_worse,
     meaning,
@@ -54,7 +56,7 @@ LATE_NS, LATELY_NS = nanoseconds(30.0), nanoseconds(120.0)
 """With more cars than can be looked at, what waits for longer is left out; how long that counts."""
 LEAP_NS = nanoseconds(2.0)  # of a clock: what was recorded before does not belong to what follows
 MOST_CHANGES = 20
-BY_EYE, FEWEST_SEEN = "eye", 50  # poses of a first look, for the Eye to be a witness
+FEWEST_SEEN = 50  # poses of a first look, for the Eye to be a witness
 SEARCHED_BEFORE_S, SEARCHED_AFTER_S = 120.0, 90.0  # of a change, for a search
 MOST_AFTER_S, LEAST_AFTER_S = 300.0, 40.0
 LOCATE_NS = nanoseconds(30.0)  # between two judgements of whose a change is
@@ -71,6 +73,7 @@ class Setup:
         threshold: Score from which on a change is reported.
         predictor: Returns what predicts cars of a file.
         places: Where the floor changed.
+        disturbances: When the world simulated less time than passed.
         executor: Runs searches and comparisons.
         data: Folder for reports and car files; None: nothing is searched for.
         budget_s: For a search.
@@ -79,24 +82,10 @@ class Setup:
     threshold: float
     predictor: Callable[[str], WatchedCar]
     places: PlaceWatch
+    disturbances: Disturbances
     executor: Executor
     data: Path | None
     budget_s: float
-
-
-@dataclass(slots=True)
-class _Trial:
-    """A version on new driving, compared with the one before it.
-
-    Attributes:
-        since_s: From when on driving is new.
-        driven_s: How long the car had been driven then.
-        done: How many comparisons were made.
-    """
-
-    since_s: float
-    driven_s: float
-    done: int = 0
 
 
 class TwinCar:
@@ -128,7 +117,7 @@ class TwinCar:
         self._watched_s = self._looked_s = self._driven_s = 0.0
         self._is_seen: bool | None = None  # by the Eye; None: not decided yet
         self._reason = ""
-        self._trial = _Trial(0.0, 0.0) if self.versions.candidate is not None else None
+        self._trial = Trial(0.0, 0.0) if self.versions.candidate is not None else None
         self._search: Future[Explained] | None = None
         self._comparison: Future[Compared] | None = None
         self._requested: tuple[int, Compared] | None = None  # of a version
@@ -189,7 +178,11 @@ class TwinCar:
     def _remember(self) -> None:
         """Take ten seconds of messages into the memory."""
         first_ns, self.next_ns = self.next_ns, self.next_ns + LOOK_NS
+        is_simulated = any(one.source == SIMULATED for one in self._messages.reports[-1:])
+        void = self._setup.disturbances.void_reasons(first_ns, self.next_ns) if is_simulated else ()
         try:
+            if void:
+                raise RecordingError(void[0])
             first_s = seconds(first_ns - self._begin_ns)
             self._memory.add(self._recording(), first_s, first_s + SPAN_S, self._camera())
         finally:
@@ -260,7 +253,8 @@ class TwinCar:
         """
         states = {one.drive.state for one in self.changes if one.drive is not None}
         every_ns = SENT_NS if "under_way" in states else LOCATE_NS
-        if 0 <= self.newest_ns - self._located_ns < every_ns:
+        is_judged = all(one.causes for one in self.changes)
+        if is_judged and 0 <= self.newest_ns - self._located_ns < every_ns:
             return []
         out = list[Outgoing]()
         others = sorted((one for one in cars if one is not self), key=lambda one: -one.driven_s)
@@ -316,6 +310,11 @@ class TwinCar:
 
     def _search_for(self, change: TwinChange, data: Path) -> list[Outgoing]:
         """Start the search for the cause of a change, when the car was driven long enough since."""
+        if change.cause == "undecided" and self._setup.places.has_found(change):
+            if self.newest_ns - change.noticed_ns <= LOCATED_NS:
+                return []  # whose it is may still come out
+            text = "Several cars noticed it at one place; whose change it is was not decided."
+            return self._now(change, structs.replace(change, search="failed", text=text))
         since_s = seconds(change.since_ns - self._begin_ns)
         later = (one for one in self.changes if one.since_ns > change.since_ns)
         ends = next((seconds(one.since_low_ns - self._begin_ns) for one in later), None)
@@ -368,7 +367,7 @@ class TwinCar:
         is_newest = named is self.changes[-1]
         if found.car_file is not None and is_newest and named.cause not in ELSEWHERE:
             made = self.versions.propose(found, named.report, self.newest_ns)
-            self._trial = _Trial(*self._searched_until)
+            self._trial = Trial(*self._searched_until)
             out += self._stored(made)
         return [*out, self.status()]
 
@@ -439,7 +438,7 @@ class TwinCar:
         changed = self.versions.put_in_force(number, request.by, request.reason, compared)
         self._requested = self._comparison = self._trial = self._watch = None
         if compared is not None and number > before:
-            self._trial = _Trial(self._memory.last_s, self._driven_s)
+            self._trial = Trial(self._memory.last_s, self._driven_s)
         changes = [seconds(one.since_high_ns - self._begin_ns) for one in self.changes]
         self._watched_s = max([0.0, *changes])  # it learns from what was driven since
         level: Literal["info", "warning"] = "info" if number > before else "warning"
@@ -457,7 +456,7 @@ class TwinCar:
         """Start a comparison again whose result could not be put in force."""
         self._requested = None
         if self._trial is None:
-            self._trial = _Trial(self._memory.last_s, self._driven_s)
+            self._trial = Trial(self._memory.last_s, self._driven_s)
         return []
 
     def status(self) -> TwinStatus:
@@ -491,9 +490,3 @@ class TwinCar:
             severity=severity, source=NAME, t_ns=self.newest_ns, name=name, vehicle=self.name,
             text=text,
         )  # fmt: skip
-
-
-def seen_by_eye(messages: CarMessages) -> CarMessages:
-    """Return a car's messages as those of one of which only the Eye knows where it is."""
-    reports = [report._replace(source=BY_EYE) for report in messages.reports]
-    return replace(messages, reports=reports)

@@ -41,7 +41,9 @@ JUDGED_AFTER_S = 60.0  # since a change: whoever came to a place once may as wel
 MOST_OF_IT = 80.0  # percentile of how far from its middle a place was driven through
 FEWEST = 10  # windows of a place that a car drove through
 NEAR_M, NEAR_WAY = 0.12, 0.5  # windows so near, and in about the same direction, are alike
-AS_WELL = 8.0  # of the weight of a change off known places: then there was one
+AS_WELL, LEFT = 8.0, 0.1
+"""A change off known places counts from such a weight on, and from that share of the place's own:
+so much of it is left elsewhere, since a car that was braked drives on otherwise for a while."""
 AS_MANY = 3.0  # windows of all its driving, that count where none was nearby
 
 
@@ -115,6 +117,10 @@ def located(
     own_s = [one.probability for one in causes if one.kind in OWN]
     is_sure = max(causes[0].probability, sum(own_s) if causes[0].kind in OWN else 0.0) >= SURE
     cause = causes[0].kind if is_sure else "undecided"
+    if change.cause == "place" and cause in OWN:
+        return (
+            change  # who brakes there, comes to lights at other times, and drives otherwise since
+        )
     open_ = {} if is_sure else {one.kind: one for one in causes if one.probability >= POSSIBLE}
     drive = next_drive(change, deciding_drive(change, open_, vehicle, cars, reaches))
     decide_by = "" if is_sure or drive is None else drive_in_words(drive, vehicle)
@@ -171,7 +177,8 @@ def causes_of(
     found = _weighed(rows, numbers)
     if found.likeliest == "place" and is_off is not None:
         off = _weighed([_off(one, is_off(one.places)) for one in rows], numbers)
-        found = off if off.weight[off.likeliest] > AS_WELL else found
+        least = AS_WELL + LEFT * found.weight["place"]
+        found = off if off.weight[off.likeliest] > least else found
     top = max(found.weight.values())
     total = sum(math.exp(value - top) for value in found.weight.values())
     x_m, y_m, radius_m = (None, None, None) if found.place is None else found.place

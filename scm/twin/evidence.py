@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scm.arrays import Floats
 from scm.clock import seconds
 from scm.records.twins import Kind, TwinChange
-from scm.twin.detector import INFORMATION, NEAR, Usual, weighed
+from scm.twin.detector import INFORMATION, NEAR, WHOLE, Usual, weighed
 from scm.twin.windows import WatchedNumber, Windows
 
 OWN: tuple[Kind, ...] = ("car", "tag")  # causes of a change that are the car's
@@ -28,7 +28,8 @@ class Evidence:
         t_s: When each window begins, on the recording's clock, (n,).
         places: In the middle of each, x and y, (n, 2) [m].
         cameras: By which the car was seen there, (n,); empty: not known.
-        scores, information: Of each number, (n, numbers).
+        scores, information: Of each number, (n, numbers); `whole`: scores of windows however far
+            they stray.
         inflation: Variance of sums of scores over that of independent windows, (numbers,).
         most: Windows that are remembered.
         is_steady: Whether the car strays as it did when that was learned by which they are weighed.
@@ -40,6 +41,7 @@ class Evidence:
     cameras: NDArray[np.str_]
     scores: Floats
     information: Floats
+    whole: Floats
     inflation: Floats
     most: int = MOST
     is_steady: bool = True
@@ -49,7 +51,9 @@ class Evidence:
         """Return that of a car that was not seen yet."""
         empty, count = np.empty((0, len(numbers))), len(numbers)
         names = np.empty(0, dtype=np.str_)
-        return cls(numbers, np.empty(0), np.empty((0, 2)), names, empty, empty, np.ones(count))
+        return cls(
+            numbers, np.empty(0), np.empty((0, 2)), names, empty, empty, empty, np.ones(count)
+        )  # fmt: skip
 
     def add(self, windows: Windows, usual: Usual, camera: str = "") -> None:
         """Add new windows; the oldest are forgotten."""
@@ -60,6 +64,7 @@ class Evidence:
         self.cameras = np.concatenate((self.cameras, names))[-self.most :]
         self.scores = np.concatenate((self.scores, shown[NEAR]))[-self.most :]
         self.information = np.concatenate((self.information, shown[INFORMATION]))[-self.most :]
+        self.whole = np.concatenate((self.whole, shown[WHOLE]))[-self.most :]
         self.inflation = usual.inflation[SPAN]
 
 

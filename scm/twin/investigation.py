@@ -174,7 +174,9 @@ def explain(
         text=_in_words(found.diagnosis, effects) + (CUT if found.diagnosis.unanswered else ""),
         since_s=_since(effects),
         car_file=made if is_found else None,
-        abilities=compared_abilities(car, load_car(made)) if is_found else (),
+        abilities=(
+            compared_abilities(car, load_car(made), found.diagnosis.fit) if is_found else ()
+        ),
     )
 
 

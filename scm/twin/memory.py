@@ -10,11 +10,13 @@ import msgspec
 import numpy as np
 
 from scm.errors import RecordingError
+from scm.recorder.driven import CarMessages
 from scm.recording.description import FILE_NAME
 from scm.recording.read import Channel, Recording
 from scm.recording.units import UNITS
 
 MEMORY_S = 900.0
+BY_EYE = "eye"
 UNIT = {dimension: unit for unit, (dimension, factor) in UNITS.items() if factor == 1.0}
 
 
@@ -129,3 +131,9 @@ def _described(name: str, channel: Channel) -> dict[str, Any]:
     found: dict[str, Any] = {"column": name, "unit": UNIT[channel.dimension]}
     found |= {} if channel.std is None else {"std": channel.std}
     return found | ({} if channel.point == (0.0, 0.0) else {"point": list(channel.point)})
+
+
+def seen_by_eye(messages: CarMessages) -> CarMessages:
+    """Return a car's messages as those of one of which only the Eye knows where it is."""
+    reports = [report._replace(source=BY_EYE) for report in messages.reports]
+    return replace(messages, reports=reports)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
+from scm.disturbances import Disturbances
 from scm.records.twins import TwinChange, TwinVersion
 from scm.runtime.part import BasePart, Service, Subscription
 from scm.twin.car import LOCATE_NS, NAME, Setup, TwinCar
@@ -55,6 +56,7 @@ class TwinPart(BasePart):
     subscriptions: Sequence[Subscription] = (
         Subscription(VehicleState), Subscription(VehicleSensors), Subscription(EyePose),
         Subscription(CityEvent), Subscription(Trip), Subscription(WorldDefinition),
+        Subscription(PartStatus, {"station": "world"}),
     )  # fmt: skip
     services: Sequence[Service] = (Service(VersionRequest), Service(TwinSendRequest))
 
@@ -70,8 +72,8 @@ class TwinPart(BasePart):
         threshold = threshold_of(false_alarm_h)
         self._places, self._judged_ns = PlaceWatch(threshold), 0
         self._setup = Setup(
-            threshold, self._predictor, self._places, self._executor, data, budget_s
-        )  # fmt: skip
+            threshold, self._predictor, self._places, Disturbances(), self._executor, data, budget_s
+        )
         self._versions, self._changes = _by_car(versions or {}), _by_car(changes or {})
         self._sending = Sending(send)
         self._status_ns = -NS_PER_S
@@ -84,6 +86,8 @@ class TwinPart(BasePart):
                 out += self._replied(item)
             elif isinstance(item.message, VersionRequest | TwinSendRequest):
                 out += self._answered(item, item.message)
+            elif isinstance(item.message, PartStatus):
+                self._setup.disturbances.receive(item)
             else:
                 self._receive(item.message, now_ns)
         for name in [n for n, one in self._cars.items() if now_ns - one.arrived_ns > GONE_NS]:

@@ -131,8 +131,8 @@ class _Rows:
 
     Attributes:
         is_usual: Which are off all places that changed, (n,).
-        score, information: Over their spread, (n, numbers): the variance of sums of scores is the
-            sum of their information.
+        shown: Scores, information, and scores of windows however far they stray, over their
+            spread, (3, n, numbers): the variance of sums of scores is the sum of their information.
     """
 
     name: str
@@ -140,8 +140,7 @@ class _Rows:
     t_s: Floats
     places: Floats
     is_usual: Bools
-    score: Floats
-    information: Floats
+    shown: Floats
 
 
 def _rows(name: str, car: Witness, changed: Collection[PlaceChange], now_s: float) -> _Rows:
@@ -152,13 +151,11 @@ def _rows(name: str, car: Witness, changed: Collection[PlaceChange], now_s: floa
     for one in changed:
         counts &= ~(_at_any(evidence.places, [one]) & (t_s < one.noticed_s))
     columns = [k for k, one in enumerate(evidence.numbers) if one.effect in EFFECTS]
-    spread = evidence.inflation[columns]
-    return _Rows(
-        name, tuple(evidence.numbers[k] for k in columns), t_s[counts], evidence.places[counts],
-        ~_at_any(evidence.places[counts], changed),
-        evidence.scores[counts][:, columns] / spread,
-        evidence.information[counts][:, columns] / spread,
-    )  # fmt: skip
+    every = np.stack((evidence.scores, evidence.information, evidence.whole))
+    shown = every[:, counts][..., columns] / evidence.inflation[columns]
+    places = evidence.places[counts]
+    numbers = tuple(evidence.numbers[k] for k in columns)
+    return _Rows(name, numbers, t_s[counts], places, ~_at_any(places, changed), shown)
 
 
 def _changed(
@@ -182,16 +179,16 @@ def _changed(
 
 def _scores(rows: list[_Rows], inside: list[Bools], since_s: float) -> Floats:
     """Return how plainly each place changed by each number, (places, numbers); 0: it did not."""
-    size, spread, also = _pooled(*_moves(rows, inside, since_s))
-    steps = np.array([one.step for one in rows[0].numbers])
+    moved, variance = _moves(rows, inside, since_s)
+    score, also = _pooled(moved[0], variance)
+    steps = np.abs(_mean(moved[1], variance)) / np.array([one.step for one in rows[0].numbers])
     every = [np.ones((1, len(one.t_s)), dtype=bool) for one in rows]
     moved, variance = _moves(rows, every, since_s)
-    shown = moved / np.sqrt(variance)
+    shown = moved[0] / np.sqrt(variance)
     everywhere = np.maximum(_rest(shown), _rest(-shown))
-    score = np.abs(size) / spread
-    is_likely = (np.abs(size) >= LEAST_STEPS * steps) & (np.abs(size) < MOST_STEPS * steps)
-    counts = (also >= ALSO) & is_likely & (score > everywhere.max())
-    return np.asarray(np.where(counts, score, 0.0))
+    is_likely = (steps >= LEAST_STEPS) & (steps < MOST_STEPS)
+    counts = (also >= ALSO) & is_likely & (np.abs(score) > everywhere.max())
+    return np.asarray(np.where(counts, np.abs(score), 0.0))
 
 
 def _described(
@@ -201,19 +198,19 @@ def _described(
     """Return since when a place changed, how far, and which cars show it."""
     onsets = np.arange(now_s - SINCE_S[-1], now_s - ONSETS_S, ONSETS_S)
     moves = [_moves(rows, there, begin_s) for begin_s in onsets.tolist()]
-    sizes, spreads = np.array([[each[0, number] for each in _pooled(*one)[:2]] for one in moves]).T
-    shown = np.abs(sizes) / spreads
+    scores = np.array([_pooled(moved[0], spread)[0][0, number] for moved, spread in moves])
+    shown = np.abs(scores)
     onset, near = int(np.argmax(shown)), onsets[shown > NEARLY * shown.max()]
     driven = np.concatenate([one.t_s[which[0]] for one, which in zip(rows, there, strict=True)])
     low_s = float(driven[driven < near[0]].max(initial=onsets[0]))
     high_s = float(driven[driven >= near[-1]].min(initial=now_s))
-    moved, variance = (each[:, 0, number] for each in moves[onset])
-    by_cars = np.sign(sizes[onset]) * moved / np.sqrt(variance)
+    moved, variance = moves[onset]
+    by_cars = np.sign(scores[onset]) * moved[0, :, 0, number] / np.sqrt(variance[:, 0, number])
     plainest = np.argsort(-by_cars, kind="stable")
     also = [rows[k].name for k in plainest[1:] if by_cars[k] >= SHOWN]
     return PlaceChange(
         x_m=at[0], y_m=at[1], radius_m=RADIUS_M, number=rows[0].numbers[number],
-        size=float(sizes[onset]), score=score, noticed_s=now_s,
+        size=float(_mean(moved[1], variance)[0, number]), score=score, noticed_s=now_s,
         since_s=(float(onsets[onset]), low_s, high_s), vehicles=(rows[plainest[0]].name, *also),
     )  # fmt: skip
 
@@ -240,7 +237,8 @@ def _moves(rows: list[_Rows], inside: list[Bools], since_s: float) -> tuple[Floa
     """Return how far the numbers of each car moved at each place, beyond how they did elsewhere.
 
     Returns:
-        That, and its variance, (cars, places, numbers); infinite where nothing was driven.
+        That, by limited and by whole scores, (2, cars, places, numbers), and its variance, (cars,
+        places, numbers); infinite where nothing was driven.
     """
     moved, variance, count = list[Floats](), list[Floats](), np.zeros((len(inside[0]), 1))
     for one, there in zip(rows, inside, strict=True):
@@ -256,32 +254,36 @@ def _moves(rows: list[_Rows], inside: list[Bools], since_s: float) -> tuple[Floa
         moved.append(here[0] - shift[0])
         variance.append(here[1] + np.where(np.isinf(shift[1]), 0.0, shift[1]))
     every = np.array(variance)
-    return np.array(moved), np.where(count < FEWEST, math.inf, every)
+    return np.stack(moved, axis=1), np.where(count < FEWEST, math.inf, every)
 
 
 def _sums(one: _Rows, which: Bools) -> Floats:
-    """Return the sums of scores and of information of some windows, (2, places, numbers)."""
-    return np.stack([which.astype(float) @ each for each in (one.score, one.information)])
+    """Return the sums of what some windows show, (3, places, numbers)."""
+    return np.stack([which.astype(float) @ each for each in one.shown])
 
 
 def _change(after: Floats, before: Floats) -> tuple[Floats, Floats]:
     """Return how far numbers moved between two sums, and its variance; infinite: not known."""
     is_known = (after[1] > 0.0) & (before[1] > 0.0)
     late, early = (np.where(is_known, each[1], 1.0) for each in (after, before))
-    moved = np.where(is_known, after[0] / late - before[0] / early, 0.0)
+    moved = np.where(is_known, after[::2] / late - before[::2] / early, 0.0)
     return moved, np.where(is_known, 1.0 / late + 1.0 / early, math.inf)
 
 
-def _pooled(moved: Floats, variance: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return how far numbers moved by all cars, and its standard deviation, (places, numbers).
-
-    Returns:
-        These, and how many standard deviations of it all cars but the plainest show.
-    """
+def _mean(moved: Floats, variance: Floats) -> Floats:
+    """Return how far numbers moved by all cars, (places, numbers)."""
     weight = 1.0 / variance
-    total = np.maximum(weight.sum(axis=0), 1e-30)
-    size = (moved * weight).sum(axis=0) / total
-    return size, 1.0 / np.sqrt(total), _rest(np.sign(size) * moved / np.sqrt(variance))
+    return np.asarray((moved * weight).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-30))
+
+
+def _pooled(moved: Floats, variance: Floats) -> tuple[Floats, Floats]:
+    """Return the score of all cars, with its sign, and what all but the plainest show of it.
+
+    Both are standard deviations, (places, numbers).
+    """
+    mean = _mean(moved, variance)
+    score = mean * np.sqrt(np.maximum((1.0 / variance).sum(axis=0), 1e-30))
+    return score, _rest(np.sign(mean) * moved / np.sqrt(variance))
 
 
 def _rest(shown: Floats) -> Floats:

@@ -5,6 +5,7 @@ later driving it is compared with the version that it replaced, and rolled back 
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Literal
 
 from msgspec.structs import replace
@@ -18,6 +19,21 @@ PROBATION_S = (150.0, 300.0)  # likewise, after it was adopted
 MOST_SENT = 20
 ERRORS = {"position_m": ("position", "mm", 1e3), "yaw_rad": ("heading", "mrad", 1e3)}
 BY_TWIN = "twin"
+
+
+@dataclass(slots=True)
+class Trial:
+    """A version on new driving, compared with the one before it.
+
+    Attributes:
+        since_s: From when on driving is new.
+        driven_s: How long the car had been driven then.
+        done: How many comparisons were made.
+    """
+
+    since_s: float
+    driven_s: float
+    done: int = 0
 
 
 class CarVersions:

@@ -56,6 +56,7 @@ def made(root: Path, tree: Path) -> subprocess.CompletedProcess[str]:
         "PYTHONDONTWRITEBYTECODE": "",
         "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
         "PYTEST_PLUGINS": "xdist.plugin,pytest_timeout",
+        "PYTEST_DEBUG_TEMPROOT": str(tree),  # else it deletes what earlier runs left
     }
     return subprocess.run(
         command, cwd=tree, capture_output=True, text=True, check=False, timeout=200.0,

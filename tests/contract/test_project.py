@@ -11,6 +11,15 @@ import pytest
 TREES = ("scm", "vehicle_agent", "tests", "bench", "examples")
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 60
+MYPY = """
+import gc
+
+gc.disable()
+gc.enable = gc.disable  # hardly an object is free before it ends: a fifth of its time
+from mypy.__main__ import console_entry
+
+console_entry()
+"""
 
 
 def check(root: Path, *command: str) -> None:
@@ -38,7 +47,7 @@ def test_format_is_clean(root: Path) -> None:
 
 @pytest.mark.timeout(900)  # it stands back like all tests, and takes most of a core for a minute
 def test_types_are_clean(root: Path) -> None:
-    check(root, "mypy")
+    check(root, sys.executable, "-c", MYPY)
 
 
 def test_imports_go_one_way(root: Path) -> None:

@@ -3,13 +3,15 @@
 Steering, drive and outside forces are the laws of `motion` in every engine.
 """
 
+import hashlib
 import importlib
 import math
 from abc import ABC, abstractmethod
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
+from numba import config, njit
 
 from tests.reality import motion
 from tests.reality.motion import NUMBERS, ROW_S, STATE, WHEEL
@@ -35,6 +37,32 @@ def find_engine(name: str) -> type:
     except ModuleNotFoundError as error:
         msg = f"--engine {name} needs {error.name}: pip install {package}"
         raise ModuleNotFoundError(msg) from error
+
+
+def cache_folder(files, within):
+    """Return a folder for code that is compiled from files, as they are now."""
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(Path(file).read_bytes() + b"\0")
+    return Path(within) / digest.hexdigest()[:16]
+
+
+def kernel(*others):
+    """Compile a function that calls laws of other files, cached until one of them has changed.
+
+    Those are all files of this folder, and `others`: numba itself sees only the function's own.
+    """
+
+    def compiled(function):
+        here, before = Path(__file__).parent, config.CACHE_DIR
+        files = (*sorted(here.glob("*.py")), *others)
+        config.CACHE_DIR = str(cache_folder(files, here / "__pycache__"))
+        try:
+            return njit(function, cache=True)  # where it is cached is decided now
+        finally:
+            config.CACHE_DIR = before
+
+    return compiled
 
 
 @njit(cache=True)

@@ -19,7 +19,7 @@ from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 from vehiclemodels.vehicle_parameters import VehicleParameters
 
 from tests.reality import motion
-from tests.reality.engine import Engine
+from tests.reality.engine import Engine, kernel
 from tests.reality.motion import ROW_S, TYRE_STIFFNESS
 from tests.reality.numbers import GRAVITY
 
@@ -262,8 +262,7 @@ def _see(c, s, x, before, h):
     s.x, s.y = x[0] / SIZE - c.cog * cos, x[1] / SIZE - c.cog * sin
 
 
-# no cache: code kept beside this file would not notice that a law in `motion` has changed
-@njit
+@kernel(vehicle_dynamics_mb.__code__.co_filename)
 def advance(numbers, state, wheels, x, given, throttle, steering, shake, first, steps):
     """Advance by some steps from step `first` on."""
     c, s, p, h = numbers[0], state[0], given[0], STEP_S * LATER

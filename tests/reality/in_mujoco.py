@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from tests.reality import motion
-from tests.reality.engine import Engine, see
+from tests.reality.engine import Engine, kernel, see
 from tests.reality.motion import ROW_S, TYRE_DAMPING, TYRE_STIFFNESS
 from tests.reality.numbers import GRAVITY
 
@@ -67,8 +67,7 @@ def _product(matrix, vector):
     return (matrix * vector).sum(axis=1)
 
 
-# no cache: code kept beside this file would not notice that a law in `motion` has changed
-@njit
+@kernel()
 def push(numbers, state, wheels, places, qpos, qvel, forces, t, throttle, steering, shake):
     """Advance steering, drive and wheels by one step, and lay all forces on the bodies."""
     c, s = numbers[0], state[0]

@@ -11,11 +11,10 @@ import tempfile
 
 import numpy as np
 import pybullet
-from numba import njit
 from pybullet_utils.bullet_client import BulletClient
 
 from tests.reality import motion
-from tests.reality.engine import Engine, see
+from tests.reality.engine import Engine, kernel, see
 from tests.reality.motion import ROW_S, TYRE_STIFFNESS
 from tests.reality.numbers import GRAVITY
 
@@ -73,8 +72,7 @@ def _car(n):
     return text, at
 
 
-# no cache: code kept beside this file would not notice that a law in `motion` has changed
-@njit
+@kernel()
 def _act(numbers, state, wheels, loads, spins, t, throttle, steering, shake, out):
     """Advance steering and drive by one step, and lay down what they demand.
 

@@ -221,8 +221,7 @@ class Rollouts:
         for row in range(fleet.capacity):
             fleet.remove(row)
         fleet.add(Pose2(self._x[0], self._y[0], self._yaw[0]))
-        for row in range(1, len(sets)):
-            fleet.copy_row(0, row)
+        fleet.copy_row(0, slice(1, len(sets)))
         for row, numbers in enumerate(sets):
             for key, value in numbers.items():
                 if key in _LATE:

@@ -25,8 +25,8 @@ from scm.records.twins import TwinChange, TwinVersion
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Part, Subscription
 from scm.traffic.signals.part import TrafficPart
-from scm.twin.car import seen_by_eye
 from scm.twin.investigation import AtOnce, T, compare
+from scm.twin.memory import seen_by_eye
 from scm.twin.part import BUDGET_S, FALSE_ALARM_H, TwinPart
 from scm.twin.trial.poses_eye import PosesEye, View, sees
 from scm.v2x.messages.city_event import CityEvent

@@ -14,7 +14,7 @@ from tests.reality import motion
 from tests.reality.cases import check_possible, make_case, names_for, possible, write_cases
 from tests.reality.concealed import LISTED
 from tests.reality.driver import Driver
-from tests.reality.engine import ENGINES, find_engine
+from tests.reality.engine import ENGINES, cache_folder, find_engine
 from tests.reality.numbers import GRAVITY, file_of, nominal
 from tests.reality.recorded import record
 from tests.reality.sensing import FAULTS
@@ -61,6 +61,16 @@ def test_a_car_goes_straight_at_the_speed_of_our_own(moving, car, throttle):
     np.testing.assert_allclose(rows[-1, 4], own[-1, 4], rtol=0.005)
     np.testing.assert_allclose(rows[-1, 1], own[-1, 1], rtol=0.01)
     np.testing.assert_allclose(rows[-1, 9:], own[-1, 9:], rtol=0.01)
+
+
+def test_kernels_are_compiled_anew_where_a_law_has_changed(tmp_path):
+    laws = [tmp_path / "motion.py", tmp_path / "other.py"]
+    for law in laws:
+        law.write_text("a = 1\n", "utf-8")
+    before = cache_folder(laws, tmp_path)
+    assert cache_folder(laws, tmp_path) == before
+    laws[1].write_text("a = 2\n", "utf-8")
+    assert cache_folder(laws, tmp_path) != before
 
 
 @pytest.mark.parametrize("steering", [0.3, -0.3])

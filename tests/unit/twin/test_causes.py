@@ -39,7 +39,7 @@ def drives(seed, is_affected=lambda t_s, x, y: False, number=ROLLING, usually=No
         scores[:, ROLLING] += usually(*places.T)
     cameras = np.where(places[:, 0] < 0.0, "west", "east")
     return Evidence(
-        NUMBERS, t_s, places, cameras, scores, np.ones_like(scores), np.ones(len(NUMBERS))
+        NUMBERS, t_s, places, cameras, scores, np.ones_like(scores), scores, np.ones(len(NUMBERS))
     )
 
 
@@ -135,6 +135,22 @@ def test_car_that_changed_when_the_floor_did_is_judged_off_that_place():
     assert judged(changed) == "place"
     assert judged(changed, is_off) == "car"
     assert judged(felt, is_off) == "place"
+
+
+def test_little_that_a_plain_change_of_the_floor_leaves_elsewhere_is_no_change_of_the_car():
+    def is_off(places):
+        return np.hypot(*(places - BEND).T) > 0.85
+
+    def judged(floor, left):
+        def felt(*at):
+            return floor * in_bend(*at) + left * since(*at)
+
+        cars = {f"n{k}": Witness(drives(k, felt), 0.0) for k in (1, 2, 3)}
+        times_s = (SINCE_S, SINCE_S - 2.0, SINCE_S + 2.0)
+        return causes_of("n1", times_s, cars, is_off)[0].kind
+
+    assert judged(8.0, 0.4) == "place"
+    assert judged(2.0, 0.4) != "place"  # as much, beside less
 
 
 def test_no_floor_moves_a_tag():

@@ -37,7 +37,7 @@ def drives(seed, missed=lambda t_s, x, y: 0.0, lasts_s=400.0, number=0):
     scores[:, number] += missed(t_s, *places.T)
     names = np.full(len(t_s), "west")
     return Evidence(
-        NUMBERS, t_s, places, names, scores, np.ones_like(scores), np.ones(len(NUMBERS))
+        NUMBERS, t_s, places, names, scores, np.ones_like(scores), scores, np.ones(len(NUMBERS))
     )
 
 
@@ -130,7 +130,7 @@ def test_where_a_car_never_was_before_it_shows_no_change():
         before = (one.t_s < SINCE_S) & (one.places[:, 1] > 0.0)
         late.append(replace(one, **{
             name: getattr(one, name)[~before]
-            for name in ("t_s", "places", "cameras", "scores", "information")
+            for name in ("t_s", "places", "cameras", "scores", "information", "whole")
         }))  # fmt: skip
     assert look(*late, watch=PlaceWatch(5.0)) is None
 
@@ -145,7 +145,7 @@ def test_cars_have_to_be_known_for_as_long_as_for_changes_of_their_own():
     new = [
         replace(one, **{
             name: getattr(one, name)[one.t_s > SINCE_S - 100.0]
-            for name in ("t_s", "places", "cameras", "scores", "information")
+            for name in ("t_s", "places", "cameras", "scores", "information", "whole")
         })
         for one in FELT
     ]  # fmt: skip

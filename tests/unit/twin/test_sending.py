@@ -4,6 +4,7 @@ import pytest
 from msgspec.structs import replace
 
 from scm.clock import NS_PER_S
+from scm.disturbances import Disturbances
 from scm.maps.load import load_map
 from scm.records.twins import TwinDrive
 from scm.twin.car import Setup, TwinCar
@@ -49,7 +50,7 @@ class Town:
 
     def __init__(self, when="agreed", of=None, **drive):
         self.sending, self.now_ns = Sending(when), 100 * NS_PER_S
-        setup = Setup(1.0, lambda car: None, PlaceWatch(1.0), None, None, 0.0)
+        setup = Setup(1.0, lambda car: None, PlaceWatch(1.0), Disturbances(), None, None, 0.0)
         self.car = TwinCar(state("n3"), self.now_ns, setup)
         self.car.remembers = lambda change: True
         self.car.newest_ns = self.now_ns

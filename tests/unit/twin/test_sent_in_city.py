@@ -37,7 +37,14 @@ class Shown:
         empty = np.empty((0, len(NUMBERS)))
         none = np.empty(0)
         self.evidence = Evidence(
-            NUMBERS, none, np.empty((0, 2)), none.astype(str), empty, empty, np.ones(len(NUMBERS))
+            NUMBERS,
+            none,
+            np.empty((0, 2)),
+            none.astype(str),
+            empty,
+            empty,
+            empty,
+            np.ones(len(NUMBERS)),
         )
         self._add(np.arange(BEFORE_S, SINCE_S, 2.0))
 
@@ -61,6 +68,7 @@ class Shown:
         one.t_s, one.places = np.append(one.t_s, times_s), np.vstack((one.places, places))
         one.cameras = np.append(one.cameras, np.full(len(times_s), ""))
         one.scores = np.vstack((one.scores, scores))
+        one.whole = one.scores
         one.information = np.vstack((one.information, np.ones_like(scores)))
 
 

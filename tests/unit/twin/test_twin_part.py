@@ -148,6 +148,33 @@ def test_clock_that_jumps_is_no_change_and_nothing_piles_up(changed):
     assert part._cars == {}
 
 
+def test_while_the_world_loses_time_its_cars_are_not_compared(changed):
+    """From the twentieth second on it simulates nine tenths of the time, for ten seconds."""
+
+    def world(k):
+        lost_s = 0.1 * min(max(0.0, 0.1 * k - 20.0), 10.0)
+        return PartStatus(station="world", t_ns=BEGAN_NS + 100 * k * NS_PER_MS, lost_s=lost_s)
+
+    slow = [[*step, *([world(k)] if k % 10 == 0 else [])] for k, step in enumerate(changed[:450])]
+    found = {}
+    for name, steps in (("slow", slow), ("as ever", changed[:450])):
+        out, _ = run(TwinPart(), steps)
+        found[name] = [one for one in out if isinstance(one, TwinStatus)]
+    lost_s = found["as ever"][-1].driven_s - found["slow"][-1].driven_s
+    assert 10.0 <= lost_s <= 20.0
+    reasons = {one.reason for one in found["slow"]}
+    assert any(one.startswith("this computer did not simulate ") for one in reasons)
+    assert found["slow"][-1].reason == ""
+
+    on_floor = [
+        [replace(one, source="eye") if isinstance(one, VehicleState) else one for one in step]
+        for step in slow
+    ]
+    out, _ = run(TwinPart(), on_floor)
+    reasons = {one.reason for one in out if isinstance(one, TwinStatus)}
+    assert not any("did not simulate" in one for one in reasons)
+
+
 def test_of_too_many_cars_each_is_watched_for_a_part_of_the_time(changed):
     """It is looked at each 45 s, as if there were 450 cars, one of which is looked at a step."""
     part = TwinPart()

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from scm.mismatch.findings import Fit, PartErrors
 from scm.records.twins import TwinEffect, TwinError, TwinParameter
-from scm.twin.abilities import abilities_of, compared_abilities
+from scm.twin.abilities import abilities_of, compared_abilities, strayed_m
 from scm.twin.investigation import Compared, Explained, compare
 from scm.twin.versions import BY_TWIN, CarVersions, differences, is_worse, meaning, verdict
 from scm.vehicles.car import load_car
@@ -152,15 +153,46 @@ def test_late_throttle_lengthens_the_way_to_stop_and_trim_the_wider_circle(trimm
         assert radius.low > 1.05 * radius.before
 
 
-def test_nine_in_ten_other_cars_of_the_file_lie_in_the_interval():
-    speed, stopping, radius = compared_abilities(nigel(), nigel())
+def test_nine_in_ten_other_cars_of_the_file_lie_in_the_interval_about_what_it_says():
+    abilities = compared_abilities(nigel(), nigel())
     others = abilities_of(nigel(), count=400, seed=2)
-    for one, values in (
-        (speed, others.speed),
-        (stopping, others.stopping),
-        (radius, others.radius),
-    ):
-        assert 0.84 < np.mean((values >= one.low) & (values <= one.high)) < 0.96
+    for one, values in zip(abilities, (others.speed, others.stopping, others.radius), strict=True):
+        assert one.value == one.before == values[0]  # the first is as the file says
+        about = values - np.median(values) + one.value
+        assert 0.84 < np.mean((about >= one.low) & (about <= one.high)) < 0.96
+
+
+def seen(after, floor, horizon_s=3.0):
+    """How a car followed driving that no fit has seen, and driving that one has."""
+    unseen = PartErrors(windows=18, before=after, after=after, noise_floor=floor)
+    known = PartErrors(windows=18, before={}, after={"wheel_m": 9.0}, noise_floor={})
+    return Fit(horizon_s=horizon_s, fit=known, choose=known, confirm=unseen)
+
+
+def test_interval_contains_how_far_the_file_strays_on_unseen_driving_beyond_noise():
+    strays = seen({"wheel_m": 0.005, "position_m": 0.1}, {"wheel_m": 0.003}, 2.0)
+    without = compared_abilities(nigel(), nigel())
+    now = compared_abilities(nigel(), nigel(), strays)
+    for one, plain, more in zip(now, without, (0.004 / 2.0, 0.004, 0.0), strict=True):
+        assert one.value == plain.value
+        above, before = one.high - one.value, plain.high - plain.value
+        assert above == pytest.approx(np.hypot(before, 1.645 * more))
+        below, before = one.value - one.low, plain.value - plain.low
+        assert below == pytest.approx(min(np.hypot(before, 1.645 * more), one.value))
+
+
+@pytest.mark.parametrize(
+    ("after", "floor", "strays_m"),
+    [
+        ({"position_m": 0.005}, {"position_m": 0.004}, 0.003),
+        ({"wheel_m": 0.001}, {"wheel_m": 0.002}, 0.0),
+        ({}, {}, 0.0),
+    ],
+)
+def test_car_strays_by_its_wheels_or_else_its_poses_and_never_less_than_noise(
+    after, floor, strays_m
+):
+    assert strayed_m(seen(after, floor).confirm) == pytest.approx(strays_m)
 
 
 def test_errors_that_come_together_narrow_or_widen_what_a_car_may_do():
