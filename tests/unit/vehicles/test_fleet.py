@@ -43,6 +43,33 @@ def test_a_row_restarts_from_a_measured_state(fleet):
     assert fleet.steer_angle[row] == 0.2
 
 
+@pytest.mark.parametrize("car", ["nigel", "dart"])
+def test_rows_placed_at_once_stand_and_drive_on_as_if_placed_one_by_one(car):
+    """Twenty rows, more than a tile, with payloads; those between stay where they were."""
+    poses = np.random.default_rng(1).uniform(-3.0, 3.0, (20, 3))
+    speeds, rows = np.linspace(0.0, 0.5, 20), np.arange(0, 40, 2)
+    once, one_by_one, reverse = (
+        Fleet(load_car(car).with_terms(["payload", "drive_delay"], {"drive.delay_s": 0.03}), 41)
+        for _ in range(3)
+    )
+    for fleet in (once, one_by_one, reverse):
+        for _ in range(41):
+            fleet.add(Pose2(0.0, 0.0, 0.5), 0.3)
+        fleet.parameters[:, fleet.parameter_names.index("payload.mass")] = np.linspace(0, 1, 41)
+        fleet.throttle[:], fleet.steering[:] = 0.4, 0.2
+        fleet.advance(0.2)
+    once.place_rows(rows, poses, speeds)
+    reverse.place_rows(rows[::-1], poses[::-1], speeds[::-1])
+    for row, pose, speed in zip(rows, poses, speeds, strict=True):
+        one_by_one.place(row, Pose2(*pose.tolist()), float(speed))
+    for fleet in (once, one_by_one, reverse):
+        fleet.throttle[:], fleet.steering[:] = 0.5, -0.3
+        fleet.advance(0.3)
+    for name in ("x", "y", "yaw", "speed", "yaw_rate", "wheel_load", "steer_angle", "time"):
+        np.testing.assert_allclose(getattr(once, name), getattr(one_by_one, name), atol=1e-12)
+        assert np.array_equal(getattr(once, name), getattr(reverse, name))
+
+
 def test_lags_restart_settled():
     fleet = Fleet(load_car("dart"), 1)
     fleet.add(Pose2(0.0, 0.0, 0.0))
