@@ -3,6 +3,7 @@
 import numpy as np
 
 from scm.arrays import Bools
+from scm.gym.signals import PASSED_RED
 from scm.gym.worlds import Worlds
 
 
@@ -15,6 +16,13 @@ def left_lane(worlds: Worlds) -> Bools:
 def touched(worlds: Worlds) -> Bools:
     """Return who touches a wall, a box or another car."""
     return worlds.touched
+
+
+def passed_red(worlds: Worlds) -> Bools:
+    """Return whose front passed a line at red in this step."""
+    if worlds.signals is None:
+        return np.zeros(len(worlds.present), np.bool_)
+    return worlds.signals.known[:, PASSED_RED] > 0.0
 
 
 def wrecked(worlds: Worlds) -> Bools:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from scm.arrays import Floats
 from scm.gym.radio import COLUMNS
+from scm.gym.signals import REACH_M
 from scm.gym.worlds import READINGS, Worlds
 from scm.maps.segments import wall_segments
 from scm.vehicles.drivers.course import AHEAD_M, BENDS, BESIDE_M, LIMIT_MPS, TURNED_RAD
@@ -123,8 +124,21 @@ def others(worlds: Worlds) -> Part:
     )  # fmt: skip
 
 
+def signals(worlds: Worlds) -> Part:
+    """Return how far the line with lights ahead is, whether it shows green, and when that changes."""
+    lights = worlds.signals
+
+    def read() -> Floats:
+        return np.empty((0, 3)) if lights is None else lights.known[:, :3]
+
+    return Part(
+        ("stop_line_m", "signal_is_green", "signal_change_s"), (0.0,) * 3, (REACH_M, 1.0, 60.0),
+        read,
+    )  # fmt: skip
+
+
 PARTS: dict[str, Callable[[Worlds], Part]] = {
-    "motion": motion, "action": action, "lane": lane, "inertial": inertial, "others": others,
+    "motion": motion, "action": action, "lane": lane, "inertial": inertial, "others": others, "signals": signals,
     "ranges": ranges, "ranges_360": partial(ranges, beams=360),
 }  # fmt: skip
 

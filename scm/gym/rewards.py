@@ -4,6 +4,8 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.gym.worlds import Worlds
+
+STANDS_MPS = 0.02
 from scm.vehicles.drivers.course import TURNED_RAD
 
 
@@ -30,6 +32,11 @@ def steering_change(worlds: Worlds) -> Floats:
 def throttle_change(worlds: Worlds) -> Floats:
     """Return how far the throttle of each is another than in the step before [1]."""
     return np.abs(worlds.actions[:, 0] - worlds.before[:, 0])
+
+
+def standing(worlds: Worlds) -> Floats:
+    """Return 1 for each that moves slower than 0.02 m/s [1]."""
+    return (np.abs(worlds.fleet.speed) < STANDS_MPS).astype(float)
 
 
 def failed(worlds: Worlds) -> Floats:

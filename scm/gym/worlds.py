@@ -12,12 +12,14 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.gym.radio import Radio
+from scm.gym.signals import Signals
 from scm.gym.randomise import Randomise, Ranges, with_effects
 from scm.gym.task import Task
 from scm.gym.touching import Touching
 from scm.maps.load import load_map
 from scm.vehicles.car import load_car
 from scm.vehicles.drivers.course import BESIDE_M, DONE_M, Course
+from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.noise import Keys, bases_of, uniforms
 from scm.vehicles.vehicle_status import VehicleStatus
@@ -57,6 +59,7 @@ class Worlds:
         fleet: All cars; row `world * agents + agent`.
         course: Where they are along their lanes.
         radio: What they know of each other; None: each is alone in its world.
+        signals: The lights; None: the task has none.
         steps: Of each world, since its episode began, (worlds,).
         present: Which cars take part, (rows,); the others are out, until the next episode.
         touched: Which touch a wall or another car now, (rows,).
@@ -81,6 +84,10 @@ class Worlds:
         self.course = Course(self.city_map, rows, task.lanes.get(self.city_map.name, ()))
         self._touching = Touching(self.city_map, self.car, worlds, task.agents)
         self.radio = Radio(self.city_map, worlds, task.agents) if task.agents > 1 else None
+        front_m = limits_of(self.car).front
+        self.signals = (
+            Signals(self.city_map, rows, front_m) if "signals" in task.observations else None
+        )
         self._every: Ints = np.arange(rows)
         self._seeds: Keys = np.zeros(worlds, np.uint64)
         self._episodes: Ints = np.full(worlds, -1, np.int64)
@@ -119,6 +126,8 @@ class Worlds:
         self.steps[worlds] = 0
         if self.radio is not None:
             self.radio.forget(rows)
+        if self.signals is not None:
+            self.signals.begin(rows, np.repeat(uniforms(bases, 2)[:, 1], self.agents))
         self._look(rows)
 
     def step(self, actions: Floats) -> None:
@@ -181,7 +190,10 @@ class Worlds:
         self._done_m[:] = done
         self.touched = self._touching.find(fleet.planar_cogs(self._every), present=self.present)
         self.most_beside_m = course.half_width
+        now_s = self.task.period_s * self.row_steps.astype(float)
+        if self.signals is not None:
+            self.signals.look(*course.arrays, now_s, self.present)
         if self.radio is not None:
-            steps, now_s = self.row_steps, self.task.period_s * self.row_steps.astype(float)
+            steps = self.row_steps
             motion = np.column_stack((fleet.x, fleet.y, fleet.yaw, fleet.speed))
             self.radio.exchange(motion, now_s, steps, self.keys, self.present)

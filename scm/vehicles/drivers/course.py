@@ -100,6 +100,11 @@ class Course:
         self.known: Floats = np.zeros((rows, COLUMNS))
 
     @property
+    def arrays(self) -> tuple[LaneArrays, DriverState]:
+        """The lanes, and where each row is on them, for compiled code."""
+        return self._lanes, self._state
+
+    @property
     def half_width(self) -> Floats:
         """Of each row's lane [m]."""
         return self._half_widths[self._state.lane_window[:, HERE]]
