@@ -50,7 +50,9 @@ class Signals:
     """
 
     def __init__(self, city_map: CityMap, rows: int, front_m: float) -> None:
-        found = [one for j, junction in enumerate(city_map.junctions) for one in _cycle(junction, j)]
+        found = [
+            one for j, junction in enumerate(city_map.junctions) for one in _cycle(junction, j)
+        ]
         times = np.array([one[1:] for one in found], np.float64).reshape(-1, 3)
         self._cycles = Cycles(times, np.array([one[0] for one in found], np.int64))
         self._front_m = front_m

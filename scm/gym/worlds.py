@@ -12,8 +12,8 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.gym.radio import Radio
-from scm.gym.signals import Signals
 from scm.gym.randomise import Randomise, Ranges, with_effects
+from scm.gym.signals import Signals
 from scm.gym.task import Task
 from scm.gym.touching import Touching
 from scm.maps.load import load_map

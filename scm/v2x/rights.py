@@ -202,6 +202,7 @@ _OF_PART: dict[str, Rights] = {
             "world/def",
             "eye/*/pose/*",
             "event/*/*",
+            "part/world/status",
         ),
         requests=("v/*/twin/version", "v/*/cmd/route"),
         services=("v/*/twin/version", "v/*/twin/send"),

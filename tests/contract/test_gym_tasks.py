@@ -12,7 +12,9 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 import scm.gym
 from scm.gym.names import all_tasks, ids
 
-UNITS = re.compile(r".*_(m|mps|mps2|rad|radps|s)|throttle|steering|other_\d+_(cos|sin)_turn|signal_is_green")
+UNITS = re.compile(
+    r".*_(m|mps|mps2|rad|radps|s)|throttle|steering|other_\d+_(cos|sin)_turn|signal_is_green"
+)
 OF_SEVERAL = [
     f"{map_name}/{task.name}-v{task.version}"
     for task in all_tasks().values()

@@ -23,7 +23,9 @@ def seen():
     rows, passed = [values], []
     for _ in range(1150):
         lane = dict(zip(names, values.T.astype(float), strict=True))
-        steering = 1.7 * lane["lane_turn_0.2m_rad"] - 8.0 * lane["beside_m"] - 2.0 * lane["turned_rad"]
+        steering = (
+            1.7 * lane["lane_turn_0.2m_rad"] - 8.0 * lane["beside_m"] - 2.0 * lane["turned_rad"]
+        )
         values, *_ = envs.step(np.column_stack((np.full(8, 0.8), np.clip(steering, -1.0, 1.0))))
         rows.append(values)
         passed.append(envs.worlds.signals.known[:, 3].copy())
@@ -69,8 +71,12 @@ def test_episode_ends_at_red():
     values, _ = envs.reset(seed=2)
     for _ in range(400):
         lane = dict(zip(names, values.T.astype(float), strict=True))
-        steering = 1.7 * lane["lane_turn_0.2m_rad"] - 8.0 * lane["beside_m"] - 2.0 * lane["turned_rad"]
-        values, _, ended, *_ = envs.step(np.column_stack((np.full(64, 0.8), np.clip(steering, -1, 1))))
+        steering = (
+            1.7 * lane["lane_turn_0.2m_rad"] - 8.0 * lane["beside_m"] - 2.0 * lane["turned_rad"]
+        )
+        values, _, ended, *_ = envs.step(
+            np.column_stack((np.full(64, 0.8), np.clip(steering, -1, 1)))
+        )
         if ended.any():
             break
     assert (envs.worlds.signals.known[ended, 3] == 1.0).all()
