@@ -125,7 +125,7 @@ def others(worlds: Worlds) -> Part:
 
 
 def signals(worlds: Worlds) -> Part:
-    """Return how far the line with lights ahead is, whether it shows green, and when that changes."""
+    """Return how far the line with lights ahead is, whether it is green, and when that changes."""
     lights = worlds.signals
 
     def read() -> Floats:
@@ -138,8 +138,9 @@ def signals(worlds: Worlds) -> Part:
 
 
 PARTS: dict[str, Callable[[Worlds], Part]] = {
-    "motion": motion, "action": action, "lane": lane, "inertial": inertial, "others": others, "signals": signals,
-    "ranges": ranges, "ranges_360": partial(ranges, beams=360),
+    "motion": motion, "action": action, "lane": lane, "inertial": inertial,
+    "others": others, "signals": signals, "ranges": ranges,
+    "ranges_360": partial(ranges, beams=360),
 }  # fmt: skip
 
 

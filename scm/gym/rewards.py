@@ -4,9 +4,9 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.gym.worlds import Worlds
+from scm.vehicles.drivers.course import TURNED_RAD
 
 STANDS_MPS = 0.02
-from scm.vehicles.drivers.course import TURNED_RAD
 
 
 def progress(worlds: Worlds) -> Floats:

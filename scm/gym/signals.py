@@ -1,4 +1,4 @@
-"""Lights of many worlds, each by a fixed cycle that begins anywhere, and what each car sees of them.
+"""Lights of many worlds, by a fixed cycle that begins anywhere, and what each car sees of them.
 
     stage after stage    green as long as the map says, else 8 s; then yellow 1 s; then all red 1 s
 
@@ -21,8 +21,8 @@ from scm.vehicles.jit import array_kernel
 GREEN_S, YELLOW_S, CLEAR_S = 8.0, 1.0, 1.0
 REACH_M = 3.0  # lines farther ahead are not seen
 TO_LINE_M, IS_GREEN, CHANGE_S, PASSED_RED = range(4)
-"""Of each car: way of its front to the line ahead [m], 1 if that shows green, when that changes [s],
-1 if it passed a line at red in this step."""
+"""Of each car: way of its front to the line ahead [m], 1 if that shows green, when that changes
+[s], 1 if it passed a line at red in this step."""
 
 
 class Cycles(ArrayStruct):
@@ -50,9 +50,8 @@ class Signals:
     """
 
     def __init__(self, city_map: CityMap, rows: int, front_m: float) -> None:
-        found = [
-            one for j, junction in enumerate(city_map.junctions) for one in _cycle(junction, j)
-        ]
+        junctions = enumerate(city_map.junctions)
+        found = [one for number, junction in junctions for one in _cycle(junction, number)]
         times = np.array([one[1:] for one in found], np.float64).reshape(-1, 3)
         self._cycles = Cycles(times, np.array([one[0] for one in found], np.int64))
         self._front_m = front_m
@@ -112,7 +111,7 @@ def _look(
             cycle, begin, end = cycles.times[int(line[row, 1])]
             phase = (now_s[row] + shares[row] * cycle) % cycle
             is_green = begin <= phase < end
-            known[row, IS_GREEN] = float(is_green)
+            known[row, IS_GREEN] = 1.0 if is_green else 0.0
             known[row, CHANGE_S] = end - phase if is_green else (begin - phase) % cycle
 
 
@@ -120,7 +119,7 @@ def _look(
 def _next_line(
     lanes: LaneArrays, state: DriverState, row: int, front: float
 ) -> tuple[float, float]:
-    """Return where the next line with lights is, as far as the car will have come, and its group."""
+    """Return at which way driven the next line with lights comes, and its group."""
     begun = state.floats[row, DONE] - state.floats[row, S]
     for ahead in range(HERE, WINDOW_SIZE):
         lane = state.lane_window[row, ahead]

@@ -1,5 +1,7 @@
 """What cars see of the lights of their world, and who passes at red."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,23 +12,24 @@ PERIOD_S = 0.05
 CYCLE_S = 20.0  # two stages of 8 s, each with a second of yellow and one of all red
 
 
+def along_the_lane(names, values):
+    """Return actions that follow the lanes at a constant throttle."""
+    lane = dict(zip(names, values.T.astype(float), strict=True))
+    steering = 1.7 * lane["lane_turn_0.2m_rad"]
+    steering += -8.0 * lane["beside_m"] - 2.0 * lane["turned_rad"]
+    return np.column_stack((np.full(len(values), 0.8), np.clip(steering, -1.0, 1.0)))
+
+
 @pytest.fixture(scope="module")
 def seen():
     """Return what eight worlds saw in a minute, their cars driving along their lanes."""
     envs = scm.gym.make_vec(GREEN_LIGHT, 8)
-    envs.worlds.task = envs.worlds.task.__class__(
-        **{name: getattr(envs.worlds.task, name) for name in envs.worlds.task.__slots__}
-        | {"ends": ()}
-    )
+    envs.worlds.task = replace(envs.worlds.task, ends=())
     names = envs.observation_names
     values, _ = envs.reset(seed=5)
     rows, passed = [values], []
     for _ in range(1150):
-        lane = dict(zip(names, values.T.astype(float), strict=True))
-        steering = (
-            1.7 * lane["lane_turn_0.2m_rad"] - 8.0 * lane["beside_m"] - 2.0 * lane["turned_rad"]
-        )
-        values, *_ = envs.step(np.column_stack((np.full(8, 0.8), np.clip(steering, -1.0, 1.0))))
+        values, *_ = envs.step(along_the_lane(names, values))
         rows.append(values)
         passed.append(envs.worlds.signals.known[:, 3].copy())
     columns = [names.index(name) for name in ("stop_line_m", "signal_is_green", "signal_change_s")]
@@ -70,13 +73,7 @@ def test_episode_ends_at_red():
     names = envs.observation_names
     values, _ = envs.reset(seed=2)
     for _ in range(400):
-        lane = dict(zip(names, values.T.astype(float), strict=True))
-        steering = (
-            1.7 * lane["lane_turn_0.2m_rad"] - 8.0 * lane["beside_m"] - 2.0 * lane["turned_rad"]
-        )
-        values, _, ended, *_ = envs.step(
-            np.column_stack((np.full(64, 0.8), np.clip(steering, -1, 1)))
-        )
+        values, _, ended, *_ = envs.step(along_the_lane(names, values))
         if ended.any():
             break
     assert (envs.worlds.signals.known[ended, 3] == 1.0).all()
