@@ -73,7 +73,7 @@ def inertial(worlds: Worlds) -> Part:
     """Return what IMU and encoders of the car file read now: noise and bias of each episode."""
     device, fleet = imu.device(worlds.car), worlds.fleet
     rows, bias = np.arange(fleet.capacity), np.array(device.bias)
-    radius = worlds.car.value("body.wheel_radius_m")
+    radius = fleet.parameters[:, [fleet.parameter_names.index("wheel_radius")]]
 
     def read() -> Floats:
         exact = imu.measure(worlds.car, fleet, rows, None)

@@ -23,9 +23,13 @@ from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.noise import Keys, bases_of, uniforms
 from scm.vehicles.vehicle_status import VehicleStatus
+from scm.world.solids import hull_of, outline_of
 
-SEEDS, CARS, READINGS = (np.uint64(n) for n in (0x5CA1AB1E5EEDED01, 0xCA25CA25CA25CA25, 0x5E4504))
+SEEDS, CARS, READINGS, LIGHTS = (
+    np.uint64(n) for n in (0x5CA1AB1E5EEDED01, 0xCA25CA25CA25CA25, 0x5E4504, 0x11647)
+)
 """Constants that keep draws of different purpose apart."""
+TRIES, MARGIN_M = 8, 0.05  # places drawn until cars stand apart, and by how much more than touching
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +92,7 @@ class Worlds:
         self.signals = (
             Signals(self.city_map, rows, front_m) if "signals" in task.observations else None
         )
+        self._apart_m = 2.0 * outline_of(hull_of(self.car))[4] + MARGIN_M
         self._every: Ints = np.arange(rows)
         self._seeds: Keys = np.zeros(worlds, np.uint64)
         self._episodes: Ints = np.full(worlds, -1, np.int64)
@@ -113,10 +118,7 @@ class Worlds:
         rows = np.repeat(worlds * self.agents, self.agents) + agents
         self.keys[rows] = bases_of(np.repeat(bases, self.agents), agents)
         draws, start = uniforms(self.keys[rows], 5), self.task.start
-        # evenly spread over the lanes, from where the world's draw says
-        where = np.repeat(uniforms(bases, 1)[:, 0], self.agents) + agents / self.agents
-        draws[:, 0] = where - np.floor(where)
-        poses = self.course.begin(rows, draws, start.beside_m, start.turned_rad)
+        poses = self._starts(bases, rows, draws)
         low, high = start.speed_mps
         self.fleet.alive[rows] = self.present[rows] = True
         if self._randomise.is_any:
@@ -127,8 +129,32 @@ class Worlds:
         if self.radio is not None:
             self.radio.forget(rows)
         if self.signals is not None:
-            self.signals.begin(rows, np.repeat(uniforms(bases, 2)[:, 1], self.agents))
+            self.signals.begin(rows, np.repeat(uniforms(bases ^ LIGHTS, 1)[:, 0], self.agents))
         self._look(rows)
+
+    def _starts(self, bases: Keys, rows: Ints, draws: Floats) -> Floats:
+        """Return where the cars of some worlds begin, (rows, 3): spread evenly over the lanes.
+
+        Where two would stand in each other, as where lanes cross, another place is drawn for all of
+        that world.
+        """
+        agents, start = np.arange(self.agents), self.task.start
+        shares = uniforms(bases, TRIES)
+        poses = np.zeros((len(bases), self.agents, 3))
+        open_ = np.arange(len(bases))
+        for tried in range(TRIES):
+            where = shares[open_, tried, None] + agents / self.agents
+            these = (open_[:, None] * self.agents + agents).ravel()
+            draws[these, 0] = (where - np.floor(where)).ravel()
+            begun = self.course.begin(rows[these], draws[these], start.beside_m, start.turned_rad)
+            poses[open_] = begun.reshape(-1, self.agents, 3)
+            apart = poses[open_, :, None, :2] - poses[open_, None, :, :2]
+            is_near = np.hypot(apart[..., 0], apart[..., 1]) < self._apart_m
+            is_near &= ~np.eye(self.agents, dtype=bool)
+            open_ = open_[is_near.any(axis=(1, 2))]
+            if not len(open_):
+                break
+        return poses.reshape(-1, 3)
 
     def step(self, actions: Floats) -> None:
         """Let all worlds go on for one period with actions (rows, 2); who is out stays out."""

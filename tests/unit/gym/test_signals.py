@@ -53,7 +53,7 @@ def test_lights_change_when_they_say_and_have_their_cycle(seen):
     assert passed_s[counts] == pytest.approx(PERIOD_S, abs=1e-4)
     assert lines[:, :, 2].max() <= CYCLE_S - 8.0
     assert (lines[:, :, 2][lines[:, :, 1] > 0.5]).max() <= 8.0
-    assert lines[:, :, 1].mean() == pytest.approx(0.4, abs=0.08)
+    assert lines[:, :, 1][lines[:, :, 0] < 2.9].mean() == pytest.approx(0.4, abs=0.08)
     assert len(set(envs.worlds.signals._shares.tolist())) == 8
 
 
@@ -66,6 +66,9 @@ def test_who_passes_while_neither_green_nor_yellow_shows_has_passed_red(seen):
     red = crossed & ~green & (lines[:-1, :, 2] < CYCLE_S - 8.0 - 1.2)  # yellow is over
     assert red.sum() > 5
     assert passed[red & (lines[:-1, :, 2] > PERIOD_S)].all()
+    yellow = crossed & ~green & (lines[:-1, :, 2] > CYCLE_S - 8.0 - 0.9)
+    assert yellow.any()
+    assert not passed[yellow].any()
 
 
 def test_episode_ends_at_red():

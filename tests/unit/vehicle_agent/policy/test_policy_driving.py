@@ -78,6 +78,25 @@ def test_policy_drives_round_as_it_did_in_training(envs, policy):
     assert came_m == pytest.approx(way_m, abs=0.6)
 
 
+def test_car_that_was_carried_elsewhere_is_found_there():
+    def state(x_m, y_m, yaw_rad):
+        return VehicleState(
+            vehicle="n1", t_ns=0, seq=1, x_m=x_m, y_m=y_m, yaw_rad=yaw_rad, speed_mps=0.2,
+            yaw_rate_radps=0.0, steering_rad=0.0, throttle=0.5, source="simulated",
+        )  # fmt: skip
+
+    senses = Senses(("beside_m", "turned_rad", "lane_turn_0.8m_rad"), SCHOOL, "n1")
+    course = Course(SCHOOL, 2)
+    poses = course.begin(np.arange(2), np.array([[0.1, 0.5, 0.5, 0.0], [0.6, 0.5, 0.5, 0.0]]), 0, 0)
+    course.follow(*poses.T)
+    for pose, known in zip(poses.tolist(), course.known, strict=True):
+        senses.look(state(*pose), STAND)  # the first look after it was carried finds it off
+        assert senses.look(state(*pose), STAND) == pytest.approx(known[[0, 1, 6]], abs=1e-3)
+    for _ in range(2):
+        beside_all = senses.look(state(1.4, -5.0, 0.0), STAND)
+    assert beside_all is None
+
+
 def test_policy_stops_at_red(policy):
     free_m, _, _ = driven(policy, SCHOOL, 12.0, ignore_signals=True)
     way_m, _, part = driven(policy, SCHOOL, 12.0)
