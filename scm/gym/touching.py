@@ -41,7 +41,7 @@ class Touching:
         self._walls: Ints = np.zeros((0, 2), np.int64)
 
     def find(self, motion: Floats, *, present: Bools) -> Bools:
-        """Return which cars touch something now, (rows,).
+        """Return which cars touch something now, (rows,); those that are not there, only walls.
 
         Args:
             motion: x, y, yaw and their rates of centres of gravity, map frame, (rows, 6).
@@ -54,7 +54,7 @@ class Touching:
             pairs = pairs[present[pairs].all(axis=1)]
         boxes = self._obstacles.boxes
         mark(marks, pairs, self._walls, motion, self._outlines, boxes, NO_BOXES)
-        return marks & present
+        return marks
 
     def _list_walls(self, motion: Floats) -> None:
         self._from = motion[:, :2].copy()

@@ -87,6 +87,23 @@ def test_episode_that_ended_begins_anew_in_the_same_step_and_its_last_observatio
     assert [one is not None for one in infos["final_obs"]] == ended.tolist()
 
 
+def test_world_that_ends_at_its_time_limit_is_terminated_and_not_truncated():
+    def first_end(most):
+        envs = scm.gym.make_vec(LAP, WORLDS, autoreset_mode="Disabled")
+        envs.worlds.task = replace(envs.worlds.task, lasts_s=0.05 * most)
+        envs.reset(seed=SEED)
+        for step, action in enumerate(actions()[:most], 1):
+            _, _, ended, over, _ = envs.step(action)
+            if (ended | over).any():
+                return step, ended, over
+        raise AssertionError
+
+    step, alone, _ = first_end(STEPS)
+    _, ended, over = first_end(step)
+    assert np.array_equal(ended, alone)
+    assert np.array_equal(over, ~alone)
+
+
 def test_world_that_ended_has_to_be_reset_where_nothing_resets_it():
     envs = scm.gym.make_vec(LAP, WORLDS, autoreset_mode="Disabled")
     before, _ = envs.reset(seed=SEED)
