@@ -47,27 +47,31 @@ class Radio:
         self._newest[rows] = math.nan
 
     def exchange(
-        self, motion: Floats, now_s: Floats, steps: Ints, keys: Keys, present: Bools
+        self, rows: Ints, motion: Floats, now_s: Floats, steps: Ints, keys: Keys, present: Bools
     ) -> None:
-        """Let all cars that are present send, and receive what reaches them.
+        """Let all cars that are present send, and some receive what reaches them.
 
         Args:
+            rows: Which receive, (n,).
             motion: x, y, yaw of the rear axles and speed, map frame, (rows, 4).
             now_s: Since each car's episode began, (rows,).
             steps: Likewise, counted, (rows,).
             keys: Of the episodes, (rows,): what is lost follows from them.
             present: Who sends, (rows,).
         """
-        _exchange(self._channel, motion, now_s, steps, keys, present, self._newest, self.known)
+        _exchange(
+            self._channel, rows, motion, now_s, steps, keys, present, self._newest, self.known
+        )
 
 
 @array_kernel
 def _exchange(
-    channel: Channel, motion: Floats, now_s: Floats, steps: Ints, keys: Keys, present: Bools,
-    newest: Floats, known: Floats,
+    channel: Channel, rows: Ints, motion: Floats, now_s: Floats, steps: Ints, keys: Keys,
+    present: Bools, newest: Floats, known: Floats,
 ) -> None:  # fmt: skip
     others = newest.shape[1]
-    for row in range(len(motion)):
+    for n in range(len(rows)):
+        row = rows[n]
         x, y, yaw = motion[row, 0], motion[row, 1], motion[row, 2]
         c, s = math.cos(yaw), math.sin(yaw)
         first = row - row % (others + 1)

@@ -64,11 +64,13 @@ class Signals:
         self._shares[rows] = shares
         self._line[rows] = np.inf
 
-    def look(self, lanes: LaneArrays, state: DriverState, now_s: Floats, present: Bools) -> None:
-        """Find what all cars see now, `now_s` (rows,) after their episode began."""
+    def look(
+        self, lanes: LaneArrays, state: DriverState, rows: Ints, now_s: Floats, present: Bools
+    ) -> None:
+        """Find what some cars (n,) see now, `now_s` (rows,) after their episode began."""
         _look(
-            lanes, state, self._cycles, self._front_m, now_s, self._shares, present, self._line,
-            self.known,
+            lanes, state, rows, self._cycles, self._front_m, now_s, self._shares, present,
+            self._line, self.known,
         )  # fmt: skip
 
 
@@ -90,10 +92,11 @@ def _cycle(junction: Junction, number: int) -> Iterator[tuple[float, ...]]:
 
 @array_kernel
 def _look(
-    lanes: LaneArrays, state: DriverState, cycles: Cycles, front: float, now_s: Floats,
-    shares: Floats, present: Bools, line: Floats, known: Floats,
+    lanes: LaneArrays, state: DriverState, rows: Ints, cycles: Cycles, front: float,
+    now_s: Floats, shares: Floats, present: Bools, line: Floats, known: Floats,
 ) -> None:  # fmt: skip
-    for row in range(len(known)):
+    for n in range(len(rows)):
+        row = rows[n]
         known[row, PASSED_RED] = 0.0
         if not present[row]:
             continue

@@ -130,7 +130,7 @@ class Worlds:
             self.radio.forget(rows)
         if self.signals is not None:
             self.signals.begin(rows, np.repeat(uniforms(bases ^ LIGHTS, 1)[:, 0], self.agents))
-        self._look(rows)
+        self._look_at_start(rows)
 
     def _starts(self, bases: Keys, rows: Ints, draws: Floats) -> Floats:
         """Return where the cars of some worlds begin, (rows, 3): spread evenly over the lanes.
@@ -163,7 +163,7 @@ class Worlds:
         self.fleet.throttle[:], self.fleet.steering[:] = self.actions.T
         self.fleet.advance(self.task.period_s)
         self.steps += 1
-        self._look(None)
+        self._look()
 
     def rewards(self) -> Floats:
         """Return what each car gains in this step, (rows,); nothing for who is out."""
@@ -204,22 +204,31 @@ class Worlds:
         """How far each car is from the middle of its lane, + = left, (rows,)."""
         return self.course.known[:, BESIDE_M]
 
-    def _look(self, began: Ints | None) -> None:
-        """Find out where all cars are; `began` are the rows whose episode begins."""
+    def _look(self) -> None:
+        """Find out where all cars are after a step."""
         fleet, course = self.fleet, self.course
         course.follow(fleet.x, fleet.y, fleet.yaw)
         done = course.known[:, DONE_M]
-        if began is None:
-            np.subtract(done, self._done_m, out=self.moved_m)
-        else:
-            self.moved_m[began] = 0.0
+        np.subtract(done, self._done_m, out=self.moved_m)
         self._done_m[:] = done
         self.touched = self._touching.find(fleet.planar_cogs(self._every), present=self.present)
+        self._look_around(self._every)
+
+    def _look_at_start(self, rows: Ints) -> None:
+        """Find out where cars are whose episode begins: they stand apart, and have not moved."""
+        fleet, course = self.fleet, self.course
+        course.follow(fleet.x, fleet.y, fleet.yaw, rows)
+        self.moved_m[rows], self._done_m[rows] = 0.0, course.known[rows, DONE_M]
+        self.touched[rows] = False
+        self._look_around(rows)
+
+    def _look_around(self, rows: Ints) -> None:
+        """Find out what cars know beside where they are."""
+        fleet, course, steps = self.fleet, self.course, self.row_steps
         self.most_beside_m = course.half_width
-        now_s = self.task.period_s * self.row_steps.astype(float)
+        now_s = self.task.period_s * steps.astype(float)
         if self.signals is not None:
-            self.signals.look(*course.arrays, now_s, self.present)
+            self.signals.look(*course.arrays, rows, now_s, self.present)
         if self.radio is not None:
-            steps = self.row_steps
             motion = np.column_stack((fleet.x, fleet.y, fleet.yaw, fleet.speed))
-            self.radio.exchange(motion, now_s, steps, self.keys, self.present)
+            self.radio.exchange(rows, motion, now_s, steps, self.keys, self.present)

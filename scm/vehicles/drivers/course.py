@@ -96,6 +96,7 @@ class Course:
         self._state = replace(empty_state(rows), routes=np.zeros(rows, np.int64))
         self._state.ints[:, AFTER], self._state.ints[:, COUNT] = CIRCULATE, 1
         self._state.ints[:, ROUTE] = np.arange(rows)
+        self._every: Ints = np.arange(rows)
         self._ids, self._at = np.zeros(MOST_SEGMENTS, np.int64), np.zeros(MOST_SEGMENTS + 1)
         self.known: Floats = np.zeros((rows, COLUMNS))
 
@@ -139,11 +140,20 @@ class Course:
         """
         _enter(self._lanes, self._state, row, self._numbers[lane], s, branches)
 
-    def follow(self, x: Floats, y: Floats, yaw: Floats) -> None:
-        """Find where all cars are, from where they were; `known` says it."""
+    def follow(self, x: Floats, y: Floats, yaw: Floats, rows: Ints | None = None) -> None:
+        """Find where cars are, from where they were; `known` says it.
+
+        Args:
+            x: Of all rows' rear axles, map frame (rows,); likewise `y` and `yaw`.
+            y: See `x`.
+            yaw: See `x`.
+            rows: Which cars, (n,); None: all.
+        """
+        rows = self._every if rows is None else rows
         _follow(
-            self._lanes, self._state, x, y, yaw, np.array(AHEAD_M), self._ids, self._at, self.known
-        )
+            self._lanes, self._state, rows, x, y, yaw, np.array(AHEAD_M), self._ids, self._at,
+            self.known,
+        )  # fmt: skip
 
 
 @array_kernel
@@ -187,10 +197,11 @@ def _begin(
 
 @array_kernel
 def _follow(
-    lanes: LaneArrays, state: DriverState, x: Floats, y: Floats, yaw: Floats, ahead: Floats,
-    ids: Ints, at: Floats, known: Floats,
+    lanes: LaneArrays, state: DriverState, rows: Ints, x: Floats, y: Floats, yaw: Floats,
+    ahead: Floats, ids: Ints, at: Floats, known: Floats,
 ) -> None:  # fmt: skip
-    for row in range(len(known)):
+    for n in range(len(rows)):
+        row = rows[n]
         if state.lane_window[row, HERE] < 0 or not np.isfinite(x[row] + y[row] + yaw[row]):
             continue
         update_position(lanes, state, row, x[row], y[row])

@@ -19,7 +19,7 @@ KEYS = bases_of(np.full(6, 3, np.uint64), EVERY)
 
 def known(radio, step=0, present=None):
     radio.exchange(
-        MOTION, np.full(6, 0.05 * step), np.full(6, step), KEYS,
+        EVERY, MOTION, np.full(6, 0.05 * step), np.full(6, step), KEYS,
         np.ones(6, bool) if present is None else present,
     )  # fmt: skip
     return radio.known.copy()
