@@ -33,7 +33,7 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         observation_names: Of the observation's columns, each with its unit.
 
     Raises:
-        gymnasium.error.Error: There is no such task, or it is of several agents.
+        gymnasium.error.Error: There is no such task, it is of several agents, or of no world.
         ScmError: There is no such car file.
     """
 
@@ -44,6 +44,9 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         task, map_name = task_of(name)
         if task.agents > 1:
             msg = f"{name} is of {task.agents} agents: make it by scm.gym.parallel_env"
+            raise Error(msg)
+        if num_envs < 1:
+            msg = f"num_envs = {num_envs}: expected 1 or more"
             raise Error(msg)
         self.name, self.num_envs, self._copy = name, num_envs, copy
         self._mode = AutoresetMode(autoreset_mode)

@@ -201,6 +201,8 @@ def test_unknown_task_is_an_error_of_gymnasium_s_that_says_what_there_is(name, w
 
 
 def test_unknown_map_and_number_are_said():
+    with pytest.raises(Error, match="num_envs = 0: expected 1 or more"):
+        scm.gym.make_vec(LAP, 0)
     with pytest.raises(MapError, match="atlantis"):
         scm.gym.make_vec("atlantis/lap-v1")
     with pytest.raises(CarError, match=r"steering\.trimm_rad.*steering\.trim_rad"):
