@@ -167,6 +167,12 @@ def change():
     )  # fmt: skip
 
 
+def test_what_was_decided_to_be_a_place_s_is_not_made_a_car_s_later():
+    cars = {"n0": Witness(drives(1, since), 0.0), "n1": Witness(drives(2), 0.0)}
+    for before, then in (("undecided", "car"), ("everywhere", "car"), ("place", "place")):
+        assert located(structs.replace(change(), cause=before), "n0", cars).cause == then
+
+
 def test_change_says_whose_it_is_and_does_not_change_by_a_hair():
     cars = {f"n{k}": Witness(drives(k + 1, in_bend), 0.0) for k in range(3)}
     found = located(change(), "n0", cars)

@@ -4,6 +4,7 @@ import dataclasses
 import os
 import signal
 from concurrent.futures import BrokenExecutor, Executor, Future
+from itertools import islice
 
 import pytest
 from msgspec.structs import replace
@@ -132,6 +133,30 @@ def test_change_of_the_floor_is_not_searched_for_in_the_car(changed, tmp_path, m
     assert city.executor.calls == []
     (event,) = [one for one in city.out if getattr(one, "name", "") == "change_located"]
     assert event.text == "Not n1 changed but the floor, within 0.3 m of (1.0, 2.0)"
+
+
+def test_new_change_is_judged_at_the_next_look_whatever_was_judged_lately(
+    changed, tmp_path, monkeypatch
+):
+    judged = []
+
+    def located(change, *_):
+        judged.append(change.noticed_ns)
+        return replace(change, cause="car", causes=(TwinCause(kind="car", probability=1.0),))
+
+    monkeypatch.setattr(twin_car, "located", located)
+    city, steps = City(tmp_path, None), iter(changed)
+    for messages in steps:
+        city.step(*messages)
+        if judged:
+            break
+    car = city.part._cars["n1"]
+    new = replace(car.changes[0], noticed_ns=car.newest_ns, cause="undecided", causes=())
+    car.add(new, "car_changed", "")
+    for messages in islice(steps, 130):
+        city.step(*messages)
+    assert set(judged) == {one.noticed_ns for one in car.changes}
+    assert len(car.changes) == 2
 
 
 def test_change_noticed_at_a_place_is_not_searched_for_while_it_is_undecided_whose_it_is(
