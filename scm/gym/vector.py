@@ -60,7 +60,6 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._ended: Bools = np.zeros(num_envs, np.bool_)
-        self._gained: Floats = np.zeros(num_envs)
         self._is_begun = False
 
     def reset(
@@ -113,9 +112,6 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
             worlds.begin(self._ended)
             self._ended = np.zeros(self.num_envs, np.bool_)
         return self._observed(), rewards, ends, over, infos
-
-    def close_extras(self, **_: Any) -> None:
-        """Nothing is left open."""
 
     def _final(self) -> Infos:
         """Return the last observations of the worlds whose episode ended."""

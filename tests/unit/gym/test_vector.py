@@ -200,7 +200,7 @@ def test_unknown_task_is_an_error_of_gymnasium_s_that_says_what_there_is(name, w
         scm.gym.make_vec(name)
 
 
-def test_unknown_map_and_number_are_said():
+def test_unknown_map_and_number_and_no_world_are_refused():
     with pytest.raises(Error, match="num_envs = 0: expected 1 or more"):
         scm.gym.make_vec(LAP, 0)
     with pytest.raises(MapError, match="atlantis"):
