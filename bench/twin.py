@@ -3,10 +3,10 @@
     python -m bench twin [EFFECT ...] [--seed 1] [--strength 2] [--since-s 300] [--search]
 
 Cars of `tests/reality`, whose ordinary numbers are not the file's, drive for ten minutes; each
-effect sets in at once, in multiples of the smallest size that 90 s can show. `nothing` is a car
-that does not change. What is named first is what shows the change most, not a diagnosis; with
-`--search` each change is searched for as `scm up --twin` does, and the car file found compared with
-the given one on the driving after that.
+effect sets in at once, or evenly in `--ramp-s`, in multiples of the smallest size that 90 s can
+show. `nothing` is a car that does not change. What is named first is what shows the change most,
+not a diagnosis; with `--search` each change is searched for as `scm up --twin` does, and the car
+file found compared with the given one on the driving after that.
 """
 
 import argparse
@@ -43,7 +43,7 @@ NEVER = ("surface_patch", "unit_error", "clock_drift")  # of a place, and no cha
 
 def drive(
     name: str, strength: float, seed: int, since_s: float, folder: Path,
-    lasts_s: float = LASTS_S, car: str = CAR,
+    lasts_s: float = LASTS_S, car: str = CAR, ramp_s: float = 0.0,
 ) -> Recording:  # fmt: skip
     """Return the recording of a car in which an effect sets in."""
     rng = np.random.default_rng([seed, *name.encode()])
@@ -51,7 +51,7 @@ def drive(
     names = () if name == "nothing" else (name,)
     effects = draw_effects(names, car, (strength, strength), rng)
     numbers, faults = (
-        Changing(dict(before), apply(before, effects), since_s, since_s)
+        Changing(dict(before), apply(before, effects), since_s, since_s + ramp_s)
         for before in (usual, FAULTS)
     )
     write(record(car, numbers, faults, lasts_s, rng), car, usual, folder)
@@ -105,6 +105,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--strength", type=float, default=2.0)
     parser.add_argument("--since-s", type=float, default=300.0)
+    parser.add_argument("--ramp-s", type=float, default=0.0, help="in which it sets in (0)")
     parser.add_argument("--search", action="store_true", help="for what each change is")
     given = parser.parse_args()
     for name in given.effects:
