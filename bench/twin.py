@@ -115,7 +115,9 @@ def main() -> None:
     after_s, driven_s, spent_s, dated, named = list[float](), 0.0, 0.0, 0, 0
     for name in given.effects:
         with tempfile.TemporaryDirectory() as folder:
-            recording = drive(name, given.strength, given.seed, given.since_s, Path(folder))
+            recording = drive(
+                name, given.strength, given.seed, given.since_s, Path(folder), ramp_s=given.ramp_s
+            )
         car, begun_s = CarWatch(predictor, threshold), time.process_time()
         changes = watch(recording, car)
         spent_s, driven_s = spent_s + time.process_time() - begun_s, driven_s + car.driven_s
