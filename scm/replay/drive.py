@@ -12,6 +12,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats
 from scm.data_quality.quality import Span
+from scm.errors import RecordingError
 from scm.recording.motion import forward, pose_point
 from scm.recording.read import Recording
 from scm.replay.commands import Commanded, Commands
@@ -40,6 +41,7 @@ KNOWN = (
     "velocity.y", "imu.accel_x", "imu.accel_y",
 )  # fmt: skip
 LEAP = 0.3
+LEAST_SAMPLES = 4  # of a channel: its noise is seen in third differences
 BLIND_S, BLIND_STEPS = 1.0, 5.0  # without a pose for longer, and for so many of its usual steps
 POSES = ("pose.x", "pose.y", "pose.yaw")
 ODOMETERS = ("speed", "velocity.x")  # best first
@@ -125,13 +127,16 @@ class Drive:
         streams: Measured channels that a car model can predict.
         battery: Measured voltage on the edges, where the car's drive knows it [V].
         point: On the body that the poses are of, from the rear axle [m].
+
+    Raises:
+        RecordingError: when there are too few poses.
     """
 
     def __init__(self, recording: Recording, car: Car) -> None:
         self.recording, self.car = recording, car
         commands = Commands(recording, car)
         throttle, steering = commands.rows
-        names = [name for name in KNOWN if name in recording.channels and _can_predict(car, name)]
+        names = [name for name in KNOWN if _is_enough(recording, name) and _can_predict(car, name)]
         streams = _with_correlation([_stream(recording, name) for name in names], recording)
         self.point = pose_point(recording)
         poses = [recording.channel(name).t for name in POSES]
@@ -263,6 +268,18 @@ def is_led(drive: Drive) -> bool:
     """Say whether the measured speed drives the car, so that only how it turns can be judged."""
     given = any(term.name == "speed_control" for term in drive.car.terms)
     return given and not any(name in drive.recording.channels for name in COMMANDED_SPEEDS)
+
+
+def _is_enough(recording: Recording, name: str) -> bool:
+    """Say whether a channel has as many samples as show its noise.
+
+    Raises:
+        RecordingError: when a pose has fewer, without which nothing can be driven again.
+    """
+    count = len(recording.channels[name].t) if name in recording.channels else 0
+    if name in POSES and count < LEAST_SAMPLES:
+        raise RecordingError(f"{name}: expected {LEAST_SAMPLES} samples at least, got {count}")
+    return count >= LEAST_SAMPLES
 
 
 def _can_predict(car: Car, name: str) -> bool:

@@ -143,10 +143,16 @@ class CarWatch:
                 windows = self._predictor.windows(stretch).between(first_s, last_s)
             except RecordingError:
                 continue
-            if self._streams is None:
-                self._streams = windows.streams
+            has_more = self._streams is not None and set(windows.streams) > set(self._streams)
+            if self._streams is None or (has_more and self._usual is None):
+                self._begin(windows.streams)
             if len(windows.begin_s) and windows.streams == self._streams:
                 yield windows
+
+    def _begin(self, streams: tuple[str, ...]) -> None:
+        """Learn by these streams; what was learned without one of them says nothing of it."""
+        self._streams, self._detector, self.driven_s = streams, Detector(self._threshold), 0.0
+        self._early.clear()
 
 
 def watch(recording: Recording, car: CarWatch) -> list[Noticed]:

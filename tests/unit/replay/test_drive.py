@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scm.errors import RecordingError
 from scm.replay.drive import Drive, _commanded, has_odometer, is_led
 from tests.unit.mismatch.made_drive import big_nigel, made_drive
 
@@ -42,3 +43,13 @@ def test_steps_begin_where_commands_change():
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
     assert drive.edges[0] >= late["pose.x"].t[0]
     assert drive.edges[0] < late["pose.x"].t[0] + 0.01
+
+
+def test_three_poses_are_too_few():
+    recording = made_drive(seconds=6.0)
+    few = {
+        name: channel.at(slice(0, 3)) if name.startswith("pose.") else channel
+        for name, channel in recording.channels.items()
+    }
+    with pytest.raises(RecordingError, match=r"pose\.x: expected 4 samples at least, got 3"):
+        Drive(replace(recording, channels=few), big_nigel())

@@ -68,6 +68,22 @@ def test_spans_in_which_a_sensor_is_missing_do_not_count(predictor, changed):
     assert car.driven_s < SINCE_S
 
 
+def test_sensor_that_comes_later_is_watched_from_then_on(predictor, changed):
+    late = without(changed, ("imu.gyro_z",), last_s=40.0)
+    car = CarWatch(predictor, THRESHOLD)
+    (noticed,) = watch(late, car)
+    assert noticed.number.effect == "gyro_bias"
+    assert car.driven_s == pytest.approx(LASTS_S - 40.0, abs=10.0)
+
+
+def test_single_reading_of_a_sensor_is_as_none(predictor, changed):
+    gyro = changed.channels["imu.gyro_z"]
+    one = replace(changed, channels=changed.channels | {"imu.gyro_z": gyro.at(gyro.t == gyro.t[9])})
+    car = CarWatch(predictor, THRESHOLD)
+    assert car.look(one, 0.0, 10.0) is None
+    assert car.driven_s > 5.0
+
+
 def test_numbers_of_all_parts_of_a_car_are_watched(predictor):
     names = {(one.effect, one.name) for one in predictor.watched}
     assert {
