@@ -166,6 +166,7 @@ class RealityBody:
     def motion(self) -> Motion:
         """Return how it moves."""
         speed, across, rate, accel = map(float, self._row[4:8])
+        across -= rate * self._now["cog"]  # a row has the centre of gravity's
         return Motion(self.pose, speed, across, rate, accel, self._angle(), "simulated")
 
     def sensors(self, vehicle: str, now_ns: int, *, wanted: bool = True) -> list[VehicleSensors]:

@@ -79,6 +79,16 @@ def test_it_drives_on_after_the_commands_that_it_had_room_for(monkeypatch):
     assert min(np.diff(x)) > 0.1
 
 
+def test_lateral_speed_is_that_of_the_rear_axle_which_hardly_slips():
+    body = changing("nigel", 1, "own")
+    body.place(Pose2(0.0, 0.0, 0.0), BEGIN_NS)
+    body.command(0.5, 1.0)
+    body.advance(BEGIN_NS + 3 * NS_PER_S)
+    motion = body.motion()
+    assert abs(motion.yaw_rate) > 0.3
+    assert abs(motion.lateral_speed) < 0.003
+
+
 def test_commands_of_20_hz_and_of_an_agent_move_a_car_alike():
     given = nominal("nigel")
     ends = []
