@@ -16,6 +16,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 import scm
 from scm.arrays import Floats
+from scm.gym.observations import Observations
 from scm.gym.parallel import CityParallelEnv
 from scm.gym.vector import CityVectorEnv
 from scm.records.policy import INPUT, OUTPUT, POLICY_KEY, PolicyMetadata
@@ -83,8 +84,10 @@ def describe_policy(path: Path, env: CityVectorEnv | CityParallelEnv) -> None:
 
 def _save(model: onnx.ModelProto, path: Path, env: CityVectorEnv | CityParallelEnv) -> None:
     worlds = env.worlds
+    seen = Observations(worlds, worlds.task.observations)
     metadata = PolicyMetadata(
-        policy=1, task=env.name, observations=env.observation_names, car=worlds.task.car,
+        policy=1, task=env.name, observations=seen.names, car=worlds.task.car,
+        low=tuple(seen.low.tolist()), high=tuple(seen.high.tolist()),
         period_s=worlds.task.period_s, agents=worlds.agents, scm=scm.__version__,
     )  # fmt: skip
     helper.set_model_props(model, {POLICY_KEY: msgspec.json.encode(metadata).decode()})

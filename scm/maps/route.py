@@ -2,7 +2,7 @@
 
 import heapq
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -157,6 +157,21 @@ class Roads:
     def stop_lines_on(self, lane: str) -> tuple[StopLine, ...]:
         """Return the stop lines of a lane in driving order."""
         return tuple(self._lines.get(lane, ()))
+
+    def line_ahead(self, lanes: Iterable[str], from_m: float) -> tuple[StopLine, float] | None:
+        """Return the next stop line on some lanes, one after the other, and the way there [m].
+
+        Args:
+            lanes: Of a route.
+            from_m: Where on it the way begins, from the begin of the first lane.
+        """
+        begin_m = -from_m
+        for lane in lanes:
+            for line in self.stop_lines_on(lane):
+                if begin_m + line.at_m >= 0.0:
+                    return line, begin_m + line.at_m
+            begin_m += self.length_of(lane)
+        return None
 
     def stop_lines_of(self, junction: str, group: str) -> tuple[StopLine, ...]:
         """Return the stop lines at which a signal group is obeyed."""

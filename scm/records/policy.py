@@ -13,6 +13,7 @@ class PolicyMetadata(msgspec.Struct, kw_only=True, frozen=True):
         policy: Version of this form.
         task: That it was trained for, with its map.
         observations: Names of its input's columns, each with its unit.
+        low, high: Their range; what lies beyond is clipped.
         car: File of the cars that it drove.
         period_s: Between two actions.
         agents: Cars in a world.
@@ -22,6 +23,8 @@ class PolicyMetadata(msgspec.Struct, kw_only=True, frozen=True):
     policy: int
     task: str
     observations: tuple[str, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
     car: str
     period_s: float
     agents: int

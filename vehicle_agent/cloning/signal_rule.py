@@ -112,10 +112,7 @@ class SignalRule:
 
     def _line_ahead(self) -> StopLine | None:
         """Return the next stop line with signals on the driver's way."""
-        batch, begin = self._driver.batch, -float(self._driver.batch.s[OWN])
-        for lane in batch.planned_lanes(OWN):
-            for line in self._roads.stop_lines_on(lane):
-                if begin + line.at_m >= self._limits.front:
-                    return line
-            begin += self._roads.length_of(lane)
-        return None
+        batch = self._driver.batch
+        front_m = float(batch.s[OWN]) + self._limits.front
+        found = self._roads.line_ahead(batch.planned_lanes(OWN), front_m)
+        return None if found is None else found[0]

@@ -5,7 +5,10 @@ from pathlib import Path
 
 from scm.clock import nanoseconds
 from scm.errors import ScmError
+from scm.runtime.part import Subscription
 from scm.v2x.exchange import Incoming
+from scm.v2x.messages.lidar_scan import LidarScan
+from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
 from vehicle_agent.autonomy.control import Command
@@ -41,26 +44,31 @@ class PolicyPart(TrainedDriver):
         car = self.policy.metadata.car
         super().__init__(name, vehicle, car, spawn, session, ignore_signals=ignore_signals)
         self._period_ns = nanoseconds(self.policy.metadata.period_s)
+        own = {"vehicle": vehicle}
+        sensed = Subscription(VehicleSensors, own), Subscription(LidarScan, own)
+        self.subscriptions = (*self.subscriptions, *sensed)
         self._senses: Senses | None = None
-        self._acted_ns, self._action, self._is_lost = -self._period_ns, STAND, False
+        self._acted_ns, self._action = -self._period_ns, STAND
         self.actions = 0
 
     def learn(self, world: WorldDefinition) -> None:
         """Follow the lanes of another map."""
         super().learn(world)
-        names = self.policy.metadata.observations
         try:
-            self._senses = Senses(names, world.map, self._vehicle)
+            self._senses = Senses(self.policy.metadata, world.map, self._vehicle)
         except ScmError as error:
             self._senses, self.problem = None, str(error)
 
     def look(self, inbox: Sequence[Incoming], now_ns: int) -> Command | None:
         """Act once a period, by the newest that the car knows of itself."""
-        states = [item.message for item in inbox if isinstance(item.message, VehicleState)]
-        if not states or self._senses is None or now_ns - self._acted_ns < self._period_ns:
+        if self._senses is None:
             return None
-        seen = self._senses.look(states[-1], self._action)
-        self._is_lost = seen is None
+        for item in inbox:
+            self._senses.receive(item)
+        states = [item.message for item in inbox if isinstance(item.message, VehicleState)]
+        if not states or now_ns - self._acted_ns < self._period_ns:
+            return None
+        seen = self._senses.look(states[-1], self._action, now_ns)
         if seen is None:
             return STAND
         self._acted_ns, self.actions = now_ns, self.actions + 1
@@ -69,6 +77,6 @@ class PolicyPart(TrainedDriver):
 
     def detail(self) -> str:
         """Return how it drives, or what it waits for, in words."""
-        if self._is_lost:
-            return f"{self._vehicle} is beside all lanes: it stands"
+        if self._senses is not None and self._senses.missing:
+            return f"{self._vehicle} stands: it waits for {self._senses.missing}"
         return f"{self.actions} actions" if self.actions else f"waits for {self._vehicle}"

@@ -89,7 +89,7 @@ class Course:
         if not chosen:
             msg = f"map {city_map.name}: expected a lane from which cars can drive on for ever"
             raise MapError(msg)
-        self._lanes, self._numbers = graph.arrays, graph.numbers
+        self._lanes, self._numbers, self._names = graph.arrays, graph.numbers, graph.names
         self._begins = np.array(chosen, np.int64)
         self._ends = np.cumsum(graph.arrays.length[chosen])
         self._half_widths = np.array([0.5 * lane.width_m for lane in city_map.lanes])
@@ -109,6 +109,11 @@ class Course:
     def half_width(self) -> Floats:
         """Of each row's lane [m]."""
         return self._half_widths[self._state.lane_window[:, HERE]]
+
+    def lanes_ahead(self, row: int) -> tuple[tuple[str, ...], float]:
+        """Return the names of a car's lanes from its own on, and how far along that it is [m]."""
+        numbers = self._state.lane_window[row, HERE:]
+        return tuple(self._names[n] for n in numbers if n >= 0), float(self._state.floats[row, S])
 
     def begin(self, rows: Ints, draws: Floats, beside_m: float, turned_rad: float) -> Floats:
         """Let cars begin somewhere along the lanes; return the poses of their rear axles.

@@ -10,7 +10,7 @@ import scm.gym
 from scm.errors import LearningError
 from scm.gym.policy_file import describe_policy, write_policy
 from scm.maps.load import load_map
-from scm.records.policy import POLICY_KEY
+from scm.records.policy import POLICY_KEY, PolicyMetadata
 from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
 from scm.traffic.signals.part import TrafficPart
@@ -58,12 +58,21 @@ def driven(policy, city_map, lasts_s, vehicle="n1", car="nigel", **options):
             for state in (item.message for item in states.drain()):
                 if not began:
                     began = True
-                    senses = Senses(part.policy.metadata.observations, OPEN, vehicle)
-                    senses.look(state, STAND)
+                    senses = Senses(part.policy.metadata, OPEN, vehicle)
+                    senses.look(state, STAND, 0)
                     course = senses._course
                 course.follow(*(np.array([v]) for v in (state.x_m, state.y_m, state.yaw_rad)))
                 off.append(course.known[0, 0])
     return course.known[0, 3], np.abs(off).max(initial=0.0), part
+
+
+def policy_of(names, low, high):
+    """Return the metadata of a policy that observes some columns, all of one range."""
+    count = len(names)
+    return PolicyMetadata(
+        policy=1, task="", observations=tuple(names), low=(low,) * count, high=(high,) * count,
+        car="nigel", period_s=0.05, agents=1, scm="",
+    )  # fmt: skip
 
 
 def test_policy_drives_round_as_it_did_in_training(envs, policy):
@@ -85,16 +94,18 @@ def test_car_that_was_carried_elsewhere_is_found_there():
             yaw_rate_radps=0.0, steering_rad=0.0, throttle=0.5, source="simulated",
         )  # fmt: skip
 
-    senses = Senses(("beside_m", "turned_rad", "lane_turn_0.8m_rad"), SCHOOL, "n1")
+    names = "beside_m", "turned_rad", "lane_turn_0.8m_rad"
+    senses = Senses(policy_of(names, -4.0, 4.0), SCHOOL, "n1")
     course = Course(SCHOOL, 2)
     poses = course.begin(np.arange(2), np.array([[0.1, 0.5, 0.5, 0.0], [0.6, 0.5, 0.5, 0.0]]), 0, 0)
     course.follow(*poses.T)
     for pose, known in zip(poses.tolist(), course.known, strict=True):
-        senses.look(state(*pose), STAND)  # the first look after it was carried finds it off
-        assert senses.look(state(*pose), STAND) == pytest.approx(known[[0, 1, 6]], abs=1e-3)
+        senses.look(state(*pose), STAND, 0)  # the first look after it was carried finds it off
+        assert senses.look(state(*pose), STAND, 0) == pytest.approx(known[[0, 1, 6]], abs=1e-3)
     for _ in range(2):
-        beside_all = senses.look(state(1.4, -5.0, 0.0), STAND)
+        beside_all = senses.look(state(1.4, -5.0, 0.0), STAND, 0)
     assert beside_all is None
+    assert senses.missing == "a lane: it is beside all of them"
 
 
 def test_policy_stops_at_red(policy):
@@ -129,7 +140,7 @@ def test_policy_that_observes_what_no_car_knows_says_so(policy, tmp_path, envs):
         statuses = city.subscribe(Subscription(PartStatus, {"station": "policy"}))
         city.run_for(2.0)
         (*_, last) = [item.message for item in statuses.drain()]
-    assert last.detail.startswith("the policy observes fuel_m: a car knows beside_m, ")
+    assert last.detail.startswith("the policy observes fuel_m: a car knows speed_mps, ")
 
 
 def test_file_that_is_no_policy_says_what_was_expected(policy, tmp_path, envs):
