@@ -26,6 +26,7 @@ from scm.twin.car import SEARCHED_AFTER_S, SEARCHED_BEFORE_S
 from scm.twin.detector import Change, threshold_of
 from scm.twin.investigation import compare, explain
 from scm.twin.part import BUDGET_S
+from scm.twin.trial.score import RAMP_OFF, STEP_OFF_S
 from scm.twin.versions import verdict
 from scm.twin.watch import CarWatch, watch
 from scm.twin.windows import WatchedCar
@@ -112,7 +113,8 @@ def main() -> None:
         if name not in (*every, "nothing"):
             parser.error(f"{name}: expected one of {', '.join(every)}, nothing")
     predictor, threshold = WatchedCar(load_car(CAR)), threshold_of(FALSE_ALARM_H)
-    after_s, driven_s, spent_s, dated, named = list[float](), 0.0, 0.0, 0, 0
+    after_s, driven_s, spent_s, dated, near, named = list[float](), 0.0, 0.0, 0, 0, 0
+    most_off_s = max(STEP_OFF_S, RAMP_OFF * given.ramp_s)
     for name in given.effects:
         with tempfile.TemporaryDirectory() as folder:
             recording = drive(
@@ -128,6 +130,7 @@ def main() -> None:
         at_s, low_s, high_s = (t_s - given.since_s for t_s in first.change.onset_s)
         after_s.append(first.change.noticed_s - given.since_s)
         dated += low_s <= 0.0 <= high_s
+        near += abs(at_s) <= most_off_s
         named += first.number.effect == name
         print(
             f"{name:<20}{after_s[-1]:+5.0f} s, onset {at_s:+5.1f} s ({low_s:+.1f} to {high_s:+.1f})"
@@ -139,7 +142,10 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as folder:
                 print(" " * 20 + search(recording, first.change, Path(folder)), flush=True)
     changed = sum(name != "nothing" for name in given.effects)
-    print(f"\nnoticed {len(after_s)} of {changed}, {named} by name; onset in its interval {dated}")
+    print(
+        f"\nnoticed {len(after_s)} of {changed}, {named} by name; onset in its interval {dated}, "
+        f"within {most_off_s:g} s {near}"
+    )
     if after_s:
         print(
             f"after {np.median(after_s):.0f} s (median), {np.percentile(after_s, 95):.0f} s (95 %)"

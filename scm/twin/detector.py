@@ -7,7 +7,8 @@ be right: what it has missed from the beginning is no change. How far windows st
 and together, and for how long they stray the same way, is learned from the first minutes.
 
 The onset is where the likelihood of the number with the highest score is greatest, and its interval
-all places that are at least e^-1.35 times as likely (90 %), and a window more on either side.
+all places that are at least e^-1.35 times as likely (90 %), and a window more on either side. A
+change at once and one that grows evenly since then are compared at each place.
 Source: Willsky and Jones, A generalized likelihood ratio approach to the detection and estimation
 of jumps in linear systems, IEEE Transactions on Automatic Control 21 (1976).
 """
@@ -35,6 +36,8 @@ ROUNDS = 20  # of an estimate that is bounded so
 TRUST = 0.05  # added to the misses' correlations: sensors are never as alike as a short drive shows
 TOGETHER = 80  # windows: longest span whose scatter 200 s can show
 LIKELY = 1.35  # of the log likelihood: 90 %
+RARER = 1.0  # a change that grows than one at once, as a log likelihood
+TINY = 1e-12  # no information: the score is 0 as well
 HOURLY, PER_FOLD = 6.0, 0.7  # highest score of an hour; more for e times as many hours
 ALIKE, MOST_ALIKE = 0.8, 5  # of the highest score; other numbers that are named
 
@@ -204,8 +207,7 @@ class History:
         first = int(np.argmax(np.abs(scores)))
         after = np.cumsum(self._shown[:, ::-1], axis=1)[:, ::-1]  # from each window on
         before = self._before[:, None] + after[:, :1] - after
-        moved, variance = _moved(after[..., first], before[..., first], LIMITED)
-        likelihood = 0.5 * moved**2 / (self.usual.inflation[:, first].max() * variance)
+        likelihood = self._likelihood(first)
         onset = int(np.argmax(likelihood))
         near = np.flatnonzero(likelihood > likelihood[onset] - LIKELY)
         low, high = self._t[near[0]] - EVERY_S, self._t[near[-1]] + LENGTH_S
@@ -220,6 +222,32 @@ class History:
             onset_s=(float(self._t[onset]), float(low), float(high)),
             alike=tuple(alike[:MOST_ALIKE]),
         )  # fmt: skip
+
+    def _likelihood(self, number: int) -> Floats:
+        """Return the log likelihood that a number began to change at each window, (windows,).
+
+        Of a change at once, or of one that grows evenly since: whichever is likelier there.
+        """
+        gone, shown = self._before[:, number], self._shown[..., number]
+        since, at = np.arange(shown.shape[1]), np.arange(1.0, shown.shape[1] + 1.0)
+
+        def later(values: Floats) -> Floats:
+            return np.asarray(np.cumsum(values[::-1])[::-1])
+
+        score, information = shown[LIMITED], shown[INFORMATION]
+        whole, known = gone[LIMITED] + score.sum(), gone[INFORMATION] + information.sum()
+        by_one, by_time = later(information), later(at * information)
+        growing = by_time - since * by_one
+        squared = later(at * at * information) - 2.0 * since * by_time + since**2 * by_one
+        at_once = later(score), by_one, by_one
+        evenly = later(at * score) - since * later(score), growing, squared
+        inflation = self.usual.inflation[:, number].max()
+        found = [
+            0.5 * (seen - mixed * whole / known) ** 2
+            / np.maximum((own - mixed * mixed / known) * inflation, TINY)
+            for seen, mixed, own in (at_once, evenly)
+        ]  # fmt: skip
+        return np.maximum(found[0], found[1] - RARER)
 
 
 def _moved(after: Floats, before: Floats, score: int) -> tuple[Floats, Floats]:

@@ -11,8 +11,11 @@ STREAMS, NUMBERS = 4, 3
 SIZE = np.array([0.004, 0.003, 0.01, 2.0])
 
 
-def drive(count, *, seed=0, wrong=0.0, changed=0.0, since=0, until=None, lasting=0.5):
-    """Return windows of a car whose number 1 is `wrong` from the beginning, and changes later."""
+def drive(count, *, seed=0, wrong=0.0, changed=0.0, since=0, until=None, lasting=0.5, grows=1):
+    """Return windows of a car whose number 1 is `wrong` from the beginning, and changes later.
+
+    It changes at once, or within `grows` windows.
+    """
     rng = np.random.default_rng(seed)
     slopes = 0.5 * SIZE[:, None] * rng.standard_normal((count, STREAMS, NUMBERS))
     noise = np.empty((count, STREAMS))
@@ -20,7 +23,8 @@ def drive(count, *, seed=0, wrong=0.0, changed=0.0, since=0, until=None, lasting
     for k, drawn in enumerate(rng.standard_normal((count, STREAMS))):
         last = noise[k] = lasting * last + (1.0 - lasting**2) ** 0.5 * drawn
     number = np.full(count, wrong)
-    number[since:until] += changed
+    change = changed * np.clip((np.arange(count) - since + 1.0) / grows, 0.0, 1.0)
+    number[since:until] += change[since:until]
     misses = SIZE * noise + number[:, None] * slopes[:, :, 1]
     nowhere = np.zeros((count, 2))
     return Windows(EVERY_S * np.arange(count), nowhere, ("x", "y", "yaw", "wheel"), misses, slopes)
@@ -46,6 +50,15 @@ def test_change_is_noticed_with_its_number_size_and_onset(size):
     last = found[-1]
     assert last.size == pytest.approx(size, abs=0.15)
     assert last.onset_s[1] <= onset_s <= last.onset_s[2] < last.onset_s[1] + 5.0
+
+
+def test_change_that_grows_is_dated_to_when_it_began():
+    onset_s, grows, off = EVERY_S * 1500, 400, []
+    for seed in range(6):
+        first = changes_in(drive(2200, seed=seed, changed=2.0, since=1500, grows=grows))[0]
+        assert onset_s < first.noticed_s < onset_s + EVERY_S * grows
+        off.append(abs(first.onset_s[0] - onset_s))
+    assert np.median(off) < 0.12 * EVERY_S * grows  # 0.16 if it were taken for one at once
 
 
 @pytest.mark.parametrize("lasting", [0.0, 0.8])
