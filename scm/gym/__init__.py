@@ -4,6 +4,7 @@
     tasks          what is to be learned, one file each
     task           what a task is made of
     worlds         many worlds of a task, their cars rows of one fleet
+    ways           where its cars begin, and how far they come: along lanes, or to a goal
     touching       who touches a wall or another car
     observations   what an agent sees of it
     rewards, ends  what it gains, and when its episode ends

@@ -4,13 +4,22 @@ import numpy as np
 
 from scm.arrays import Bools
 from scm.gym.signals import PASSED_RED
+from scm.gym.ways import AWAY_M, TURNED_RAD
 from scm.gym.worlds import Worlds
+from scm.vehicles.drivers.course import BESIDE_M
+from scm.vehicles.parked import is_parked
 
 
 def left_lane(worlds: Worlds) -> Bools:
     """Return whose rear axle has a wheel beyond the edge of its lane."""
-    half_track = 0.5 * worlds.car.value("body.track_m")
-    return np.abs(worlds.beside_m) + half_track > worlds.most_beside_m
+    half_track, course = 0.5 * worlds.car.value("body.track_m"), worlds.course
+    return np.abs(course.known[:, BESIDE_M]) + half_track > course.half_width
+
+
+def parked(worlds: Worlds) -> Bools:
+    """Return who stands at its goal, within the tolerances of cars that park themselves."""
+    known = worlds.to_goal.known
+    return is_parked(known[:, AWAY_M], known[:, TURNED_RAD], worlds.fleet.speed)
 
 
 def touched(worlds: Worlds) -> Bools:

@@ -62,10 +62,11 @@ def lane(worlds: Worlds) -> Part:
     """Return where the car is in its lane, the speed limit, and how the lane turns ahead."""
     bends = tuple(f"lane_turn_{ahead:g}m_rad" for ahead in AHEAD_M)
     most = (0.5, np.pi, 5.0, *(2.0 * np.pi,) * len(bends))
+    known = worlds.course.known
     columns = [BESIDE_M, TURNED_RAD, LIMIT_MPS, *range(BENDS, BENDS + len(AHEAD_M))]
     return Part(
         ("beside_m", "turned_rad", "speed_limit_mps", *bends), tuple(-one for one in most), most,
-        lambda: worlds.course.known[:, columns],
+        lambda: known[:, columns],
     )  # fmt: skip
 
 
@@ -107,6 +108,14 @@ def ranges(worlds: Worlds, beams: int = 108) -> Part:
     return Part(names, (nearest,) * beams, (farthest,) * beams, read)
 
 
+def goal(worlds: Worlds) -> Part:
+    """Return the goal's place and direction, seen from the car."""
+    names = ("goal_ahead_m", "goal_left_m", "goal_cos_turn", "goal_sin_turn")
+    most = (10.0, 10.0, 1.0, 1.0)
+    known = worlds.to_goal.known[:, : len(names)]
+    return Part(names, tuple(-one for one in most), most, lambda: known)
+
+
 def others(worlds: Worlds) -> Part:
     """Return what the radio knows of each other car: place and direction seen from the own, age."""
     radio = worlds.radio
@@ -139,8 +148,8 @@ def signals(worlds: Worlds) -> Part:
 
 PARTS: dict[str, Callable[[Worlds], Part]] = {
     "motion": motion, "action": action, "lane": lane, "inertial": inertial,
-    "others": others, "signals": signals, "ranges": ranges,
-    "ranges_360": partial(ranges, beams=360),
+    "others": others, "signals": signals, "goal": goal, "ranges": ranges,
+    "ranges_36": partial(ranges, beams=36), "ranges_360": partial(ranges, beams=360),
 }  # fmt: skip
 
 

@@ -3,25 +3,47 @@
 import numpy as np
 
 from scm.arrays import Floats
+from scm.gym import ends
 from scm.gym.worlds import Worlds
-from scm.vehicles.drivers.course import TURNED_RAD
+from scm.vehicles.drivers.course import BESIDE_M, TURNED_RAD
 
 STANDS_MPS = 0.02
 
 
 def progress(worlds: Worlds) -> Floats:
     """Return how far each car came along its lanes [m]."""
-    return worlds.moved_m
+    return worlds.lanes.moved_m
 
 
 def off_centre(worlds: Worlds) -> Floats:
     """Return how far each is from the middle of its lane, as a share of half its width [1]."""
-    return np.abs(worlds.beside_m) / worlds.most_beside_m
+    course = worlds.course
+    return np.abs(course.known[:, BESIDE_M]) / course.half_width
 
 
 def turned(worlds: Worlds) -> Floats:
     """Return how far each is turned from its lane's direction [rad]."""
     return np.abs(worlds.course.known[:, TURNED_RAD])
+
+
+def goal_progress(worlds: Worlds) -> Floats:
+    """Return how much nearer each car came to its goal [m]."""
+    return worlds.to_goal.nearer[:, 0]
+
+
+def goal_turn_progress(worlds: Worlds) -> Floats:
+    """Return how much less than before each is turned from its goal's direction [rad]."""
+    return worlds.to_goal.nearer[:, 1]
+
+
+def parked(worlds: Worlds) -> Floats:
+    """Return 1 for each that is parked [1]."""
+    return ends.parked(worlds).astype(float)
+
+
+def contact(worlds: Worlds) -> Floats:
+    """Return 1 for each that touches a wall, a box or another car [1]."""
+    return worlds.touched.astype(float)
 
 
 def steering_change(worlds: Worlds) -> Floats:

@@ -17,7 +17,7 @@ End = Callable[["Worlds"], Bools]
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where an agent's car begins: anywhere along the lanes, drawn for each episode.
+    """Where an agent's car begins on lanes: anywhere along them, drawn for each episode.
 
     Attributes:
         beside_m: At most so far from the middle of its lane.
@@ -26,6 +26,27 @@ class Start:
     """
 
     beside_m: float = 0.0
+    turned_rad: float = 0.0
+    speed_mps: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceStart:
+    """Where an agent's car begins on a map without lanes: near a place of it, with a goal.
+
+    Both are drawn for each episode.
+
+    Attributes:
+        places: By map, names of places to begin at; a map that is not there: its spawns.
+        goals: By map, names of places to drive to; a map that is not there: its bays.
+        aside_m: At most so far from the place, along x and along y.
+        turned_rad: At most so far from its direction.
+        speed_mps: The slowest and the fastest.
+    """
+
+    places: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    goals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    aside_m: float = 0.0
     turned_rad: float = 0.0
     speed_mps: tuple[float, float] = (0.0, 0.0)
 
@@ -66,7 +87,7 @@ class Task:
     observations: tuple[str, ...]
     rewards: tuple[Term, ...]
     ends: tuple[End, ...]
-    start: Start
+    start: Start | PlaceStart
     lasts_s: float
     agents: int = 1
     lanes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)

@@ -11,14 +11,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
+from scm.errors import MapError
 from scm.gym.radio import Radio
 from scm.gym.randomise import Randomise, Ranges, with_effects
 from scm.gym.signals import Signals
-from scm.gym.task import Task
+from scm.gym.task import PlaceStart, Task
 from scm.gym.touching import Touching
+from scm.gym.ways import AlongLanes, ToGoal, Way
 from scm.maps.load import load_map
 from scm.vehicles.car import load_car
-from scm.vehicles.drivers.course import BESIDE_M, DONE_M, Course
+from scm.vehicles.drivers.course import Course
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.noise import Keys, bases_of, uniforms
@@ -61,14 +63,12 @@ class Worlds:
 
     Attributes:
         fleet: All cars; row `world * agents + agent`.
-        course: Where they are along their lanes.
         radio: What they know of each other; None: each is alone in its world.
         signals: The lights; None: the task has none.
         steps: Of each world, since its episode began, (worlds,).
         present: Which cars take part, (rows,); the others are out, until the next episode.
         touched: Which touch a wall or another car now, (rows,).
         actions: In force, -1 to 1, throttle and steering, (rows, 2); `before`: of the step before.
-        moved_m: How far each car came along its lanes in this step, (rows,).
 
     Raises:
         ScmError: There is no such map or car, or it does not suit the task.
@@ -85,7 +85,11 @@ class Worlds:
         self._randomise = Randomise(self.fleet, options.randomise, options.ranges)
         self.fleet.threads = threads
         self.fleet.alive[:] = True
-        self.course = Course(self.city_map, rows, task.lanes.get(self.city_map.name, ()))
+        self._way: Way = (
+            ToGoal(self.city_map, rows, task.start)
+            if isinstance(task.start, PlaceStart)
+            else AlongLanes(self.city_map, rows, task.start, task.lanes.get(self.city_map.name, ()))
+        )
         self._touching = Touching(self.city_map, self.car, worlds, task.agents)
         self.radio = Radio(self.city_map, worlds, task.agents) if task.agents > 1 else None
         front_m = limits_of(self.car).front
@@ -101,8 +105,6 @@ class Worlds:
         self.present: Bools = np.zeros(rows, np.bool_)
         self.touched: Bools = np.zeros(rows, np.bool_)
         self.actions, self.before = np.zeros((2, rows, 2))
-        self.moved_m, self._done_m = np.zeros((2, rows))
-        self.most_beside_m = self.course.half_width
 
     def seed(self, worlds: Ints, seeds: Ints) -> None:
         """Let some worlds (n,) begin anew with the first episode of seeds (n,)."""
@@ -117,7 +119,7 @@ class Worlds:
         agents = np.tile(np.arange(self.agents), len(worlds))
         rows = np.repeat(worlds * self.agents, self.agents) + agents
         self.keys[rows] = bases_of(np.repeat(bases, self.agents), agents)
-        draws, start = uniforms(self.keys[rows], 5), self.task.start
+        draws, start = uniforms(self.keys[rows], 6), self.task.start
         poses = self._starts(bases, rows, draws)
         low, high = start.speed_mps
         self.fleet.alive[rows] = self.present[rows] = True
@@ -133,12 +135,12 @@ class Worlds:
         self._look_at_start(rows)
 
     def _starts(self, bases: Keys, rows: Ints, draws: Floats) -> Floats:
-        """Return where the cars of some worlds begin, (rows, 3): spread evenly over the lanes.
+        """Return where the cars of some worlds begin, (rows, 3): spread evenly.
 
         Where two would stand in each other, as where lanes cross, another place is drawn for all of
         that world.
         """
-        agents, start = np.arange(self.agents), self.task.start
+        agents = np.arange(self.agents)
         shares = uniforms(bases, TRIES)
         poses = np.zeros((len(bases), self.agents, 3))
         open_ = np.arange(len(bases))
@@ -146,7 +148,7 @@ class Worlds:
             where = shares[open_, tried, None] + agents / self.agents
             these = (open_[:, None] * self.agents + agents).ravel()
             draws[these, 0] = (where - np.floor(where)).ravel()
-            begun = self.course.begin(rows[these], draws[these], start.beside_m, start.turned_rad)
+            begun = self._way.begin(rows[these], draws[these])
             poses[open_] = begun.reshape(-1, self.agents, 3)
             apart = poses[open_, :, None, :2] - poses[open_, None, :, :2]
             is_near = np.hypot(apart[..., 0], apart[..., 1]) < self._apart_m
@@ -200,35 +202,51 @@ class Worlds:
         return np.asarray(self.fleet.status != VehicleStatus.OK)
 
     @property
-    def beside_m(self) -> Floats:
-        """How far each car is from the middle of its lane, + = left, (rows,)."""
-        return self.course.known[:, BESIDE_M]
+    def lanes(self) -> AlongLanes:
+        """Where cars are along their lanes.
+
+        Raises:
+            MapError: The task's cars drive to goals.
+        """
+        if not isinstance(self._way, AlongLanes):
+            raise MapError(f"task {self.task.name}: its cars drive to goals, not along lanes")
+        return self._way
+
+    @property
+    def to_goal(self) -> ToGoal:
+        """Where cars are seen from their goals.
+
+        Raises:
+            MapError: The task's cars drive along lanes.
+        """
+        if not isinstance(self._way, ToGoal):
+            raise MapError(f"task {self.task.name}: its cars drive along lanes, not to goals")
+        return self._way
+
+    @property
+    def course(self) -> Course:
+        """Where cars are along their lanes; see `lanes`."""
+        return self.lanes.course
 
     def _look(self) -> None:
         """Find out where all cars are after a step."""
-        fleet, course = self.fleet, self.course
-        course.follow(fleet.x, fleet.y, fleet.yaw)
-        done = course.known[:, DONE_M]
-        np.subtract(done, self._done_m, out=self.moved_m)
-        self._done_m[:] = done
-        self.touched = self._touching.find(fleet.planar_cogs(self._every), present=self.present)
+        self._way.look(self.fleet)
+        motion = self.fleet.planar_cogs(self._every)
+        self.touched = self._touching.find(motion, present=self.present)
         self._look_around(self._every)
 
     def _look_at_start(self, rows: Ints) -> None:
         """Find out where cars are whose episode begins: they stand apart, and have not moved."""
-        fleet, course = self.fleet, self.course
-        course.follow(fleet.x, fleet.y, fleet.yaw, rows)
-        self.moved_m[rows], self._done_m[rows] = 0.0, course.known[rows, DONE_M]
+        self._way.look_at_start(self.fleet, rows)
         self.touched[rows] = False
         self._look_around(rows)
 
     def _look_around(self, rows: Ints) -> None:
         """Find out what cars know beside where they are."""
-        fleet, course, steps = self.fleet, self.course, self.row_steps
-        self.most_beside_m = course.half_width
+        fleet, steps = self.fleet, self.row_steps
         now_s = self.task.period_s * steps.astype(float)
         if self.signals is not None:
-            self.signals.look(*course.arrays, rows, now_s, self.present)
+            self.signals.look(*self.course.arrays, rows, now_s, self.present)
         if self.radio is not None:
             motion = np.column_stack((fleet.x, fleet.y, fleet.yaw, fleet.speed))
             self.radio.exchange(rows, motion, now_s, steps, self.keys, self.present)

@@ -14,6 +14,7 @@ from scm.errors import PathError, RunError
 from scm.geometry import Pose2
 from scm.vehicles.car import Car
 from scm.vehicles.driver import Other
+from scm.vehicles.parked import TOLERANCE_M, TOLERANCE_RAD
 from vehicle_agent.autonomy import astar, hybrid_astar
 from vehicle_agent.autonomy.control import Command, Tracker
 from vehicle_agent.autonomy.elastic_band import ElasticBand
@@ -33,8 +34,6 @@ SLACK_M = 0.005  # less than where the path begins, which it may leave
 ROUNDED, QUIET_M = 0.4, 0.025  # part of a range's noise by which corners recede, above so much
 LOOK_AHEAD_S = 1.5
 LATEST_S = 0.2  # for which a pose is extrapolated
-TOLERANCE_M, TOLERANCE_RAD = 0.03, 0.05
-"""From the goal, within which the car stays: the published ones are 0.05 m and 0.0873 rad."""
 
 Planner = Callable[[GridMap, CarLimits, Pose2, Pose2, float], Path]
 """From a grid, the car's limits, start, goal and margin [m] to a path; raises PathError."""

@@ -18,11 +18,12 @@ import numpy as np
 
 from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import PathError
-from scm.geometry import Pose2, wrap_angle
+from scm.geometry import Pose2
 from scm.records.city_map import CityMap
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.car import Car
+from scm.vehicles.parked import STANDS_MPS, is_parked
 from vehicle_agent.autonomy.control import Command
 from vehicle_agent.autonomy.grid_map import FREE, grid_of_cells, grid_of_city
 from vehicle_agent.autonomy.navigation import OWN, Navigator, Stack
@@ -174,11 +175,11 @@ class Parking:
 
     def _plan(self, here: Whereabouts, now_ns: int) -> None:
         """Look for a path, from where the car stands."""
-        if abs(here.speed_mps) > 0.02:
+        if abs(here.speed_mps) > STANDS_MPS:
             return
         if self._planned_ns is not None and now_ns - self._planned_ns < PLAN_AGAIN_NS:
             return
-        if self._at_goal(here):
+        if self._is_parked(here):
             self._stand("parked", "", now_ns)
             return
         self._planned_ns = now_ns
@@ -227,10 +228,11 @@ class Parking:
             self._is_new_scan = False
             self.navigator.replan(grid, here, self.perception.steering_rad)
 
-    def _at_goal(self, here: Whereabouts) -> bool:
-        off = self.goal.inverse() @ here.pose
-        is_near = math.hypot(off.x, off.y) < self._stack.tolerance_m
-        return is_near and abs(wrap_angle(off.yaw)) < self._stack.tolerance_rad
+    def _is_parked(self, here: Whereabouts) -> bool:
+        off, stack = self.goal.inverse() @ here.pose, self._stack
+        away_m = math.hypot(off.x, off.y)
+        within = stack.tolerance_m, stack.tolerance_rad
+        return bool(is_parked(away_m, off.yaw, here.speed_mps, *within))
 
 
 def _uncertainty(found: Localised) -> str:

@@ -58,7 +58,7 @@ def test_ranges_are_those_that_the_city_s_scanner_has(worlds):
 
 
 def test_nothing_has_moved_when_an_episode_begins(worlds):
-    assert (worlds.moved_m == 0.0).all()
+    assert (worlds.lanes.moved_m == 0.0).all()
     worlds.step(np.full((3, 2), 0.5))
     worlds.begin(np.array([True, False, True]))
-    assert (worlds.moved_m != 0.0).tolist() == [False, True, False]
+    assert (worlds.lanes.moved_m != 0.0).tolist() == [False, True, False]

@@ -17,15 +17,10 @@ from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.car import load_car
+from scm.vehicles.parked import TOLERANCE_M, TOLERANCE_RAD
 from scm.world.part import WorldPart
 from vehicle_agent.autonomy.grid_map import grid_of_city
-from vehicle_agent.autonomy.navigation import (
-    OWN,
-    PUBLISHED,
-    TOLERANCE_M,
-    TOLERANCE_RAD,
-    Navigator,
-)
+from vehicle_agent.autonomy.navigation import OWN, PUBLISHED, Navigator
 from vehicle_agent.autonomy.parking import Parking
 from vehicle_agent.autonomy.perception import Whereabouts
 from vehicle_agent.autonomy.plan import limits_of
@@ -244,4 +239,4 @@ def test_published_stack_stays_within_the_published_tolerances(stack, stays):
     parking = Parking(NIGEL, OBSTACLES, GOAL, stack=stack)
     for off, is_near in ((0.045, stays), (0.055, False)):
         here = Whereabouts(0, GOAL @ Pose2(off, 0.0, 0.08), 0.0, 0.0, is_known=True)
-        assert parking._at_goal(here) is is_near
+        assert parking._is_parked(here) is is_near
