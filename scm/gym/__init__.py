@@ -6,6 +6,7 @@
     worlds         many worlds of a task, their cars rows of one fleet
     ways           where its cars begin, and how far they come: along lanes, or to a goal
     touching       who touches a wall or another car
+    traffic        cars of a world that rules drive
     observations   what an agent sees of it
     rewards, ends  what it gains, and when its episode ends
     vector         as a Gymnasium vector environment

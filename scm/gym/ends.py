@@ -12,14 +12,14 @@ from scm.vehicles.parked import is_parked
 
 def left_lane(worlds: Worlds) -> Bools:
     """Return whose rear axle has a wheel beyond the edge of its lane."""
-    half_track, course = 0.5 * worlds.car.value("body.track_m"), worlds.course
-    return np.abs(course.known[:, BESIDE_M]) + half_track > course.half_width
+    half_track, lanes = 0.5 * worlds.car.value("body.track_m"), worlds.lanes
+    return np.abs(lanes.known[:, BESIDE_M]) + half_track > lanes.half_width
 
 
 def parked(worlds: Worlds) -> Bools:
     """Return who stands at its goal, within the tolerances of cars that park themselves."""
     known = worlds.to_goal.known
-    return is_parked(known[:, AWAY_M], known[:, TURNED_RAD], worlds.fleet.speed)
+    return is_parked(known[:, AWAY_M], known[:, TURNED_RAD], worlds.fleet.speed[: worlds.rows])
 
 
 def touched(worlds: Worlds) -> Bools:

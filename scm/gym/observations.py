@@ -15,6 +15,7 @@ from scm.gym.radio import COLUMNS
 from scm.gym.signals import REACH_M
 from scm.gym.worlds import READINGS, Worlds
 from scm.maps.segments import wall_segments
+from scm.vehicles.drivers.cars_ahead import REACH
 from scm.vehicles.drivers.course import AHEAD_M, BENDS, BESIDE_M, LIMIT_MPS, TURNED_RAD
 from scm.vehicles.noise import bases_of
 from scm.vehicles.rays.cast import cast
@@ -45,7 +46,10 @@ class Part:
 def motion(worlds: Worlds) -> Part:
     """Return the true motion of the rear axle, and the steering angle."""
     fleet = worlds.fleet
-    columns = (fleet.speed, fleet.lateral_speed, fleet.yaw_rate, fleet.steer_angle)
+    columns = tuple(
+        signal[: worlds.rows]
+        for signal in (fleet.speed, fleet.lateral_speed, fleet.yaw_rate, fleet.steer_angle)
+    )
     most = (5.0, 2.0, 10.0, 1.0)
     return Part(
         ("speed_mps", "lateral_speed_mps", "yaw_rate_radps", "steer_angle_rad"),
@@ -62,7 +66,7 @@ def lane(worlds: Worlds) -> Part:
     """Return where the car is in its lane, the speed limit, and how the lane turns ahead."""
     bends = tuple(f"lane_turn_{ahead:g}m_rad" for ahead in AHEAD_M)
     most = (0.5, np.pi, 5.0, *(2.0 * np.pi,) * len(bends))
-    known = worlds.course.known
+    known = worlds.lanes.known
     columns = [BESIDE_M, TURNED_RAD, LIMIT_MPS, *range(BENDS, BENDS + len(AHEAD_M))]
     return Part(
         ("beside_m", "turned_rad", "speed_limit_mps", *bends), tuple(-one for one in most), most,
@@ -73,14 +77,14 @@ def lane(worlds: Worlds) -> Part:
 def inertial(worlds: Worlds) -> Part:
     """Return what IMU and encoders of the car file read now: noise and bias of each episode."""
     device, fleet = imu.device(worlds.car), worlds.fleet
-    rows, bias = np.arange(fleet.capacity), np.array(device.bias)
-    radius = fleet.parameters[:, [fleet.parameter_names.index("wheel_radius")]]
+    rows, bias = np.arange(worlds.rows), np.array(device.bias)
+    radius = fleet.parameters[: worlds.rows, [fleet.parameter_names.index("wheel_radius")]]
 
     def read() -> Floats:
         exact = imu.measure(worlds.car, fleet, rows, None)
-        bases = bases_of(worlds.keys ^ READINGS, worlds.row_steps)
+        bases = bases_of(worlds.keys[: worlds.rows] ^ READINGS, worlds.row_steps)
         readings = add_device_errors(device, exact, bias, bases)
-        return np.column_stack((readings[:, :6], radius * fleet.wheel_speed[:, 2:]))
+        return np.column_stack((readings[:, :6], radius * fleet.wheel_speed[: worlds.rows, 2:]))
 
     names = [f"accel_{axis}_mps2" for axis in "xyz"] + [f"gyro_{axis}_radps" for axis in "xyz"]
     most = (50.0,) * 3 + (20.0,) * 3 + (5.0,) * 2
@@ -97,12 +101,13 @@ def ranges(worlds: Worlds, beams: int = 108) -> Part:
     nobody = np.empty((0, 4)), np.empty(0, np.int64)
     scene = Scene(WallGrid(wall_segments(worlds.city_map)), *nobody)
     bearings = lidar.Bearings(0.0, 2.0 * np.pi / beams, beams)
-    own = np.arange(fleet.capacity)
+    own = np.arange(worlds.rows)
 
     def read() -> Floats:
-        c, s = np.cos(fleet.yaw), np.sin(fleet.yaw)
-        x, y = fleet.x + c * ahead - s * left, fleet.y + s * ahead + c * left
-        return cast(scene, np.column_stack((x, y, fleet.yaw)), own, bearings, farthest)
+        x, y, yaw = fleet.x[own], fleet.y[own], fleet.yaw[own]
+        c, s = np.cos(yaw), np.sin(yaw)
+        x, y = x + c * ahead - s * left, y + s * ahead + c * left
+        return cast(scene, np.column_stack((x, y, yaw)), own, bearings, farthest)
 
     names = tuple(f"range_{beam}_m" for beam in range(beams))
     return Part(names, (nearest,) * beams, (farthest,) * beams, read)
@@ -114,6 +119,16 @@ def goal(worlds: Worlds) -> Part:
     most = (10.0, 10.0, 1.0, 1.0)
     known = worlds.to_goal.known[:, : len(names)]
     return Part(names, tuple(-one for one in most), most, lambda: known)
+
+
+def ahead(worlds: Worlds) -> Part:
+    """Return the gaps to the cars ahead and behind on the lanes, and how fast those are."""
+    traffic = worlds.traffic
+    if traffic is None:
+        raise TypeError(f"task {worlds.task.name}: `ahead` needs cars that rules drive")
+    names = ("leader_gap_m", "leader_speed_mps", "follower_gap_m", "follower_speed_mps")
+    most, known = (REACH, 5.0) * 2, traffic.known
+    return Part(names, (0.0, -5.0) * 2, most, lambda: known)
 
 
 def others(worlds: Worlds) -> Part:
@@ -148,7 +163,8 @@ def signals(worlds: Worlds) -> Part:
 
 PARTS: dict[str, Callable[[Worlds], Part]] = {
     "motion": motion, "action": action, "lane": lane, "inertial": inertial,
-    "others": others, "signals": signals, "goal": goal, "ranges": ranges,
+    "others": others, "signals": signals, "ahead": ahead, "goal": goal,
+    "ranges": ranges,
     "ranges_36": partial(ranges, beams=36), "ranges_360": partial(ranges, beams=360),
 }  # fmt: skip
 
@@ -173,7 +189,7 @@ class Observations:
             np.array([v for part in self._parts for v in getattr(part, side)], np.float32)
             for side in ("low", "high")
         )
-        self.values: Observation = np.zeros((worlds.fleet.capacity, len(self.names)), np.float32)
+        self.values: Observation = np.zeros((worlds.rows, len(self.names)), np.float32)
 
     def update(self) -> Observation:
         """Look at all cars; return the array, which the next call writes over."""

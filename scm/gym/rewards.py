@@ -17,13 +17,12 @@ def progress(worlds: Worlds) -> Floats:
 
 def off_centre(worlds: Worlds) -> Floats:
     """Return how far each is from the middle of its lane, as a share of half its width [1]."""
-    course = worlds.course
-    return np.abs(course.known[:, BESIDE_M]) / course.half_width
+    return np.abs(worlds.lanes.known[:, BESIDE_M]) / worlds.lanes.half_width
 
 
 def turned(worlds: Worlds) -> Floats:
     """Return how far each is turned from its lane's direction [rad]."""
-    return np.abs(worlds.course.known[:, TURNED_RAD])
+    return np.abs(worlds.lanes.known[:, TURNED_RAD])
 
 
 def goal_progress(worlds: Worlds) -> Floats:
@@ -58,7 +57,7 @@ def throttle_change(worlds: Worlds) -> Floats:
 
 def standing(worlds: Worlds) -> Floats:
     """Return 1 for each that moves slower than 0.02 m/s [1]."""
-    return (np.abs(worlds.fleet.speed) < STANDS_MPS).astype(float)
+    return (np.abs(worlds.fleet.speed[: worlds.rows]) < STANDS_MPS).astype(float)
 
 
 def failed(worlds: Worlds) -> Floats:

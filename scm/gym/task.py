@@ -23,11 +23,29 @@ class Start:
         beside_m: At most so far from the middle of its lane.
         turned_rad: At most so far from its lane's direction.
         speed_mps: The slowest and the fastest.
+        gap_m: The cars of a world begin one behind the other, rear axles so far apart at least and
+            at most, and branch alike; None: spread evenly.
+        behind: How many of them begin behind the first agent's.
     """
 
     beside_m: float = 0.0
     turned_rad: float = 0.0
     speed_mps: tuple[float, float] = (0.0, 0.0)
+    gap_m: tuple[float, float] | None = None
+    behind: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Traffic:
+    """Cars of a world that are driven by rules; they are no agents.
+
+    Attributes:
+        cars: How many.
+        speed_mps: The slowest and the fastest that one drives at on a free road, drawn for each.
+    """
+
+    cars: int
+    speed_mps: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +94,7 @@ class Task:
         rewards: Its summands.
         ends: When a car's episode ends; it also does after `lasts_s`.
         agents: Cars of a world.
+        traffic: Further cars of a world; None: none.
         lanes: By map, lanes to begin on; a map that is not there: any.
         car: The car file.
         period_s: Between two actions.
@@ -90,6 +109,7 @@ class Task:
     start: Start | PlaceStart
     lasts_s: float
     agents: int = 1
+    traffic: Traffic | None = None
     lanes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     car: str = "nigel"
     period_s: float = 0.05

@@ -26,16 +26,17 @@ class Touching:
     Args:
         city_map: Its walls and boxes never move, whatever hits them.
         car: What all cars are.
-        worlds: How many, of `cars` cars each; a world's cars stand one after the other.
+        cars: Rows of each world's, (worlds, cars).
+        agents: How many of each world's are agents'; what others touch of each other is not found.
     """
 
-    def __init__(self, city_map: CityMap, car: Car, worlds: int, cars: int) -> None:
+    def __init__(self, city_map: CityMap, car: Car, cars: Ints, agents: int) -> None:
         self._obstacles = obstacles_of(obstacle_boxes(city_map))
-        rows = worlds * cars
+        rows = cars.size
         self._outlines = np.tile(np.array(outline_of(hull_of(car))), (rows, 1))
-        within = np.array(list(combinations(range(cars), 2)), np.int64).reshape(-1, 2)
-        first = cars * np.arange(worlds)
-        self._pairs: Ints = (first[:, None, None] + within).reshape(-1, 2)
+        pairs = [pair for pair in combinations(range(cars.shape[1]), 2) if pair[0] < agents]
+        within = np.array(pairs, np.int64).reshape(-1, 2)
+        self._pairs: Ints = cars[:, within].reshape(-1, 2)
         self._rows = np.arange(rows)
         self._from, self._leeway = np.full((rows, 2), np.inf), np.zeros(rows)
         self._walls: Ints = np.zeros((0, 2), np.int64)

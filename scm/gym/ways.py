@@ -24,7 +24,9 @@ from scm.vehicles.lane_math import sin_cos
 AHEAD_M, LEFT_M, COS_TURN, SIN_TURN, AWAY_M, TURNED_RAD = range(6)
 COLUMNS = 6
 # Columns of an episode's draws, uniform from 0 to 1.
-WHERE, AHEAD_DRAW, TURNED_DRAW, GOAL_DRAW, _SPEED, LEFT_DRAW = range(6)
+WHERE, AHEAD_DRAW, TURNED_DRAW, GOAL_DRAW, SPEED_DRAW, LEFT_DRAW = range(6)
+BRANCHES, GAP_DRAW = 3, 5  # on lanes
+DRAWS = 6
 
 
 class Way(Protocol):
@@ -50,40 +52,67 @@ class AlongLanes:
 
     Args:
         city_map: With its lanes.
-        rows: How many cars.
+        cars: Rows of each world's, (worlds, cars); agents' rows are the first of all.
+        agents: How many rows are agents'.
         start: Where on a lane they begin.
         lanes: By name, that they begin on; none: any from which one can go on.
 
     Attributes:
-        course: Where they are along their lanes.
-        moved_m: How far each came along them in this step, (rows,).
+        course: Where all cars are along their lanes.
+        known: Of the agents' cars, see `Course`, (agents, columns).
+        moved_m: How far each of them came along its lanes in this step, (agents,).
 
     Raises:
         MapError: There is no such lane, or none from which one can go on.
     """
 
     def __init__(
-        self, city_map: CityMap, rows: int, start: Start, lanes: Sequence[str] = ()
+        self, city_map: CityMap, cars: Ints, agents: int, start: Start, lanes: Sequence[str] = ()
     ) -> None:
-        self.course = Course(city_map, rows, lanes)
-        self.moved_m, self._done_m = np.zeros((2, rows))
-        self._start = start
+        self.course = Course(city_map, cars.size, lanes)
+        self.known = self.course.known[:agents]
+        self.moved_m, self._done_m = np.zeros((2, agents))
+        self._start, self._cars = start, cars.shape[1]
+
+    @property
+    def half_width(self) -> Floats:
+        """Of each agent's lane [m]."""
+        return self.course.half_width[: len(self.known)]
 
     def begin(self, rows: Ints, draws: Floats) -> Floats:
-        """Let cars begin anywhere along the lanes; see `Way`."""
-        return self.course.begin(rows, draws, self._start.beside_m, self._start.turned_rad)
+        """Let cars begin anywhere along the lanes, or one behind the other; see `Way`."""
+        start, ahead = self._start, None
+        if start.gap_m is not None:
+            of_world = draws.reshape(-1, self._cars, draws.shape[1])
+            of_world[:, :, [WHERE, BRANCHES]] = of_world[:, :1, [WHERE, BRANCHES]]
+            ahead = _one_behind_the_other(of_world[:, :, GAP_DRAW], start)
+        return self.course.begin(rows, draws, start.beside_m, start.turned_rad, ahead)
 
     def look_at_start(self, fleet: Fleet, rows: Ints) -> None:
         """Find where cars (n,) are that begin: they have not moved."""
         self.course.follow(fleet.x, fleet.y, fleet.yaw, rows)
-        self.moved_m[rows], self._done_m[rows] = 0.0, self.course.known[rows, DONE_M]
+        own = rows[rows < len(self.known)]
+        self.moved_m[own], self._done_m[own] = 0.0, self.known[own, DONE_M]
 
     def look(self, fleet: Fleet) -> None:
         """Find where all cars are after a step."""
         self.course.follow(fleet.x, fleet.y, fleet.yaw)
-        done = self.course.known[:, DONE_M]
+        done = self.known[:, DONE_M]
         np.subtract(done, self._done_m, out=self.moved_m)
         self._done_m[:] = done
+
+
+def _one_behind_the_other(draws: Floats, start: Start) -> Floats:
+    """Return how far ahead of its world's last each car begins, (worlds * cars,) [m].
+
+    The first `start.behind` of the cars after the agent's follow it, the others lead.
+    """
+    low, high = start.gap_m or (0.0, 0.0)
+    ahead = np.cumsum(low + (high - low) * draws, axis=1)
+    order = np.arange(draws.shape[1])
+    order[: start.behind + 1] = [start.behind, *range(start.behind)]
+    found: Floats = ahead[:, order].ravel()
+    return found
 
 
 class ToGoal:

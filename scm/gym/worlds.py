@@ -1,9 +1,9 @@
 """Many worlds of one task, side by side: their cars are rows of one fleet.
 
-World after world, each with its agents' cars one after the other. A step is one call of the
-physics for all of them, and one of each compiled look at what came of it. An episode's draws follow
-from the world's seed and the episode's number alone, so that a world is the same bit by bit however
-many there are.
+World after world, each with its agents' cars one after the other; then those that rules drive. A
+step is one call of the physics for all of them, and one of each compiled look at what came of it.
+An episode's draws follow from the world's seed and the episode's number alone, so that a world is
+the same bit by bit however many there are.
 """
 
 from dataclasses import dataclass, field
@@ -17,7 +17,8 @@ from scm.gym.randomise import Randomise, Ranges, with_effects
 from scm.gym.signals import Signals
 from scm.gym.task import PlaceStart, Task
 from scm.gym.touching import Touching
-from scm.gym.ways import AlongLanes, ToGoal, Way
+from scm.gym.traffic import RuleDrivenCars
+from scm.gym.ways import DRAWS, SPEED_DRAW, WHERE, AlongLanes, ToGoal, Way
 from scm.maps.load import load_map
 from scm.vehicles.car import load_car
 from scm.vehicles.drivers.course import Course
@@ -62,7 +63,9 @@ class Worlds:
         threads: For the physics.
 
     Attributes:
-        fleet: All cars; row `world * agents + agent`.
+        rows: How many cars are agents'. What follows is of these (rows,), but for the fleet.
+        fleet: All cars; row `world * agents + agent`, then those that rules drive.
+        traffic: What drives those; None: there are none.
         radio: What they know of each other; None: each is alone in its world.
         signals: The lights; None: the task has none.
         steps: Of each world, since its episode began, (worlds,).
@@ -78,29 +81,38 @@ class Worlds:
         self, task: Task, map_name: str, worlds: int, options: Options, threads: int = 1
     ) -> None:
         self.task, self.count, self.agents = task, worlds, task.agents
-        rows = worlds * task.agents
+        rows = self.rows = worlds * task.agents
+        more = task.traffic.cars if task.traffic is not None else 0
+        own, others = np.arange(rows), rows + np.arange(worlds * more)
+        self._cars: Ints = np.hstack((own.reshape(worlds, -1), others.reshape(worlds, more)))
         self.city_map = load_map(map_name)
         self.car = with_effects(load_car(options.car or task.car), options.ranges)
-        self.fleet = Fleet(self.car, rows)
+        self.fleet = Fleet(self.car, self._cars.size)
         self._randomise = Randomise(self.fleet, options.randomise, options.ranges)
         self.fleet.threads = threads
         self.fleet.alive[:] = True
+        lanes = task.lanes.get(self.city_map.name, ())
         self._way: Way = (
             ToGoal(self.city_map, rows, task.start)
             if isinstance(task.start, PlaceStart)
-            else AlongLanes(self.city_map, rows, task.start, task.lanes.get(self.city_map.name, ()))
+            else AlongLanes(self.city_map, self._cars, rows, task.start, lanes)
         )
-        self._touching = Touching(self.city_map, self.car, worlds, task.agents)
+        self.traffic = (
+            RuleDrivenCars(self.course, self._cars, task.agents, self.car, task.traffic)
+            if task.traffic is not None
+            else None
+        )
+        self._touching = Touching(self.city_map, self.car, self._cars, task.agents)
         self.radio = Radio(self.city_map, worlds, task.agents) if task.agents > 1 else None
         front_m = limits_of(self.car).front
         self.signals = (
             Signals(self.city_map, rows, front_m) if "signals" in task.observations else None
         )
         self._apart_m = 2.0 * outline_of(hull_of(self.car))[4] + MARGIN_M
-        self._every: Ints = np.arange(rows)
+        self._every: Ints = np.arange(self._cars.size)
         self._seeds: Keys = np.zeros(worlds, np.uint64)
         self._episodes: Ints = np.full(worlds, -1, np.int64)
-        self.keys: Keys = np.zeros(rows, np.uint64)
+        self.keys: Keys = np.zeros(self._cars.size, np.uint64)
         self.steps: Ints = np.zeros(worlds, np.int64)
         self.present: Bools = np.zeros(rows, np.bool_)
         self.touched: Bools = np.zeros(rows, np.bool_)
@@ -116,23 +128,25 @@ class Worlds:
         worlds = np.flatnonzero(which)
         self._episodes[worlds] += 1
         bases = bases_of(self._seeds[worlds] ^ CARS, self._episodes[worlds])
-        agents = np.tile(np.arange(self.agents), len(worlds))
-        rows = np.repeat(worlds * self.agents, self.agents) + agents
-        self.keys[rows] = bases_of(np.repeat(bases, self.agents), agents)
-        draws, start = uniforms(self.keys[rows], 6), self.task.start
+        rows, count = self._cars[worlds].ravel(), self._cars.shape[1]
+        own = rows[rows < self.rows]
+        self.keys[rows] = bases_of(np.repeat(bases, count), np.tile(np.arange(count), len(worlds)))
+        draws = uniforms(self.keys[rows], DRAWS)
         poses = self._starts(bases, rows, draws)
-        low, high = start.speed_mps
-        self.fleet.alive[rows] = self.present[rows] = True
+        low, high = self.task.start.speed_mps
+        self.fleet.alive[rows] = self.present[own] = True
         if self._randomise.is_any:
             self._randomise.draw(rows, self.keys[rows])
-        self.fleet.place_rows(rows, poses, low + (high - low) * draws[:, 4])
-        self.actions[rows] = self.before[rows] = 0.0
+        self.fleet.place_rows(rows, poses, low + (high - low) * draws[:, SPEED_DRAW])
+        self.actions[own] = self.before[own] = 0.0
         self.steps[worlds] = 0
         if self.radio is not None:
-            self.radio.forget(rows)
+            self.radio.forget(own)
         if self.signals is not None:
-            self.signals.begin(rows, np.repeat(uniforms(bases ^ LIGHTS, 1)[:, 0], self.agents))
-        self._look_at_start(rows)
+            self.signals.begin(own, np.repeat(uniforms(bases ^ LIGHTS, 1)[:, 0], self.agents))
+        if self.traffic is not None:
+            self.traffic.begin(worlds, self.keys)
+        self._look_at_start(worlds, rows, own)
 
     def _starts(self, bases: Keys, rows: Ints, draws: Floats) -> Floats:
         """Return where the cars of some worlds begin, (rows, 3): spread evenly.
@@ -140,19 +154,19 @@ class Worlds:
         Where two would stand in each other, as where lanes cross, another place is drawn for all of
         that world.
         """
-        agents = np.arange(self.agents)
-        shares = uniforms(bases, TRIES)
-        poses = np.zeros((len(bases), self.agents, 3))
+        count = self._cars.shape[1]
+        cars, shares = np.arange(count), uniforms(bases, TRIES)
+        poses = np.zeros((len(bases), count, 3))
         open_ = np.arange(len(bases))
         for tried in range(TRIES):
-            where = shares[open_, tried, None] + agents / self.agents
-            these = (open_[:, None] * self.agents + agents).ravel()
-            draws[these, 0] = (where - np.floor(where)).ravel()
+            where = shares[open_, tried, None] + cars / count
+            these = (open_[:, None] * count + cars).ravel()
+            draws[these, WHERE] = (where - np.floor(where)).ravel()
             begun = self._way.begin(rows[these], draws[these])
-            poses[open_] = begun.reshape(-1, self.agents, 3)
+            poses[open_] = begun.reshape(-1, count, 3)
             apart = poses[open_, :, None, :2] - poses[open_, None, :, :2]
             is_near = np.hypot(apart[..., 0], apart[..., 1]) < self._apart_m
-            is_near &= ~np.eye(self.agents, dtype=bool)
+            is_near &= ~np.eye(count, dtype=bool)
             open_ = open_[is_near.any(axis=(1, 2))]
             if not len(open_):
                 break
@@ -162,7 +176,11 @@ class Worlds:
         """Let all worlds go on for one period with actions (rows, 2); who is out stays out."""
         self.before[:] = self.actions
         np.clip(actions, -1.0, 1.0, out=self.actions)
-        self.fleet.throttle[:], self.fleet.steering[:] = self.actions.T
+        self.fleet.throttle[: self.rows], self.fleet.steering[: self.rows] = self.actions.T
+        if self.traffic is not None:
+            self.fleet.throttle[self.rows :], self.fleet.steering[self.rows :] = (
+                self.traffic.commands.T
+            )
         self.fleet.advance(self.task.period_s)
         self.steps += 1
         self._look()
@@ -184,7 +202,7 @@ class Worlds:
     def remove(self, rows: Bools) -> None:
         """Let cars (rows,) take part no more, until the next episode."""
         self.present &= ~rows
-        self.fleet.alive[rows] = False
+        self.fleet.alive[: self.rows] &= ~rows
 
     @property
     def is_over(self) -> Bools:
@@ -199,7 +217,7 @@ class Worlds:
     @property
     def is_wrecked(self) -> Bools:
         """Which cars rolled over, or left every physical range, (rows,)."""
-        return np.asarray(self.fleet.status != VehicleStatus.OK)
+        return np.asarray(self.fleet.status[: self.rows] != VehicleStatus.OK)
 
     @property
     def lanes(self) -> AlongLanes:
@@ -232,21 +250,24 @@ class Worlds:
         """Find out where all cars are after a step."""
         self._way.look(self.fleet)
         motion = self.fleet.planar_cogs(self._every)
-        self.touched = self._touching.find(motion, present=self.present)
-        self._look_around(self._every)
+        self.touched = self._touching.find(motion, present=self.fleet.alive)[: self.rows]
+        self._look_around(np.arange(self.count), self._every[: self.rows])
 
-    def _look_at_start(self, rows: Ints) -> None:
+    def _look_at_start(self, worlds: Ints, rows: Ints, own: Ints) -> None:
         """Find out where cars are whose episode begins: they stand apart, and have not moved."""
         self._way.look_at_start(self.fleet, rows)
-        self.touched[rows] = False
-        self._look_around(rows)
+        self.touched[own] = False
+        self._look_around(worlds, own)
 
-    def _look_around(self, rows: Ints) -> None:
-        """Find out what cars know beside where they are."""
+    def _look_around(self, worlds: Ints, own: Ints) -> None:
+        """Find out what cars of some worlds know beside where they are; `own` are the agents'."""
         fleet, steps = self.fleet, self.row_steps
         now_s = self.task.period_s * steps.astype(float)
         if self.signals is not None:
-            self.signals.look(*self.course.arrays, rows, now_s, self.present)
+            self.signals.look(*self.course.arrays, own, now_s, self.present)
         if self.radio is not None:
             motion = np.column_stack((fleet.x, fleet.y, fleet.yaw, fleet.speed))
-            self.radio.exchange(rows, motion, now_s, steps, self.keys, self.present)
+            self.radio.exchange(own, motion, now_s, steps, self.keys, self.present)
+        if self.traffic is not None:
+            is_first = self.steps[worlds] == 0
+            self.traffic.decide(worlds, fleet, np.where(is_first, -1.0, self.task.period_s))

@@ -39,6 +39,7 @@ from scm.vehicles.drivers.lane_graph import (
     lane_graph_of,
 )
 from scm.vehicles.drivers.lane_tracking import (
+    advance_window,
     fill_window,
     heading_change,
     list_segments,
@@ -68,6 +69,7 @@ class Course:
         lanes: By name, that a car may begin on; none: on any from which one can go on for ever.
 
     Attributes:
+        graph: Of the lanes.
         known: Of each row (rows, columns): its offset from the lane's centre, + = left [m], and how
             far it is turned from the lane's direction, + = left [rad]; the speed limit [m/s]; how
             far it has come along the lanes since it began [m]; how far the lane will have turned
@@ -79,7 +81,7 @@ class Course:
     """
 
     def __init__(self, city_map: CityMap, rows: int, lanes: Sequence[str] = ()) -> None:
-        graph = lane_graph_of(Roads(city_map))
+        graph = self.graph = lane_graph_of(Roads(city_map))
         for name in lanes:
             if name not in graph.numbers:
                 msg = f"map {city_map.name}: no lane {name!r}{nearest(name, sorted(graph.names))}"
@@ -89,7 +91,7 @@ class Course:
         if not chosen:
             msg = f"map {city_map.name}: expected a lane from which cars can drive on for ever"
             raise MapError(msg)
-        self._lanes, self._numbers, self._names = graph.arrays, graph.numbers, graph.names
+        self._lanes = graph.arrays
         self._begins = np.array(chosen, np.int64)
         self._ends = np.cumsum(graph.arrays.length[chosen])
         self._half_widths = np.array([0.5 * lane.width_m for lane in city_map.lanes])
@@ -113,9 +115,13 @@ class Course:
     def lanes_ahead(self, row: int) -> tuple[tuple[str, ...], float]:
         """Return the names of a car's lanes from its own on, and how far along that it is [m]."""
         numbers = self._state.lane_window[row, HERE:]
-        return tuple(self._names[n] for n in numbers if n >= 0), float(self._state.floats[row, S])
+        names = tuple(self.graph.names[n] for n in numbers if n >= 0)
+        return names, float(self._state.floats[row, S])
 
-    def begin(self, rows: Ints, draws: Floats, beside_m: float, turned_rad: float) -> Floats:
+    def begin(
+        self, rows: Ints, draws: Floats, beside_m: float, turned_rad: float,
+        ahead_m: Floats | None = None,
+    ) -> Floats:  # fmt: skip
         """Let cars begin somewhere along the lanes; return the poses of their rear axles.
 
         Args:
@@ -123,14 +129,16 @@ class Course:
             draws: Of their episodes, (n, 4).
             beside_m: At most so far beside the lane's centre.
             turned_rad: At most so far from its direction.
+            ahead_m: How much farther along its lanes each begins than is drawn, (n,); None: 0.
 
         Returns:
             x, y and yaw, map frame, (n, 3) [m, rad].
         """
         poses: Floats = np.empty((len(rows), 3))
+        ahead_m = np.zeros(len(rows)) if ahead_m is None else ahead_m
         _begin(
-            self._lanes, self._state, rows, draws, self._begins, self._ends, beside_m, turned_rad,
-            poses,
+            self._lanes, self._state, rows, draws, self._begins, self._ends, ahead_m, beside_m,
+            turned_rad, poses,
         )  # fmt: skip
         return poses
 
@@ -143,7 +151,7 @@ class Course:
             s: About how far along it the rear axle is [m].
             branches: A draw, 0 to 1, that decides where the lanes branch.
         """
-        _enter(self._lanes, self._state, row, self._numbers[lane], s, branches)
+        _enter(self._lanes, self._state, row, self.graph.numbers[lane], s, branches)
 
     def follow(self, x: Floats, y: Floats, yaw: Floats, rows: Ints | None = None) -> None:
         """Find where cars are, from where they were; `known` says it.
@@ -177,7 +185,7 @@ def _enter(
 @array_kernel
 def _begin(
     lanes: LaneArrays, state: DriverState, rows: Ints, draws: Floats, begins: Ints, ends: Floats,
-    beside_m: float, turned_rad: float, poses: Floats,
+    ahead_m: Floats, beside_m: float, turned_rad: float, poses: Floats,
 ) -> None:  # fmt: skip
     for k in range(len(rows)):
         row, along = rows[k], draws[k, WHERE] * ends[-1]
@@ -185,8 +193,13 @@ def _begin(
         while at < len(begins) - 1 and along >= ends[at]:
             at += 1
         lane = begins[at]
-        s = along - (ends[at - 1] if at else 0.0)
+        s = along - (ends[at - 1] if at else 0.0) + ahead_m[k]
         _enter(lanes, state, row, lane, s, draws[k, BRANCHES])
+        while s > lanes.length[lane]:
+            s -= lanes.length[lane]
+            advance_window(lanes, state, row)
+            lane = state.lane_window[row, HERE]
+        state.floats[row, S] = s
         segment = lanes.segments[segment_at(lanes.segment_first, lanes.segments, lane, s)]
         beside = (2.0 * draws[k, BESIDE_DRAW] - 1.0) * beside_m
         turn = segment[CURVATURE] * (s - segment[AT])

@@ -60,7 +60,7 @@ def motion(*poses):
 
 def test_cars_touch_walls_and_others_of_their_own_world_only():
     car = load_car("nigel")
-    touching = Touching(MAP, car, 2, 2)
+    touching = Touching(MAP, car, np.arange(4).reshape(2, 2), 2)
     free, near, wall = (1.0, 0.6, 0.0), (1.2, 0.65, 0.0), (2.75, 0.6, 0.0)
     every = np.ones(4, bool)
     assert touching.find(motion(free, wall, near, near), present=every).tolist() == [
