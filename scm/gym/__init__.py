@@ -7,6 +7,7 @@
     ways           where its cars begin, and how far they come: along lanes, or to a goal
     touching       who touches a wall or another car
     traffic        cars of a world that rules drive
+    pursuit        where the car is that another pursues
     observations   what an agent sees of it
     rewards, ends  what it gains, and when its episode ends
     vector         as a Gymnasium vector environment

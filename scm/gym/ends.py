@@ -3,6 +3,7 @@
 import numpy as np
 
 from scm.arrays import Bools
+from scm.gym.pursuit import LOST_M, away_m
 from scm.gym.signals import PASSED_RED
 from scm.gym.ways import AWAY_M, TURNED_RAD
 from scm.gym.worlds import Worlds
@@ -20,6 +21,11 @@ def parked(worlds: Worlds) -> Bools:
     """Return who stands at its goal, within the tolerances of cars that park themselves."""
     known = worlds.to_goal.known
     return is_parked(known[:, AWAY_M], known[:, TURNED_RAD], worlds.fleet.speed[: worlds.rows])
+
+
+def lost(worlds: Worlds) -> Bools:
+    """Return whose pursued car is more than 2 m away."""
+    return away_m(worlds) > LOST_M
 
 
 def touched(worlds: Worlds) -> Bools:

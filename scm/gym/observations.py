@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scm.arrays import Floats
+from scm.gym.pursuit import LOST_M, look, pursued_rows
 from scm.gym.radio import COLUMNS
 from scm.gym.signals import REACH_M
 from scm.gym.worlds import READINGS, Worlds
@@ -131,6 +132,17 @@ def ahead(worlds: Worlds) -> Part:
     return Part(names, (0.0, -5.0) * 2, most, lambda: known)
 
 
+def pursued(worlds: Worlds) -> Part:
+    """Return the pursued car's place and direction, seen from the own, and its speed."""
+    names = ("ahead_m", "left_m", "cos_turn", "sin_turn", "speed_mps")
+    most, rows = (2.0 * LOST_M, 2.0 * LOST_M, 1.0, 1.0, 5.0), pursued_rows(worlds)
+
+    def read() -> Floats:
+        return np.column_stack((look(worlds)[:, :4], worlds.fleet.speed[rows]))
+
+    return Part(tuple(f"pursued_{name}" for name in names), tuple(-one for one in most), most, read)
+
+
 def others(worlds: Worlds) -> Part:
     """Return what the radio knows of each other car: place and direction seen from the own, age."""
     radio = worlds.radio
@@ -163,7 +175,7 @@ def signals(worlds: Worlds) -> Part:
 
 PARTS: dict[str, Callable[[Worlds], Part]] = {
     "motion": motion, "action": action, "lane": lane, "inertial": inertial,
-    "others": others, "signals": signals, "ahead": ahead, "goal": goal,
+    "others": others, "signals": signals, "ahead": ahead, "goal": goal, "pursued": pursued,
     "ranges": ranges,
     "ranges_36": partial(ranges, beams=36), "ranges_360": partial(ranges, beams=360),
 }  # fmt: skip

@@ -4,6 +4,7 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.gym import ends
+from scm.gym.pursuit import CLOSE_M, away_m
 from scm.gym.worlds import Worlds
 from scm.vehicles.drivers.course import BESIDE_M, TURNED_RAD
 
@@ -43,6 +44,17 @@ def parked(worlds: Worlds) -> Floats:
 def contact(worlds: Worlds) -> Floats:
     """Return 1 for each that touches a wall, a box or another car [1]."""
     return worlds.touched.astype(float)
+
+
+def close(worlds: Worlds) -> Floats:
+    """Return 1 for each whose rear axle is 0.4 to 0.7 m from that of the car it pursues [1]."""
+    (least, most), away = CLOSE_M, away_m(worlds)
+    return ((least <= away) & (away <= most)).astype(float)
+
+
+def too_far(worlds: Worlds) -> Floats:
+    """Return how much farther than 0.7 m the pursued car is away [m]."""
+    return np.maximum(0.0, away_m(worlds) - CLOSE_M[1])
 
 
 def steering_change(worlds: Worlds) -> Floats:

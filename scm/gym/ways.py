@@ -156,18 +156,19 @@ class ToGoal:
 
     def look_at_start(self, fleet: Fleet, rows: Ints) -> None:
         """Find where cars (n,) are that begin: they have not moved."""
-        _look(self.goals, fleet.x, fleet.y, fleet.yaw, rows, self.known)
+        see(self.goals, fleet.x, fleet.y, fleet.yaw, rows, self.known)
         self.nearer[rows] = 0.0
 
     def look(self, fleet: Fleet) -> None:
         """Find where all cars are after a step."""
         before = self.known[:, AWAY_M:].copy()
-        _look(self.goals, fleet.x, fleet.y, fleet.yaw, self._every, self.known)
+        see(self.goals, fleet.x, fleet.y, fleet.yaw, self._every, self.known)
         np.subtract(before, self.known[:, AWAY_M:], out=self.nearer)
 
 
 @array_kernel
-def _look(goals: Floats, x: Floats, y: Floats, yaw: Floats, rows: Ints, known: Floats) -> None:
+def see(goals: Floats, x: Floats, y: Floats, yaw: Floats, rows: Ints, known: Floats) -> None:
+    """Find where goals are, seen from some cars (n,); all else is of all cars, (rows, ...)."""
     for n in range(len(rows)):
         row = rows[n]
         dx, dy = goals[row, 0] - x[row], goals[row, 1] - y[row]

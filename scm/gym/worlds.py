@@ -65,7 +65,8 @@ class Worlds:
     Attributes:
         rows: How many cars are agents'. What follows is of these (rows,), but for the fleet.
         fleet: All cars; row `world * agents + agent`, then those that rules drive.
-        traffic: What drives those; None: there are none.
+        cars: Rows of each world's, agents' first, (worlds, cars).
+        traffic: What drives those that are no agents'; None: there are none.
         radio: What they know of each other; None: each is alone in its world.
         signals: The lights; None: the task has none.
         steps: Of each world, since its episode began, (worlds,).
@@ -84,10 +85,10 @@ class Worlds:
         rows = self.rows = worlds * task.agents
         more = task.traffic.cars if task.traffic is not None else 0
         own, others = np.arange(rows), rows + np.arange(worlds * more)
-        self._cars: Ints = np.hstack((own.reshape(worlds, -1), others.reshape(worlds, more)))
+        self.cars: Ints = np.hstack((own.reshape(worlds, -1), others.reshape(worlds, more)))
         self.city_map = load_map(map_name)
         self.car = with_effects(load_car(options.car or task.car), options.ranges)
-        self.fleet = Fleet(self.car, self._cars.size)
+        self.fleet = Fleet(self.car, self.cars.size)
         self._randomise = Randomise(self.fleet, options.randomise, options.ranges)
         self.fleet.threads = threads
         self.fleet.alive[:] = True
@@ -95,24 +96,24 @@ class Worlds:
         self._way: Way = (
             ToGoal(self.city_map, rows, task.start)
             if isinstance(task.start, PlaceStart)
-            else AlongLanes(self.city_map, self._cars, rows, task.start, lanes)
+            else AlongLanes(self.city_map, self.cars, rows, task.start, lanes)
         )
         self.traffic = (
-            RuleDrivenCars(self.course, self._cars, task.agents, self.car, task.traffic)
+            RuleDrivenCars(self.course, self.cars, task.agents, self.car, task.traffic)
             if task.traffic is not None
             else None
         )
-        self._touching = Touching(self.city_map, self.car, self._cars, task.agents)
+        self._touching = Touching(self.city_map, self.car, self.cars, task.agents)
         self.radio = Radio(self.city_map, worlds, task.agents) if task.agents > 1 else None
         front_m = limits_of(self.car).front
         self.signals = (
             Signals(self.city_map, rows, front_m) if "signals" in task.observations else None
         )
         self._apart_m = 2.0 * outline_of(hull_of(self.car))[4] + MARGIN_M
-        self._every: Ints = np.arange(self._cars.size)
+        self._every: Ints = np.arange(self.cars.size)
         self._seeds: Keys = np.zeros(worlds, np.uint64)
         self._episodes: Ints = np.full(worlds, -1, np.int64)
-        self.keys: Keys = np.zeros(self._cars.size, np.uint64)
+        self.keys: Keys = np.zeros(self.cars.size, np.uint64)
         self.steps: Ints = np.zeros(worlds, np.int64)
         self.present: Bools = np.zeros(rows, np.bool_)
         self.touched: Bools = np.zeros(rows, np.bool_)
@@ -128,7 +129,7 @@ class Worlds:
         worlds = np.flatnonzero(which)
         self._episodes[worlds] += 1
         bases = bases_of(self._seeds[worlds] ^ CARS, self._episodes[worlds])
-        rows, count = self._cars[worlds].ravel(), self._cars.shape[1]
+        rows, count = self.cars[worlds].ravel(), self.cars.shape[1]
         own = rows[rows < self.rows]
         self.keys[rows] = bases_of(np.repeat(bases, count), np.tile(np.arange(count), len(worlds)))
         draws = uniforms(self.keys[rows], DRAWS)
@@ -154,7 +155,7 @@ class Worlds:
         Where two would stand in each other, as where lanes cross, another place is drawn for all of
         that world.
         """
-        count = self._cars.shape[1]
+        count = self.cars.shape[1]
         cars, shares = np.arange(count), uniforms(bases, TRIES)
         poses = np.zeros((len(bases), count, 3))
         open_ = np.arange(len(bases))

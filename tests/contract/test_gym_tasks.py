@@ -13,7 +13,7 @@ import scm.gym
 from scm.gym.names import all_tasks, ids
 
 UNITS = re.compile(
-    r".*_(m|mps|mps2|rad|radps|s)|throttle|steering|(other_\d+|goal)_(cos|sin)_turn|signal_is_green"
+    r".*_(m|mps|mps2|rad|radps|s)|throttle|steering|(other_\d+|goal|pursued)_(cos|sin)_turn|signal_is_green"
 )
 OF_SEVERAL = [
     f"{map_name}/{task.name}-v{task.version}"

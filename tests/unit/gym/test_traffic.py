@@ -127,7 +127,7 @@ def test_rule_driven_cars_stop_behind_an_agent_that_stands():
 def test_rule_driven_cars_go_round_at_their_speeds_and_touch_nothing():
     worlds = begun(60)
     worlds.remove(np.ones(60, bool))
-    touching = Touching(worlds.city_map, worlds.car, worlds._cars, 4)
+    touching = Touching(worlds.city_map, worlds.car, worlds.cars, 4)
     speeds = worlds.course.arrays[1].floats[worlds.rows :, REQUESTED_SPEED]
     fastest = np.zeros(len(speeds))
     for _ in range(900):
@@ -158,7 +158,7 @@ def test_rule_driven_car_lets_an_agent_pass_a_junction_that_is_near(way, goes):
 
 def test_agent_s_contact_with_a_rule_driven_car_counts_and_that_of_others_does_not():
     worlds = begun(2)
-    touching = Touching(worlds.city_map, worlds.car, worlds._cars, 1)
+    touching = Touching(worlds.city_map, worlds.car, worlds.cars, 1)
     motion = np.zeros((8, 6))
     motion[:, 0], motion[:, 1] = 1.0, 0.6
     motion[[0, 1], 1] = 0.3, 0.55
