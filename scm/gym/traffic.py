@@ -45,6 +45,7 @@ from scm.vehicles.noise import Keys, uniforms
 
 SPEEDS = np.uint64(0x57EED5)  # keeps these draws apart from others
 AGENTS_FIRST_M = 1.0  # by which an agent counts as nearer to a junction than it is
+SAME_WAY = 0.5  # cosine of the angle to a lane, from which on a car drives along it
 LEADER_GAP_M, LEADER_MPS, FOLLOWER_GAP_M, FOLLOWER_MPS = range(4)
 """Of an agent's car: gaps, bumper to bumper, to the cars ahead of it and behind it on their lanes,
 and their speeds along them. None within 2 m: 2 m, and the own speed."""
@@ -226,7 +227,7 @@ def _find_leader(
             leader[REAR_AT], leader[LENGTH_OF] = rear, 2.0 * half_length
             leader[SPEED_OF] = max(0.0, at[k, _SPEED] * same)
         gap = max(0.0, rear - kind[FRONT])
-        if k < agents and same > 0.0 and gap < known[rows[k], FOLLOWER_GAP_M]:
+        if k < agents and same > SAME_WAY and gap < known[rows[k], FOLLOWER_GAP_M]:
             known[rows[k], FOLLOWER_GAP_M] = gap
             known[rows[k], FOLLOWER_MPS] = at[own, _SPEED]
     return bool(leader[REAR_AT] < math.inf)

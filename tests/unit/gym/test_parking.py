@@ -41,6 +41,8 @@ def test_goals_are_all_bays_and_cars_begin_near_all_spawns(lot):
     off = poses[:, None] - places
     nearest = np.abs(off[..., :2]).max(axis=2).argmin(axis=1)
     assert set(nearest.tolist()) == set(range(len(places)))
+    pairs = set(zip(nearest.tolist(), map(tuple, lot.to_goal.goals.tolist()), strict=True))
+    assert len(pairs) > 0.9 * len(places) * len(bays)
     aside = np.abs(off[np.arange(len(poses)), nearest])
     assert (aside <= [0.1 + 1e-9, 0.1 + 1e-9, 0.3 + 1e-9]).all()
     assert (aside.max(axis=0) > [0.09, 0.09, 0.27]).all()

@@ -8,7 +8,7 @@ from scm.gym.observations import Observations
 from scm.gym.touching import Touching
 from scm.gym.traffic import FOLLOWER_GAP_M, FOLLOWER_MPS, LEADER_GAP_M, LEADER_MPS
 from scm.vehicles.drivers.cars_ahead import REACH, STANDSTILL_GAP
-from scm.vehicles.drivers.driver_state import HERE, REQUESTED_SPEED, S
+from scm.vehicles.drivers.driver_state import HERE, REQUESTED_SPEED, SEED, S
 
 TRAFFIC = "driving_school/traffic-v1"
 ROUND = ("crossing_south_east", "east_loop", "crossing_south_west", "west_loop")
@@ -28,7 +28,7 @@ def begun(count, name=TRAFFIC, **options):
 
 def rows_of(worlds, world):
     """Return the rows of a world: the agent's car, and those that rules drive."""
-    return np.array([world, *(worlds.count + 3 * world + np.arange(3))])
+    return worlds.cars[world].T
 
 
 def put(worlds, row, lane, along, speed=0.0):
@@ -75,6 +75,25 @@ def test_cars_begin_one_behind_the_other_by_drawn_gaps_and_one_follows_the_agent
     assert not worlds.ends().any()
 
 
+def test_cars_of_a_world_branch_alike():
+    worlds = begun(40, "market_town/traffic-v1")
+    state = worlds.course.arrays[1]
+    seeds = state.ints[worlds.cars, SEED]
+    assert (seeds == seeds[:, :1]).all()
+    assert len(set(seeds[:, 0].tolist())) == 40
+
+
+def test_rule_driven_cars_drive_on_at_the_speed_that_they_begin_with():
+    worlds = begun(40)
+    speed, first = worlds.fleet.speed.copy(), rows_of(worlds, np.arange(40))[3]
+    slower = speed[first] < worlds.course.arrays[1].floats[first, REQUESTED_SPEED]
+    moving = first[slower & (speed[first] > 0.05)]
+    assert len(moving) > 10
+    for _ in range(10):
+        worlds.step(np.zeros((40, 2)))
+        assert (worlds.fleet.speed[moving] > speed[moving] - 0.02).all()
+
+
 def test_gaps_are_from_bumper_to_bumper_and_of_the_own_world_alone():
     worlds = begun(2)
     agent, follower, leader, far = rows_of(worlds, 1)
@@ -110,6 +129,17 @@ def test_car_that_crosses_the_way_is_ahead():
     assert 0.8 - FRONT_M - 0.25 < known[LEADER_GAP_M] < 0.8 - FRONT_M
     assert known[LEADER_MPS] < 0.15
     assert known[FOLLOWER_GAP_M] == REACH
+
+
+def test_car_that_comes_from_the_side_follows_nobody():
+    worlds = begun(1)
+    agent, crossing, *others = rows_of(worlds, 0)
+    worlds.fleet.alive[others] = False
+    put(worlds, agent, ROUND[0], MIDDLE_M - 0.08)
+    put(worlds, crossing, ROUND[2], MIDDLE_M - 0.7)
+    assert look(worlds)[0, FOLLOWER_GAP_M] == REACH
+    put(worlds, crossing, ROUND[0], MIDDLE_M - 0.7)
+    assert look(worlds)[0, FOLLOWER_GAP_M] == pytest.approx(0.62 - LENGTH_M, abs=0.01)
 
 
 def test_rule_driven_cars_stop_behind_an_agent_that_stands():
