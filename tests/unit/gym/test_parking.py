@@ -89,6 +89,8 @@ def test_what_is_gained_is_how_much_nearer_the_car_came():
     assert rewards.goal_progress(worlds)[0] == pytest.approx(away - now_away, abs=1e-9)
     assert rewards.goal_turn_progress(worlds)[0] == pytest.approx(turned - now_turned, abs=1e-9)
     assert turned - now_turned > 1e-4
+    worlds.begin(np.ones(1, bool))
+    assert rewards.goal_progress(worlds)[0] == rewards.goal_turn_progress(worlds)[0] == 0.0
 
 
 @pytest.mark.parametrize(

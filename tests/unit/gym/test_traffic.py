@@ -186,6 +186,19 @@ def test_rule_driven_car_lets_an_agent_pass_a_junction_that_is_near(way, goes):
     assert not worlds.touched.any()
 
 
+def test_rule_driven_car_follows_into_a_junction():
+    worlds = begun(1)
+    agent, own, *others = rows_of(worlds, 0)
+    worlds.fleet.alive[others] = False
+    put(worlds, agent, ROUND[0], MIDDLE_M)
+    put(worlds, own, ROUND[0], 0.0)
+    look(worlds)
+    for _ in range(120):
+        worlds.step(np.zeros((1, 2)))
+    assert worlds.course.arrays[1].floats[own, S] > JUNCTION_M
+    assert not worlds.touched.any()
+
+
 def test_agent_s_contact_with_a_rule_driven_car_counts_and_that_of_others_does_not():
     worlds = begun(2)
     touching = Touching(worlds.city_map, worlds.car, worlds.cars, 1)
