@@ -60,7 +60,7 @@ class Around(ArrayStruct):
 
     Attributes:
         ids, begins: Segments of its lanes ahead, and where each begins from its rear axle.
-        listed: How many those are, and which it is on.
+        counts: How many those are, and which it is on.
         at: Where it is, the columns above.
         junction: The columns above.
         leader: (1, 3) as the driver's kernels have it, of one car.
@@ -68,7 +68,7 @@ class Around(ArrayStruct):
 
     ids: Ints
     begins: Floats
-    listed: Ints
+    counts: Ints
     at: Floats
     junction: Floats
     leader: Floats
@@ -151,15 +151,15 @@ def _decide(
                     known[row, LEADER_MPS] = leader[SPEED_OF]
                 continue
             ids, begins, floats = around.ids[k], around.begins[k], state.floats[row]
-            listed, here = around.listed[k]
+            segments, here = around.counts[k]
             target, _ = open_road_speed(
-                lanes.segments, ids, begins, around.leader, kind, floats, listed, here,
+                lanes.segments, ids, begins, around.leader, kind, floats, segments, here,
                 int(found), False, False,
             )  # fmt: skip
             target = min(target, _speed_to_junction(around, rows, agents, alive, k, kind))
             speed = around.at[k, _SPEED]
             commands[row - first, 1] = steer(
-                lanes.segments, ids, begins, kind, floats, listed, here, motion[row, 2],
+                lanes.segments, ids, begins, kind, floats, segments, here, motion[row, 2],
                 max(0.0, speed), passed[n],
             )  # fmt: skip
             commands[row - first, 0] = throttle(kind, floats, target, speed, passed[n])
@@ -178,11 +178,11 @@ def _look_ahead(
     at[_SPEED] = speed
     window, along = state.lane_window[row], state.floats[row, S]
     back = max(MIN_PREVIEW, 0.5 * max(0.0, speed) * kind[SWING])
-    listed, here, _ = list_segments(
+    segments, here, _ = list_segments(
         lanes.segment_first, lanes.segments, window, along, back, kind[FRONT] + REACH,
         around.ids[k], around.begins[k],
     )  # fmt: skip
-    around.listed[k, 0], around.listed[k, 1] = listed, here
+    around.counts[k, 0], around.counts[k, 1] = segments, here
     junction = around.junction[k]
     junction[_WAY], junction[_JUNCTION] = math.inf, -1.0
     begun = -along - (lanes.length[window[BEHIND]] if window[BEHIND] >= 0 else 0.0)
@@ -218,7 +218,7 @@ def _find_leader(
         if k == own or not alive[rows[k]] or dx * dx + dy * dy > far * far:
             continue
         hit, rear, same = first_overlap(
-            lanes.segments, around.ids[own], around.begins[own], kind, around.listed[own, 0],
+            lanes.segments, around.ids[own], around.begins[own], kind, around.counts[own, 0],
             REACH, at[k, _X], at[k, _Y], at[k, _COS], at[k, _SIN], half_length, half_width,
         )  # fmt: skip
         if not hit:

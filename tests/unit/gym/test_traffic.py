@@ -68,9 +68,11 @@ def test_cars_begin_one_behind_the_other_by_drawn_gaps_and_one_follows_the_agent
     assert (gaps > 0.6 - 1e-9).all()
     assert (gaps < 1.0 + 1e-9).all()
     assert gaps.max() - gaps.min() > 0.35
+    assert (np.ptp(gaps, axis=1) > 1e-4).all()  # each has a draw of its own
     speeds = state.floats[worlds.rows :, REQUESTED_SPEED]
     assert 0.08 <= speeds.min() < 0.09
     assert 0.21 < speeds.max() <= 0.22
+    assert (np.ptp(speeds.reshape(60, 3), axis=1) > 1e-4).all()
     worlds.step(np.zeros((60, 2)))
     assert not worlds.ends().any()
 
