@@ -247,7 +247,7 @@ class History:
             / np.maximum((own - mixed * mixed / known) * inflation, TINY)
             for seen, mixed, own in (at_once, evenly)
         ]  # fmt: skip
-        return np.maximum(found[0], found[1] - RARER)
+        return np.asarray(np.maximum(found[0], found[1] - RARER))
 
 
 def _moved(after: Floats, before: Floats, score: int) -> tuple[Floats, Floats]:
