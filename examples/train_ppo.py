@@ -3,7 +3,8 @@
     python examples/train_ppo.py driving_school/lap-v1 --out lap.onnx
 
 Needs scm[gym,learn]. One small network acts, one says what is to be gained; both see observations
-over their usual size. Source: Schulman et al., "Proximal policy optimization algorithms", 2017.
+over their usual size. Agents of one world share them, and learn nothing while they are out.
+Source: Schulman et al., "Proximal policy optimization algorithms", 2017.
 """
 
 import argparse
@@ -20,7 +21,7 @@ import optax
 import scm.gym
 from scm.gym.policy_file import write_policy
 
-HIDDEN, WORLDS, STEPS = 64, 512, 64
+HIDDEN, AGENTS, STEPS = 64, 512, 64
 ROUNDS, BATCHES = 4, 8  # over what was driven, and pieces of it
 DISCOUNT, TRACE, CLIP, RATE, ENTROPY = 0.99, 0.95, 0.2, 1e-3, 1e-3
 
@@ -49,14 +50,14 @@ class Usual:
 
 
 class Driven(NamedTuple):
-    """What was seen, done and gained, each (steps, worlds, ...)."""
+    """What was seen, done and gained, each (steps, agents, ...)."""
 
     seen: np.ndarray
     action: np.ndarray
     likelihood: np.ndarray
     gain: np.ndarray
     value: np.ndarray
-    counts: np.ndarray
+    present: np.ndarray
 
 
 def layers(key: jax.Array, *sizes: int) -> list[tuple[jax.Array, jax.Array]]:
@@ -90,11 +91,11 @@ def likelihood(mean: jax.Array, log_spread: jax.Array, action: jax.Array) -> jax
 
 def loss(params: dict, part: tuple[jax.Array, ...]) -> jax.Array:
     """Return what is to be made small, for a piece of what was driven."""
-    seen, action, before, gain, target, counts = part
+    seen, action, before, gain, target, present = part
     ratio = jnp.exp(likelihood(run(params["actor"], seen), params["spread"], action) - before)
     better = jnp.minimum(ratio * gain, jnp.clip(ratio, 1.0 - CLIP, 1.0 + CLIP) * gain)
     off = 0.5 * (run(params["critic"], seen)[:, 0] - target) ** 2
-    mean = ((off - better) * counts).sum() / counts.sum()
+    mean = ((off - better) * present).sum() / present.sum()
     return mean - ENTROPY * params["spread"].sum()
 
 
@@ -130,7 +131,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("policy.onnx"))
     given = parser.parse_args()
-    envs = scm.gym.make_vec(given.task, WORLDS, copy=False)
+    envs = scm.gym.make_vec(given.task, AGENTS, copy=False)
     columns = envs.single_observation_space.shape[0]
     key = jax.random.key(given.seed)
     key, first, second = jax.random.split(key, 3)
@@ -140,38 +141,38 @@ def main() -> None:
     }  # fmt: skip
     optimiser, learn = learner(RATE)
     state, usual, rng = optimiser.init(params), Usual(columns), np.random.default_rng(given.seed)
-    raw, _ = envs.reset(seed=given.seed)
+    raw, infos = envs.reset(seed=given.seed)
     usual.add(raw)
-    begun_s, taken, fresh = time.perf_counter(), 0, np.zeros(WORLDS, bool)
-    returns, own = [], np.zeros(WORLDS)
+    begun_s, taken, returns, own = time.perf_counter(), 0, [], np.zeros(AGENTS)
     while time.perf_counter() - begun_s < 60.0 * given.minutes:
         rows, ended, over = [], [], []
         for _ in range(STEPS):
-            seen = usual.of(raw)
+            seen, present = usual.of(raw), infos["present"]
             key, draw = jax.random.split(key)
             action, before, value = map(np.asarray, act(params, seen, draw))
-            raw, gain, end, late, _ = envs.step(np.clip(action, -1.0, 1.0))
-            usual.add(raw)
-            rows.append(Driven(seen, action, before, gain, value, ~fresh))
+            raw, gain, end, late, infos = envs.step(np.clip(action, -1.0, 1.0))
+            usual.add(raw[infos["present"]])
+            rows.append(Driven(seen, action, before, gain, value, present))
             ended.append(end)
             over.append(late)
             own += gain
             done = end | late
             returns += own[done].tolist()
-            own[done], fresh = 0.0, done
-            taken += WORLDS
+            own[done] = 0.0
+            taken += present.sum()
         driven = Driven(*map(np.array, zip(*rows, strict=True)))
         _, _, last = act(params, usual.of(raw), key)
         gain = advantages(driven, np.array(ended), np.array(over), np.asarray(last))
         target = gain + driven.value
-        gain = (gain - gain.mean()) / (gain.std() + 1e-8)
-        table = [driven.seen, driven.action, driven.likelihood, gain, target, driven.counts]
-        table = [one.reshape(STEPS * WORLDS, *one.shape[2:]).astype(np.float32) for one in table]
+        those = gain[driven.present]
+        gain = (gain - those.mean()) / (those.std() + 1e-8)
+        table = [driven.seen, driven.action, driven.likelihood, gain, target, driven.present]
+        table = [one.reshape(STEPS * AGENTS, *one.shape[2:]).astype(np.float32) for one in table]
         for _ in range(ROUNDS):
-            for piece in np.array_split(rng.permutation(STEPS * WORLDS), BATCHES):
+            for piece in np.array_split(rng.permutation(STEPS * AGENTS), BATCHES):
                 params, state = learn(params, state, tuple(one[piece] for one in table))
         spent_s = time.perf_counter() - begun_s
-        mean = np.mean(returns[-WORLDS:]) if returns else np.nan
+        mean = np.mean(returns[-AGENTS:]) if returns else np.nan
         print(
             f"{spent_s:6.1f} s {taken:10d} steps, {taken / spent_s:8.0f}/s, return {mean:7.3f}",
             flush=True,

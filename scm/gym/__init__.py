@@ -22,7 +22,7 @@ from typing import Any
 
 import gymnasium
 
-from scm.gym.names import ids
+from scm.gym.names import ids, task_of
 from scm.gym.parallel import CityParallelEnv
 from scm.gym.single import CityEnv
 from scm.gym.vector import CityVectorEnv
@@ -31,10 +31,10 @@ __all__ = ["CityEnv", "CityParallelEnv", "CityVectorEnv", "make_vec", "parallel_
 
 
 def make_vec(name: str, num_envs: int = 1, **options: Any) -> CityVectorEnv:
-    """Return many worlds of a task; see `CityVectorEnv`.
+    """Return many worlds of a task, `num_envs` agents in all; see `CityVectorEnv`.
 
     Raises:
-        gymnasium.error.Error: There is no such task, or it is of several agents.
+        gymnasium.error.Error: There is no such task, or no whole number of worlds.
         ScmError: There is no such map or car file.
     """
     return CityVectorEnv(name, num_envs, **options)
@@ -53,6 +53,7 @@ def parallel_env(name: str, **options: Any) -> CityParallelEnv:
 for _name in ids():
     if _name not in gymnasium.registry:
         gymnasium.register(
-            _name, entry_point="scm.gym.single:CityEnv",
+            _name,
+            entry_point="scm.gym.single:CityEnv" if task_of(_name)[0].agents == 1 else None,
             vector_entry_point="scm.gym.vector:CityVectorEnv", kwargs={"name": _name},
         )  # fmt: skip

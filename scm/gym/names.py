@@ -24,12 +24,11 @@ def all_tasks() -> dict[str, Task]:
 
 
 def ids() -> list[str]:
-    """Return the names under which Gymnasium knows the tasks of one agent."""
+    """Return the names under which Gymnasium knows the tasks."""
     return [
         f"scm/{map_name}-{task.name}-v{task.version}"
         for task in all_tasks().values()
         for map_name in task.maps
-        if task.agents == 1
     ]
 
 

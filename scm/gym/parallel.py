@@ -87,7 +87,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):  # type: ignore[mi
                 given[row] = self._checked(actions, agent)
         worlds.step(given)
         rewards, ends = worlds.rewards(), worlds.ends()
-        over = np.repeat(worlds.is_over, worlds.agents) & ~ends
+        over = worlds.out_of_time & ~ends
         seen = self._of_agents(self._seen.update().copy())
         gained = self._of_agents(rewards.tolist())
         ended, out_of_time = self._of_agents(ends.tolist()), self._of_agents(over.tolist())

@@ -40,13 +40,12 @@ class CityEnv(gymnasium.Env[Observation, Floats]):
     ) -> tuple[Observation, Infos]:
         """Begin the next episode; with a seed, its first."""
         super().reset(seed=seed)
-        seen, infos = self._one.reset(seed=seed, options=options)
-        return seen[0], infos
+        return self._one.reset(seed=seed, options=options)[0][0], {}
 
     def step(self, action: Floats) -> tuple[Observation, float, bool, bool, Infos]:
         """Go on for one period with throttle and steering, -1 to 1."""
-        seen, reward, ended, over, infos = self._one.step(np.asarray(action)[None])
-        return seen[0], float(reward[0]), bool(ended[0]), bool(over[0]), infos
+        seen, reward, ended, over, _ = self._one.step(np.asarray(action)[None])
+        return seen[0], float(reward[0]), bool(ended[0]), bool(over[0]), {}
 
     def close(self) -> None:
         """Close it: it cannot be used any more."""

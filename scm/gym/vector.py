@@ -18,12 +18,18 @@ Infos = dict[str, Any]
 
 
 class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
-    """Many worlds of one task.
+    """Many worlds of one task: each of its agents is a sub-environment.
+
+    Of a task of several agents, agent a of world w is row `w * agents + a` of every array. A world
+    begins its next episode as a whole, when all of its agents have ended; `infos["present"]`,
+    (num_envs,), says who takes part in the next step. Who does not, gains nothing by it, reports no
+    end, and its observation says nothing.
 
     Args:
         name: Of the task with its map, `driving_school/lap-v1`.
-        num_envs: How many worlds.
-        autoreset_mode: When a world whose episode ended begins its next one.
+        num_envs: How many agents, over all worlds; a multiple of the task's agents.
+        autoreset_mode: When a world whose agents have all ended begins its next episode: in the
+            next step, in the same one, or by `reset` alone.
         threads: For the physics; None: one a core.
         copy: Whether each observation is an array of its own; else the next step writes over it.
         options: Of `Options`: another car file, and what is drawn for each episode.
@@ -33,7 +39,7 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         observation_names: Of the observation's columns, each with its unit.
 
     Raises:
-        gymnasium.error.Error: There is no such task, it is of several agents, or of no world.
+        gymnasium.error.Error: There is no such task, or no whole number of worlds.
         ScmError: There is no such car file.
     """
 
@@ -42,24 +48,23 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         threads: int | None = None, copy: bool = True, **options: Any,
     ) -> None:  # fmt: skip
         task, map_name = task_of(name)
-        if task.agents > 1:
-            msg = f"{name} is of {task.agents} agents: make it by scm.gym.parallel_env"
-            raise Error(msg)
-        if num_envs < 1:
-            msg = f"num_envs = {num_envs}: expected 1 or more"
+        worlds, rest = divmod(num_envs, task.agents)
+        if worlds < 1 or rest:
+            each = f"a multiple of {task.agents}, the agents of a world" if task.agents > 1 else ""
+            msg = f"num_envs = {num_envs}: expected {each or '1 or more'}"
             raise Error(msg)
         self.name, self.num_envs, self._copy = name, num_envs, copy
         self._mode = AutoresetMode(autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self._mode}
         threads = threads or len(os.sched_getaffinity(0))
-        self.worlds = Worlds(task, map_name, num_envs, Options(**options), threads)
+        self.worlds = Worlds(task, map_name, worlds, Options(**options), threads)
         self._seen = Observations(self.worlds, task.observations)
         self.observation_names = self._seen.names
         self.single_observation_space = spaces.Box(self._seen.low, self._seen.high)
         self.single_action_space = spaces.Box(-1.0, 1.0, (2,))
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._ended: Bools = np.zeros(num_envs, np.bool_)
+        self._every: Bools = np.ones(num_envs, np.bool_)
         self._is_begun = False
 
     def reset(
@@ -70,22 +75,21 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         Args:
             seed: Of the first world; each other's is higher by one. Or one for each; None: it goes
                 on with the next episode of the seed that it has.
-            options: `reset_mask`, (num_envs,) of bool.
+            options: `reset_mask`, (num_envs,) of bool: all agents of a world, or none.
         """
         self._check_open()
         which = self._mask(options)
-        if isinstance(seed, int):
-            seed = [seed + k for k in range(self.num_envs)]
         if seed is None and not self._is_begun:
-            first = int(self.np_random.integers(2**31))
-            seed = [first + k for k in range(self.num_envs)]
+            seed = int(self.np_random.integers(2**31))
+        if isinstance(seed, int):
+            seed = [seed + k for k in range(self.worlds.count)]
         if seed is not None:
             numbers = self._seeds(seed)
             given = np.array([one is not None for one in seed]) & which
             self.worlds.seed(np.flatnonzero(given), numbers[given])
         self.worlds.begin(which)
-        self._ended[which], self._is_begun = False, True
-        return self._observed(), {}
+        self._is_begun = True
+        return self._observed(), self._infos()
 
     def step(self, actions: Floats) -> tuple[Observation, Floats, Bools, Bools, Infos]:
         """Let all worlds go on for one period with actions (num_envs, 2): throttle, steering."""
@@ -93,29 +97,29 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         if not self._is_begun:
             msg = "step before reset: call reset first"
             raise ResetNeeded(msg)
-        given = self._checked(actions)
-        fresh = self._ended.copy()
-        if fresh.any() and self._mode is AutoresetMode.DISABLED:
-            msg = f"world {int(np.argmax(fresh))} ended: reset it first, by options['reset_mask']"
+        given, worlds = self._checked(actions), self.worlds
+        are_over = worlds.are_out
+        if are_over.any() and self._mode is AutoresetMode.DISABLED:
+            msg = f"world {int(np.argmax(are_over))} ended: reset it, by options['reset_mask']"
             raise ResetNeeded(msg)
-        worlds = self.worlds
         worlds.step(given)
-        rewards, ends, over = worlds.rewards(), worlds.ends(), worlds.is_over
+        rewards, ends = worlds.rewards(), worlds.ends()
+        late = worlds.out_of_time & ~ends
+        worlds.remove(ends | late)
         infos: Infos = {}
-        if fresh.any():  # their step was this: to begin
-            worlds.begin(fresh)
-            rewards[fresh], ends[fresh], over[fresh] = 0.0, False, False
-        over &= ~ends
-        self._ended = ends | over
-        if self._ended.any() and self._mode is AutoresetMode.SAME_STEP:
-            infos = self._final()
-            worlds.begin(self._ended)
-            self._ended = np.zeros(self.num_envs, np.bool_)
-        return self._observed(), rewards, ends, over, infos
+        if are_over.any():  # their step was this: to begin
+            worlds.begin(are_over)
+        elif self._mode is AutoresetMode.SAME_STEP and (ends | late).any():
+            infos = self._final(ends | late)
+            worlds.begin(worlds.are_out)
+        return self._observed(), rewards, ends, late, infos | self._infos()
 
-    def _final(self) -> Infos:
-        """Return the last observations of the worlds whose episode ended."""
-        last, ended = self._seen.update(), self._ended.copy()
+    def _infos(self) -> Infos:
+        return {"present": self.worlds.present.copy(), "_present": self._every}
+
+    def _final(self, ended: Bools) -> Infos:
+        """Return the last observations of the agents whose episode ended in this step."""
+        last = self._seen.update()
         final = np.full(self.num_envs, None, dtype=object)
         for k in np.flatnonzero(ended).tolist():
             final[k] = last[k].copy()
@@ -131,8 +135,8 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
             msg = f"actions of shape {given.shape}: expected ({self.num_envs}, 2)"
             raise InvalidAction(msg)
         if not np.isfinite(given).all():
-            world = int(np.argmin(np.isfinite(given).all(axis=1)))
-            msg = f"action of world {world} is {given[world].tolist()}: expected numbers, -1 to 1"
+            row = int(np.argmin(np.isfinite(given).all(axis=1)))
+            msg = f"action of agent {row} is {given[row].tolist()}: expected numbers, -1 to 1"
             raise InvalidAction(msg)
         return given
 
@@ -142,22 +146,29 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
             raise ClosedEnvironmentError(msg)
 
     def _seeds(self, seeds: list[int | None]) -> Ints:
-        if len(seeds) != self.num_envs:
-            msg = f"{len(seeds)} seeds: expected one for each of {self.num_envs} worlds"
+        if len(seeds) != self.worlds.count:
+            msg = f"{len(seeds)} seeds: expected one for each of {self.worlds.count} worlds"
             raise ValueError(msg)
         return np.array([one or 0 for one in seeds], np.int64)
 
     def _mask(self, options: Infos | None) -> Bools:
+        """Return which worlds to begin anew, (worlds,)."""
         mask = (options or {}).get("reset_mask")
         if mask is None:
-            return np.ones(self.num_envs, np.bool_)
+            return np.ones(self.worlds.count, np.bool_)
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
             msg = f"options['reset_mask']: expected an array of bool, got {mask!r}"
             raise TypeError(msg)
         if mask.shape != (self.num_envs,) or not mask.any():
             msg = (
-                f"options['reset_mask']: expected shape ({self.num_envs},) with a world in it, got "
-                f"{mask.shape} with {int(mask.sum())}"
+                f"options['reset_mask']: expected shape ({self.num_envs},) with an agent in it, "
+                f"got {mask.shape} with {int(mask.sum())}"
             )
             raise ValueError(msg)
-        return mask
+        by_world = mask.reshape(self.worlds.count, -1)
+        which: Bools = np.asarray(by_world.any(axis=1))
+        if not by_world[which].all():
+            world = int(np.argmax(which & ~by_world.all(axis=1)))
+            msg = f"options['reset_mask']: expected all agents of world {world}, or none"
+            raise ValueError(msg)
+        return which

@@ -206,9 +206,14 @@ class Worlds:
         self.fleet.alive[: self.rows] &= ~rows
 
     @property
-    def is_over(self) -> Bools:
-        """Which worlds have reached their time limit, (worlds,)."""
-        return np.asarray(self.steps >= self.task.most_steps)
+    def out_of_time(self) -> Bools:
+        """Which cars still take part and have reached the time limit, (rows,)."""
+        return (self.row_steps >= self.task.most_steps) & self.present
+
+    @property
+    def are_out(self) -> Bools:
+        """In which worlds no car takes part any more, (worlds,)."""
+        return np.asarray(~self.present.reshape(self.count, -1).any(axis=1))
 
     @property
     def row_steps(self) -> Ints:

@@ -164,7 +164,7 @@ def test_observations_are_arrays_of_their_own_unless_views_are_requested():
     ("wrong", "words"),
     [
         (np.zeros((3, 2)), r"shape \(3, 2\): expected \(2, 2\)"),
-        ([[0.0, 0.0], [0.0, np.nan]], r"action of world 1 is \[0.0, nan\]"),
+        ([[0.0, 0.0], [0.0, np.nan]], r"action of agent 1 is \[0.0, nan\]"),
     ],
 )
 def test_wrong_actions_are_refused_and_change_nothing(wrong, words):
@@ -192,7 +192,6 @@ def test_use_before_reset_and_after_close_is_refused():
         ("lap", "expected a map, a task and its version"),
         ("driving_school/lab-v1", "did you mean 'lap'"),
         ("driving_school/lap-v9", "has version 1, not 9"),
-        ("driving_school/crossing-v1", "4 agents: make it by scm.gym.parallel_env"),
     ],
 )
 def test_unknown_task_is_an_error_of_gymnasium_s_that_says_what_there_is(name, words):
@@ -213,7 +212,7 @@ def test_unknown_map_and_number_and_no_world_are_refused():
     ("options", "error", "words"),
     [
         ({"reset_mask": [True, False]}, TypeError, "expected an array of bool"),
-        ({"reset_mask": np.zeros(2, bool)}, ValueError, "with a world in it"),
+        ({"reset_mask": np.zeros(2, bool)}, ValueError, "with an agent in it"),
         ({"reset_mask": np.ones(3, bool)}, ValueError, r"shape \(2,\)"),
     ],
 )
