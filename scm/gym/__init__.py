@@ -9,6 +9,7 @@
     traffic        cars of a world that rules drive
     pursuit        where the car is that another pursues
     observations   what an agent sees of it
+    actions        what it may do
     rewards, ends  what it gains, and when its episode ends
     vector         as a Gymnasium vector environment
     single         as a Gymnasium environment

@@ -26,6 +26,7 @@ from scm.vehicles.sensor_noise import add_device_errors
 from scm.vehicles.sensors import imu, lidar
 
 Observation = NDArray[np.float32]
+FAR_M = 5.0  # more than any way across a school
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +144,42 @@ def pursued(worlds: Worlds) -> Part:
     return Part(tuple(f"pursued_{name}" for name in names), tuple(-one for one in most), most, read)
 
 
+def goal_offset(worlds: Worlds) -> Part:
+    """Return the goal's place less the own, in the map's frame."""
+    fleet, goals = worlds.fleet, worlds.to_goal.goals
+    return Part(
+        ("goal_x_m", "goal_y_m"), (-FAR_M,) * 2, (FAR_M,) * 2,
+        lambda: goals[:, :2] - np.column_stack((fleet.x, fleet.y)),
+    )  # fmt: skip
+
+
+def peers(worlds: Worlds) -> Part:
+    """Return each other car less the own, exactly, in the map's frame; who is out is far away.
+
+    The next after the own comes first, the one before it last.
+    """
+    fleet, count = worlds.fleet, worlds.agents - 1
+    own = np.arange(worlds.rows)[:, None]
+    behind = (own + 1 + np.arange(count)) % worlds.agents
+    rows = own - own % worlds.agents + behind
+    names = ("x_m", "y_m", "turn_rad", "speed_mps")
+    most = (FAR_M, FAR_M, np.pi, 5.0)
+
+    def read() -> Floats:
+        turn = fleet.yaw[rows] - fleet.yaw[own]
+        seen = np.stack(
+            (fleet.x[rows] - fleet.x[own], fleet.y[rows] - fleet.y[own],
+             np.arctan2(np.sin(turn), np.cos(turn)), fleet.speed[rows]), axis=2,
+        )  # fmt: skip
+        seen[~worlds.present[rows]] = FAR_M, FAR_M, 0.0, 0.0
+        return seen.reshape(worlds.rows, -1)
+
+    return Part(
+        tuple(f"peer_{k}_{name}" for k in range(count) for name in names),
+        tuple(-one for one in most) * count, most * count, read,
+    )  # fmt: skip
+
+
 def others(worlds: Worlds) -> Part:
     """Return what the radio knows of each other car: place and direction seen from the own, age."""
     radio = worlds.radio
@@ -175,8 +212,8 @@ def signals(worlds: Worlds) -> Part:
 
 PARTS: dict[str, Callable[[Worlds], Part]] = {
     "motion": motion, "action": action, "lane": lane, "inertial": inertial,
-    "others": others, "signals": signals, "ahead": ahead, "goal": goal, "pursued": pursued,
-    "ranges": ranges,
+    "others": others, "peers": peers, "signals": signals, "ahead": ahead, "goal": goal,
+    "goal_offset": goal_offset, "pursued": pursued, "ranges": ranges,
     "ranges_36": partial(ranges, beams=36), "ranges_360": partial(ranges, beams=360),
 }  # fmt: skip
 

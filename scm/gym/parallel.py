@@ -9,6 +9,7 @@ from numpy.random import default_rng
 from pettingzoo import ParallelEnv
 
 from scm.arrays import Bools, Floats
+from scm.gym.actions import Actions, action_space, commands_of
 from scm.gym.names import task_of
 from scm.gym.observations import Observation, Observations
 from scm.gym.worlds import Options, Worlds
@@ -16,7 +17,7 @@ from scm.gym.worlds import Options, Worlds
 Infos = dict[str, dict[str, Any]]
 
 
-class CityParallelEnv(ParallelEnv[str, Observation, Floats]):  # type: ignore[misc]  # untyped
+class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[misc]  # untyped
     """One world of one task; each of its cars is an agent.
 
     A car whose episode ended is taken away, and is an agent no more until the next reset.
@@ -46,15 +47,15 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):  # type: ignore[mi
         self.observation_spaces = {
             agent: spaces.Box(self._seen.low, self._seen.high) for agent in self.possible_agents
         }
-        self.action_spaces = {agent: spaces.Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
+        self.action_spaces = {agent: action_space(task) for agent in self.possible_agents}
         self._is_begun = self._is_closed = False
 
     def observation_space(self, agent: str) -> spaces.Box:
         """Return the space of an agent's observations."""
         return self.observation_spaces[agent]
 
-    def action_space(self, agent: str) -> spaces.Box:
-        """Return the space of an agent's actions: throttle and steering, -1 to 1."""
+    def action_space(self, agent: str) -> spaces.Box | spaces.Discrete:
+        """Return the space of an agent's actions: throttle and steering, -1 to 1, or a choice."""
         return self.action_spaces[agent]
 
     def reset(
@@ -72,7 +73,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):  # type: ignore[mi
         return self._of_agents(self._seen.update().copy()), {agent: {} for agent in self.agents}
 
     def step(
-        self, actions: dict[str, Floats]
+        self, actions: dict[str, Actions]
     ) -> tuple[
         dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], Infos
     ]:  # fmt: skip
@@ -110,15 +111,12 @@ class CityParallelEnv(ParallelEnv[str, Observation, Floats]):  # type: ignore[mi
         rows = {agent: row for row, agent in enumerate(self.possible_agents)}
         return {agent: values[rows[agent]] for agent in self.agents}
 
-    def _checked(self, actions: dict[str, Floats], agent: str) -> Floats:
+    def _checked(self, actions: dict[str, Actions], agent: str) -> Floats:
         if agent not in actions:
             msg = f"no action of {agent}: expected one of each of {', '.join(self.agents)}"
             raise InvalidAction(msg)
-        given = np.asarray(actions[agent], dtype=np.float64)
-        if given.shape != (2,) or not np.isfinite(given).all():
-            msg = f"action of {agent} is {given.tolist()}: expected two numbers, -1 to 1"
-            raise InvalidAction(msg)
-        return given
+        found: Floats = commands_of(self.worlds.task, [actions[agent]], [agent])[0]
+        return found
 
     def _check_open(self) -> None:
         if self._is_closed:

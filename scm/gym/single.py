@@ -6,12 +6,12 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from scm.arrays import Floats
+from scm.gym.actions import Actions
 from scm.gym.observations import Observation
 from scm.gym.vector import CityVectorEnv, Infos
 
 
-class CityEnv(gymnasium.Env[Observation, Floats]):
+class CityEnv(gymnasium.Env[Observation, Actions]):
     """One world of one task.
 
     Args:
@@ -42,9 +42,9 @@ class CityEnv(gymnasium.Env[Observation, Floats]):
         super().reset(seed=seed)
         return self._one.reset(seed=seed, options=options)[0][0], {}
 
-    def step(self, action: Floats) -> tuple[Observation, float, bool, bool, Infos]:
-        """Go on for one period with throttle and steering, -1 to 1."""
-        seen, reward, ended, over, _ = self._one.step(np.asarray(action)[None])
+    def step(self, action: Actions) -> tuple[Observation, float, bool, bool, Infos]:
+        """Go on for one period with throttle and steering, -1 to 1, or the number of a choice."""
+        seen, reward, ended, over, _ = self._one.step(np.array([action]))
         return seen[0], float(reward[0]), bool(ended[0]), bool(over[0]), {}
 
     def close(self) -> None:

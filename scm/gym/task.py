@@ -57,6 +57,7 @@ class PlaceStart:
     Attributes:
         places: By map, names of places to begin at; a map that is not there: its spawns.
         goals: By map, names of places to drive to; a map that is not there: its bays.
+        is_paired: Whether who begins at a place drives to the goal of the same number.
         aside_m: At most so far from the place, along x and along y.
         turned_rad: At most so far from its direction.
         speed_mps: The slowest and the fastest.
@@ -64,6 +65,7 @@ class PlaceStart:
 
     places: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     goals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    is_paired: bool = False
     aside_m: float = 0.0
     turned_rad: float = 0.0
     speed_mps: tuple[float, float] = (0.0, 0.0)
@@ -96,6 +98,7 @@ class Task:
         agents: Cars of a world.
         traffic: Further cars of a world; None: none.
         lanes: By map, lanes to begin on; a map that is not there: any.
+        choices: Throttle and steering, -1 to 1, of each action; none: they are chosen freely.
         car: The car file.
         period_s: Between two actions.
     """
@@ -111,6 +114,7 @@ class Task:
     agents: int = 1
     traffic: Traffic | None = None
     lanes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    choices: tuple[tuple[float, float], ...] = ()
     car: str = "nigel"
     period_s: float = 0.05
     version: int = 1

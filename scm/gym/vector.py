@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.error import ClosedEnvironmentError, Error, InvalidAction, ResetNeeded
+from gymnasium.error import ClosedEnvironmentError, Error, ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from scm.arrays import Bools, Floats, Ints
+from scm.gym.actions import Actions, action_space, commands_of
 from scm.gym.names import task_of
 from scm.gym.observations import Observation, Observations
 from scm.gym.worlds import Options, Worlds
@@ -17,7 +18,7 @@ from scm.gym.worlds import Options, Worlds
 Infos = dict[str, Any]
 
 
-class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
+class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
     """Many worlds of one task: each of its agents is a sub-environment.
 
     Of a task of several agents, agent a of world w is row `w * agents + a` of every array. A world
@@ -61,7 +62,7 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         self._seen = Observations(self.worlds, task.observations)
         self.observation_names = self._seen.names
         self.single_observation_space = spaces.Box(self._seen.low, self._seen.high)
-        self.single_action_space = spaces.Box(-1.0, 1.0, (2,))
+        self.single_action_space = action_space(task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._every: Bools = np.ones(num_envs, np.bool_)
@@ -91,13 +92,18 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
         self._is_begun = True
         return self._observed(), self._infos()
 
-    def step(self, actions: Floats) -> tuple[Observation, Floats, Bools, Bools, Infos]:
-        """Let all worlds go on for one period with actions (num_envs, 2): throttle, steering."""
+    def step(self, actions: Actions) -> tuple[Observation, Floats, Bools, Bools, Infos]:
+        """Let all worlds go on for one period.
+
+        Args:
+            actions: Throttle and steering, (num_envs, 2); or numbers of choices, (num_envs,).
+        """
         self._check_open()
         if not self._is_begun:
             msg = "step before reset: call reset first"
             raise ResetNeeded(msg)
-        given, worlds = self._checked(actions), self.worlds
+        worlds = self.worlds
+        given = commands_of(worlds.task, actions, range(self.num_envs))
         are_over = worlds.are_out
         if are_over.any() and self._mode is AutoresetMode.DISABLED:
             msg = f"world {int(np.argmax(are_over))} ended: reset it, by options['reset_mask']"
@@ -128,17 +134,6 @@ class CityVectorEnv(VectorEnv[Observation, Floats, Any]):
     def _observed(self) -> Observation:
         seen = self._seen.update()
         return seen.copy() if self._copy else seen
-
-    def _checked(self, actions: Floats) -> Floats:
-        given = np.asarray(actions, dtype=np.float64)
-        if given.shape != (self.num_envs, 2):
-            msg = f"actions of shape {given.shape}: expected ({self.num_envs}, 2)"
-            raise InvalidAction(msg)
-        if not np.isfinite(given).all():
-            row = int(np.argmin(np.isfinite(given).all(axis=1)))
-            msg = f"action of agent {row} is {given[row].tolist()}: expected numbers, -1 to 1"
-            raise InvalidAction(msg)
-        return given
 
     def _check_open(self) -> None:
         if self.closed:

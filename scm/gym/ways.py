@@ -138,6 +138,9 @@ class ToGoal:
         places = start.places.get(name) or tuple(one.name for one in city_map.spawns)
         if not goals or not places:
             raise MapError(f"map {name}: expected bays, and spawns to begin at")
+        if start.is_paired and len(goals) != len(places):
+            msg = f"map {name}: expected a goal for each of {len(places)} places, got {len(goals)}"
+            raise MapError(msg)
         self._choice = np.array([roads.spawn_pose(one) for one in goals])
         self._places = np.array([roads.spawn_pose(one) for one in places])
         self._start, self._every = start, np.arange(rows)
@@ -146,9 +149,9 @@ class ToGoal:
 
     def begin(self, rows: Ints, draws: Floats) -> Floats:
         """Let cars begin near one of the places each, with a goal; see `Way`."""
-        chosen = (draws[:, GOAL_DRAW] * len(self._choice)).astype(np.int64)
-        self.goals[rows] = self._choice[chosen]
         where = (draws[:, WHERE] * len(self._places)).astype(np.int64)
+        chosen = (draws[:, GOAL_DRAW] * len(self._choice)).astype(np.int64)
+        self.goals[rows] = self._choice[where if self._start.is_paired else chosen]
         most = (self._start.aside_m, self._start.aside_m, self._start.turned_rad)
         offsets = 2.0 * draws[:, [AHEAD_DRAW, LEFT_DRAW, TURNED_DRAW]] - 1.0
         found: Floats = self._places[where] + np.array(most) * offsets

@@ -67,7 +67,7 @@ class Worlds:
         fleet: All cars; row `world * agents + agent`, then those that rules drive.
         cars: Rows of each world's, agents' first, (worlds, cars).
         traffic: What drives those that are no agents'; None: there are none.
-        radio: What they know of each other; None: each is alone in its world.
+        radio: What they know of each other; None: the task has no radio.
         signals: The lights; None: the task has none.
         steps: Of each world, since its episode began, (worlds,).
         present: Which cars take part, (rows,); the others are out, until the next episode.
@@ -104,7 +104,9 @@ class Worlds:
             else None
         )
         self._touching = Touching(self.city_map, self.car, self.cars, task.agents)
-        self.radio = Radio(self.city_map, worlds, task.agents) if task.agents > 1 else None
+        self.radio = (
+            Radio(self.city_map, worlds, task.agents) if "others" in task.observations else None
+        )
         front_m = limits_of(self.car).front
         self.signals = (
             Signals(self.city_map, rows, front_m) if "signals" in task.observations else None

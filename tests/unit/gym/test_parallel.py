@@ -101,7 +101,7 @@ def test_wrong_use_is_refused():
     given = actions(env, seen)
     with pytest.raises(InvalidAction, match="no action of car_3: expected one of each of car_0"):
         env.step({name: one for name, one in given.items() if name != "car_3"})
-    with pytest.raises(InvalidAction, match=r"action of car_1 is \[nan, 0.0\]"):
+    with pytest.raises(InvalidAction, match=r"action of agent car_1 is \[nan, 0.0\]"):
         env.step(given | {"car_1": np.array([np.nan, 0.0])})
     assert env.worlds.steps.tolist() == [0]
     env.close()
