@@ -5,6 +5,7 @@
     task           what a task is made of
     worlds         many worlds of a task, their cars rows of one fleet
     ways           where its cars begin, and how far they come: along lanes, or to a goal
+    junctions      signals that agents choose, behind the city's own kernel
     touching       who touches a wall or another car
     traffic        cars of a world that rules drive
     pursuit        where the car is that another pursues

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scm.arrays import Floats
+from scm.gym.junctions import AHEAD, NEAR, QUEUE
 from scm.gym.pursuit import LOST_M, look, pursued_rows
 from scm.gym.radio import COLUMNS
 from scm.gym.signals import REACH_M
@@ -26,6 +27,7 @@ from scm.vehicles.sensor_noise import add_device_errors
 from scm.vehicles.sensors import imu, lidar
 
 Observation = NDArray[np.float32]
+MOST_CARS = 50.0
 FAR_M = 5.0  # more than any way across a school
 
 
@@ -197,6 +199,31 @@ def others(worlds: Worlds) -> Part:
     )  # fmt: skip
 
 
+def junction(worlds: Worlds) -> Part:
+    """Return a junction's traffic, group by group, and what is green; what it lacks is 0.
+
+    Pressure is the cars before a group's line less those where its ways lead to.
+    """
+    junctions = worlds.junctions
+    if junctions is None:
+        raise TypeError(f"task {worlds.task.name}: `junction` needs agents that are junctions")
+    per_group = ("near_cars", "queue_cars", "pressure_cars", "is_green")
+    groups = [f"group_{k}_{name}" for k in range(junctions.places) for name in per_group]
+    stages = [f"stage_{k}_is_chosen" for k in range(junctions.choices)]
+    most = (MOST_CARS, MOST_CARS, MOST_CARS, 1.0) * junctions.places + (1.0,) * len(stages)
+    low = (0.0, 0.0, -MOST_CARS, 0.0) * junctions.places + (0.0,) * (len(stages) + 1)
+
+    def read() -> Floats:
+        near, queue, behind = (junctions.known[:, :, one] for one in (NEAR, QUEUE, AHEAD))
+        columns = (near, queue, near - behind, junctions.green)
+        traffic = np.stack([junctions.of_places(one) for one in columns], axis=3)
+        chosen = junctions.stage.ravel()[:, None] == np.arange(junctions.choices)
+        since_s = worlds.task.period_s * junctions.since.reshape(-1, 1)
+        return np.hstack((traffic.reshape(worlds.rows, -1), chosen, since_s))
+
+    return Part((*groups, *stages, "since_change_s"), low, (*most, 600.0), read)
+
+
 def signals(worlds: Worlds) -> Part:
     """Return how far the line with lights ahead is, whether it is green, and when that changes."""
     lights = worlds.signals
@@ -213,7 +240,8 @@ def signals(worlds: Worlds) -> Part:
 PARTS: dict[str, Callable[[Worlds], Part]] = {
     "motion": motion, "action": action, "lane": lane, "inertial": inertial,
     "others": others, "peers": peers, "signals": signals, "ahead": ahead, "goal": goal,
-    "goal_offset": goal_offset, "pursued": pursued, "ranges": ranges,
+    "goal_offset": goal_offset, "pursued": pursued, "junction": junction,
+    "ranges": ranges,
     "ranges_36": partial(ranges, beams=36), "ranges_360": partial(ranges, beams=360),
 }  # fmt: skip
 

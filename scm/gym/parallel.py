@@ -8,8 +8,8 @@ from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
 from numpy.random import default_rng
 from pettingzoo import ParallelEnv
 
-from scm.arrays import Bools, Floats
-from scm.gym.actions import Actions, action_space, commands_of
+from scm.arrays import Bools
+from scm.gym.actions import Actions, Space, action_space, checked
 from scm.gym.names import task_of
 from scm.gym.observations import Observation, Observations
 from scm.gym.worlds import Options, Worlds
@@ -42,19 +42,19 @@ class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[m
         self.worlds = Worlds(task, map_name, 1, Options(**options))
         self._seen = Observations(self.worlds, task.observations)
         self.observation_names = self._seen.names
-        self.possible_agents = [f"car_{number}" for number in range(task.agents)]
+        self.possible_agents = list(self.worlds.agent_names)
         self.agents: list[str] = []
         self.observation_spaces = {
             agent: spaces.Box(self._seen.low, self._seen.high) for agent in self.possible_agents
         }
-        self.action_spaces = {agent: action_space(task) for agent in self.possible_agents}
+        self.action_spaces = dict.fromkeys(self.possible_agents, action_space(self.worlds))
         self._is_begun = self._is_closed = False
 
     def observation_space(self, agent: str) -> spaces.Box:
         """Return the space of an agent's observations."""
         return self.observation_spaces[agent]
 
-    def action_space(self, agent: str) -> spaces.Box | spaces.Discrete:
+    def action_space(self, agent: str) -> Space:
         """Return the space of an agent's actions: throttle and steering, -1 to 1, or a choice."""
         return self.action_spaces[agent]
 
@@ -82,7 +82,9 @@ class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[m
         if not self._is_begun:
             msg = "step before reset: call reset first"
             raise ResetNeeded(msg)
-        worlds, given = self.worlds, np.zeros((len(self.possible_agents), 2))
+        worlds, space = self.worlds, self.action_spaces[self.possible_agents[0]]
+        dtype = np.int64 if isinstance(space, spaces.Discrete) else np.float64
+        given: Any = np.zeros((len(self.possible_agents), *(space.shape or ())), dtype)
         for row, agent in enumerate(self.possible_agents):
             if agent in self.agents:
                 given[row] = self._checked(actions, agent)
@@ -111,12 +113,11 @@ class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[m
         rows = {agent: row for row, agent in enumerate(self.possible_agents)}
         return {agent: values[rows[agent]] for agent in self.agents}
 
-    def _checked(self, actions: dict[str, Actions], agent: str) -> Floats:
+    def _checked(self, actions: dict[str, Actions], agent: str) -> Any:
         if agent not in actions:
             msg = f"no action of {agent}: expected one of each of {', '.join(self.agents)}"
             raise InvalidAction(msg)
-        found: Floats = commands_of(self.worlds.task, [actions[agent]], [agent])[0]
-        return found
+        return checked(self.action_spaces[agent], [actions[agent]], [agent])[0]
 
     def _check_open(self) -> None:
         if self._is_closed:

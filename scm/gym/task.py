@@ -23,6 +23,7 @@ class Start:
         beside_m: At most so far from the middle of its lane.
         turned_rad: At most so far from its lane's direction.
         speed_mps: The slowest and the fastest.
+        is_abreast: Whether cars may begin beside each other: the lanes do not cross.
         gap_m: The cars of a world begin one behind the other, rear axles so far apart at least and
             at most, and branch alike; None: spread evenly.
         behind: How many of them begin behind the first agent's.
@@ -31,6 +32,7 @@ class Start:
     beside_m: float = 0.0
     turned_rad: float = 0.0
     speed_mps: tuple[float, float] = (0.0, 0.0)
+    is_abreast: bool = False
     gap_m: tuple[float, float] | None = None
     behind: int = 0
 
@@ -95,7 +97,9 @@ class Task:
         observations: By name, see `observations`.
         rewards: Its summands.
         ends: When a car's episode ends; it also does after `lasts_s`.
-        agents: Cars of a world.
+        agents: Cars of a world; or its map's junctions, with `of_junctions`.
+        of_junctions: Whether they are junctions: they choose what is green, and rules drive all
+            cars.
         traffic: Further cars of a world; None: none.
         lanes: By map, lanes to begin on; a map that is not there: any.
         choices: Throttle and steering, -1 to 1, of each action; none: they are chosen freely.
@@ -112,6 +116,7 @@ class Task:
     start: Start | PlaceStart
     lasts_s: float
     agents: int = 1
+    of_junctions: bool = False
     traffic: Traffic | None = None
     lanes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     choices: tuple[tuple[float, float], ...] = ()

@@ -4,8 +4,9 @@
                car ahead, and what stops before a junction that another car passes first
     steering   as the city's own driver
 
-At a junction agents go first where they are near; else the nearer car does. All are kernels of the
-city's driver but for that rule, which stands for signals and signs.
+Where signals stand, a car stops before a line that is not green, unless it cannot any more. Else
+agents go first at a junction where they are near, and the nearer car does. All are kernels of the
+city's driver but for these rules.
 """
 
 import math
@@ -23,6 +24,7 @@ from scm.vehicles.drivers.driver_state import (
     BEHIND,
     DECEL,
     FRONT,
+    HERE,
     REAR,
     REQUESTED_SPEED,
     SWING,
@@ -32,7 +34,7 @@ from scm.vehicles.drivers.driver_state import (
     S,
     kind_row,
 )
-from scm.vehicles.drivers.lane_graph import LaneArrays
+from scm.vehicles.drivers.lane_graph import GROUP, LaneArrays
 from scm.vehicles.drivers.lane_tracking import list_segments
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.speed_control import braking, stopping_speed, throttle
@@ -86,6 +88,7 @@ class RuleDrivenCars:
         traffic: How they drive.
 
     Attributes:
+        green: Which groups of the map's signals are, (worlds, groups); none: they do not count.
         commands: Throttle and steering of each of them, (worlds * others, 2).
         known: Of each agent's car, the columns above, (worlds * agents, 4).
     """
@@ -100,6 +103,7 @@ class RuleDrivenCars:
             np.zeros((count, 2), np.int64), np.zeros((count, 5)), np.zeros((count, 3)),
             np.zeros((1, 3)),
         )  # fmt: skip
+        self.green: Bools = np.zeros((worlds, 0), np.bool_)
         self.commands: Floats = np.zeros((worlds * (count - agents), 2))
         self.known: Floats = np.zeros((worlds * agents, 4))
 
@@ -121,14 +125,15 @@ class RuleDrivenCars:
         motion = np.column_stack((fleet.x, fleet.y, fleet.yaw, fleet.speed))
         _decide(
             *self._course.arrays, self._around, self._cars, self._agents, self._kind, worlds,
-            passed_s, motion, fleet.alive, self.commands, self.known,
+            passed_s, motion, fleet.alive, self.green, self.commands, self.known,
         )  # fmt: skip
 
 
 @array_kernel
 def _decide(
     lanes: LaneArrays, state: DriverState, around: Around, cars: Ints, agents: int, kind: Floats,
-    worlds: Ints, passed: Floats, motion: Floats, alive: Bools, commands: Floats, known: Floats,
+    worlds: Ints, passed: Floats, motion: Floats, alive: Bools, green: Bools, commands: Floats,
+    known: Floats,
 ) -> None:  # fmt: skip
     front, first, count = kind[FRONT], len(known), cars.shape[1]
     for n in range(len(worlds)):
@@ -156,8 +161,12 @@ def _decide(
                 lanes.segments, ids, begins, around.leader, kind, floats, segments, here,
                 int(found), False, False,
             )  # fmt: skip
-            target = min(target, _speed_to_junction(around, rows, agents, alive, k, kind))
             speed = around.at[k, _SPEED]
+            if green.shape[1]:
+                held = _speed_to_line(lanes, state, row, green[worlds[n]], speed, kind)
+            else:
+                held = _speed_to_junction(around, rows, agents, alive, k, kind)
+            target = min(target, held)
             commands[row - first, 1] = steer(
                 lanes.segments, ids, begins, kind, floats, segments, here, motion[row, 2],
                 max(0.0, speed), passed[n],
@@ -251,4 +260,24 @@ def _speed_to_junction(
         goes = junction[k, _WAY] < braking(at[k, _SPEED], kind[DECEL], 0.0)
         if goes or theirs < way or (theirs == way and k < own):
             return stopping_speed(way - SHORT_OF_LINE, kind[DECEL])
+    return math.inf
+
+
+@array_kernel
+def _speed_to_line(
+    lanes: LaneArrays, state: DriverState, row: int, green: Bools, speed: float, kind: Floats
+) -> float:
+    """Return the speed that stops a car before the next line unless that is green [m/s]."""
+    begun = -state.floats[row, S] - kind[FRONT]
+    for place in range(HERE, WINDOW_SIZE):
+        lane = state.lane_window[row, place]
+        if lane < 0 or begun > REACH:
+            break
+        for k in range(lanes.line_first[lane], lanes.line_first[lane + 1]):
+            way, group = begun + lanes.line_at[k], lanes.line_links[k, GROUP]
+            if group >= 0 and way >= 0.0:
+                if green[group] or way < braking(speed, kind[DECEL], 0.0):
+                    return math.inf
+                return stopping_speed(way - SHORT_OF_LINE, kind[DECEL])
+        begun += lanes.length[lane]
     return math.inf

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from scm.arrays import Bools, Floats, Ints
-from scm.gym.actions import Actions, action_space, commands_of
+from scm.gym.actions import Actions, action_space, checked
 from scm.gym.names import task_of
 from scm.gym.observations import Observation, Observations
 from scm.gym.worlds import Options, Worlds
@@ -62,7 +62,7 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
         self._seen = Observations(self.worlds, task.observations)
         self.observation_names = self._seen.names
         self.single_observation_space = spaces.Box(self._seen.low, self._seen.high)
-        self.single_action_space = action_space(task)
+        self.single_action_space = self._space = action_space(self.worlds)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._every: Bools = np.ones(num_envs, np.bool_)
@@ -103,7 +103,7 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
             msg = "step before reset: call reset first"
             raise ResetNeeded(msg)
         worlds = self.worlds
-        given = commands_of(worlds.task, actions, range(self.num_envs))
+        given = checked(self._space, actions, range(self.num_envs))
         are_over = worlds.are_out
         if are_over.any() and self._mode is AutoresetMode.DISABLED:
             msg = f"world {int(np.argmax(are_over))} ended: reset it, by options['reset_mask']"

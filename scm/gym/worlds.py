@@ -12,10 +12,11 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import MapError
+from scm.gym.junctions import Junctions
 from scm.gym.radio import Radio
 from scm.gym.randomise import Randomise, Ranges, with_effects
 from scm.gym.signals import Signals
-from scm.gym.task import PlaceStart, Task
+from scm.gym.task import PlaceStart, Start, Task
 from scm.gym.touching import Touching
 from scm.gym.traffic import RuleDrivenCars
 from scm.gym.ways import DRAWS, SPEED_DRAW, WHERE, AlongLanes, ToGoal, Way
@@ -32,6 +33,7 @@ SEEDS, CARS, READINGS, LIGHTS = (
     np.uint64(n) for n in (0x5CA1AB1E5EEDED01, 0xCA25CA25CA25CA25, 0x5E4504, 0x11647)
 )
 """Constants that keep draws of different purpose apart."""
+CARS_STEP_S = 0.05  # of cars that rules drive, where junctions choose more seldom
 TRIES, MARGIN_M = 8, 0.05  # places drawn until cars stand apart, and by how much more than touching
 
 
@@ -69,6 +71,7 @@ class Worlds:
         traffic: What drives those that are no agents'; None: there are none.
         radio: What they know of each other; None: the task has no radio.
         signals: The lights; None: the task has none.
+        junctions: Those that are agents, with the lights that they choose; None: cars are agents.
         steps: Of each world, since its episode began, (worlds,).
         present: Which cars take part, (rows,); the others are out, until the next episode.
         touched: Which touch a wall or another car now, (rows,).
@@ -84,7 +87,9 @@ class Worlds:
         self.task, self.count, self.agents = task, worlds, task.agents
         rows = self.rows = worlds * task.agents
         more = task.traffic.cars if task.traffic is not None else 0
-        own, others = np.arange(rows), rows + np.arange(worlds * more)
+        own = np.arange(0 if task.of_junctions else rows)
+        self._own, driven = len(own), len(own) // worlds
+        others = self._own + np.arange(worlds * more)
         self.cars: Ints = np.hstack((own.reshape(worlds, -1), others.reshape(worlds, more)))
         self.city_map = load_map(map_name)
         self.car = with_effects(load_car(options.car or task.car), options.ranges)
@@ -96,14 +101,18 @@ class Worlds:
         self._way: Way = (
             ToGoal(self.city_map, rows, task.start)
             if isinstance(task.start, PlaceStart)
-            else AlongLanes(self.city_map, self.cars, rows, task.start, lanes)
+            else AlongLanes(self.city_map, self.cars, self._own, task.start, lanes)
         )
+        self.junctions = self._junctions() if task.of_junctions else None
+        self._substeps = round(task.period_s / CARS_STEP_S) if task.of_junctions else 1
         self.traffic = (
-            RuleDrivenCars(self.course, self.cars, task.agents, self.car, task.traffic)
+            RuleDrivenCars(self.course, self.cars, driven, self.car, task.traffic)
             if task.traffic is not None
             else None
         )
-        self._touching = Touching(self.city_map, self.car, self.cars, task.agents)
+        if self.traffic is not None and self.junctions is not None:
+            self.traffic.green = self.junctions.green
+        self._touching = Touching(self.city_map, self.car, self.cars, driven)
         self.radio = (
             Radio(self.city_map, worlds, task.agents) if "others" in task.observations else None
         )
@@ -111,7 +120,8 @@ class Worlds:
         self.signals = (
             Signals(self.city_map, rows, front_m) if "signals" in task.observations else None
         )
-        self._apart_m = 2.0 * outline_of(hull_of(self.car))[4] + MARGIN_M
+        is_abreast = isinstance(task.start, Start) and task.start.is_abreast
+        self._apart_m = 0.0 if is_abreast else 2.0 * outline_of(hull_of(self.car))[4] + MARGIN_M
         self._every: Ints = np.arange(self.cars.size)
         self._seeds: Keys = np.zeros(worlds, np.uint64)
         self._episodes: Ints = np.full(worlds, -1, np.int64)
@@ -120,6 +130,13 @@ class Worlds:
         self.present: Bools = np.zeros(rows, np.bool_)
         self.touched: Bools = np.zeros(rows, np.bool_)
         self.actions, self.before = np.zeros((2, rows, 2))
+
+    def _junctions(self) -> Junctions:
+        found = Junctions(self.city_map, self.count, self.task.period_s)
+        if len(found.names) != self.agents:
+            msg = f"map {self.city_map.name}: expected {self.agents} junctions, got {found.names}"
+            raise MapError(msg)
+        return found
 
     def seed(self, worlds: Ints, seeds: Ints) -> None:
         """Let some worlds (n,) begin anew with the first episode of seeds (n,)."""
@@ -132,21 +149,24 @@ class Worlds:
         self._episodes[worlds] += 1
         bases = bases_of(self._seeds[worlds] ^ CARS, self._episodes[worlds])
         rows, count = self.cars[worlds].ravel(), self.cars.shape[1]
-        own = rows[rows < self.rows]
+        own = rows[rows < self._own]
         self.keys[rows] = bases_of(np.repeat(bases, count), np.tile(np.arange(count), len(worlds)))
         draws = uniforms(self.keys[rows], DRAWS)
         poses = self._starts(bases, rows, draws)
         low, high = self.task.start.speed_mps
-        self.fleet.alive[rows] = self.present[own] = True
+        self.fleet.alive[rows] = self.present.reshape(self.count, -1)[worlds] = True
         if self._randomise.is_any:
             self._randomise.draw(rows, self.keys[rows])
         self.fleet.place_rows(rows, poses, low + (high - low) * draws[:, SPEED_DRAW])
-        self.actions[own] = self.before[own] = 0.0
+        for actions in (self.actions, self.before):
+            actions.reshape(self.count, self.agents, -1)[worlds] = 0.0
         self.steps[worlds] = 0
         if self.radio is not None:
             self.radio.forget(own)
         if self.signals is not None:
             self.signals.begin(own, np.repeat(uniforms(bases ^ LIGHTS, 1)[:, 0], self.agents))
+        if self.junctions is not None:
+            self.junctions.begin(worlds)
         if self.traffic is not None:
             self.traffic.begin(worlds, self.keys)
         self._look_at_start(worlds, rows, own)
@@ -175,18 +195,26 @@ class Worlds:
                 break
         return poses.reshape(-1, 3)
 
-    def step(self, actions: Floats) -> None:
-        """Let all worlds go on for one period with actions (rows, 2); who is out stays out."""
-        self.before[:] = self.actions
-        np.clip(actions, -1.0, 1.0, out=self.actions)
-        self.fleet.throttle[: self.rows], self.fleet.steering[: self.rows] = self.actions.T
-        if self.traffic is not None:
-            self.fleet.throttle[self.rows :], self.fleet.steering[self.rows :] = (
-                self.traffic.commands.T
-            )
-        self.fleet.advance(self.task.period_s)
+    def step(self, actions: Floats | Ints) -> None:
+        """Let all worlds go on for one period; who is out stays out.
+
+        Args:
+            actions: Throttle and steering, (rows, 2); or numbers of choices, (rows,).
+        """
+        fleet, own = self.fleet, self._own
+        if self.junctions is not None:
+            self.junctions.request(actions.astype(np.int64).reshape(self.count, -1))
+        else:
+            given = np.array(self.task.choices)[actions] if self.task.choices else actions
+            self.before[:] = self.actions
+            np.clip(given, -1.0, 1.0, out=self.actions)
+            fleet.throttle[:own], fleet.steering[:own] = self.actions.T
         self.steps += 1
-        self._look()
+        for _ in range(self._substeps):
+            if self.traffic is not None:
+                fleet.throttle[own:], fleet.steering[own:] = self.traffic.commands.T
+            fleet.advance(self.task.period_s / self._substeps)
+            self._look()
 
     def rewards(self) -> Floats:
         """Return what each car gains in this step, (rows,); nothing for who is out."""
@@ -205,7 +233,14 @@ class Worlds:
     def remove(self, rows: Bools) -> None:
         """Let cars (rows,) take part no more, until the next episode."""
         self.present &= ~rows
-        self.fleet.alive[: self.rows] &= ~rows
+        self.fleet.alive[: self._own] &= ~rows[: self._own]
+
+    @property
+    def agent_names(self) -> tuple[str, ...]:
+        """Of a world's agents: its junctions, or its cars by number."""
+        if self.junctions is not None:
+            return self.junctions.names
+        return tuple(f"car_{number}" for number in range(self.agents))
 
     @property
     def out_of_time(self) -> Bools:
@@ -258,8 +293,8 @@ class Worlds:
         """Find out where all cars are after a step."""
         self._way.look(self.fleet)
         motion = self.fleet.planar_cogs(self._every)
-        self.touched = self._touching.find(motion, present=self.fleet.alive)[: self.rows]
-        self._look_around(np.arange(self.count), self._every[: self.rows])
+        self.touched = self._touching.find(motion, present=self.fleet.alive)[: self._own]
+        self._look_around(np.arange(self.count), self._every[: self._own])
 
     def _look_at_start(self, worlds: Ints, rows: Ints, own: Ints) -> None:
         """Find out where cars are whose episode begins: they stand apart, and have not moved."""
@@ -276,6 +311,9 @@ class Worlds:
         if self.radio is not None:
             motion = np.column_stack((fleet.x, fleet.y, fleet.yaw, fleet.speed))
             self.radio.exchange(own, motion, now_s, steps, self.keys, self.present)
+        is_first, step_s = self.steps[worlds] == 0, self.task.period_s / self._substeps
+        if self.junctions is not None:
+            passed_s = np.where(is_first, 0.0, step_s)
+            self.junctions.look(*self.course.arrays, worlds, self.cars, fleet.speed, passed_s)
         if self.traffic is not None:
-            is_first = self.steps[worlds] == 0
-            self.traffic.decide(worlds, fleet, np.where(is_first, -1.0, self.task.period_s))
+            self.traffic.decide(worlds, fleet, np.where(is_first, -1.0, step_s))

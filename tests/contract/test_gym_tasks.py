@@ -13,7 +13,8 @@ import scm.gym
 from scm.gym.names import all_tasks, ids
 
 UNITS = re.compile(
-    r".*_(m|mps|mps2|rad|radps|s)|throttle|steering|(other_\d+|goal|pursued)_(cos|sin)_turn|signal_is_green"
+    r".*_(m|mps|mps2|rad|radps|s|cars)|throttle|steering|(other_\d+|goal|pursued)_(cos|sin)_turn|"
+    r"(signal|group_\d+)_is_green|stage_\d+_is_chosen"
 )
 OF_ONE = [name for name in ids() if gymnasium.spec(name).entry_point is not None]
 OF_SEVERAL = [

@@ -6,6 +6,7 @@ from gymnasium import spaces
 from gymnasium.error import InvalidAction
 
 import scm.gym
+from scm.gym.tasks.intersection import left_over
 
 NAME = "intersection_school/intersection-v1"
 STRAIGHT, SLOWLY = 4, 1
@@ -75,6 +76,8 @@ def test_car_alone_arrives_after_the_published_way_and_gains_one():
     assert worlds.to_goal.known[0, 4] == pytest.approx(0.26, abs=0.02)
     assert 0.05 * steps == pytest.approx((away - 0.26) / 0.267, abs=1.0)
     assert gain[1:].tolist() == [0.0] * 3
+    worlds.touched[0] = True
+    assert left_over(worlds)[0] == 0.0  # who touches another at the goal has arrived
 
 
 def test_car_that_touches_the_line_between_the_directions_loses_by_what_was_left():
