@@ -12,6 +12,7 @@
     observations   what an agent sees of it
     actions        what it may do
     rewards, ends  what it gains, and when its episode ends
+    picture        a world from above
     vector         as a Gymnasium vector environment
     single         as a Gymnasium environment
     radio          what cars of a world know of each other

@@ -8,10 +8,11 @@ from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
 from numpy.random import default_rng
 from pettingzoo import ParallelEnv
 
-from scm.arrays import Bools
+from scm.arrays import Bools, Image
 from scm.gym.actions import Actions, Space, action_space, checked
 from scm.gym.names import task_of
 from scm.gym.observations import Observation, Observations
+from scm.gym.picture import Picture, checked_mode, metadata_of
 from scm.gym.worlds import Options, Worlds
 
 Infos = dict[str, dict[str, Any]]
@@ -24,6 +25,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[m
 
     Args:
         name: Of the task with its map, `driving_school/crossing-v1`.
+        render_mode: `rgb_array`: `render` returns pictures.
         options: Of `Options`: another car file, and what is drawn for each episode.
 
     Attributes:
@@ -35,10 +37,11 @@ class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[m
         ScmError: There is no such map or car file.
     """
 
-    def __init__(self, name: str, **options: Any) -> None:
+    def __init__(self, name: str, render_mode: str | None = None, **options: Any) -> None:
         task, map_name = task_of(name)
-        self.metadata = {"render_modes": [], "name": f"{task.name}-v{task.version}"}
-        self.name, self.render_mode = name, None
+        self.metadata = metadata_of(task) | {"name": f"{task.name}-v{task.version}"}
+        self.name, self.render_mode = name, checked_mode(render_mode)
+        self._picture: Picture | None = None
         self.worlds = Worlds(task, map_name, 1, Options(**options))
         self._seen = Observations(self.worlds, task.observations)
         self.observation_names = self._seen.names
@@ -97,6 +100,14 @@ class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[m
         infos: Infos = {agent: {} for agent in self.agents}
         self._remove(ends | over)
         return seen, gained, ended, out_of_time, infos
+
+    def render(self) -> Image | None:
+        """Return a picture of the world, (height, width, 3); None: there is no `render_mode`."""
+        if self.render_mode is None:
+            return None
+        if self._picture is None:
+            self._picture = Picture(self.worlds)
+        return self._picture.of()
 
     def close(self) -> None:
         """Close it: it cannot be used any more."""

@@ -16,6 +16,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 import scm
 from scm.arrays import Floats
+from scm.errors import LearningError
 from scm.gym.observations import Observations
 from scm.gym.parallel import CityParallelEnv
 from scm.gym.vector import CityVectorEnv
@@ -37,6 +38,9 @@ def write_policy(
         spread: Their standard deviations, (columns,).
         env: That it was trained in.
         clip: Most that a scaled observation is taken for.
+
+    Raises:
+        LearningError: The task's actions are choices by number, which no car's program can take.
     """
     columns = len(mean)
     shown = {"mean": mean[None], "spread": spread[None]}
@@ -78,12 +82,17 @@ def describe_policy(path: Path, env: CityVectorEnv | CityParallelEnv) -> None:
     Args:
         path: Of the file; it is written anew.
         env: That it was trained in.
+
+    Raises:
+        LearningError: see `write_policy`.
     """
     _save(onnx.load(path), path, env)
 
 
 def _save(model: onnx.ModelProto, path: Path, env: CityVectorEnv | CityParallelEnv) -> None:
     worlds = env.worlds
+    if worlds.task.choices or worlds.junctions is not None:
+        raise LearningError(f"{env.name}: expected throttle and steering, its actions are choices")
     seen = Observations(worlds, worlds.task.observations)
     metadata = PolicyMetadata(
         policy=1, task=env.name, observations=seen.names, car=worlds.task.car,

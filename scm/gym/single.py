@@ -6,8 +6,10 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from scm.arrays import Image
 from scm.gym.actions import Actions
 from scm.gym.observations import Observation
+from scm.gym.picture import RENDER_MODES
 from scm.gym.vector import CityVectorEnv, Infos
 
 
@@ -26,11 +28,13 @@ class CityEnv(gymnasium.Env[Observation, Actions]):
         ScmError: There is no such car file.
     """
 
+    metadata: dict[str, Any] = {"render_modes": RENDER_MODES}  # noqa: RUF012 as its base has it
+
     def __init__(self, name: str, **options: Any) -> None:
-        self.metadata = {"render_modes": []}
         self._one = CityVectorEnv(
             name, 1, autoreset_mode=AutoresetMode.DISABLED, threads=1, **options
         )
+        self.metadata, self.render_mode = self._one.metadata, self._one.render_mode
         self.observation_names = self._one.observation_names
         self.observation_space = self._one.single_observation_space
         self.action_space = self._one.single_action_space
@@ -46,6 +50,11 @@ class CityEnv(gymnasium.Env[Observation, Actions]):
         """Go on for one period with throttle and steering, -1 to 1, or the number of a choice."""
         seen, reward, ended, over, _ = self._one.step(np.array([action]))
         return seen[0], float(reward[0]), bool(ended[0]), bool(over[0]), {}
+
+    def render(self) -> Image | None:
+        """Return a picture of the world, (height, width, 3); None: there is no `render_mode`."""
+        pictures = self._one.render()
+        return None if pictures is None else pictures[0]
 
     def close(self) -> None:
         """Close it: it cannot be used any more."""

@@ -9,10 +9,11 @@ from gymnasium.error import ClosedEnvironmentError, Error, ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from scm.arrays import Bools, Floats, Ints
+from scm.arrays import Bools, Floats, Image, Ints
 from scm.gym.actions import Actions, action_space, checked
 from scm.gym.names import task_of
 from scm.gym.observations import Observation, Observations
+from scm.gym.picture import Picture, checked_mode, metadata_of
 from scm.gym.worlds import Options, Worlds
 
 Infos = dict[str, Any]
@@ -33,6 +34,7 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
             next step, in the same one, or by `reset` alone.
         threads: For the physics; None: one a core.
         copy: Whether each observation is an array of its own; else the next step writes over it.
+        render_mode: `rgb_array`: `render` returns pictures, one of each world.
         options: Of `Options`: another car file, and what is drawn for each episode.
 
     Attributes:
@@ -46,7 +48,8 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
 
     def __init__(
         self, name: str, num_envs: int = 1, *, autoreset_mode: AutoresetMode | str = "NextStep",
-        threads: int | None = None, copy: bool = True, **options: Any,
+        threads: int | None = None, copy: bool = True, render_mode: str | None = None,
+        **options: Any,
     ) -> None:  # fmt: skip
         task, map_name = task_of(name)
         worlds, rest = divmod(num_envs, task.agents)
@@ -56,7 +59,8 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
             raise Error(msg)
         self.name, self.num_envs, self._copy = name, num_envs, copy
         self._mode = AutoresetMode(autoreset_mode)
-        self.metadata = {"render_modes": [], "autoreset_mode": self._mode}
+        self.metadata = metadata_of(task) | {"autoreset_mode": self._mode}
+        self.render_mode = checked_mode(render_mode)
         threads = threads or len(os.sched_getaffinity(0))
         self.worlds = Worlds(task, map_name, worlds, Options(**options), threads)
         self._seen = Observations(self.worlds, task.observations)
@@ -67,6 +71,7 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._every: Bools = np.ones(num_envs, np.bool_)
         self._is_begun = False
+        self._picture: Picture | None = None
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: Infos | None = None
@@ -119,6 +124,14 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
             infos = self._final(ends | late)
             worlds.begin(worlds.are_out)
         return self._observed(), rewards, ends, late, infos | self._infos()
+
+    def render(self) -> tuple[Image, ...] | None:
+        """Return a picture of each world, (height, width, 3); None: there is no `render_mode`."""
+        if self.render_mode is None:
+            return None
+        if self._picture is None:
+            self._picture = Picture(self.worlds)
+        return tuple(self._picture.of(world) for world in range(self.worlds.count))
 
     def _infos(self) -> Infos:
         return {"present": self.worlds.present.copy(), "_present": self._every}

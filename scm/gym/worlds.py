@@ -68,6 +68,7 @@ class Worlds:
         rows: How many cars are agents'. What follows is of these (rows,), but for the fleet.
         fleet: All cars; row `world * agents + agent`, then those that rules drive.
         cars: Rows of each world's, agents' first, (worlds, cars).
+        way: How its cars drive: along lanes, or to goals.
         traffic: What drives those that are no agents'; None: there are none.
         radio: What they know of each other; None: the task has no radio.
         signals: The lights; None: the task has none.
@@ -98,7 +99,7 @@ class Worlds:
         self.fleet.threads = threads
         self.fleet.alive[:] = True
         lanes = task.lanes.get(self.city_map.name, ())
-        self._way: Way = (
+        self.way: Way = (
             ToGoal(self.city_map, rows, task.start)
             if isinstance(task.start, PlaceStart)
             else AlongLanes(self.city_map, self.cars, self._own, task.start, lanes)
@@ -185,7 +186,7 @@ class Worlds:
             where = shares[open_, tried, None] + cars / count
             these = (open_[:, None] * count + cars).ravel()
             draws[these, WHERE] = (where - np.floor(where)).ravel()
-            begun = self._way.begin(rows[these], draws[these])
+            begun = self.way.begin(rows[these], draws[these])
             poses[open_] = begun.reshape(-1, count, 3)
             apart = poses[open_, :, None, :2] - poses[open_, None, :, :2]
             is_near = np.hypot(apart[..., 0], apart[..., 1]) < self._apart_m
@@ -269,9 +270,9 @@ class Worlds:
         Raises:
             MapError: The task's cars drive to goals.
         """
-        if not isinstance(self._way, AlongLanes):
+        if not isinstance(self.way, AlongLanes):
             raise MapError(f"task {self.task.name}: its cars drive to goals, not along lanes")
-        return self._way
+        return self.way
 
     @property
     def to_goal(self) -> ToGoal:
@@ -280,9 +281,9 @@ class Worlds:
         Raises:
             MapError: The task's cars drive along lanes.
         """
-        if not isinstance(self._way, ToGoal):
+        if not isinstance(self.way, ToGoal):
             raise MapError(f"task {self.task.name}: its cars drive along lanes, not to goals")
-        return self._way
+        return self.way
 
     @property
     def course(self) -> Course:
@@ -291,14 +292,14 @@ class Worlds:
 
     def _look(self) -> None:
         """Find out where all cars are after a step."""
-        self._way.look(self.fleet)
+        self.way.look(self.fleet)
         motion = self.fleet.planar_cogs(self._every)
         self.touched = self._touching.find(motion, present=self.fleet.alive)[: self._own]
         self._look_around(np.arange(self.count), self._every[: self._own])
 
     def _look_at_start(self, worlds: Ints, rows: Ints, own: Ints) -> None:
         """Find out where cars are whose episode begins: they stand apart, and have not moved."""
-        self._way.look_at_start(self.fleet, rows)
+        self.way.look_at_start(self.fleet, rows)
         self.touched[own] = False
         self._look_around(worlds, own)
 

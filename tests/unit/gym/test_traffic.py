@@ -49,7 +49,7 @@ def put(worlds, row, lane, along, speed=0.0):
 
 def look(worlds):
     """Look at all cars where they are now; return what agents know."""
-    worlds._way.look(worlds.fleet)
+    worlds.way.look(worlds.fleet)
     every = np.arange(worlds.count)
     worlds.traffic.decide(every, worlds.fleet, np.full(worlds.count, -1.0))
     return worlds.traffic.known
