@@ -38,6 +38,7 @@ LONG = (
     "flow",
     "glosa",
     "gym",
+    "gym_transfer",
     "kill",
     "misbehaviour",
     "mismatch",

@@ -123,15 +123,28 @@ def advantages(driven: Driven, ended: np.ndarray, over: np.ndarray, last: np.nda
     return found
 
 
-def main() -> None:
-    """Train, print what is gained, and write the network."""
+def arguments() -> argparse.Namespace:
+    """Return what was given on the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("task", nargs="?", default="driving_school/lap-v1")
     parser.add_argument("--minutes", type=float, default=5.0)
+    parser.add_argument("--steps", type=float, default=np.inf, help="of all agents, at most")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--car", help="car file, such as one that scm mismatch found")
+    parser.add_argument("--randomise", type=float, default=0.0, help="its numbers, so many stds")
+    words = ("KEY", "LOW", "HIGH")
+    parser.add_argument("--range", nargs=3, action="append", default=[], metavar=words)
     parser.add_argument("--out", type=Path, default=Path("policy.onnx"))
-    given = parser.parse_args()
-    envs = scm.gym.make_vec(given.task, AGENTS, copy=False)
+    return parser.parse_args()
+
+
+def main() -> None:
+    """Train, print what is gained, and write the network."""
+    given = arguments()
+    ranges = {key: (float(low), float(high)) for key, low, high in given.range}
+    envs = scm.gym.make_vec(
+        given.task, AGENTS, copy=False, car=given.car, randomise=given.randomise, ranges=ranges
+    )
     columns = envs.single_observation_space.shape[0]
     key = jax.random.key(given.seed)
     key, first, second = jax.random.split(key, 3)
@@ -144,7 +157,7 @@ def main() -> None:
     raw, infos = envs.reset(seed=given.seed)
     usual.add(raw)
     begun_s, taken, returns, own = time.perf_counter(), 0, [], np.zeros(AGENTS)
-    while time.perf_counter() - begun_s < 60.0 * given.minutes:
+    while time.perf_counter() - begun_s < 60.0 * given.minutes and taken < given.steps:
         rows, ended, over = [], [], []
         for _ in range(STEPS):
             seen, present = usual.of(raw), infos["present"]

@@ -34,6 +34,10 @@ IsOff = Callable[[Floats], Bools]
 ELSEWHERE: tuple[Kind, ...] = ("place", "camera")
 OF_TAGS = ("pose_point", "pose_heading")
 OF_CAMERAS = ("camera_tilt", "pose_scale", "pose_latency", "clock_offset", "clock_drift")
+OF_FLOORS = (
+    "rolling_resistance", "stiction", "grade", "tyre_grip", "tyre_stiffness", "tyre_relaxation",
+    "viscous_drag", "corner_drag", "wind",
+)  # fmt: skip
 RADII_M = (0.2, 0.35, 0.6)
 GRID_M = 0.2  # between the middles of places
 MOST_PLACES = 200  # those that the car was at most
@@ -199,10 +203,10 @@ def causes_of(
 def _weighed(rows: Sequence[_Rows], numbers: Sequence[WatchedNumber]) -> _Weighed:
     """Return how likely each cause is by the windows of all cars."""
     own = next(one for one in rows if one.is_changed)
-    of_tags, of_cameras, of_sensors = _kinds(numbers)
+    of_tags, of_cameras, of_sensors, of_floors = _kinds(numbers)
     by_car = _evidence([own], [own.after])
     everywhere = _evidence(rows, [one.after for one in rows])
-    by_place, place = _of_places(rows, own, ~of_sensors)
+    by_place, place = _of_places(rows, own, of_floors)
     by_camera, camera = _of_cameras(rows, own, of_cameras)
     found: dict[Kind, float] = {
         "car": _mean(by_car[~of_tags & ~of_cameras]),
@@ -268,11 +272,12 @@ def _usually(places: Floats, after: Bools, score: Floats, information: Floats) -
     )
 
 
-def _kinds(numbers: Sequence[WatchedNumber]) -> tuple[Bools, Bools, Bools]:
-    """Return which numbers are a tag's, a camera's, and a sensor's at all."""
+def _kinds(numbers: Sequence[WatchedNumber]) -> tuple[Bools, Bools, Bools, Bools]:
+    """Return which numbers are a tag's, a camera's, a sensor's at all, and what a floor does."""
     effects = [one.effect for one in numbers]
     of_sensors = np.array([one.equation == "sensor" for one in numbers])
-    return np.isin(effects, OF_TAGS), np.isin(effects, OF_CAMERAS), of_sensors
+    of_floors = np.isin(effects, OF_FLOORS)
+    return np.isin(effects, OF_TAGS), np.isin(effects, OF_CAMERAS), of_sensors, of_floors
 
 
 def _evidence(rows: Sequence[_Rows], affected: Sequence[Bools]) -> Floats:
