@@ -29,6 +29,7 @@ from scm.twin.places import EFFECTS, PlaceWatch
 from scm.twin.windows import EVERY_S, WatchedNumber
 
 PRIOR = {"car": 0.45, "tag": 0.1, "place": 0.2, "camera": 0.1, "everywhere": 0.15}
+SELDOM = math.log(0.25)  # a car's change that shows at one place only, as where it brakes
 SURE, POSSIBLE, NEAR = 0.9, 0.1, 0.01  # probabilities; nearer than that are the same
 IsOff = Callable[[Floats], Bools]
 ELSEWHERE: tuple[Kind, ...] = ("place", "camera")
@@ -208,8 +209,10 @@ def _weighed(rows: Sequence[_Rows], numbers: Sequence[WatchedNumber]) -> _Weighe
     everywhere = _evidence(rows, [one.after for one in rows])
     by_place, place = _of_places(rows, own, of_floors)
     by_camera, camera = _of_cameras(rows, own, of_cameras)
+    of_cars = ~of_tags & ~of_cameras
+    at_a_place, _ = _of_places([own], own, of_cars)
     found: dict[Kind, float] = {
-        "car": _mean(by_car[~of_tags & ~of_cameras]),
+        "car": float(np.logaddexp(_mean(by_car[of_cars]), at_a_place + SELDOM)),
         "tag": _mean(by_car[of_tags]),
         "place": by_place,
         "camera": by_camera,

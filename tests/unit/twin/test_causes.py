@@ -88,6 +88,25 @@ def test_one_car_alone_does_not_tell_its_change_from_that_of_everything():
     assert found["everywhere"] > 0.1
 
 
+@pytest.mark.parametrize("information", [1.0, 1e-3])
+def test_change_that_one_car_alone_shows_at_a_place_is_not_the_floor_s(information):
+    """Others drive there and show nothing, however little they could show."""
+
+    def shown(kind):
+        others = [drives(k) for k in (2, 3)]
+        for one in others:
+            one.scores, one.information = (
+                one.scores * information**0.5,
+                one.information * information,
+            )
+        found = causes(drives(1, lambda *at: 4.0 * in_bend(*at)), *others)
+        return {one.kind: one.probability for one in found}[kind]
+
+    assert shown("place") < 0.9
+    if information == 1.0:
+        assert shown("car") > 0.9
+
+
 def test_bend_where_a_car_always_strays_is_no_place_that_changed():
     """Both drive on as before, the first with a change of its own."""
 
