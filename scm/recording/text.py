@@ -59,7 +59,7 @@ def read(path: Path, selection: Selection) -> Columns:
     Raises:
         RecordingError: naming the line, when it has no names, no common width, or is no text.
     """
-    csv.field_size_limit(limits.MAX_BYTES)
+    csv.field_size_limit(max(csv.field_size_limit(), limits.MAX_BYTES))  # of the whole process
     text, is_cut = _text(path)
     return _Table(path, text, selection, is_cut=is_cut).columns()
 

@@ -1,5 +1,6 @@
 """Tables as people write them: every common dialect is read, and a bad cell is named."""
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +89,14 @@ def test_a_file_that_is_too_large_is_refused(
     np.savez(tmp_path / "large.npz", t=np.zeros(9))
     with pytest.raises(RecordingError, match="split it"):
         read_table(tmp_path / "large.npz")
+
+
+def test_reading_a_table_leaves_other_tables_of_the_process_their_fields(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "MAX_BYTES", 12)
+    columns(tmp_path, PLAIN)
+    assert next(csv.reader(["from,to,vehicles_per_hour"]))[2] == "vehicles_per_hour"
 
 
 def test_an_npz_of_text_and_objects_is_read_as_far_as_it_is_numbers(tmp_path: Path) -> None:
