@@ -140,26 +140,6 @@ def test_car_that_stands_within_both_tolerances_is_parked():
     assert is_parked(0.04, 0.08, 0.0, 0.05, 0.0873)
 
 
-def test_world_is_the_same_bit_by_bit_whatever_their_number():
-    def played(first, count):
-        envs = scm.gym.make_vec(LOT, count)
-        seen = [envs.reset(seed=7 + first)[0]]
-        ahead = np.linspace(0.4, 1.0, 9)[first : first + count]
-        given = np.column_stack((ahead, 1.0 - ahead))
-        ended = 0
-        for _ in range(250):
-            now, gain, end, *_ = envs.step(given)
-            seen.append(np.column_stack((now, gain, end)))
-            ended += end.sum()
-        return seen, ended
-
-    together, ended = played(0, 9)
-    assert ended > 5
-    alone, _ = played(4, 2)
-    pairs = zip(together, alone, strict=True)
-    assert all(np.array_equal(one[4:6], other) for one, other in pairs)
-
-
 def test_map_without_bays_or_places_and_parts_of_lanes_are_refused():
     empty = replace(load_map("parking_lot"), bays=())
     with pytest.raises(MapError, match="map parking_lot: expected bays, and spawns"):

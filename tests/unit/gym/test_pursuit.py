@@ -96,22 +96,3 @@ def test_contact_with_the_pursued_car_ends_the_episode():
     put_agent(worlds, Pose2(-0.28, 0.0, 0.0))
     worlds.step(np.zeros((1, 2)))
     assert worlds.ends().all()
-
-
-def test_world_is_the_same_bit_by_bit_whatever_their_number():
-    def played(first, count):
-        envs = scm.gym.make_vec(PURSUIT, count)
-        seen = [envs.reset(seed=40 + first)[0]]
-        ahead = np.linspace(0.0, 1.0, 9)[first : first + count]
-        ended = 0
-        for _ in range(200):
-            now, gain, end, *_ = envs.step(np.column_stack((ahead, 0.1 * ahead)))
-            seen.append(np.column_stack((now, gain, end)))
-            ended += end.sum()
-        return seen, ended
-
-    together, ended = played(0, 9)
-    assert ended > 5
-    alone, _ = played(4, 2)
-    pairs = zip(together, alone, strict=True)
-    assert all(np.array_equal(one[4:6], other) for one, other in pairs)

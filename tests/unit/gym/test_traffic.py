@@ -211,25 +211,6 @@ def test_agent_s_contact_with_a_rule_driven_car_counts_and_that_of_others_does_n
     assert marks.tolist() == [False, True, False, False, False, True, True, True]
 
 
-def test_world_is_the_same_bit_by_bit_whatever_their_number():
-    def played(first, count):
-        envs = scm.gym.make_vec("market_town/traffic-v1", count, randomise=1.0)
-        seen = [envs.reset(seed=40 + first)[0]]
-        ahead = np.linspace(0.0, 1.0, 9)[first : first + count]
-        ended = 0
-        for _ in range(200):
-            now, gain, end, *_ = envs.step(np.column_stack((ahead, 0.1 * ahead)))
-            seen.append(np.column_stack((now, gain, end)))
-            ended += end.sum()
-        return seen, ended
-
-    together, ended = played(0, 9)
-    assert ended > 5
-    alone, _ = played(4, 2)
-    pairs = zip(together, alone, strict=True)
-    assert all(np.array_equal(one[4:6], other) for one, other in pairs)
-
-
 def test_observation_of_traffic_needs_traffic():
     lap = scm.gym.make_vec("driving_school/lap-v1", 1).worlds
     with pytest.raises(TypeError, match="task lap: `ahead` needs cars that rules drive"):
