@@ -13,6 +13,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def scene(
         )
         drive = record(CAR, numbers, faults, LASTS_S, rng)
         if "camera" in kinds:
-            drive = replace(drive, poses=by_one_camera(sunk(drive.poses, since_s, scale)))
+            drive = replace(drive, poses=sunk(drive.poses, since_s, scale))
         if "place" in kinds:
             patched += is_through(drive.poses, since_s, drawn["place"][0][2].parameters)
         write(drive, CAR, before, folder / str(k))
@@ -101,19 +102,10 @@ def sunk(poses: Floats, since_s: float, scale: float) -> Floats:
     return poses
 
 
-def by_one_camera(poses: Floats) -> Floats:
-    """Return the poses of the camera that saw a car most, for each ten seconds."""
-    west, look = poses[:, 1] < 0.0, (poses[:, 0] // SPAN_S).astype(int)
-    seen = np.bincount(look)
-    is_west = np.bincount(look, west) > 0.5 * seen
-    return poses[west == is_west[look]]
-
-
-def camera_of(recording: Recording, first_s: float) -> str:
-    """Return which camera saw a car most in ten seconds."""
+def camera_of(recording: Recording, t_s: float) -> str:
+    """Return which camera saw a car."""
     x = recording.channels["pose.x"]
-    there = (x.t >= first_s) & (x.t < first_s + SPAN_S)
-    return "west" if there.any() and float(np.mean(x.values[there] < 0.0)) > 0.5 else "east"
+    return "west" if float(np.interp(t_s, x.t, x.values)) < 0.0 else "east"
 
 
 @dataclass(slots=True)
@@ -142,7 +134,7 @@ def judged(
         for (name, watch), recording in zip(watches.items(), recordings, strict=True):
             part = part_of(recording, first_s - BEFORE_S, first_s + SPAN_S + AFTER_S)
             try:
-                one = watch.look(part, first_s, first_s + SPAN_S, camera_of(recording, first_s))
+                one = watch.look(part, first_s, first_s + SPAN_S, partial(camera_of, recording))
             except RecordingError:
                 continue
             if one and not any(had.vehicle == name and not had.is_place for had in noticed):

@@ -4,8 +4,9 @@ Times of several recordings follow one another; the first keeps its own.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from scm.arrays import Floats, Ints
 from scm.mismatch.findings import Estimate
@@ -135,3 +136,17 @@ class Evidence:
     retuned_m: float | None = None
     pauses: tuple[tuple[float, float], ...] = ()
     widened: tuple[str, ...] = ()
+
+
+def without_pauses(t_s: float, pauses: Sequence[tuple[float, float]]) -> float:
+    """Return a time on the recording's clock as it is drawn; in a pause, where this was cut out.
+
+    Args:
+        t_s: On the recording's clock.
+        pauses: As `Evidence.pauses`.
+    """
+    drawn_s = t_s
+    for (first_s, later_s), (end_s, _) in pairwise((*pauses, (math.inf, 0.0))):
+        if t_s - later_s >= first_s:
+            drawn_s = min(t_s - later_s, end_s)
+    return drawn_s

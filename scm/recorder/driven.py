@@ -12,9 +12,9 @@ collision no car's poses count for at least a second, and until the car is away 
 import math
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -39,6 +39,7 @@ MAX_COMMAND_AGE_NS = NS_PER_S // 4  # of a report, for its command to be known
 TICK_NS, RUN_IN_NS = 20 * NS_PER_MS, NS_PER_S
 HIT, BEFORE_HIT_NS, AFTER_HIT_NS, AWAY_M = "contact", NS_PER_S // 10, NS_PER_S, 0.3
 SIMULATED = "simulated"
+LOST_FRAMES = 3.0  # without the car: another camera may have it
 # Reasons for not counting rows, printed after their number.
 HIT_LATELY = "until a second after a hit and 0.3 m away"
 STOPPED = "while its guard stopped it"
@@ -121,6 +122,28 @@ class Stretch(NamedTuple):
     epoch: int
 
 
+def by_one_camera(seen: Mapping[str, Sequence[EyePose]]) -> list[EyePose]:
+    """Return poses of a car in their order, by one camera at a time.
+
+    The first camera goes on until it has lost the car: no two cameras agree exactly, and poses that
+    jumped to and fro between them would look like noise.
+
+    Args:
+        seen: By each camera.
+    """
+    lost_ns = {
+        camera: LOST_FRAMES * float(np.median(np.diff(sorted(one.t_ns for one in poses))))
+        for camera, poses in seen.items()
+        if len(poses) > 1
+    }
+    chosen = list[EyePose]()
+    for pose in sorted(chain(*seen.values()), key=lambda one: one.t_ns):
+        last = chosen[-1] if chosen else pose
+        if pose.camera == last.camera or pose.t_ns - last.t_ns > lost_ns.get(last.camera, 0.0):
+            chosen.append(pose)
+    return chosen
+
+
 def reports_commands(messages: CarMessages) -> bool:
     """Return whether a car's reports include the steering."""
     return any(report.steering is not None for report in messages.reports)
@@ -131,8 +154,7 @@ def recording_of(
 ) -> Recording:
     """Return the messages about a car as a recording, with times since `start_ns`.
 
-    Poses of a simulated car are those it reports, of a real one those of the overhead camera that
-    saw it most.
+    Poses of a simulated car are those it reports, of a real one those of the overhead cameras.
 
     Args:
         messages: All of them.
@@ -192,8 +214,8 @@ class _Drive:
         ]
         std = REPORTED_M, REPORTED_M, REPORTED_RAD
         if not rows:
-            seen = max(self._messages.seen.values(), key=len, default=[])
-            rows = sorted((pose.t_ns, pose.x_m, pose.y_m, pose.yaw_rad) for pose in seen)
+            seen = by_one_camera(self._messages.seen)
+            rows = [(pose.t_ns, pose.x_m, pose.y_m, pose.yaw_rad) for pose in seen]
             variances = [pose.covariance[::4] for pose in seen] or [(np.nan,) * 3]
             std = tuple(np.sqrt(np.maximum(np.median(variances, axis=0), 1e-12)))
         t = np.array([row[0] for row in rows], np.int64)

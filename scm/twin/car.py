@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Literal
 
@@ -18,7 +19,7 @@ from msgspec import structs
 from scm.clock import nanoseconds, seconds
 from scm.disturbances import Disturbances
 from scm.errors import CarError, RecordingError
-from scm.recorder.driven import SIMULATED, CarMessages, recording_of
+from scm.recorder.driven import SIMULATED, CarMessages, by_one_camera, recording_of
 from scm.recording.read import Recording
 from scm.records.twins import TwinChange, TwinDrive, TwinVersion
 from scm.twin.causes import ELSEWHERE, cause_in_words, located
@@ -184,7 +185,7 @@ class TwinCar:
             if void:
                 raise RecordingError(void[0])
             first_s = seconds(first_ns - self._begin_ns)
-            self._memory.add(self._recording(), first_s, first_s + SPAN_S, self._camera())
+            self._memory.add(self._recording(), first_s, first_s + SPAN_S, self._cameras())
         finally:
             self._messages.forget(self.next_ns - BEFORE_NS)
 
@@ -200,10 +201,13 @@ class TwinCar:
         messages = seen_by_eye(messages) if self._is_seen else messages
         return recording_of(messages, Path(NAME), self.name, self._begin_ns)
 
-    def _camera(self) -> str:
-        """Return which camera saw the car most; empty: none, or the car itself is the witness."""
-        seen = self._messages.seen
-        return max(seen, key=lambda name: len(seen[name])) if self._is_seen and seen else ""
+    def _cameras(self) -> list[tuple[float, str]]:
+        """Return which cameras saw the car, each from when on; none if it is its own witness."""
+        if not self._is_seen:
+            return []
+        of_cameras = groupby(by_one_camera(self._messages.seen), lambda pose: pose.camera)
+        firsts = [(next(poses).t_ns, camera) for camera, poses in of_cameras]
+        return [(seconds(t_ns - self._begin_ns), camera) for t_ns, camera in firsts]
 
     def _watch_on(self, watch: CarWatch) -> list[Outgoing]:
         """Look at ten seconds of the memory; return a change, if they show one."""
@@ -211,7 +215,7 @@ class TwinCar:
         self._watched_s = last_s = first_s + SPAN_S
         recording = self._memory.between(first_s - BEFORE_S, last_s + AFTER_S)
         before_s = watch.driven_s
-        noticed = watch.look(recording, first_s, last_s, self._memory.camera_at(first_s))
+        noticed = watch.look(recording, first_s, last_s, self._memory.camera_at)
         if first_s >= self._looked_s:
             self._looked_s = last_s
             self._driven_s += watch.driven_s - before_s

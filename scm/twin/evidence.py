@@ -55,13 +55,12 @@ class Evidence:
             numbers, np.empty(0), np.empty((0, 2)), names, empty, empty, empty, np.ones(count)
         )  # fmt: skip
 
-    def add(self, windows: Windows, usual: Usual, camera: str = "") -> None:
-        """Add new windows; the oldest are forgotten."""
+    def add(self, windows: Windows, usual: Usual, cameras: NDArray[np.str_]) -> None:
+        """Add new windows, and by which camera each was seen; the oldest are forgotten."""
         shown = weighed(windows, usual)
-        names = np.full(len(windows.begin_s), camera, dtype=np.str_)
         self.t_s = np.concatenate((self.t_s, windows.begin_s))[-self.most :]
         self.places = np.concatenate((self.places, windows.places))[-self.most :]
-        self.cameras = np.concatenate((self.cameras, names))[-self.most :]
+        self.cameras = np.concatenate((self.cameras, cameras))[-self.most :]
         self.scores = np.concatenate((self.scores, shown[NEAR]))[-self.most :]
         self.information = np.concatenate((self.information, shown[INFORMATION]))[-self.most :]
         self.whole = np.concatenate((self.whole, shown[WHOLE]))[-self.most :]

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ class _Piece:
     first_s: float
     last_s: float
     recording: Recording
-    camera: str
+    cameras: Sequence[tuple[float, str]]
 
 
 class CarMemory:
@@ -41,16 +42,19 @@ class CarMemory:
         self._pieces = deque[_Piece]()
         self.last_s = -math.inf
 
-    def add(self, recording: Recording, first_s: float, last_s: float, camera: str = "") -> None:
+    def add(
+        self, recording: Recording, first_s: float, last_s: float,
+        cameras: Sequence[tuple[float, str]] = (),
+    ) -> None:  # fmt: skip
         """Add what was recorded from `first_s` on, on the recording's clock.
 
         Args:
             recording: May go on after `last_s`: that counts until the next is added.
             first_s: What was recorded before does not count.
             last_s: Until when all is there.
-            camera: By which the car was seen; empty: by none.
+            cameras: By which the car was seen, each with its first moment; empty: by none.
         """
-        self._pieces.append(_Piece(first_s, last_s, _from(recording, first_s, math.inf), camera))
+        self._pieces.append(_Piece(first_s, last_s, _from(recording, first_s, math.inf), cameras))
         self.last_s = last_s
         while self._pieces[0].last_s < last_s - MEMORY_S:
             self._pieces.popleft()
@@ -61,8 +65,10 @@ class CarMemory:
         return next(later, self.last_s)
 
     def camera_at(self, t_s: float) -> str:
-        """Return which camera saw the car at a time; empty: none."""
-        return next((one.camera for one in self._pieces if one.first_s <= t_s < one.last_s), "")
+        """Return which camera saw the car at a time, or last before it; empty: none."""
+        piece = next((one for one in reversed(self._pieces) if one.first_s <= t_s), None)
+        cameras = () if piece is None else piece.cameras
+        return next((camera for first_s, camera in reversed(cameras) if first_s <= t_s), "")
 
     def between(self, first_s: float, last_s: float) -> Recording:
         """Return what was driven in a span.

@@ -4,11 +4,12 @@ Each span is predicted with what was recorded before it and a second of what com
 smoothed poses are better. After a change the car is another one: how it strays is learned anew.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scm.clock import nanoseconds
 from scm.data_quality.prepare import screen, stretches
@@ -27,6 +28,9 @@ SPAN_S, PART_S = 10.0, 100.0  # parts are cut out at once: a cut reads all that 
 BEFORE_S, AFTER_S = 2.0, 1.0
 ANEW_S = 360.0  # of driving after a change: until then it is judged by what was before
 SPANS_A_PLACE = 3  # after so many, places are looked at: each half minute
+
+
+CameraAt = Callable[[float], str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +78,7 @@ class CarWatch:
         self._detector = Detector(threshold)
         self._streams: tuple[str, ...] | None = None
         self._usual: Usual | None = None
-        self._early = list[tuple[Windows, str]]()  # until it is known how the car strays
+        self._early = list[tuple[Windows, NDArray[np.str_]]]()  # until its usual straying is known
         self.evidence = Evidence.none(predictor.watched)
         self.driven_s = self.highest = self._changed_s = 0.0
 
@@ -89,21 +93,23 @@ class CarWatch:
         return self._detector.is_learning
 
     def look(
-        self, recording: Recording, first_s: float, last_s: float, camera: str = ""
-    ) -> Noticed | None:
+        self, recording: Recording, first_s: float, last_s: float,
+        camera_at: CameraAt = lambda _: "",
+    ) -> Noticed | None:  # fmt: skip
         """Look at a span of a recording, once; return the change that it shows, if it does.
 
         Args:
             recording: With what surrounds the span, if there is any.
             first_s: On the recording's clock.
             last_s: Likewise.
-            camera: That saw the car in it, if one did.
+            camera_at: Returns which camera saw the car at a time; empty: none.
         """
         change, self.highest = None, 0.0
-        for windows in self._windows(recording, first_s, last_s):
+        for found in self._windows(recording, first_s, last_s):
+            windows, cameras = by_one_camera(found, camera_at)
             self.driven_s += EVERY_S * len(windows.begin_s)
             change = change or self._detector.update(windows)
-            self._remember(windows, camera)
+            self._remember(windows, cameras)
             self.highest = max(self.highest, self._detector.highest)
         if change is None:
             return None
@@ -114,7 +120,7 @@ class CarWatch:
         alike = tuple((watched[number], size) for number, size in change.alike)
         return Noticed(change, watched[change.number], alike, driven_s)
 
-    def _remember(self, windows: Windows, camera: str) -> None:
+    def _remember(self, windows: Windows, cameras: NDArray[np.str_]) -> None:
         """Add windows to the evidence, weighed by how the car strays; early ones when it is known.
 
         All are weighed by what was learned first: otherwise they could not be compared. Some time
@@ -125,7 +131,7 @@ class CarWatch:
         if self._usual is None or (is_over and usual is not None):
             most, self._usual = self.evidence.most, usual
             self.evidence = replace(Evidence.none(self._predictor.watched), most=most)
-        self._early.append((windows, camera))
+        self._early.append((windows, cameras))
         if self._usual is not None:
             for early, by in self._early:
                 self.evidence.add(early, self._usual, by)
@@ -153,6 +159,20 @@ class CarWatch:
         """Learn by these streams; what was learned without one of them says nothing of it."""
         self._streams, self._detector, self.driven_s = streams, Detector(self._threshold), 0.0
         self._early.clear()
+
+
+def by_one_camera(
+    windows: Windows, camera_at: CameraAt
+) -> tuple[Windows, NDArray[np.str_]]:  # fmt: skip
+    """Return the windows without those in which another camera takes over, and their cameras.
+
+    No two cameras agree exactly, so the car would seem to have moved there.
+    """
+    first, last = (
+        np.array([camera_at(t_s) for t_s in times_s.tolist()], dtype=np.str_)
+        for times_s in (windows.begin_s, windows.begin_s + LENGTH_S)
+    )
+    return windows.where(first == last), first[first == last]
 
 
 def watch(recording: Recording, car: CarWatch) -> list[Noticed]:

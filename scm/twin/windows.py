@@ -12,7 +12,7 @@ from math import pi
 
 import numpy as np
 
-from scm.arrays import Floats
+from scm.arrays import Bools, Floats
 from scm.mismatch.effect_catalogue import Candidate, Parameter, candidates, terms_needed
 from scm.mismatch.findings import Equation
 from scm.mismatch.fit.noise import Noise, usual_noise
@@ -68,7 +68,14 @@ class Windows:
 
     def between(self, first_s: float, last_s: float) -> "Windows":
         """Return the windows that begin in a span of time."""
-        these = (self.begin_s >= first_s) & (self.begin_s < last_s)
+        return self.where((self.begin_s >= first_s) & (self.begin_s < last_s))
+
+    def where(self, these: Bools) -> "Windows":
+        """Return some of the windows.
+
+        Args:
+            these: Whether each is one, (n,).
+        """
         return replace(
             self, begin_s=self.begin_s[these], places=self.places[these],
             misses=self.misses[these], slopes=self.slopes[these],

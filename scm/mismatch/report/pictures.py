@@ -5,10 +5,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 
 from scm.maps.svg import element
-from scm.mismatch.evidence import Curve, Evidence, RefittedParameter, Tried
-from scm.mismatch.findings import Diagnosis
+from scm.mismatch.evidence import Curve, Evidence, RefittedParameter, Tried, without_pauses
+from scm.mismatch.findings import Diagnosis, Effect, Estimate
 from scm.mismatch.report.drive_pictures import error_pictures, floor_map, time_line, window_pictures
 from scm.mismatch.report.plot import (
     TEXT_PX,
@@ -83,7 +84,7 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Pict
             evidence.free_runs,
             after,
             clock,
-            [at for e in diagnosis.effects for at in (e.since_s, e.until_s) if at is not None],
+            _moments_drawn(diagnosis.effects, evidence.pauses, start_s),
         ),
         curves=_curves(evidence.curves),
         windows=window_pictures(evidence.free_runs),
@@ -91,6 +92,21 @@ def draw(diagnosis: Diagnosis, evidence: Evidence, start_s: float = 0.0) -> Pict
         numbers=_numbers(evidence.refitted),
         tried=_tried(evidence.tried, [effect.name for effect in diagnosis.effects]),
     )
+
+
+def _moments_drawn(
+    effects: Sequence[Effect], pauses: Sequence[tuple[float, float]], start_s: float
+) -> list[Estimate]:
+    """Return when effects changed, as it is drawn: without pauses."""
+
+    def drawn(t_s: float) -> float:
+        return without_pauses(t_s + start_s, pauses) - start_s
+
+    moments = [at for one in effects for at in (one.since_s, one.until_s) if at is not None]
+    return [
+        structs.replace(at, value=drawn(at.value), low=drawn(at.low), high=drawn(at.high))
+        for at in moments
+    ]
 
 
 def _better(diagnosis: Diagnosis, retuned_m: float | None = None) -> Picture | None:

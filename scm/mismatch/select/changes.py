@@ -40,13 +40,16 @@ STRONGER = 1.0, 1.5, 2.25  # times what the screen finds: it weighs disturbed ev
 def span_of(base: Hypothesis) -> tuple[float, float] | None:
     """Return the span of the recording in which changes may be searched for, on its clock.
 
-    None where there are several recordings: a moment of one means nothing in another.
+    None where there are several recordings: a moment of one means nothing in another. Stretches of
+    one recording have one clock.
     """
-    if len(base.model.drives) != 1:
+    drives = base.model.drives
+    if len({(drive.recording.path, drive.recording.name) for drive in drives}) > 1:
         return None
-    edges = base.model.drives[0].edges
-    span = float(edges[0]), float(edges[-1])
-    return span if span[1] - span[0] >= LEAST_S else None
+    first_s = min(float(drive.edges[0]) for drive in drives)
+    last_s = max(float(drive.edges[-1]) for drive in drives)
+    driven_s = sum(float(np.ptp(drive.edges)) for drive in drives)
+    return (first_s, last_s) if driven_s >= LEAST_S else None
 
 
 def changes_to_try(

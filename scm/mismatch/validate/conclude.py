@@ -124,7 +124,8 @@ def conclude(selected: Selected, notify: Notify) -> Result:
     if fit is not None and valid.free_runs is not None:
         fit = structs.replace(fit, stated=stated_by(car, valid.free_runs))
     located, residuals = locate(retuned, best)
-    located = since_changes(located, effects, float(selected.drives[0].edges[-1]))
+    end_s = float(selected.drives[-1].edges[-1])
+    located = since_changes(located, effects, end_s, _pauses(selected))
     suggestions = () if selected.context.by_windows else undecided_of(selected, best, notify)
     undecided = tuple(suggestion.undecided for suggestion in suggestions)
     verdict = Verdict.MISMATCH

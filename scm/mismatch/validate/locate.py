@@ -14,7 +14,7 @@ from msgspec import structs
 from scm.arrays import Bools, Floats, Ints
 from scm.data_quality.quality import Span
 from scm.mismatch.effect_catalogue import Candidate
-from scm.mismatch.evidence import FreeRuns, Residual
+from scm.mismatch.evidence import FreeRuns, Residual, without_pauses
 from scm.mismatch.findings import Effect, Equation, Fit, Located, Place
 from scm.mismatch.fit.fitter import TAIL, Fitter
 from scm.mismatch.fit.hypothesis import Hypothesis
@@ -227,8 +227,9 @@ def _named(effect: Candidate, values: Floats) -> Place | None:
 
 
 def since_changes(
-    located: Sequence[Located], effects: Sequence[Effect], end_s: float
-) -> tuple[Located, ...]:
+    located: Sequence[Located], effects: Sequence[Effect], end_s: float,
+    pauses: Sequence[tuple[float, float]] = (),
+) -> tuple[Located, ...]:  # fmt: skip
     """Return what was located with its time, where effects began at a moment.
 
     Args:
@@ -236,6 +237,7 @@ def since_changes(
             was there before.
         effects: That were found.
         end_s: Of the recording, on its clock.
+        pauses: As `Evidence.pauses`: where something was located is known without them.
     """
     found = list[Located]()
     for one in located:
@@ -250,7 +252,8 @@ def since_changes(
         is_late = one.when_s is None and bool(spans) and len(spans) == len(began)
         when_s = one.when_s
         if is_late:
-            when_s = ((min(since for since, _ in spans), max(until for _, until in spans)),)
+            ends = min(since for since, _ in spans), max(until for _, until in spans)
+            when_s = ((without_pauses(ends[0], pauses), without_pauses(ends[1], pauses)),)
         found.append(structs.replace(one, when_s=when_s))
     return tuple(found)
 

@@ -3,12 +3,22 @@
 import math
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from msgspec import structs
 
-from scm.mismatch.changing_effect import EDGE_S, LEAST_S, RARE, changing, may_change, moments_in
+from scm.data_quality.prepare import between
+from scm.mismatch.changing_effect import (
+    EDGE_S,
+    LEAST_S,
+    RARE,
+    ChangingEffect,
+    changing,
+    may_change,
+    moments_in,
+)
 from scm.mismatch.findings import Course, Effect, Estimate, Located
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import together
@@ -22,8 +32,9 @@ from scm.mismatch.validate.explain import _moment
 from scm.mismatch.validate.found_car import CarFiles
 from scm.mismatch.validate.locate import since_changes
 from scm.mismatch.validate.stages import as_it_was, at_shares, spans_of
+from scm.replay.drive import Drive
 from tests.unit.mismatch import made_up_findings as made_up
-from tests.unit.mismatch.made_drive import big_nigel, driven, nigel
+from tests.unit.mismatch.made_drive import big_nigel, driven, made_drive, nigel
 from tests.unit.mismatch.made_fit import candidate
 
 SINCE_S, SPAN = 15.0, (0.0, 30.0)
@@ -329,6 +340,41 @@ def test_the_error_of_an_effect_that_began_is_located_in_time():
     changed = structs.replace(late, before=effect.parameters)
     assert since_changes(located, [changed], 90.0) == located
     assert since_changes(located, [late, effect], 90.0) == located
+
+
+def test_what_is_located_by_a_change_after_a_pause_is_where_the_pause_was_cut_out():
+    found = made_up.CASES["one_effect"]()[0]
+    effect = found.effects[0]
+    since = Estimate(value=142.0, low=141.2, high=143.1, unit="s")
+    late = structs.replace(effect, course=Course.STEP, since_s=since)
+    located = tuple(structs.replace(one, when_s=None) for one in found.located)
+    pauses = ((0.0, 0.0), (30.5, 100.0))  # the first 30 s, and what is from 130.5 s on
+    moved = since_changes(located, [late], 190.0, pauses)
+    assert {one.when_s for one in moved if one.equation is effect.equation} == {((42.0, 90.0),)}
+
+
+def test_moment_is_found_where_the_recording_has_pauses():
+    whole = made_drive(seconds=30.0, sense=_late)
+    drives = [Drive(between(whole, *ends), big_nigel()) for ends in ((0.0, 10.0), (11.5, 30.0))]
+    model = Likelihood.of(drives, big_nigel())
+    context = context_of(model, "gyro_bias", "gyro_scale", "accel_bias")
+    fitter = context.fitter(model)
+    (base,) = fitter.refine([fitter.unfitted()], rounds=2, fresh=True)
+    best = extend(context, base).alternatives[0]
+    assert (best.effects[0].name, best.effects[0].course) == ("gyro_bias", Course.STEP)
+    assert best.values[-1] == pytest.approx(SINCE_S, abs=1.0)
+
+
+def test_moment_of_one_of_two_recordings_is_not_searched_for():
+    one = made_drive(seconds=30.0, sense=_late)
+    drives = [Drive(replace(one, path=Path(name)), big_nigel()) for name in ("a.mcap", "b.mcap")]
+    model = Likelihood.of(drives, big_nigel())
+    context = context_of(model, "gyro_bias")
+    fitter = context.fitter(model)
+    (base,) = fitter.refine([fitter.unfitted()], rounds=2, fresh=True)
+    found = extend(context, base).alternatives
+    assert found
+    assert not any(isinstance(one.effects[0], ChangingEffect) for one in found)
 
 
 def test_before_a_change_the_car_s_own_number_counts():

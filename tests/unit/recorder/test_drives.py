@@ -400,7 +400,7 @@ def test_commands_that_the_car_refuses_do_not_count(tmp_path: Path) -> None:
     assert_allclose(drive.channel("command.throttle").values, [0.5, 1.0, 0.0, 0.0])
 
 
-def test_a_real_car_is_where_the_camera_that_saw_it_most_says(tmp_path: Path) -> None:
+def test_a_real_car_is_where_one_camera_sees_it_though_another_does_too(tmp_path: Path) -> None:
     states = [reported(ms, source="odometry") for ms in range(0, 1000, 20)]
     commands = [told(ms) for ms in range(0, 1000, 100)]
     poses = [seen(ms, x_m=1.0) for ms in range(0, 1000, 100)] + [seen(50, "side", x_m=2.0)]
@@ -408,6 +408,19 @@ def test_a_real_car_is_where_the_camera_that_saw_it_most_says(tmp_path: Path) ->
     assert_allclose(drive.channel("pose.x").values, [1.0] * 10)
     stds = [drive.channel(f"pose.{name}").std for name in ("x", "y", "yaw")]
     assert_allclose(stds, [0.002, 0.003, 0.01])
+
+
+def test_another_camera_takes_over_where_the_first_has_lost_the_car(tmp_path: Path) -> None:
+    states = [reported(ms, source="odometry") for ms in range(0, 3000, 20)]
+    commands = [told(ms) for ms in range(0, 3000, 100)]
+    west = [*range(0, 1000, 100), *range(1200, 1500, 100)]  # two frames lost: still its car
+    poses = [seen(ms, "west", x_m=1.0) for ms in west]
+    poses += [seen(ms + 30, "east", x_m=2.0) for ms in range(800, 3000, 100)]
+    (drive,) = read_drives(said(tmp_path / "a.mcap", *states, *commands, *reversed(poses)))
+    x = drive.channel("pose.x")
+    assert_allclose(x.values, [1.0] * len(west) + [2.0] * (len(x.t) - len(west)))
+    assert_allclose(x.t[len(west) - 1 : len(west) + 1], [1.4, 1.73], atol=0.011)
+    assert x.t[-1] == pytest.approx(2.93, abs=0.011)
 
 
 def test_a_real_car_that_no_camera_saw_is_refused(tmp_path: Path) -> None:

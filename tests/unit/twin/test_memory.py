@@ -47,6 +47,16 @@ def test_gap_is_skipped_and_nothing_driven_is_refused_in_words(drive):
         memory.between(12.0, 18.0)
 
 
+def test_camera_is_the_one_that_saw_the_car_then_or_last(drive):
+    memory = CarMemory()
+    memory.add(drive, 0.0, 10.0, [(0.0, "west"), (7.0, "east")])
+    memory.add(drive, 10.0, 20.0, [(9.0, "east"), (14.0, "west")])
+    memory.add(drive, 20.0, 30.0)
+    at = {3.0: "west", 7.0: "east", 9.9: "east", 10.0: "east", 13.9: "east", 14.0: "west"}
+    assert {t_s: memory.camera_at(t_s) for t_s in at} == at
+    assert memory.camera_at(25.0) == memory.camera_at(-1.0) == ""
+
+
 def test_old_pieces_are_forgotten(drive):
     memory = CarMemory()
     for k in range(200):

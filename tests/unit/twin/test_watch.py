@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from scm.mismatch.fit.residual_windows import LENGTH_S
 from scm.recording.read import Channel
 from scm.twin.detector import threshold_of
 from scm.twin.evidence import Evidence
@@ -74,6 +75,18 @@ def test_sensor_that_comes_later_is_watched_from_then_on(predictor, changed):
     (noticed,) = watch(late, car)
     assert noticed.number.effect == "gyro_bias"
     assert car.driven_s == pytest.approx(LASTS_S - 40.0, abs=10.0)
+
+
+def test_window_in_which_another_camera_takes_over_is_left_out(predictor, changed):
+    car = CarWatch(predictor, THRESHOLD)
+    seen = []
+    car._remember = lambda windows, cameras: seen.append((windows.begin_s, cameras))
+    car.look(changed, 0.0, 10.0, lambda t_s: "west" if t_s < 4.2 else "east")
+    begin_s, cameras = (np.concatenate(one) for one in zip(*seen, strict=True))
+    over = (begin_s < 4.2) & (begin_s + LENGTH_S >= 4.2)
+    assert not over.any()
+    assert len(begin_s) > 10
+    np.testing.assert_array_equal(cameras, np.where(begin_s < 4.2, "west", "east"))
 
 
 def test_single_reading_of_a_sensor_is_as_none(predictor, changed):
