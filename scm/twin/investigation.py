@@ -133,6 +133,7 @@ class Worker(Executor):
 
 
 def _begin(leash: Leash) -> None:
+    os.setsid()  # in the twin part's session it would be nice to that part alone
     stand_back(os.getpid())
     end_with(leash)
 

@@ -367,6 +367,7 @@ def test_worker_that_was_killed_is_started_again_and_stands_back():
     try:
         first = process_id()
         assert worker.submit(os.getpriority, os.PRIO_PROCESS, 0).result(60.0) == NICER
+        assert worker.submit(os.getsid, 0).result(60.0) == first, "else nice to its parent alone"
         os.kill(first, signal.SIGKILL)
         assert (process_id() or process_id()) not in (None, first)
     finally:
