@@ -115,7 +115,11 @@ def main() -> None:
     one_s, _ = ours(1, threads=1)
     print(f"one world: {1.0 / one_s:.0f} steps/s")
     for name, make in peers().items():
-        peer = peer_rate(make)
+        try:
+            peer = peer_rate(make)
+        except OSError as error:  # MetaDrive fetches its assets when it is first started
+            print(f"{name}: cannot be started here: {error}")
+            continue
         print(f"{name}: {peer:.0f} steps/s; ours {rate / peer:.0f} times that")
     print(
         f"{given.resets} resets: the process grows by {100.0 * growth(given.resets):.2f} % "
