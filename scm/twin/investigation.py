@@ -38,7 +38,7 @@ from scm.vehicles.car import load_car
 FAILURES = (ScmError, OSError, BrokenExecutor)
 """Of searches and comparisons, which never end the part."""
 HORIZON_S = 3.0
-APART_S = 20.0  # between a change as it was noticed and as the search dates it
+EARLIER_S, LATER_S = 60.0, 20.0  # that a change began than it was noticed to; a lag shows at stops
 BETTER = 0.95  # of an error: what a new version has to reach in one at least
 RECORDING = "recording"
 T = TypeVar("T")
@@ -188,7 +188,7 @@ def _is_of(effect: Effect, onset_s: tuple[float, float]) -> bool:
     if effect.since_s is None:
         return True  # evenly all along
     low, high = onset_s
-    return low - APART_S <= effect.since_s.value <= high + APART_S
+    return low - EARLIER_S <= effect.since_s.value <= high + LATER_S
 
 
 def _since(effects: Sequence[Effect]) -> tuple[float, float, float] | None:

@@ -107,7 +107,7 @@ def _changed(status: TwinStatus, version: TwinVersion, given: CarFacts) -> _Chan
         faster = _ratio(speed.high, before.get("cruise_mps"))
         if faster > 1.0 and math.isfinite(given.speed_mps):
             facts = replace(facts, speed_mps=given.speed_mps * min(faster, MAX_FACTOR))
-            words["speed_mps"] = f"may drive {faster:.2g} times as fast as before"
+            words["speed_mps"] = f"may drive {100.0 * (faster - 1.0):.2g} % faster than before"
     was_m = before.get("stopping_m")
     if stop is not None and was_m is not None and 0.0 <= was_m < stop.high:
         later_s = (stop.high - was_m) / max(facts.slow_mps if speed is None else speed.low, 1e-3)

@@ -340,7 +340,8 @@ def test_search_that_ran_out_of_time_says_so(tmp_path):
     ("course", "since_s", "counts"),
     [
         (Course.STEP, 105.0, True),
-        (Course.STEP, 60.0, False),
+        (Course.STEP, 60.0, True),
+        (Course.STEP, 30.0, False),
         (Course.STEP, 150.0, False),
         (Course.RAMP, None, True),
         (Course.CONSTANT, None, False),
