@@ -6,7 +6,6 @@ import onnx
 import pytest
 from msgspec.structs import replace
 
-import scm.gym
 from scm.errors import LearningError
 from scm.gym.policy_file import describe_policy, write_policy
 from scm.maps.load import load_map
@@ -26,24 +25,6 @@ from vehicle_agent.trained_driver import STAND
 SCHOOL = load_map("driving_school")
 OPEN = replace(SCHOOL, junctions=(), stop_lines=(), lights=())
 ROUND_M = 6.92
-
-
-@pytest.fixture(scope="module")
-def envs():
-    return scm.gym.make_vec("driving_school/lap-v1", 4)
-
-
-@pytest.fixture(scope="module")
-def policy(envs, tmp_path_factory):
-    """Return the file of a policy of one layer: a linear law that follows its lane."""
-    path = tmp_path_factory.mktemp("policy") / "lane.onnx"
-    names = envs.observation_names
-    weights = np.zeros((len(names), 2))
-    for name, gain in {"beside_m": -8.0, "turned_rad": -2.0, "lane_turn_0.2m_rad": 1.7}.items():
-        weights[names.index(name), 1] = gain
-    columns = np.zeros(len(names)), np.ones(len(names))
-    write_policy(path, [(weights, np.array([0.8, 0.0]))], *columns, envs)
-    return path
 
 
 def driven(policy, city_map, lasts_s, vehicle="n1", car="nigel", **options):
