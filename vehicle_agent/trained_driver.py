@@ -135,10 +135,14 @@ class TrainedDriver(BasePart):
     def _check(self, state: VehicleState) -> None:
         """Do not drive another car than the one that it was trained on."""
         if state.car != self._car and not self.problem:
-            self.problem = (
+            self.refuse(
                 f"the network was trained on a {self._car}, {self._vehicle} is a {state.car}"
             )
-            event(_log, "network", level=logging.WARNING, why=repr(self.problem))
+
+    def refuse(self, problem: str) -> None:
+        """Drive no more, and say why."""
+        self.problem = problem
+        event(_log, "cannot_drive", level=logging.WARNING, vehicle=self._vehicle, why=repr(problem))
 
     def _put(self, now_ns: int) -> list[Outgoing]:
         if now_ns - self._spawn_ns < NS_PER_S:

@@ -25,6 +25,14 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="put the car onto the map first, there or at any free place",
     )  # fmt: skip
     parser.add_argument(
+        "--goal", type=place, default="", metavar="PLACE",
+        help="where a policy is to park: a spawn place or bay of the map, or X,Y,DEG "
+        "(--goal=-0.7,0,90 if X is below 0)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--pursue", default="", metavar="CAR", help="the car that a policy is to follow"
+    )
+    parser.add_argument(
         "--ignore-signals", action="store_true", help="drive on whatever the signals show"
     )
     agent_arguments(parser, "of this agent, which holds the lease (drive-VEHICLE)")
@@ -66,8 +74,11 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _network(name: str, vehicle: str, arguments: argparse.Namespace) -> "tuple[TrainedDriver, str]":
+    from scm.errors import LearningError
     from vehicle_agent.cloning.driving import NetworkPart
 
+    if arguments.goal or arguments.pursue:
+        raise LearningError("--goal and --pursue are for policies: a network drives by its camera")
     part = NetworkPart(
         name, vehicle, arguments.model, arguments.throttle, spawn=arguments.spawn,
         ignore_signals=arguments.ignore_signals,
@@ -78,13 +89,16 @@ def _network(name: str, vehicle: str, arguments: argparse.Namespace) -> "tuple[T
 
 def _policy(name: str, vehicle: str, arguments: argparse.Namespace) -> "tuple[TrainedDriver, str]":
     from scm.errors import LearningError
+    from scm.v2x.key import check_name
     from vehicle_agent.policy.driving import PolicyPart
+    from vehicle_agent.policy.senses import Aim
 
     if arguments.throttle is not None:
         raise LearningError("--throttle: a policy has its own")
+    pursued = check_name(arguments.pursue, "--pursue") if arguments.pursue else ""
     part = PolicyPart(
         name, vehicle, arguments.model, spawn=arguments.spawn,
-        ignore_signals=arguments.ignore_signals,
+        ignore_signals=arguments.ignore_signals, aim=Aim(arguments.goal, pursued),
     )  # fmt: skip
     return part, f"a policy for {part.policy.metadata.task}"
 

@@ -13,7 +13,7 @@ from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
 from vehicle_agent.autonomy.control import Command
 from vehicle_agent.policy.model import Policy
-from vehicle_agent.policy.senses import Senses
+from vehicle_agent.policy.senses import NOWHERE, Aim, Senses, counts_of
 from vehicle_agent.trained_driver import STAND, TrainedDriver
 
 
@@ -28,9 +28,11 @@ class PolicyPart(TrainedDriver):
             there.
         session: Of its bus.
         ignore_signals: Whether it drives on whatever they show.
+        aim: Where it is to drive; a car that is parked at its goal stands from then on.
 
     Attributes:
         actions: How many it took.
+        is_parked: Whether it stands at its goal.
 
     Raises:
         LearningError: when the policy cannot be used.
@@ -38,9 +40,10 @@ class PolicyPart(TrainedDriver):
 
     def __init__(
         self, name: str, vehicle: str, model: Path, spawn: str | None = None, session: str = "",
-        *, ignore_signals: bool = False,
+        *, ignore_signals: bool = False, aim: Aim = NOWHERE,
     ) -> None:  # fmt: skip
         self.policy = Policy(model)
+        counts_of(self.policy.metadata, aim)
         car = self.policy.metadata.car
         super().__init__(name, vehicle, car, spawn, session, ignore_signals=ignore_signals)
         self._period_ns = nanoseconds(self.policy.metadata.period_s)
@@ -49,15 +52,16 @@ class PolicyPart(TrainedDriver):
         self.subscriptions = (*self.subscriptions, *sensed)
         self._senses: Senses | None = None
         self._acted_ns, self._action = -self._period_ns, STAND
-        self.actions = 0
+        self.actions, self.is_parked, self._aim = 0, False, aim
 
     def learn(self, world: WorldDefinition) -> None:
         """Follow the lanes of another map."""
         super().learn(world)
         try:
-            self._senses = Senses(self.policy.metadata, world.map, self._vehicle)
+            self._senses = Senses(self.policy.metadata, world.map, self._vehicle, self._aim)
         except ScmError as error:
-            self._senses, self.problem = None, str(error)
+            self._senses = None
+            self.refuse(str(error))
 
     def look(self, inbox: Sequence[Incoming], now_ns: int) -> Command | None:
         """Act once a period, by the newest that the car knows of itself."""
@@ -68,6 +72,9 @@ class PolicyPart(TrainedDriver):
         states = [item.message for item in inbox if isinstance(item.message, VehicleState)]
         if not states or now_ns - self._acted_ns < self._period_ns:
             return None
+        self.is_parked = self.is_parked or self._senses.is_parked(states[-1])
+        if self.is_parked:
+            return STAND
         seen = self._senses.look(states[-1], self._action, now_ns)
         if seen is None:
             return STAND
@@ -77,6 +84,8 @@ class PolicyPart(TrainedDriver):
 
     def detail(self) -> str:
         """Return how it drives, or what it waits for, in words."""
+        if self.is_parked:
+            return f"{self._vehicle} is parked at {self._aim.goal}"
         if self._senses is not None and self._senses.missing:
             return f"{self._vehicle} stands: it waits for {self._senses.missing}"
         return f"{self.actions} actions" if self.actions else f"waits for {self._vehicle}"

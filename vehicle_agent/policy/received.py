@@ -1,4 +1,4 @@
-"""What a policy observes beside the car's own motion: what the car's sensors and its radio receive.
+"""What a policy observes beside the car's own motion: what its sensors and radio receive, its goal.
 
 Each class returns columns by the names that they have in training, or says what it waits for.
 """
@@ -22,6 +22,7 @@ from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.spatem import SpatemRx
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.vehicles.car import Car
+from scm.vehicles.drivers.cam_tracker import MAX_CAM_AGE_NS, other_of
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.signal_table import SignalTable
 
@@ -37,12 +38,14 @@ class Now(NamedTuple):
     Attributes:
         lanes: On which the car drives on, the one it is on first.
         along_m: How far along that its rear axle is.
+        speed_mps: Of the rear axle along the body.
     """
 
     t_ns: int
     pose: Pose2
     lanes: tuple[str, ...]
     along_m: float
+    speed_mps: float
 
 
 Columns = dict[str, float] | str
@@ -56,6 +59,12 @@ class Received(Protocol):
 
     def columns(self, now: Now) -> Columns:
         """Return the columns by name, or in words what they wait for."""
+
+
+def seen_from(pose: Pose2, there: Pose2) -> tuple[float, float, float, float]:
+    """Return a pose as seen from another: ahead and left [m], cosine and sine of its direction."""
+    x, y, turn = pose.inverse() @ there
+    return x, y, math.cos(turn), math.sin(turn)
 
 
 class Inertial:
@@ -160,13 +169,62 @@ class Others:
 
     def _seen(self, view: CamView, arrived_ns: int, now: Now) -> tuple[float, ...]:
         (x, y), yaw = view.place or (0.0, 0.0), view.yaw_rad or 0.0
-        dx = x - self._front_m * math.cos(yaw) - now.pose.x
-        dy = y - self._front_m * math.sin(yaw) - now.pose.y
-        c, s, turn = math.cos(now.pose.yaw), math.sin(now.pose.yaw), yaw - now.pose.yaw
-        return (
-            c * dx + s * dy, c * dy - s * dx, math.cos(turn), math.sin(turn),
-            view.speed_mps or 0.0, seconds(now.t_ns - arrived_ns),
-        )  # fmt: skip
+        there = Pose2(x, y, yaw) @ Pose2(-self._front_m, 0.0, 0.0)
+        age_s = seconds(now.t_ns - arrived_ns)
+        return (*seen_from(now.pose, there), view.speed_mps or 0.0, age_s)
+
+
+class Pursued:
+    """The car that is pursued, extrapolated from its newest CAM.
+
+    Args:
+        name: Of that car.
+        car: The own car file: the other is taken for a car of that kind.
+    """
+
+    def __init__(self, name: str, car: Car) -> None:
+        self._name, limits = name, limits_of(car)
+        self._middle_m = 0.5 * (limits.front - limits.rear)
+        self._newest: tuple[CamView, int] | None = None
+
+    def receive(self, item: Incoming) -> None:
+        """Receive a CAM."""
+        message = item.message
+        if isinstance(message, CamRx) and message.station == self._name:
+            view = read_cam(message.body)
+            if view.place is not None and view.yaw_rad is not None:
+                self._newest = view, item.t_ns
+
+    def columns(self, now: Now) -> Columns:
+        """Return where it is now, seen from the car, and how fast."""
+        if self._newest is None or now.t_ns - self._newest[1] > MAX_CAM_AGE_NS:
+            return f"a CAM of {self._name}"
+        view, arrived_ns = self._newest
+        other = other_of(view, seconds(now.t_ns - arrived_ns))
+        there = Pose2(other.x, other.y, other.yaw) @ Pose2(-self._middle_m, 0.0, 0.0)
+        names = ("ahead_m", "left_m", "cos_turn", "sin_turn", "speed_mps")
+        values = (*seen_from(now.pose, there), other.speed)
+        return {f"pursued_{name}": value for name, value in zip(names, values, strict=True)}
+
+
+class Goal:
+    """The place that the car is to drive to.
+
+    Args:
+        pose: Of its rear axle there.
+    """
+
+    def __init__(self, pose: Pose2) -> None:
+        self.pose = pose
+
+    def receive(self, item: Incoming) -> None:
+        """Receive nothing: it stays where it is."""
+
+    def columns(self, now: Now) -> Columns:
+        """Return where it is, seen from the car."""
+        names = ("ahead_m", "left_m", "cos_turn", "sin_turn")
+        values = seen_from(now.pose, self.pose)
+        return {f"goal_{name}": value for name, value in zip(names, values, strict=True)}
 
 
 class Lights:

@@ -116,12 +116,17 @@ def test_policy_that_observes_what_no_car_knows_says_so(policy, tmp_path, envs):
     metadata["observations"][0] = "fuel_m"
     entry.value = msgspec.json.encode(metadata).decode()
     onnx.save(model, path)
-    part = PolicyPart("policy", "n1", path)
-    with Lockstep([WorldPart(OPEN, 1, (("n1", "nigel"),)), part]) as city:
+    with pytest.raises(LearningError, match="observes fuel_m: a car knows speed_mps, "):
+        PolicyPart("policy", "n1", path)
+
+
+def test_policy_of_lanes_says_that_a_map_has_none(policy):
+    part = PolicyPart("policy", "n1", policy)
+    with Lockstep([WorldPart(load_map("parking_school"), 1, (("n1", "nigel"),)), part]) as city:
         statuses = city.subscribe(Subscription(PartStatus, {"station": "policy"}))
         city.run_for(2.0)
         (*_, last) = [item.message for item in statuses.drain()]
-    assert last.detail.startswith("the policy observes fuel_m: a car knows speed_mps, ")
+    assert last.detail.startswith("map parking_school: expected a lane from which cars can drive")
 
 
 def test_file_that_is_no_policy_says_what_was_expected(policy, tmp_path, envs):

@@ -39,7 +39,7 @@ HERE = Pose2(0.0, 0.0, 0.0)
 
 
 def now(t_ns, pose=HERE, lanes=(), along_m=0.0):
-    return Now(t_ns, pose, lanes, along_m)
+    return Now(t_ns, pose, lanes, along_m, 0.0)
 
 
 def arrived(message, t_ns=0):
