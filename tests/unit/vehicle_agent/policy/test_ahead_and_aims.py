@@ -26,6 +26,7 @@ from scm.world.part import WorldPart
 from tests.unit.vehicle_agent.policy.test_policy_driving import policy_of
 from vehicle_agent.policy.ahead import Ahead
 from vehicle_agent.policy.driving import PolicyPart
+from vehicle_agent.policy.model import Policy
 from vehicle_agent.policy.received import Now, Pursued
 from vehicle_agent.policy.senses import NOWHERE, Aim, Senses, counts_of
 from vehicle_agent.trained_driver import STAND
@@ -165,6 +166,26 @@ def test_policy_needs_its_goal_and_the_car_to_pursue():
         Senses(parks, load_map("parking_school"), "n1", Aim(goal="gaol"))
 
 
+def test_car_is_parked_where_it_stands_in_the_direction_of_its_goal():
+    senses = Senses(policy_of(GOAL, -1.0, 1.0), load_map("parking_school"), "n1", Aim("goal"))
+    goal = senses.goal
+    assert senses.is_parked(state_of("n1", goal @ Pose2(0.02, 0.0, 0.04)))
+    assert not senses.is_parked(state_of("n1", goal @ Pose2(0.04, 0.0, 0.0)))
+    assert not senses.is_parked(state_of("n1", goal @ Pose2(0.0, 0.0, 0.1)))
+    assert not senses.is_parked(state_of("n1", goal, 0.1))
+
+
+def test_car_that_comes_backwards_or_towards_one_neither_leads_nor_follows():
+    city_map = load_map("driving_school")
+    roads, senses = roads_of(city_map), Senses(policy_of(AHEAD, -5.0, 5.0), city_map, "n1")
+    at, lane = 0.6, roads.lanes["east_loop"]
+    for name, along_m in (("n2", at + 0.6), ("n3", at - 0.5)):
+        senses.receive(cam(name, lane.at(along_m) @ Pose2(0.0, 0.0, math.pi), 0.2))
+    seen = senses.look(state_of("n1", lane.at(at), 0.1), STAND, 0).tolist()
+    assert 0.1 < seen[0] < 0.4  # it stands in the way
+    assert seen[1:] == [0.0, REACH, 0.1]
+
+
 @pytest.fixture(scope="module")
 def approach(tmp_path_factory):
     """Return the file of a policy that drives straight on, the slower the nearer its goal is."""
@@ -194,3 +215,18 @@ def test_policy_parks_at_its_goal_and_stands_there(approach):
     away_m = math.hypot(way[-1].x_m - goal.x, way[-1].y_m - goal.y)
     assert 0.005 < away_m < 0.03  # by itself the policy would drive on to the middle
     assert (way[-1].throttle, way[-1].steering) == (0.0, 0.0)
+
+
+def test_car_stands_at_once_while_something_is_missing(approach):
+    part = PolicyPart("policy", "n1", approach, aim=Aim("goal"))
+    part._senses = Senses(part.policy.metadata, load_map("parking_school"), "n1", Aim("goal"))
+    state = Incoming(state_of("n1", Pose2(0.0, 0.0, 0.0)), 0)
+    assert part.look([state], NS_PER_S) == STAND
+    assert part.detail() == "n1 stands: it waits for its LIDAR"
+
+
+def test_actions_are_within_their_range(approach):
+    policy = Policy(approach)
+    columns = np.zeros(len(policy.metadata.observations))
+    columns[policy.metadata.observations.index("goal_ahead_m")] = 9.0
+    assert policy(columns).throttle == 1.0

@@ -21,16 +21,19 @@ from scm.runtime.lockstep import Lockstep
 from scm.runtime.part import Subscription
 from scm.traffic.monitor.part import MonitorPart
 from scm.traffic.signals.part import TrafficPart
+from scm.v2x.etsi.convert import station_id
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.vehicles.car import load_car
 from scm.world.part import WorldPart
+from tests.unit.vehicle_agent.policy.test_ahead_and_aims import cam, state_of
 from tests.unit.vehicle_agent.policy.test_policy_driving import policy_of
+from vehicle_agent.autonomy.control import Command
 from vehicle_agent.policy.driving import PolicyPart
 from vehicle_agent.policy.model import Policy
-from vehicle_agent.policy.received import Inertial, Lights, Now, Others, Ranges
+from vehicle_agent.policy.received import UNKNOWN_S, Inertial, Lights, Now, Others, Ranges
 from vehicle_agent.policy.senses import Senses
 
 SCHOOL = load_map("driving_school")
@@ -99,6 +102,7 @@ def test_wheels_of_a_car_that_was_placed_anew_are_not_compared_with_those_before
     [
         ({}, [0.0, 2.0, 4.0, 6.0]),
         ({"bearing_first_rad": -math.pi}, [4.0, 6.0, 0.0, 2.0]),
+        ({"bearing_first_rad": 0.1}, [0.0, 2.0, 4.0, 6.0]),
         # Beams from -90 to +77 degrees, 24 apart: behind, nothing is seen.
         ({"bearing_first_rad": -math.pi / 2, "bearing_step_rad": 0.42}, [4.0, 7.0, 9.0, 0.0]),
     ],
@@ -191,3 +195,59 @@ def test_lidar_sees_what_it_does_in_training(city):
     in_training = PARTS["ranges"](worlds).read()[0]
     in_city = [seen[f"range_{k}_m"] for k in range(108)]
     assert np.median(np.abs(in_city - in_training)) < 0.05  # it drives on until it looks again
+
+
+def test_others_are_the_nearest_in_the_order_of_their_stations_without_the_own_car():
+    others, stations = Others(2, NIGEL, "n1"), {one: station_id(one) for one in ("a", "b", "c")}
+    first, second, far = sorted(stations, key=stations.get)
+    places = {first: 2.0, second: 1.0, far: 9.0, "n1": 0.0}
+    for name, x_m in places.items():
+        others.receive(cam(name, Pose2(x_m, 0.5, 0.3), 0.1))
+    seen = others.columns(now(2 * NS_PER_S))
+    assert [seen[f"other_{k}_ahead_m"] for k in range(2)] == pytest.approx([2.0, 1.0], abs=3e-3)
+    assert seen["other_0_left_m"] == pytest.approx(0.5, abs=3e-3)
+    assert seen["other_0_sin_turn"] == pytest.approx(math.sin(0.3), abs=3e-3)
+    assert (seen["other_0_age_s"], seen["other_1_age_s"]) == (2.0, 2.0)
+
+
+def before_a_line():
+    """Return lanes of the school, and where on them a front is 0.5 m before a line."""
+    roads, line = roads_of(SCHOOL), SCHOOL.stop_lines[0]
+    return roads, (line.lane, *roads.successors(line.lane)), line.at_m - 0.5 - 0.23
+
+
+def test_line_of_which_nothing_is_known_is_not_green():
+    roads, lanes, along_m = before_a_line()
+    seen = Lights(SCHOOL, roads, NIGEL, REACH_M).columns(now(0, HERE, lanes, along_m))
+    assert seen == {
+        "stop_line_m": pytest.approx(0.5), "signal_is_green": 0.0, "signal_change_s": UNKNOWN_S
+    }  # fmt: skip
+
+
+def test_line_beyond_reach_is_none():
+    roads, lanes, along_m = before_a_line()
+    seen = Lights(SCHOOL, roads, NIGEL, 0.4).columns(now(0, HERE, lanes, along_m))
+    assert seen == {"stop_line_m": 0.4, "signal_is_green": 1.0, "signal_change_s": 0.0}
+
+
+def test_columns_of_the_state_and_of_the_action_in_force(city):
+    names = "speed_mps", "lateral_speed_mps", "yaw_rate_radps", "steer_angle_rad"
+    senses = Senses(policy_of((*names, "throttle", "steering"), -1.0, 1.0), SCHOOL, "n1")
+    state = VehicleState(
+        vehicle="n1", t_ns=0, seq=1, x_m=0.0, y_m=0.0, yaw_rad=0.0, speed_mps=0.1,
+        lateral_speed_mps=0.2, yaw_rate_radps=0.3, steering_rad=0.4, throttle=0.7, steering=0.8,
+        source="simulated",
+    )  # fmt: skip
+    assert senses.look(state, Command(0.5, 0.6), 0).tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    _, seen, _ = city
+    assert seen["throttle"] == pytest.approx(0.8)
+
+
+def test_cars_turn_where_their_names_decide():
+    town, ways = load_map("market_town"), set()
+    pose = roads_of(town).spawn_pose(town.spawns[0].name)
+    for name in ("n1", "n2", "n3", "n4"):
+        senses = Senses(policy_of(("beside_m",), -1.0, 1.0), town, name)
+        senses.look(state_of(name, pose), Command(0.0, 0.0), 0)
+        ways.add(senses._course.lanes_ahead(0)[0])
+    assert len(ways) > 1
