@@ -199,7 +199,7 @@ def test_lidar_sees_what_it_does_in_training(city):
 
 def test_others_are_the_nearest_in_the_order_of_their_stations_without_the_own_car():
     others, stations = Others(2, NIGEL, "n1"), {one: station_id(one) for one in ("a", "b", "c")}
-    first, second, far = sorted(stations, key=stations.get)
+    far, first, second = sorted(stations, key=stations.get)
     places = {first: 2.0, second: 1.0, far: 9.0, "n1": 0.0}
     for name, x_m in places.items():
         others.receive(cam(name, Pose2(x_m, 0.5, 0.3), 0.1))
