@@ -130,6 +130,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--steps", type=float, default=np.inf, help="of all agents, at most")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--action", default="throttle_steering", help="or speed_curvature")
     parser.add_argument("--car", help="car file, such as one that scm mismatch found")
     parser.add_argument("--randomise", type=float, default=0.0, help="its numbers, so many stds")
     words = ("KEY", "LOW", "HIGH")
@@ -143,8 +144,10 @@ def main() -> None:
     given = arguments()
     ranges = {key: (float(low), float(high)) for key, low, high in given.range}
     envs = scm.gym.make_vec(
-        given.task, AGENTS, copy=False, car=given.car, randomise=given.randomise, ranges=ranges
-    )
+        given.task, AGENTS, copy=False, action=given.action, car=given.car,
+        randomise=given.randomise, ranges=ranges,
+    )  # fmt: skip
+    reach = envs.single_action_space.high
     columns = envs.single_observation_space.shape[0]
     key = jax.random.key(given.seed)
     key, first, second = jax.random.split(key, 3)
@@ -163,7 +166,7 @@ def main() -> None:
             seen, present = usual.of(raw), infos["present"]
             key, draw = jax.random.split(key)
             action, before, value = map(np.asarray, act(params, seen, draw))
-            raw, gain, end, late, infos = envs.step(np.clip(action, -1.0, 1.0))
+            raw, gain, end, late, infos = envs.step(reach * np.clip(action, -1.0, 1.0))
             usual.add(raw[infos["present"]])
             rows.append(Driven(seen, action, before, gain, value, present))
             ended.append(end)
@@ -191,6 +194,7 @@ def main() -> None:
             flush=True,
         )
     layers_of = [tuple(map(np.asarray, layer)) for layer in params["actor"]]
+    layers_of[-1] = tuple(reach * one for one in layers_of[-1])
     write_policy(given.out, layers_of, usual.mean, usual.spread, envs)
     print(f"{given.out}: drive it by vehicle-agent drive {given.out} --vehicle NAME")
 

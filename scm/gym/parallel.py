@@ -26,7 +26,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[m
     Args:
         name: Of the task with its map, `driving_school/crossing-v1`.
         render_mode: `rgb_array`: `render` returns pictures.
-        options: Of `Options`: another car file, and what is drawn for each episode.
+        options: Of `Options`: other actions, another car file, what is drawn for each episode.
 
     Attributes:
         name: As it was given.
@@ -58,7 +58,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[m
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Space:
-        """Return the space of an agent's actions: throttle and steering, -1 to 1, or a choice."""
+        """Return the space of an agent's actions."""
         return self.action_spaces[agent]
 
     def reset(

@@ -1,9 +1,9 @@
 """Trained policies as ONNX files that `vehicle-agent drive` can use.
 
     input   observation   float32 (1, columns), as the environment gives it
-    output  action        float32 (1, 2): throttle and steering; beyond -1 to 1 they are clipped
+    output  action        float32 (1, 2), as the environment takes it; beyond its range: clipped
 
-What scales observations belongs into the network. Write needs `onnx`.
+What scales observations or actions belongs into the network. Write needs `onnx`.
 """
 
 from collections.abc import Sequence
@@ -94,10 +94,12 @@ def _save(model: onnx.ModelProto, path: Path, env: CityVectorEnv | CityParallelE
     if worlds.task.choices or worlds.junctions is not None:
         raise LearningError(f"{env.name}: expected throttle and steering, its actions are choices")
     seen = Observations(worlds, worlds.task.observations)
+    speed, turn = worlds.reach.tolist()
     metadata = PolicyMetadata(
         policy=1, task=env.name, observations=seen.names, car=worlds.task.car,
         low=tuple(seen.low.tolist()), high=tuple(seen.high.tolist()),
         period_s=worlds.task.period_s, agents=worlds.agents, scm=scm.__version__,
+        actions=worlds.action_names, action_low=(-speed, -turn), action_high=(speed, turn),
     )  # fmt: skip
     helper.set_model_props(model, {POLICY_KEY: msgspec.json.encode(metadata).decode()})
     onnx.save(model, path)

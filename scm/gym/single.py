@@ -47,7 +47,7 @@ class CityEnv(gymnasium.Env[Observation, Actions]):
         return self._one.reset(seed=seed, options=options)[0][0], {}
 
     def step(self, action: Actions) -> tuple[Observation, float, bool, bool, Infos]:
-        """Go on for one period with throttle and steering, -1 to 1, or the number of a choice."""
+        """Go on for one period with an action, two numbers or the number of a choice."""
         seen, reward, ended, over, _ = self._one.step(np.array([action]))
         return seen[0], float(reward[0]), bool(ended[0]), bool(over[0]), {}
 

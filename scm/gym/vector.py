@@ -35,7 +35,7 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
         threads: For the physics; None: one a core.
         copy: Whether each observation is an array of its own; else the next step writes over it.
         render_mode: `rgb_array`: `render` returns pictures, one of each world.
-        options: Of `Options`: another car file, and what is drawn for each episode.
+        options: Of `Options`: other actions, another car file, what is drawn for each episode.
 
     Attributes:
         name: As it was given.
@@ -101,7 +101,7 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
         """Let all worlds go on for one period.
 
         Args:
-            actions: Throttle and steering, (num_envs, 2); or numbers of choices, (num_envs,).
+            actions: Two numbers of each agent, (num_envs, 2); or numbers of choices, (num_envs,).
         """
         self._check_open()
         if not self._is_begun:

@@ -12,6 +12,7 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import MapError
+from scm.gym.actions import names_of, reach_of
 from scm.gym.junctions import Junctions
 from scm.gym.radio import Radio
 from scm.gym.randomise import Randomise, Ranges, with_effects
@@ -21,9 +22,11 @@ from scm.gym.touching import Touching
 from scm.gym.traffic import RuleDrivenCars
 from scm.gym.ways import DRAWS, SPEED_DRAW, WHERE, AlongLanes, ToGoal, Way
 from scm.maps.load import load_map
+from scm.records.policy import SPEED_CURVATURE
 from scm.vehicles.car import load_car
 from scm.vehicles.drivers.course import Course
 from scm.vehicles.drivers.limits import limits_of
+from scm.vehicles.drivers.speed_curvature import SpeedCurvatureController
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.noise import Keys, bases_of, uniforms
 from scm.vehicles.vehicle_status import VehicleStatus
@@ -45,11 +48,14 @@ class Options:
         car: A car file, by name or path, such as one that `scm mismatch` found; None: the task's.
         randomise: For each episode, every number that the car file gives a standard deviation is
             drawn anew, from so many times that.
+        action: What agents choose: `throttle_steering`, or `speed_curvature`, which the controller
+            of the city's cars turns into commands.
         ranges: Likewise, further numbers by `section.key`, evenly from low to high; an effect that
             the car lacks is added to it.
     """
 
     car: str | None = None
+    action: str = "throttle_steering"
     randomise: float = 0.0
     ranges: Ranges = field(default_factory=dict)
 
@@ -77,8 +83,11 @@ class Worlds:
         present: Which cars take part, (rows,); the others are out, until the next episode.
         touched: Which touch a wall or another car now, (rows,).
         actions: In force, -1 to 1, throttle and steering, (rows, 2); `before`: of the step before.
+        action_names: Of the two columns of what an agent chooses.
+        reach: Its largest action, (2,).
 
     Raises:
+        gymnasium.error.Error: There is no such kind of action.
         ScmError: There is no such map or car, or it does not suit the task.
     """
 
@@ -86,6 +95,7 @@ class Worlds:
         self, task: Task, map_name: str, worlds: int, options: Options, threads: int = 1
     ) -> None:
         self.task, self.count, self.agents = task, worlds, task.agents
+        self.action_names = names_of(task, options.action)
         rows = self.rows = worlds * task.agents
         more = task.traffic.cars if task.traffic is not None else 0
         own = np.arange(0 if task.of_junctions else rows)
@@ -97,6 +107,12 @@ class Worlds:
         self.fleet = Fleet(self.car, self.cars.size)
         self._randomise = Randomise(self.fleet, options.randomise, options.ranges)
         self.fleet.threads = threads
+        self.reach = reach_of(self.car, self.action_names)
+        self._controller = (
+            SpeedCurvatureController(limits_of(self.car), rows)
+            if self.action_names == SPEED_CURVATURE
+            else None
+        )
         self.fleet.alive[:] = True
         lanes = task.lanes.get(self.city_map.name, ())
         self.way: Way = (
@@ -159,6 +175,8 @@ class Worlds:
         if self._randomise.is_any:
             self._randomise.draw(rows, self.keys[rows])
         self.fleet.place_rows(rows, poses, low + (high - low) * draws[:, SPEED_DRAW])
+        if self._controller is not None:
+            self._controller.begin(own, self.fleet.speed[own])
         for actions in (self.actions, self.before):
             actions.reshape(self.count, self.agents, -1)[worlds] = 0.0
         self.steps[worlds] = 0
@@ -200,15 +218,17 @@ class Worlds:
         """Let all worlds go on for one period; who is out stays out.
 
         Args:
-            actions: Throttle and steering, (rows, 2); or numbers of choices, (rows,).
+            actions: As `action_names` says, (rows, 2); or numbers of choices, (rows,).
         """
         fleet, own = self.fleet, self._own
         if self.junctions is not None:
             self.junctions.request(actions.astype(np.int64).reshape(self.count, -1))
         else:
             given = np.array(self.task.choices)[actions] if self.task.choices else actions
-            self.before[:] = self.actions
-            np.clip(given, -1.0, 1.0, out=self.actions)
+            given = np.asarray(np.clip(given, -self.reach, self.reach), np.float64)
+            if self._controller is not None:
+                given = self._controller.commands(given, fleet.speed[:own], self.task.period_s)
+            self.before[:], self.actions[:] = self.actions, given
             fleet.throttle[:own], fleet.steering[:own] = self.actions.T
         self.steps += 1
         for _ in range(self._substeps):

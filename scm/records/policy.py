@@ -4,6 +4,8 @@ import msgspec
 
 POLICY_KEY = "scm_policy"  # of the ONNX file's metadata
 INPUT, OUTPUT = "observation", "action"
+COMMANDS, SPEED_CURVATURE = ("throttle", "steering"), ("speed_mps", "curvature_per_m")
+"""What actions may be: the commands themselves, or what the car's controller turns into them."""
 
 
 class PolicyMetadata(msgspec.Struct, kw_only=True, frozen=True):
@@ -14,6 +16,8 @@ class PolicyMetadata(msgspec.Struct, kw_only=True, frozen=True):
         task: That it was trained for, with its map.
         observations: Names of its input's columns, each with its unit.
         low, high: Their range; what lies beyond is clipped.
+        actions: Names of its output's columns: `COMMANDS` or `SPEED_CURVATURE`.
+        action_low, action_high: Their range; what lies beyond is clipped.
         car: File of the cars that it drove.
         period_s: Between two actions.
         agents: Cars in a world.
@@ -29,3 +33,6 @@ class PolicyMetadata(msgspec.Struct, kw_only=True, frozen=True):
     period_s: float
     agents: int
     scm: str
+    actions: tuple[str, str] = COMMANDS
+    action_low: tuple[float, float] = (-1.0, -1.0)
+    action_high: tuple[float, float] = (1.0, 1.0)

@@ -3,14 +3,21 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from scm.clock import nanoseconds
+import numpy as np
+
+from scm.arrays import Floats
+from scm.clock import nanoseconds, seconds
 from scm.errors import ScmError
+from scm.records.policy import SPEED_CURVATURE
 from scm.runtime.part import Subscription
 from scm.v2x.exchange import Incoming
 from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.vehicle_sensors import VehicleSensors
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.v2x.messages.world_definition import WorldDefinition
+from scm.vehicles.car import load_car
+from scm.vehicles.drivers.limits import limits_of
+from scm.vehicles.drivers.speed_curvature import SpeedCurvatureController
 from vehicle_agent.autonomy.control import Command
 from vehicle_agent.policy.model import Policy
 from vehicle_agent.policy.senses import NOWHERE, Aim, Senses, counts_of
@@ -51,6 +58,12 @@ class PolicyPart(TrainedDriver):
         sensed = Subscription(VehicleSensors, own), Subscription(LidarScan, own)
         self.subscriptions = (*self.subscriptions, *sensed)
         self._senses: Senses | None = None
+        self._controller = (
+            SpeedCurvatureController(limits_of(load_car(car)), 1)
+            if self.policy.metadata.actions == SPEED_CURVATURE
+            else None
+        )
+        self._speed_mps = 0.0
         self._acted_ns, self._action = -self._period_ns, STAND
         self.actions, self.is_parked, self._aim = 0, False, aim
 
@@ -72,15 +85,37 @@ class PolicyPart(TrainedDriver):
         states = [item.message for item in inbox if isinstance(item.message, VehicleState)]
         if not states or now_ns - self._acted_ns < self._period_ns:
             return None
+        self._speed_mps = states[-1].speed_mps
         self.is_parked = self.is_parked or self._senses.is_parked(states[-1])
         if self.is_parked:
             return STAND
         seen = self._senses.look(states[-1], self._action, now_ns)
         if seen is None:
+            self._begin_anew()
             return STAND
+        passed_s = seconds(now_ns - self._acted_ns)
         self._acted_ns, self.actions = now_ns, self.actions + 1
-        self._action = self.policy(seen)
+        self._action = self._command_for(self.policy(seen), passed_s)
         return self._action
+
+    def allowed(self, now_ns: int) -> Command:
+        """Return the command with the throttle that signals allow."""
+        allowed = super().allowed(now_ns)
+        if allowed.throttle < self._action.throttle:
+            self._begin_anew()
+        return allowed
+
+    def _command_for(self, action: Floats, passed_s: float) -> Command:
+        """Return the command for an action (2,), a time after the one before."""
+        if self._controller is not None:
+            speed = np.array([self._speed_mps])
+            (action,) = self._controller.commands(action[None], speed, passed_s)
+        return Command(*action.tolist())
+
+    def _begin_anew(self) -> None:
+        """Let the controller go on from the car's speed: it does not do what was commanded."""
+        if self._controller is not None:
+            self._controller.begin(np.zeros(1, np.int64), np.array([self._speed_mps]))
 
     def detail(self) -> str:
         """Return how it drives, or what it waits for, in words."""

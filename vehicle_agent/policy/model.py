@@ -7,8 +7,14 @@ import numpy as np
 
 from scm.arrays import Floats
 from scm.errors import LearningError
-from scm.records.policy import INPUT, OUTPUT, POLICY_KEY, PolicyMetadata
-from vehicle_agent.autonomy.control import Command
+from scm.records.policy import (
+    COMMANDS,
+    INPUT,
+    OUTPUT,
+    POLICY_KEY,
+    SPEED_CURVATURE,
+    PolicyMetadata,
+)
 from vehicle_agent.network_file import session_of
 
 
@@ -42,6 +48,10 @@ class Policy:
             self.metadata = msgspec.json.decode(entries[POLICY_KEY], type=PolicyMetadata)
         except msgspec.MsgspecError as cause:
             raise LearningError(f"{path}: its metadata: {cause}") from cause
+        if self.metadata.actions not in (COMMANDS, SPEED_CURVATURE):
+            known = ", ".join(COMMANDS), ", ".join(SPEED_CURVATURE)
+            got = ", ".join(self.metadata.actions)
+            raise LearningError(f"{path}: its actions are {got}: expected {' or '.join(known)}")
         columns = len(self.metadata.observations)
         ports = [
             (one.name, one.type, list(one.shape))
@@ -56,10 +66,10 @@ class Policy:
                 f"{path}: expected actions, got {action.tolist()}: are its weights NaN?"
             )
 
-    def __call__(self, observation: Floats) -> Command:
-        """Return the action for an observation (columns,)."""
-        throttle, steering = np.clip(self._run(observation), -1.0, 1.0).tolist()
-        return Command(throttle, steering)
+    def __call__(self, observation: Floats) -> Floats:
+        """Return the action (2,), within its range, for an observation (columns,)."""
+        found = np.clip(self._run(observation), self.metadata.action_low, self.metadata.action_high)
+        return np.asarray(found)
 
     def _run(self, observation: Floats) -> Floats:
         seen = observation[None].astype(np.float32)

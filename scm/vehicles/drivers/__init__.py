@@ -8,6 +8,7 @@ giving_way       stop or go without signals               cam_tracker   cars aro
 junction_exits   whether there is room behind a junction  hazards       hazard warnings from DENMs
 speed_control    allowed speed and throttle               green_light   speed advice at signals
 steering         a path and a pose to a steering command  reception     whether reception is good
+speed_curvature  what a trained policy chooses, as commands
 Tables of arrays: lane_graph the map, driver_state the drivers, received_cams the stations,
 signal_table the signals. channel decides which radio frames arrive; limits reads a car's limits
 from its car file.

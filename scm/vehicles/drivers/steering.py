@@ -75,9 +75,15 @@ def steer(
     path_curvature = (after - before) / (2.0 * half)
     error = math.sin(yaw - mean_yaw)
     curvature = path_curvature + feedback(kind, floats, error, path_curvature, speed)
+    floats[STEER] = wheel_angle(kind, curvature)
+    return float(floats[STEER] / kind[STEER_LIMIT])
+
+
+@kernel_function
+def wheel_angle(kind: Floats, curvature: float) -> float:
+    """Return the angle of the front wheels [rad] for a curvature [1/m], as far as they turn."""
     limit = kind[STEER_LIMIT]
-    floats[STEER] = max(-limit, min(limit, math.atan(kind[WHEELBASE] * curvature)))
-    return float(floats[STEER] / limit)
+    return float(max(-limit, min(limit, math.atan(kind[WHEELBASE] * curvature))))
 
 
 @kernel_function

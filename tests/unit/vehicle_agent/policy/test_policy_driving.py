@@ -47,6 +47,19 @@ def driven(policy, city_map, lasts_s, vehicle="n1", car="nigel", **options):
     return course.known[0, 3], np.abs(off).max(initial=0.0), part
 
 
+def metadata_of(policy):
+    """Return the metadata of a policy's file."""
+    (entry,) = onnx.load(policy).metadata_props
+    return msgspec.json.decode(entry.value)
+
+
+def with_metadata(policy, metadata, path):
+    """Write a policy with other metadata."""
+    model = onnx.load(policy)
+    model.metadata_props[0].value = msgspec.json.encode(metadata).decode()
+    onnx.save(model, path)
+
+
 def policy_of(names, low, high):
     """Return the metadata of a policy that observes some columns, all of one range."""
     count = len(names)
@@ -66,6 +79,74 @@ def test_policy_drives_round_as_it_did_in_training(envs, policy):
         seen = envs.step(np.array([list(action(row))[:2] for row in seen.astype(float)]))[0]
     came_m = envs.worlds.course.known[:, 3] - began_m
     assert came_m == pytest.approx(way_m, abs=0.6)
+
+
+@pytest.fixture(scope="module")
+def cruising(tmp_path_factory):
+    """Return environments, and the file of a policy that chooses 0.15 m/s and its lane's bend."""
+    envs = scm.gym.make_vec("driving_school/lap-v1", 4, action="speed_curvature")
+    path = tmp_path_factory.mktemp("cruising") / "lane.onnx"
+    names = envs.observation_names
+    weights = np.zeros((len(names), 2))
+    for name, gain in {"beside_m": -33.0, "turned_rad": -8.0, "lane_turn_0.2m_rad": 5.0}.items():
+        weights[names.index(name), 1] = gain
+    columns = np.zeros(len(names)), np.ones(len(names))
+    write_policy(path, [(weights, np.array([0.15, 0.0]))], *columns, envs)
+    return envs, path
+
+
+def test_policy_of_speed_and_curvature_drives_as_it_did_in_training(cruising):
+    envs, path = cruising
+    way_m, off_m, part = driven(path, OPEN, 20.0)
+    assert (way_m, off_m) == (pytest.approx(0.15 * 19.0, abs=0.25), pytest.approx(0.0, abs=0.03))
+    assert part._speed_mps == pytest.approx(0.15, abs=0.01)
+    action, seen = Policy(path), envs.reset(seed=3)[0]
+    began_m = envs.worlds.course.known[:, 3].copy()
+    for _ in range(400):
+        seen = envs.step(np.array([action(row) for row in seen.astype(float)]))[0]
+    assert envs.worlds.course.known[:, 3] - began_m == pytest.approx(0.15 * 20.0, abs=0.1)
+
+
+def test_policy_of_speed_and_curvature_stops_at_red_and_goes_on_smoothly(cruising):
+    _, path = cruising
+    _, _, part = driven(path, SCHOOL, 12.0)
+    assert part._waits_for.startswith("waits for green")
+    assert part._action.throttle < 0.5  # it does not press on against the rule that holds the car
+    free = driven(path, SCHOOL, 12.0, ignore_signals=True)[2]
+    assert free._speed_mps == pytest.approx(0.15, abs=0.01)
+
+
+def test_older_policy_commands_throttle_and_steering(policy, tmp_path):
+    path = tmp_path / "older.onnx"
+    metadata = metadata_of(policy)
+    for name in ("actions", "action_low", "action_high"):
+        del metadata[name]
+    with_metadata(policy, metadata, path)
+    seen = np.zeros(len(metadata["observations"]))
+    assert Policy(path)(seen) == pytest.approx([0.8, 0.0])
+    way_m, _, _ = driven(path, OPEN, 10.0)
+    assert way_m == pytest.approx(driven(policy, OPEN, 10.0)[0], abs=1e-12)
+
+
+def test_action_beyond_its_range_is_clipped(cruising, policy):
+    for path, names, high in (
+        (policy, ("throttle", "steering"), [1.0, 1.0]),
+        (cruising[1], ("speed_mps", "curvature_per_m"), cruising[0].single_action_space.high),
+    ):
+        loaded = Policy(path)
+        assert loaded.metadata.actions == names
+        beside = loaded.metadata.observations.index("beside_m")
+        seen = np.zeros(len(loaded.metadata.observations))
+        seen[beside] = -9.0
+        assert loaded(seen)[1] == pytest.approx(high[1])
+
+
+def test_policy_of_unknown_actions_says_what_was_expected(policy, tmp_path):
+    path = tmp_path / "unknown.onnx"
+    with_metadata(policy, {**metadata_of(policy), "actions": ["speed_mps", "steering"]}, path)
+    words = "its actions are speed_mps, steering: expected throttle, steering or speed_mps, curv"
+    with pytest.raises(LearningError, match=words):
+        Policy(path)
 
 
 def test_car_that_was_carried_elsewhere_is_found_there():
@@ -110,12 +191,9 @@ def test_policy_drives_no_other_car_than_it_was_trained_on(policy):
 
 def test_policy_that_observes_what_no_car_knows_says_so(policy, tmp_path, envs):
     path = tmp_path / "more.onnx"
-    model = onnx.load(policy)
-    (entry,) = model.metadata_props
-    metadata = msgspec.json.decode(entry.value)
+    metadata = metadata_of(policy)
     metadata["observations"][0] = "fuel_m"
-    entry.value = msgspec.json.encode(metadata).decode()
-    onnx.save(model, path)
+    with_metadata(policy, metadata, path)
     with pytest.raises(LearningError, match="observes fuel_m: a car knows speed_mps, "):
         PolicyPart("policy", "n1", path)
 
