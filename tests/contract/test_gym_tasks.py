@@ -33,6 +33,17 @@ def test_gymnasium_finds_nothing_wrong(name):
         check_env(gymnasium.make(name).unwrapped)
 
 
+@pytest.mark.parametrize("name", OF_ONE)
+def test_stable_baselines3_finds_nothing_wrong(name):
+    checker = pytest.importorskip(
+        "stable_baselines3.common.env_checker",
+        reason="stable-baselines3 is not installed: it needs torch, which scm does not",
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checker.check_env(gymnasium.make(name))
+
+
 @pytest.mark.parametrize("name", OF_SEVERAL)
 def test_pettingzoo_finds_nothing_wrong(name):
     with warnings.catch_warnings():
