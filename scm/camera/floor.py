@@ -58,13 +58,9 @@ class Floor:
         self._seed = seed
         self._paths: dict[str, LanePath] = {}
         self._patches: OrderedDict[tuple[Ring, int, int], Drawing] = OrderedDict()
-        x0, y0, x1, y1 = bounds(city_map)
-        size = np.array([x1 - x0, y1 - y0]) + 2 * BESIDE_M
-        fits = min(FINEST_TEXELS_PER_M, math.sqrt(MAX_TEXELS / float(size.prod())))
         self.whole: Drawing | None = None
-        if fits >= FINE.texels_per_m:
-            corner = (x0 - BESIDE_M, y1 + BESIDE_M)
-            self.whole = self._drawn(city_map, corner, size, fits, TABLE)
+        if _extent(city_map, FINEST_TEXELS_PER_M)[2] >= FINE.texels_per_m:
+            self.whole = whole_floor(city_map, daylight, FINEST_TEXELS_PER_M, seed, self._paths)
 
     def paint(self, canvas: Image, lens: Lens, view: View, light: float) -> None:
         """Paint what lies below the horizon.
@@ -99,29 +95,58 @@ class Floor:
             corner = (float(at[0]) - half, float(at[1]) + half)
             size = np.array([ring.size_m, ring.size_m])
             beyond = colour_of(self._map.floor.colour)
-            self._patches[key] = self._drawn(around, corner, size, ring.texels_per_m, beyond)
+            self._patches[key] = _drawn(
+                around, (corner, size, ring.texels_per_m), beyond, self._daylight, self._seed,
+                self._paths,
+            )  # fmt: skip
             if len(self._patches) > MAX_PATCHES:
                 self._patches.popitem(last=False)
         self._patches.move_to_end(key)
         return self._patches[key], half - float(np.abs(at - (x, y)).max())
 
-    def _drawn(
-        self,
-        city_map: CityMap,
-        corner: tuple[float, float],
-        size: Floats,
-        texels_per_m: float,
-        beyond: Colour,
-    ) -> "Drawing":
-        for lane in city_map.lanes:
-            if lane.name not in self._paths:
-                self._paths[lane.name] = LanePath(lane)
-        rng = np.random.default_rng([self._seed, *b"floor"])
-        sheet = FloorSheet(*corner, size, rng, texels_per_m)
-        paint_floor(sheet, city_map, self._paths)
-        _lay_tag(sheet, city_map)
-        _shade(sheet, city_map, self._daylight)
-        return Drawing(sheet, beyond)
+
+Extent = tuple[tuple[float, float], Floats, float]
+"""Upper left corner and size of a part of the floor [m], and how fine it is [texels/m]."""
+
+
+def whole_floor(
+    city_map: CityMap, daylight: Daylight, finest: float, seed: int = 0,
+    paths: dict[str, LanePath] | None = None,
+) -> "Drawing":  # fmt: skip
+    """Return the whole floor of a city in one picture, as fine as fits.
+
+    Args:
+        city_map: The city.
+        daylight: The light on it.
+        finest: Most texels per metre.
+        seed: Of the floor's grain.
+        paths: Its lanes by name, of those that somebody has; the others are added.
+    """
+    known = {} if paths is None else paths
+    return _drawn(city_map, _extent(city_map, finest), TABLE, daylight, seed, known)
+
+
+def _extent(city_map: CityMap, finest: float) -> Extent:
+    x0, y0, x1, y1 = bounds(city_map)
+    size = np.array([x1 - x0, y1 - y0]) + 2 * BESIDE_M
+    fits = min(finest, math.sqrt(MAX_TEXELS / float(size.prod())))
+    return (x0 - BESIDE_M, y1 + BESIDE_M), size, fits
+
+
+def _drawn(
+    city_map: CityMap, extent: Extent, beyond: Colour, daylight: Daylight, seed: int,
+    paths: dict[str, LanePath],
+) -> "Drawing":  # fmt: skip
+    corner, size, texels_per_m = extent
+    for lane in city_map.lanes:
+        if lane.name not in paths:
+            paths[lane.name] = LanePath(lane)
+    rng = np.random.default_rng([seed, *b"floor"])
+    sheet = FloorSheet(*corner, size, rng, texels_per_m)
+    paint_floor(sheet, city_map, paths)
+    _lay_tag(sheet, city_map)
+    _shade(sheet, city_map, daylight)
+    return Drawing(sheet, beyond)
 
 
 class Ring(NamedTuple):

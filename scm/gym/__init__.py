@@ -10,6 +10,7 @@
     traffic        cars of a world that rules drive
     pursuit        where the car is that another pursues
     observations   what an agent sees of it
+    camera         what its front camera sees
     actions        what it may do
     rewards, ends  what it gains, and when its episode ends
     picture        a world from above

@@ -3,14 +3,18 @@
 To add one, write a function that returns a `Part` and name it in `PARTS`.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from gymnasium.error import Error
 from numpy.typing import NDArray
 
 from scm.arrays import Floats
+from scm.errors import nearest
+from scm.gym.camera import FrontCameras
 from scm.gym.junctions import AHEAD, NEAR, QUEUE
 from scm.gym.pursuit import LOST_M, look, pursued_rows
 from scm.gym.radio import COLUMNS
@@ -44,7 +48,7 @@ class Part:
     names: tuple[str, ...]
     low: tuple[float, ...]
     high: tuple[float, ...]
-    read: Callable[[], Floats]
+    read: Callable[[], Floats | Observation]
 
 
 def motion(worlds: Worlds) -> Part:
@@ -117,6 +121,13 @@ def ranges(worlds: Worlds, beams: int = 108) -> Part:
     return Part(names, (nearest,) * beams, (farthest,) * beams, read)
 
 
+def camera(worlds: Worlds) -> Part:
+    """Return the newest picture of the front camera."""
+    cameras = FrontCameras(worlds)
+    count = len(cameras.names)
+    return Part(cameras.names, (0.0,) * count, (1.0,) * count, cameras.read)
+
+
 def goal(worlds: Worlds) -> Part:
     """Return the goal's place and direction, seen from the car."""
     names = ("goal_ahead_m", "goal_left_m", "goal_cos_turn", "goal_sin_turn")
@@ -137,6 +148,8 @@ def ahead(worlds: Worlds) -> Part:
 
 def pursued(worlds: Worlds) -> Part:
     """Return the pursued car's place and direction, seen from the own, and its speed."""
+    if worlds.traffic is None:
+        raise TypeError(f"task {worlds.task.name}: `pursued` needs cars that rules drive")
     names = ("ahead_m", "left_m", "cos_turn", "sin_turn", "speed_mps")
     most, rows = (2.0 * LOST_M, 2.0 * LOST_M, 1.0, 1.0, 5.0), pursued_rows(worlds)
 
@@ -241,7 +254,7 @@ PARTS: dict[str, Callable[[Worlds], Part]] = {
     "motion": motion, "action": action, "lane": lane, "inertial": inertial,
     "others": others, "peers": peers, "signals": signals, "ahead": ahead, "goal": goal,
     "goal_offset": goal_offset, "pursued": pursued, "junction": junction,
-    "ranges": ranges,
+    "camera": camera, "ranges": ranges,
     "ranges_36": partial(ranges, beams=36), "ranges_360": partial(ranges, beams=360),
 }  # fmt: skip
 
@@ -257,11 +270,20 @@ class Observations:
         names: Of the columns.
         low, high: Their range, (columns,).
         values: What `update` saw, (rows, columns).
+
+    Raises:
+        gymnasium.error.Error: There is no such part, or the agents have none of its columns.
     """
 
     def __init__(self, worlds: Worlds, parts: Sequence[str]) -> None:
+        for part in parts:
+            _check(worlds, part)
         self._parts = [PARTS[name](worlds) for name in parts]
         self.names = tuple(name for part in self._parts for name in part.names)
+        twice = [name for name, count in Counter(self.names).items() if count > 1]
+        if twice or not self.names:
+            found = f"{twice[0]} more than once" if twice else "none"
+            raise Error(f"observations = {tuple(parts)}: expected columns once each, got {found}")
         self.low, self.high = (
             np.array([v for part in self._parts for v in getattr(part, side)], np.float32)
             for side in ("low", "high")
@@ -276,3 +298,11 @@ class Observations:
             at += len(part.names)
         np.clip(self.values, self.low, self.high, out=self.values)
         return self.values
+
+
+def _check(worlds: Worlds, part: str) -> None:
+    """Raise an error where agents cannot have a part."""
+    if part not in PARTS:
+        raise Error(f"observations: no {part!r}{nearest(part, sorted(PARTS))}")
+    if worlds.junctions is not None and part != "junction":
+        raise Error(f"observations: {part!r} is a car's, the agents of {worlds.task.name} are none")

@@ -26,7 +26,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[m
     Args:
         name: Of the task with its map, `driving_school/crossing-v1`.
         render_mode: `rgb_array`: `render` returns pictures.
-        options: Of `Options`: other actions, another car file, what is drawn for each episode.
+        options: Of `Options`: other actions, observations or car, what is drawn for each episode.
 
     Attributes:
         name: As it was given.
@@ -43,7 +43,7 @@ class CityParallelEnv(ParallelEnv[str, Observation, Actions]):  # type: ignore[m
         self.name, self.render_mode = name, checked_mode(render_mode)
         self._picture: Picture | None = None
         self.worlds = Worlds(task, map_name, 1, Options(**options))
-        self._seen = Observations(self.worlds, task.observations)
+        self._seen = Observations(self.worlds, self.worlds.task.observations)
         self.observation_names = self._seen.names
         self.possible_agents = list(self.worlds.agent_names)
         self.agents: list[str] = []

@@ -35,7 +35,7 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
         threads: For the physics; None: one a core.
         copy: Whether each observation is an array of its own; else the next step writes over it.
         render_mode: `rgb_array`: `render` returns pictures, one of each world.
-        options: Of `Options`: other actions, another car file, what is drawn for each episode.
+        options: Of `Options`: other actions, observations or car, what is drawn for each episode.
 
     Attributes:
         name: As it was given.
@@ -63,7 +63,7 @@ class CityVectorEnv(VectorEnv[Observation, Actions, Any]):
         self.render_mode = checked_mode(render_mode)
         threads = threads or len(os.sched_getaffinity(0))
         self.worlds = Worlds(task, map_name, worlds, Options(**options), threads)
-        self._seen = Observations(self.worlds, task.observations)
+        self._seen = Observations(self.worlds, self.worlds.task.observations)
         self.observation_names = self._seen.names
         self.single_observation_space = spaces.Box(self._seen.low, self._seen.high)
         self.single_action_space = self._space = action_space(self.worlds)

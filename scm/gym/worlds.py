@@ -6,7 +6,8 @@ An episode's draws follow from the world's seed and the episode's number alone, 
 the same bit by bit however many there are.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -50,12 +51,14 @@ class Options:
             drawn anew, from so many times that.
         action: What agents choose: `throttle_steering`, or `speed_curvature`, which the controller
             of the city's cars turns into commands.
+        observations: What agents see, names of `scm.gym.observations`; None: what the task says.
         ranges: Likewise, further numbers by `section.key`, evenly from low to high; an effect that
             the car lacks is added to it.
     """
 
     car: str | None = None
     action: str = "throttle_steering"
+    observations: Sequence[str] | None = None
     randomise: float = 0.0
     ranges: Ranges = field(default_factory=dict)
 
@@ -94,6 +97,8 @@ class Worlds:
     def __init__(
         self, task: Task, map_name: str, worlds: int, options: Options, threads: int = 1
     ) -> None:
+        if options.observations is not None:
+            task = replace(task, observations=tuple(options.observations))
         self.task, self.count, self.agents = task, worlds, task.agents
         self.action_names = names_of(task, options.action)
         rows = self.rows = worlds * task.agents
