@@ -82,7 +82,7 @@ def test_observed_action_is_the_command_in_force():
 
 def test_episode_begins_with_a_fresh_controller():
     worlds, other = worlds_of(1), worlds_of(1)
-    driven(worlds, [[-0.2, 1.0]], 2.0)
+    driven(worlds, [[0.24, 1.0]], 2.0)
     for one in (worlds, other):
         one.seed(np.zeros(1, int), np.array([7]))
         one.begin(np.ones(1, bool))
