@@ -26,7 +26,6 @@ from scm.world.part import WorldPart
 from tests.unit.vehicle_agent.policy.test_policy_driving import policy_of
 from vehicle_agent.policy.ahead import Ahead
 from vehicle_agent.policy.driving import PolicyPart
-from vehicle_agent.policy.model import Policy
 from vehicle_agent.policy.received import Now, Pursued
 from vehicle_agent.policy.senses import NOWHERE, Aim, Senses, counts_of
 from vehicle_agent.trained_driver import STAND
@@ -223,10 +222,3 @@ def test_car_stands_at_once_while_something_is_missing(approach):
     state = Incoming(state_of("n1", Pose2(0.0, 0.0, 0.0)), 0)
     assert part.look([state], NS_PER_S) == STAND
     assert part.detail() == "n1 stands: it waits for its LIDAR"
-
-
-def test_actions_are_within_their_range(approach):
-    policy = Policy(approach)
-    columns = np.zeros(len(policy.metadata.observations))
-    columns[policy.metadata.observations.index("goal_ahead_m")] = 9.0
-    assert policy(columns).throttle == 1.0

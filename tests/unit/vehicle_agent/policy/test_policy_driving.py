@@ -6,6 +6,7 @@ import onnx
 import pytest
 from msgspec.structs import replace
 
+import scm.gym
 from scm.errors import LearningError
 from scm.gym.policy_file import describe_policy, write_policy
 from scm.maps.load import load_map
