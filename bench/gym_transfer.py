@@ -98,7 +98,7 @@ def drive_once(
         seen = None if is_out else senses.look(state_of(row, car, step * period_s), action, 0)
         if seen is None:
             return float(known[DONE_M]), step * period_s
-        action = policy(seen)
+        action = Command(*policy(seen).tolist())
         row = car.command(step, action.throttle, action.steering)[-1]
     return float(known[DONE_M]), DRIVEN_S
 

@@ -53,7 +53,7 @@ def film(policy: Policy, path: Path) -> float:
     seen, _ = env.reset(seed=SEED)
     frames, way_m = [], 0.0
     for step in range(EVERY * FRAMES):
-        seen, gain, ended, over, _ = env.step(np.array(policy(seen.astype(float))[:2]))
+        seen, gain, ended, over, _ = env.step(policy(seen.astype(float)))
         way_m += gain
         if ended or over:
             break
