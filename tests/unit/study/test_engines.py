@@ -7,14 +7,15 @@ import submitit
 
 from scm.errors import RunError, StudyError
 from scm.study.case_process import Task
-from scm.study.engine import SlurmEngine, slurm_options
+from scm.study.engine import SlurmEngine, run_share, slurm_options
 from scm.study.results import create_results
 from scm.study.search import run_search
 from tests.unit.study.studying import Here, loaded
 
 
-def test_slurm_s_jobs_share_the_cases_and_a_bad_one_costs_only_its_own(tmp_path):
-    """Submitit's local executor runs jobs as Slurm does, on this machine."""
+def test_slurm_s_jobs_share_the_cases_and_a_bad_one_costs_only_its_own(tmp_path, monkeypatch):
+    """Submitit's local executor runs jobs as Slurm does, on this machine; one has 2 and then 0."""
+    monkeypatch.setattr("scm.study.engine.SHARES_PER_JOB", 1)
     scenario = (
         "import os\ndef run(case, a=1.0):\n    if a > 2.5: os._exit(4)\n    return {'total': a}\n"
     )
@@ -22,7 +23,7 @@ def test_slurm_s_jobs_share_the_cases_and_a_bad_one_costs_only_its_own(tmp_path)
     folder = create_results(study, tmp_path / "out", []).folder
     logging.getLogger("submitit").setLevel(logging.ERROR)
     engine = SlurmEngine(submitit.LocalExecutor(tmp_path / "jobs"), study, folder, 2)
-    rows = {row.case: row for row in engine.run(Task(case=n) for n in range(4))}
+    rows = {row.case: row for row in engine.run(Task(case=n) for n in (2, 1, 0, 3))}
     assert {n: row.outcome for n, row in rows.items()} == {
         0: "success", 1: "success", 2: "error", 3: "success",
     }  # fmt: skip
@@ -30,25 +31,25 @@ def test_slurm_s_jobs_share_the_cases_and_a_bad_one_costs_only_its_own(tmp_path)
 
 
 class Cancelling:
-    """Submitit's interface where Slurm cancels the job of case 0 so often."""
+    """Submitit's interface, in this process, where Slurm cancels the job of case 0 so often."""
 
-    def __init__(self, times):
-        self.times = times
+    def __init__(self, study, times):
+        self.study, self.times = study, times
 
     def map_array(self, call, folders, names, shares):
-        assert shares
-        return [Job(self, lambda args=args: call(*args))
-                for args in zip(folders, names, shares, strict=True)]  # fmt: skip
+        assert call is run_share
+        assert len(folders) == len(names) == len(shares) > 0
+        return [Job(self, share) for share in shares]
 
 
 class Job:
     job_id = "7_0"
 
-    def __init__(self, executor, call):
-        self.executor, self.call = executor, call
+    def __init__(self, executor, share):
+        self.executor, self.share = executor, share
 
     def result(self):
-        rows = self.call()
+        rows = [self.executor.study.run(task.case, task.values) for task in self.share]
         if rows[0].case == 0 and self.executor.times:
             self.executor.times -= 1
             raise submitit.core.utils.UncompletedJobError("cancelled")
@@ -58,7 +59,7 @@ class Job:
 def on_slurm(tmp_path, times):
     study = loaded(tmp_path)
     folder = create_results(study, tmp_path / "out", []).folder
-    return SlurmEngine(Cancelling(times), study, folder, 1)
+    return SlurmEngine(Cancelling(study, times), study, folder, 1)
 
 
 def test_cases_of_a_cancelled_job_run_again(tmp_path):
