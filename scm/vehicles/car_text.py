@@ -13,6 +13,8 @@ from scm.vehicles.own_term import SUFFIX
 from scm.vehicles.term import Term
 
 _QUOTES = ('"""', "'''", '"', "'")
+_MARK = re.compile("|".join(_QUOTES) + r"|[#\[\]{}\n]")  # what may end a value, or hides such
+_DEEPER = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
 def quoted(text: str) -> str:
@@ -88,24 +90,19 @@ def _new_list(text: str, key: str, names: Sequence[str], comment: str) -> str:
 def end_of_value(text: str, start: int) -> int:
     """Return where the value that starts here ends: behind its bracket, quote or last letter."""
     depth, at = 0, start
-    while at < len(text):
-        quote = next((q for q in _QUOTES if text.startswith(q, at)), None)
-        if quote:
-            at = _end_of_string(text, at, quote)
-        elif text[at] == "#":
-            at = _end_of_line(text, at)
-        elif text[at] in "[{":
-            depth, at = depth + 1, at + 1
-        elif text[at] in "]}":
-            depth, at = depth - 1, at + 1
-        elif text[at] == "\n" and depth == 0:
-            return at
-        else:
-            at += 1
+    while mark := _MARK.search(text, at):
+        at, depth = mark.end(), depth + _DEEPER.get(mark[0], 0)
+        if mark[0] in _QUOTES:
+            at = _end_of_string(text, mark.start(), mark[0])
+        elif mark[0] == "#":
+            at = _end_of_line(text, mark.start())
+        elif mark[0] == "\n":
+            if depth == 0:
+                return mark.start()
             continue
         if depth == 0:
             return at
-    return at
+    return len(text)
 
 
 def _end_of_string(text: str, start: int, quote: str) -> int:
