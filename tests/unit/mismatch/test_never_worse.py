@@ -288,9 +288,20 @@ def test_a_car_that_loses_to_the_witness_is_not_handed_out(plain_model, tmp_path
     assert "Cause unknown" not in page
 
 
-def test_a_search_that_lost_begins_again_where_the_witness_points(plain_model):
+def test_a_search_that_lost_begins_again_where_the_witness_points(plain_model, monkeypatch):
+    """From a bicycle of steering alone."""
+    begun = []
+
+    def again(*lost):
+        begun.append(from_witness(*lost))
+        return begun[-1]
+
+    monkeypatch.setattr(module, "from_witness", again)
     plain_model(0.005, steering_offset_rad=0.03)
     found = concluded(*missed()).diagnosis
+    (searched,) = begun
+    assert searched.best.names == ("steer_trim",)
+    assert searched.context.by_windows
     assert [effect.name for effect in found.effects] == ["steer_trim"]
     assert found.effects[0].parameters["offset_rad"].value == pytest.approx(0.05, abs=0.01)
     assert (found.failure, found.dropped) == (None, ())
@@ -304,13 +315,6 @@ def test_what_began_from_the_witness_counts_only_where_it_is_nearer(plain_model,
     monkeypatch.setattr(module, "loses", lambda _: True)
     found = concluded(model, retuned, best).diagnosis
     assert [gone.name for gone in found.dropped] == ["steer_trim"]
-
-
-def test_a_search_begins_again_from_a_bicycle_of_steering_alone():
-    model, retuned, gyro = missed()
-    found = from_witness(selected(model, retuned, gyro), {"steering_offset_rad": 0.08})
-    assert found.best.names == ("steer_trim",)
-    assert found.context.by_windows
 
 
 def test_nothing_begins_again_where_no_effect_stands_for_the_bicycle_or_time_is_up():
