@@ -110,14 +110,14 @@ def test_the_list_tells_what_is_written_and_opens_a_replay_that_leaves_no_trace(
     page = visited.page
     try:
         page.wait_for_selector('tr[data-state="unreadable"] >> text=an MCAP file begins otherwise')
-        why = page.locator('tr[data-state="cut off"] .why')
+        why = page.locator('tr[data-recording="half"][data-state="cut off"] .why')
         assert "`" not in why.inner_text()
         assert why.locator("code").inner_text() == "scm recover half.mcap"
         judge_everywhere(visited, "recordings_list")
     finally:
         bad.unlink()
         half.unlink()
-    assert page.locator('tr[data-state="being written"]').count() == 1
+    page.wait_for_selector(f'tr[data-recording="{NAME}"][data-state="being written"]')
     page.click(f'tr[data-recording="{NAME}"] a')
     page.wait_for_selector(".not-live")
     page.go_back()

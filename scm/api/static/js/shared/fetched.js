@@ -13,7 +13,7 @@ export function useFetched(path, every_ms = 0) {
     let next = null;
     read(path, quit.signal)
       .then(
-        (body) => setFound({ body, error: null }),
+        (body) => quit.signal.aborted || setFound({ body, error: null }),
         (error) => quit.signal.aborted || setFound((before) => ({ ...before, error: error.message })),
       )
       .then(() => {
@@ -30,7 +30,7 @@ export function useFetched(path, every_ms = 0) {
 
 async function read(path, signal) {
   const response = await fetch(placed(`/api/v1${path}`), { signal });
+  if (response.ok) return response.json(); // of which a part may not come: that is an error
   const body = await response.json().catch(() => ({}));
-  if (response.ok) return body;
   throw new Error(body.detail || body.title || `${path}: ${response.status}`);
 }
