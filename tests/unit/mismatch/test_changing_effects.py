@@ -23,6 +23,7 @@ from scm.mismatch.findings import Course, Effect, Estimate, Located
 from scm.mismatch.fit.fitter import Fitter
 from scm.mismatch.fit.hypothesis import together
 from scm.mismatch.fit.likelihood import Likelihood
+from scm.mismatch.report.pictures import _moments_drawn
 from scm.mismatch.report.sentences import effect_title, since_sentence
 from scm.mismatch.select.changes import changes_to_try, moments_scored, with_best_moments
 from scm.mismatch.select.confirm import with_placed_moments
@@ -351,6 +352,15 @@ def test_what_is_located_by_a_change_after_a_pause_is_where_the_pause_was_cut_ou
     pauses = ((0.0, 0.0), (30.5, 100.0))  # the first 30 s, and what is from 130.5 s on
     moved = since_changes(located, [late], 190.0, pauses)
     assert {one.when_s for one in moved if one.equation is effect.equation} == {((42.0, 90.0),)}
+
+
+@pytest.mark.parametrize("start_s", [0.0, 100.0])
+def test_moment_after_a_pause_is_drawn_where_the_pause_was_cut_out(start_s):
+    since = Estimate(value=142.0, low=120.0, high=143.0, unit="s")
+    late = structs.replace(made_up.lag(), course=Course.STEP, since_s=since)
+    pauses = ((start_s, 0.0), (start_s + 30.5, 100.0))
+    (drawn,) = _moments_drawn([late], pauses, start_s)
+    assert (drawn.value, drawn.low, drawn.high) == (42.0, 30.5, 43.0)
 
 
 def test_moment_is_found_where_the_recording_has_pauses():
