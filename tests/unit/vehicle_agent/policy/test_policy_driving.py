@@ -6,7 +6,6 @@ import onnx
 import pytest
 from msgspec.structs import replace
 
-import scm.gym
 from scm.errors import LearningError
 from scm.gym.policy_file import describe_policy, write_policy
 from scm.maps.load import load_map
@@ -80,20 +79,6 @@ def test_policy_drives_round_as_it_did_in_training(envs, policy):
         seen = envs.step(np.array([list(action(row))[:2] for row in seen.astype(float)]))[0]
     came_m = envs.worlds.course.known[:, 3] - began_m
     assert came_m == pytest.approx(way_m, abs=0.6)
-
-
-@pytest.fixture(scope="module")
-def cruising(tmp_path_factory):
-    """Return environments, and the file of a policy that chooses 0.15 m/s and its lane's bend."""
-    envs = scm.gym.make_vec("driving_school/lap-v1", 4, action="speed_curvature")
-    path = tmp_path_factory.mktemp("cruising") / "lane.onnx"
-    names = envs.observation_names
-    weights = np.zeros((len(names), 2))
-    for name, gain in {"beside_m": -33.0, "turned_rad": -8.0, "lane_turn_0.2m_rad": 5.0}.items():
-        weights[names.index(name), 1] = gain
-    columns = np.zeros(len(names)), np.ones(len(names))
-    write_policy(path, [(weights, np.array([0.15, 0.0]))], *columns, envs)
-    return envs, path
 
 
 def test_policy_of_speed_and_curvature_drives_as_it_did_in_training(cruising):
