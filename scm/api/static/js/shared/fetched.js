@@ -1,8 +1,29 @@
-/** Data of the server: read once, or repeatedly while the page is visible. */
+/** Data of the server: read once, or repeatedly while a component is mounted. */
 import { useCallback, useEffect, useState } from "preact/hooks";
 import { placed } from "scm/shared/base.js";
 
-/** @returns `{body, error, again}`: null until it came, and a function that reads it anew. */
+/** @returns {Promise<{body, etag}>} a resource; rejects with the server's sentence. */
+export async function read(path, signal) {
+  const response = await fetch(placed(`/api/v1${path}`), { signal }).catch(unreached);
+  if (response.ok) return { body: await response.json(), etag: response.headers.get("ETag") }; // cut off: an error, not `{}`
+  const problem = await response.json().catch(() => ({}));
+  throw new Error(problem.detail || problem.title || `${path}: ${response.status}`);
+}
+
+export async function readBody(path) {
+  return (await read(path)).body;
+}
+
+/** The browser's own message is for programmers; that a request was ended on purpose is for its caller. */
+export function unreached(error) {
+  if (error.name === "AbortError") throw error;
+  throw new Error(error.name === "TimeoutError" ? "The city did not answer in time." : "The city cannot be reached.");
+}
+
+/**
+ * Read now, and every so often; what was read stays while the next answer is on its way.
+ * @returns `{body, error, again}`: null until it came, and a function that reads it anew.
+ */
 export function useFetched(path, every_ms = 0) {
   const [found, setFound] = useState({ body: null, error: null });
   const [count, setCount] = useState(0);
@@ -13,7 +34,7 @@ export function useFetched(path, every_ms = 0) {
     let next = null;
     read(path, quit.signal)
       .then(
-        (body) => quit.signal.aborted || setFound({ body, error: null }),
+        ({ body }) => quit.signal.aborted || setFound({ body, error: null }),
         (error) => quit.signal.aborted || setFound((before) => ({ ...before, error: error.message })),
       )
       .then(() => {
@@ -26,11 +47,4 @@ export function useFetched(path, every_ms = 0) {
     };
   }, [path, count, every_ms]);
   return { ...found, again };
-}
-
-async function read(path, signal) {
-  const response = await fetch(placed(`/api/v1${path}`), { signal });
-  if (response.ok) return response.json(); // of which a part may not come: that is an error
-  const body = await response.json().catch(() => ({}));
-  throw new Error(body.detail || body.title || `${path}: ${response.status}`);
 }

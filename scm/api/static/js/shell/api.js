@@ -1,6 +1,7 @@
 /** Changes go through here: REST with an idempotency key, problems as sentences, the API key stored for the tab. */
 import { signal } from "@preact/signals";
 import { placed } from "scm/shared/base.js";
+import { unreached } from "scm/shared/fetched.js";
 
 const KEY = "scm-api-key";
 const REFUSALS = [401, 403, 429]; // of a key; what else goes wrong is not its fault
@@ -61,11 +62,6 @@ async function send(method, path, body, own, timeout_ms) {
   if (response.status === 401 && (await requestKey())) return send(method, path, body, own, timeout_ms);
   const sentence = reply.detail || reply.title || `${method} ${path}: ${response.status}`;
   throw Object.assign(new Error(sentence), { code: reply.code });
-}
-
-/** The browser's own message is for programmers. */
-function unreached({ name }) {
-  throw new Error(name === "TimeoutError" ? "The city did not answer in time." : "The city cannot be reached.");
 }
 
 /**

@@ -4,7 +4,7 @@ import { html } from "scm/shared/html.js";
 import { clock, fixed } from "scm/shared/format.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { Sure } from "scm/shared/sure.js";
-import { read } from "scm/pages/eye/polling.js";
+import { readBody } from "scm/shared/fetched.js";
 import { named } from "scm/pages/eye/in_force.js";
 import { change } from "scm/shell/api.js";
 import { placed } from "scm/shared/base.js";
@@ -59,7 +59,7 @@ function Row({ camera, one, open, discard, put }) {
   return html`
     <tr>
       <td>
-        <button class="name" title="Show the file" onClick=${async () => open(await read(path).catch(() => null))}>${one.name}</button>
+        <button class="name" title="Show the file" onClick=${async () => open(await readBody(path).catch(() => null))}>${one.name}</button>
         <small>${factsOf(one, fits)}</small>
       </td>
       <td>

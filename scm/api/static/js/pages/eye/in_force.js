@@ -3,7 +3,7 @@ import { useEffect, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { clock } from "scm/shared/format.js";
 import { Dialog } from "scm/shared/dialog.js";
-import { read } from "scm/pages/eye/polling.js";
+import { readBody } from "scm/shared/fetched.js";
 import { change, notify } from "scm/shell/api.js";
 
 /** `{lens, place}` in words. */
@@ -78,7 +78,7 @@ export function PutInForce({ camera, choice, close }) {
 function useReport(name) {
   const [report, setReport] = useState(null);
   useEffect(() => {
-    if (name) read(`/eye/calibrations/${name}`).then(({ row }) => row.reported && read(`/eye/calibrations/${name}/report`).then(setReport)).catch(() => null);
+    if (name) readBody(`/eye/calibrations/${name}`).then(({ row }) => row.reported && readBody(`/eye/calibrations/${name}/report`).then(setReport)).catch(() => null);
   }, [name]);
   return report;
 }

@@ -3,7 +3,8 @@ import { useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
 import { Sure } from "scm/shared/sure.js";
-import { savedBy, read, usePolled, useUnfinished } from "scm/pages/eye/polling.js";
+import { savedBy, useUnfinished } from "scm/pages/eye/unfinished.js";
+import { readBody, useFetched } from "scm/shared/fetched.js";
 import { finished } from "scm/shared/operation.js";
 import { Coverage } from "scm/pages/eye/coverage.js";
 import { filledIn, freeName, Progress, useStored } from "scm/pages/eye/progress.js";
@@ -17,7 +18,7 @@ const FIRST = { board: "chessboard", columns: 9, rows: 6, square_mm: 30, marker_
 
 export function LensStep({ camera, saved, done, put }) {
   const root = `/eye/cameras/${camera.camera}`;
-  const { body, error, again } = usePolled(`${root}/views`, 0);
+  const { body, error, again } = useFetched(`${root}/views`, 0);
   const [board, setBoard] = useStored(`board ${camera.camera}`, FIRST);
   const [row, setRow] = useState(null);
   const [lens, setLens] = useState(null);
@@ -31,7 +32,7 @@ export function LensStep({ camera, saved, done, put }) {
     again();
     const called = savedBy(over);
     if (!called) return;
-    const report = await read(`/eye/calibrations/${called}/report`).catch(() => null);
+    const report = await readBody(`/eye/calibrations/${called}/report`).catch(() => null);
     setLens(report && { ...report.lens, called });
     notify("info", `The lens is saved as ${called}.`);
     done();

@@ -2,7 +2,8 @@
 import { useRef, useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
-import { savedBy, read, useUnfinished } from "scm/pages/eye/polling.js";
+import { savedBy, useUnfinished } from "scm/pages/eye/unfinished.js";
+import { readBody } from "scm/shared/fetched.js";
 import { finished } from "scm/shared/operation.js";
 import { filledIn, freeName, Progress, useStored } from "scm/pages/eye/progress.js";
 import { change, notify } from "scm/shell/api.js";
@@ -23,7 +24,7 @@ export function PlaceStep({ camera, saved, lenses, done, put }) {
   const follow = async (operation) => {
     const called = savedBy(await finished(operation, setRow));
     if (!called) return;
-    const report = await read(`/eye/calibrations/${called}/report`).catch(() => null);
+    const report = await readBody(`/eye/calibrations/${called}/report`).catch(() => null);
     setFound(report && { ...report, name: called });
     notify("info", `The place is saved as ${called}.`);
     done();

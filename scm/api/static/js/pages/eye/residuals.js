@@ -2,7 +2,7 @@
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
 import { fixed } from "scm/shared/format.js";
-import { usePolled } from "scm/pages/eye/polling.js";
+import { useFetched } from "scm/shared/fetched.js";
 import { ResidualFloor } from "scm/pages/eye/residual_floor.js";
 
 const WINDOWS = { 30: "30 s", 120: "2 min", 300: "5 min" };
@@ -13,7 +13,7 @@ export function Residuals({ camera }) {
   const [window_s, setWindow] = useState("120");
   const [vehicle, setVehicle] = useState("");
   const path = `/eye/cameras/${camera.camera}/residuals?window_s=${window_s}`;
-  const { body, error } = usePolled(path, PERIOD_MS);
+  const { body, error } = useFetched(path, PERIOD_MS);
   const shown = body?.samples.filter((one) => !vehicle || one.vehicle === vehicle) ?? [];
   const picked = body?.vehicles.some((one) => one.vehicle === vehicle) ? vehicle : "";
   return html`

@@ -1,13 +1,13 @@
 /** Where all cameras together take each car to be, with what is wrong with it. */
 import { html } from "scm/shared/html.js";
 import { fixed, span } from "scm/shared/format.js";
-import { usePolled } from "scm/pages/eye/polling.js";
+import { useFetched } from "scm/shared/fetched.js";
 
 const POLL_MS = 500;
 const DEG = 180 / Math.PI;
 
 export function Tracks() {
-  const { body, error } = usePolled("/eye/tracks", POLL_MS);
+  const { body, error } = useFetched("/eye/tracks", POLL_MS);
   const rows = body?.tracks ?? [];
   return html`
     <section class="panel wide eye-tracks" aria-label="Tracks">

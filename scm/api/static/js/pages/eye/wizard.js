@@ -1,7 +1,7 @@
 /** Calibrating a camera in steps: its lens by a printed board, its place by tags on the floor, the saved calibrations. */
 import { useState } from "preact/hooks";
 import { html } from "scm/shared/html.js";
-import { usePolled } from "scm/pages/eye/polling.js";
+import { useFetched } from "scm/shared/fetched.js";
 import { PutInForce } from "scm/pages/eye/in_force.js";
 import { LensStep } from "scm/pages/eye/lens_step.js";
 import { PlaceStep } from "scm/pages/eye/place_step.js";
@@ -9,7 +9,7 @@ import { Calibrations } from "scm/pages/eye/calibrations.js";
 
 export function Wizard({ camera }) {
   const [choice, setChoice] = useState(); // a calibration's name; null: the one before; undefined: none
-  const calibrations = usePolled("/eye/calibrations?limit=200", 5000);
+  const calibrations = useFetched("/eye/calibrations?limit=200", 5000);
   if (calibrations.error && calibrations.body === null) {
     return html`<section class="panel wide" aria-label="Calibrate"><p class="empty" role="alert">${calibrations.error}</p></section>`;
   }

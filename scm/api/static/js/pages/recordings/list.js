@@ -2,7 +2,7 @@
 import { coded } from "scm/shared/coded.js";
 import { html } from "scm/shared/html.js";
 import { Tabs } from "scm/pages/recordings/tabs.js";
-import { useReading } from "scm/pages/recordings/reading.js";
+import { useFetched } from "scm/shared/fetched.js";
 import { minutes, moment, size } from "scm/pages/recordings/words.js";
 import { go, route } from "scm/shell/router.js";
 
@@ -12,7 +12,7 @@ const ROWS = 50;
 export function RecordingsList() {
   const { cursor = "" } = route.value.query;
   const path = `/recordings?limit=${ROWS}${cursor && `&cursor=${encodeURIComponent(cursor)}`}`;
-  const { body, error } = useReading(path, EVERY_MS);
+  const { body, error } = useFetched(path, EVERY_MS);
   return html`
     <${Tabs} here="recordings" />
     <section class="panel list" aria-label="Recordings">

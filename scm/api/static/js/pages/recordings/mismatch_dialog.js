@@ -5,7 +5,7 @@ import { Dialog } from "scm/shared/dialog.js";
 import { searchBody, question, SearchFields } from "scm/shared/search_fields.js";
 import { change } from "scm/shell/api.js";
 import { go } from "scm/shell/router.js";
-import { read } from "scm/pages/recordings/reading.js";
+import { read } from "scm/shared/fetched.js";
 
 export function MismatchDialog({ recording, cars, player, chosen, onClose }) {
   const names = cars.map((car) => car.vehicle);

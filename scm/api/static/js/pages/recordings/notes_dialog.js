@@ -4,7 +4,7 @@ import { html } from "scm/shared/html.js";
 import { Dialog } from "scm/shared/dialog.js";
 import { change } from "scm/shell/api.js";
 import { go } from "scm/shell/router.js";
-import { read } from "scm/pages/recordings/reading.js";
+import { read } from "scm/shared/fetched.js";
 import { size } from "scm/pages/recordings/words.js";
 
 export function NotesDialog({ recording, onClose, onChanged }) {

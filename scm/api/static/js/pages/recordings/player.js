@@ -1,6 +1,6 @@
 /** What plays a recording: where it is, how fast, and the frames about that moment. */
 import { signal } from "@preact/signals";
-import { read } from "scm/pages/recordings/reading.js";
+import { read } from "scm/shared/fetched.js";
 import { spoken } from "scm/pages/recordings/words.js";
 
 const STRETCH_S = 10; // of one answer of the server

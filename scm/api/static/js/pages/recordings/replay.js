@@ -9,7 +9,7 @@ import { EyeThen } from "scm/pages/recordings/eye_then.js";
 import { MismatchDialog } from "scm/pages/recordings/mismatch_dialog.js";
 import { DeleteDialog, NotesDialog } from "scm/pages/recordings/notes_dialog.js";
 import { Player } from "scm/pages/recordings/player.js";
-import { read, useReading } from "scm/pages/recordings/reading.js";
+import { read, useFetched } from "scm/shared/fetched.js";
 import { ReplayMap } from "scm/pages/recordings/replay_map.js";
 import { DownloadDialog } from "scm/pages/recordings/download_dialog.js";
 import { Timeline } from "scm/pages/recordings/timeline.js";
@@ -78,7 +78,7 @@ async function load(name) {
 }
 
 function Unreadable({ name, why }) {
-  const recording = useReading(address(name)).body; // null where there is none of that name
+  const recording = useFetched(address(name)).body; // null where there is none of that name
   return html`
     <section class="panel" role="alert">
       <h2>${name} cannot be shown</h2>
@@ -97,7 +97,7 @@ function Played({ player, summary, events, more, onChanged }) {
   const [chosen, setChosen] = useState(null);
   const { recording } = summary;
   const close = () => (openDialog.value = null);
-  const { disturbances, void: reasons } = useReading(`${address(recording.name)}/disturbances`).body ?? NOTHING;
+  const { disturbances, void: reasons } = useFetched(`${address(recording.name)}/disturbances`).body ?? NOTHING;
   const { cars, eye_cameras: eye, car_cameras: own } = summary;
   return html`
     <div class="replay">

@@ -7,7 +7,7 @@ import { Sure } from "scm/shared/sure.js";
 import { change } from "scm/shell/api.js";
 import { go, route } from "scm/shell/router.js";
 import { Tabs } from "scm/pages/recordings/tabs.js";
-import { read, useReading } from "scm/pages/recordings/reading.js";
+import { read, useFetched } from "scm/shared/fetched.js";
 import { BASE } from "scm/shared/base.js";
 
 const LOOK_MS = 1000;
@@ -28,8 +28,8 @@ with open_city("driving_school", connect=os.environ["SCM_CONNECT"]) as city:
 
 export function Scenarios() {
   const { query } = route.value;
-  const list = useReading("/scenarios");
-  const work = useReading("/operations?limit=200", LOOK_MS);
+  const list = useFetched("/scenarios");
+  const work = useFetched("/operations?limit=200", LOOK_MS);
   const runs = (work.body?.items ?? []).filter((row) => row.kind === "scenario");
   const run = runs.find((row) => row.id === query.run) ?? null;
   const name = query.script ?? run?.what ?? list.body?.items[0]?.name ?? "";

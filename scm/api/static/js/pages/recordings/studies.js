@@ -4,13 +4,13 @@ import { html } from "scm/shared/html.js";
 import { placed } from "scm/shared/base.js";
 import { UNKNOWN } from "scm/shared/format.js";
 import { Tabs } from "scm/pages/recordings/tabs.js";
-import { useReading } from "scm/pages/recordings/reading.js";
+import { useFetched } from "scm/shared/fetched.js";
 import { moment } from "scm/pages/recordings/words.js";
 
 const EVERY_MS = 4000;
 
 export function Studies() {
-  const { body, error } = useReading("/studies?limit=500", EVERY_MS);
+  const { body, error } = useFetched("/studies?limit=500", EVERY_MS);
   return html`
     <${Tabs} here="studies" />
     <section class="panel list studies" aria-label="Studies">
