@@ -18,8 +18,10 @@ from pymunk import batch
 from scm.arrays import Floats
 from scm.records.city_map import CityMap, MapTag, Wall
 from scm.records.floor import Floor
-from scm.world.contacts import INSTANT, ITERATIONS, Contacts
-from scm.world.solids import Hull, car_body, solids
+from scm.world.contact_groups import ITERATIONS
+from scm.world.contact_space import INSTANT
+from scm.world.contacts import Contacts
+from scm.world.solids import Hull, car_body, solid_shape, solids
 
 HULL = Hull(2.4, 0.0229, -0.14, 0.16, -0.0875, 0.0875, restitution=0.2, friction=0.5)
 SIZES = (100, 1000, 10_000)
@@ -114,7 +116,7 @@ def plain(city_map: CityMap, motion: Floats, *, moving: bool) -> Callable[[int],
     """Return the peer's step: every car in one space, written, solved and read by batch calls."""
     space = pymunk.Space()
     space.iterations = ITERATIONS
-    space.add(*solids(space.static_body, city_map))
+    space.add(*(solid_shape(space.static_body, solid) for solid in solids(city_map)))
     for x, y, yaw in motion[:, :3].tolist():
         body = car_body(HULL)
         body.position, body.angle = (x, y), yaw

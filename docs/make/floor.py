@@ -16,7 +16,8 @@ from scm.records.floor import Floor, Plate, Ramp
 from scm.vehicles.car import load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
-from scm.world.contacts import STEP_S, Contacts
+from scm.world.contact_space import STEP_S
+from scm.world.contacts import Contacts
 from scm.world.solids import Hull
 
 PICTURES = Path(__file__).parents[1] / "pictures"

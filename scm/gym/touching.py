@@ -11,9 +11,9 @@ from scm.world.broad_phase import (
     LEEWAY_M,
     LOOK_AHEAD_S,
     has_strayed,
-    list_walls,
     mark,
     obstacles_of,
+    walls_near,
 )
 from scm.world.solids import hull_of, obstacle_boxes, outline_of
 
@@ -61,11 +61,4 @@ class Touching:
         self._from = motion[:, :2].copy()
         self._leeway = LEEWAY_M + LOOK_AHEAD_S * np.hypot(motion[:, 3], motion[:, 4])
         reach = self._outlines[:, 4] + self._leeway
-        room = max(64, 4 * len(motion))
-        while True:
-            walls = np.empty((room, 2), np.int64)
-            count = list_walls(walls, motion, reach, self._obstacles)
-            if count <= room:
-                break
-            room = 2 * count
-        self._walls = walls[:count]
+        self._walls = walls_near(motion, reach, self._obstacles)

@@ -3,6 +3,9 @@
 Bodies carry a circle about their centre of gravity. Lists of pairs whose circles come close are
 made anew only when a body has moved by its leeway; between that each step looks at the listed pairs
 alone, and marks those whose boxes really overlap. A lone car costs a few nanoseconds a step.
+
+Lists hold all that may matter to a body, in ascending order, so what a step finds out about it
+depends on those near it alone: neither on others' motion nor on when the lists were made.
 """
 
 import math
@@ -74,7 +77,7 @@ def obstacles_of(boxes: Floats) -> Obstacles:
 
 
 class BroadPhase:
-    """Lists of pairs of a set of bodies that come in the same order at most steps."""
+    """Lists of pairs of a set of bodies, whose rows keep their order as bodies come and go."""
 
     def __init__(self, obstacles: Obstacles) -> None:
         self._obstacles = obstacles
@@ -95,7 +98,8 @@ class BroadPhase:
             first_box: Rows from here on are boxes: two of them at rest do not count as touching.
         """
         if has_strayed(order, self._order, self._from, self._leeway, motion):
-            self._list_anew(order, motion, outlines)
+            leeway = LEEWAY_M + LOOK_AHEAD_S * np.hypot(motion[:, 3], motion[:, 4])
+            self._list_anew(order, motion, leeway, outlines)
         marks = np.zeros(len(motion), np.bool_)
         mark(marks, self._pairs, self._walls, motion, outlines, self._obstacles.boxes, first_box)
         return marks
@@ -110,32 +114,46 @@ class BroadPhase:
         fast = is_any_fast(moves, outlines)
         if not (fast or marks.any()):
             return None
+        if does_leave(self._from, self._leeway, starts, moves):
+            leeway = LEEWAY_M + 2.0 * np.hypot(moves[:, 0], moves[:, 1])
+            self._list_anew(self._order, starts, leeway, outlines)
         shares = np.ones(len(moves))
         share_moves(shares, self._pairs, self._walls, starts, moves, outlines, boxes, marks, fast)
         return shares if (shares < 1.0).any() else None
 
-    def _list_anew(self, order: Ints, motion: Floats, outlines: Floats) -> None:
-        self._order, self._from = order.copy(), motion[:, :2].copy()
-        self._leeway = LEEWAY_M + LOOK_AHEAD_S * np.hypot(motion[:, 3], motion[:, 4])
-        reach = outlines[:, 4] + self._leeway
+    def overlaps(self, motion: Floats, outlines: Floats, marks: Bools) -> Ints:
+        """Return the pairs of rows (k, 2) of marked bodies that overlap, the lower row first.
+
+        The arguments are those of `touching`, and what it returned.
+        """
+        found = np.empty_like(self._pairs)
+        return found[: list_overlaps(found, self._pairs, marks, motion, outlines)]
+
+    def _list_anew(self, order: Ints, places: Floats, leeway: Floats, outlines: Floats) -> None:
+        self._order, self._from, self._leeway = order.copy(), places[:, :2].copy(), leeway
+        reach = outlines[:, 4] + leeway + TOUCH_M
         room = max(64, 4 * len(order))
         head = np.zeros(_buckets(len(order)), np.int64)
-        after, places = np.zeros(len(order), np.int64), np.zeros((len(order), 2), np.int64)
+        after, cells = np.zeros(len(order), np.int64), np.zeros((len(order), 2), np.int64)
         while True:
             self._pairs = np.empty((room, 2), np.int64)
-            count = list_pairs(self._pairs, motion, reach, head, after, places)
+            count = list_pairs(self._pairs, places, reach, head, after, cells)
             if count <= room:
                 break
             room = 2 * count
         self._pairs = self._pairs[:count]
-        room = max(64, 4 * len(order))
-        while True:
-            self._walls = np.empty((room, 2), np.int64)
-            count = list_walls(self._walls, motion, reach, self._obstacles)
-            if count <= room:
-                break
-            room = 2 * count
-        self._walls = self._walls[:count]
+        self._walls = walls_near(places, reach, self._obstacles)
+
+
+def walls_near(places: Floats, reach: Floats, obstacles: Obstacles) -> Ints:
+    """Return rows and obstacles (k, 2) within reach (n,) of places (n, 2 or more), ascending."""
+    room = max(64, 4 * len(reach))
+    while True:
+        walls = np.empty((room, 2), np.int64)
+        count = list_walls(walls, places, reach, obstacles)
+        if count <= room:
+            return walls[:count]
+        room = 2 * count
 
 
 def _buckets(n: int) -> int:
@@ -158,12 +176,38 @@ def has_strayed(order: Ints, known: Ints, begun: Floats, leeway: Floats, motion:
 
 
 @array_kernel
+def does_leave(begun: Floats, leeway: Floats, starts: Floats, moves: Floats) -> bool:
+    """Return whether any body begins or ends its move further from there than its leeway."""
+    for i in range(begun.shape[0]):
+        dx, dy = starts[i, 0] - begun[i, 0], starts[i, 1] - begun[i, 1]
+        far = leeway[i] * leeway[i]
+        if not dx * dx + dy * dy <= far:
+            return True
+        dx, dy = dx + moves[i, 0], dy + moves[i, 1]
+        if not dx * dx + dy * dy <= far:
+            return True
+    return False
+
+
+@kernel_function
+def put_in_order(rows: Ints, begin: int, end: int, column: int) -> None:
+    """Sort a few rows by a column, ascending; the other column is the same in all of them."""
+    for k in range(begin + 1, end):
+        value, place = rows[k, column], k
+        while place > begin and rows[place - 1, column] > value:
+            rows[place, column] = rows[place - 1, column]
+            place -= 1
+        rows[place, column] = value
+
+
+@array_kernel
 def list_pairs(
     pairs: Ints, motion: Floats, reach: Floats, head: Ints, after: Ints, places: Ints
 ) -> int:
     """Write the pairs whose circles overlap; return how many there are, written or not.
 
-    `head`, a power of two long, `after` (n,) and `places` (n, 2) are room to work in.
+    They are in order of their higher row, then of their lower one, which comes first. `head`, a
+    power of two long, `after` (n,) and `places` (n, 2) are room to work in.
     """
     n = reach.shape[0]
     widest = 0.01
@@ -176,6 +220,7 @@ def list_pairs(
     count = 0
     for i in range(n):
         column, row = math.floor(motion[i, 0] / cell), math.floor(motion[i, 1] / cell)
+        begun = count
         for k in range(9):
             c, r = column + k % 3 - 1, row + k // 3 - 1
             j = head[(c * 73856093 ^ r * 19349663) & (size - 1)]
@@ -188,6 +233,7 @@ def list_pairs(
                             pairs[count, 0], pairs[count, 1] = j, i
                         count += 1
                 j = after[j]
+        put_in_order(pairs, begun, min(count, pairs.shape[0]), 0)
         places[i, 0], places[i, 1] = column, row
         bucket = (column * 73856093 ^ row * 19349663) & (size - 1)
         after[i] = head[bucket]
@@ -206,7 +252,10 @@ def gap_to_box(x: float, y: float, box: Floats) -> float:
 
 @array_kernel
 def list_walls(walls: Ints, motion: Floats, reach: Floats, obstacles: Obstacles) -> int:
-    """Write (body, obstacle) where a circle reaches an obstacle; return how many there are."""
+    """Write (body, obstacle) where a circle reaches an obstacle; return how many there are.
+
+    They are in order of both.
+    """
     frame, count = obstacles.frame, 0
     for i in range(reach.shape[0]):
         x, y, r = motion[i, 0], motion[i, 1], reach[i]
@@ -230,6 +279,7 @@ def list_walls(walls: Ints, motion: Floats, reach: Floats, obstacles: Obstacles)
                     if count < walls.shape[0]:
                         walls[count, 0], walls[count, 1] = i, wall
                     count += 1
+        put_in_order(walls, begun, min(count, walls.shape[0]), 1)
     return count
 
 
@@ -310,3 +360,15 @@ def mark(
         i = walls[k, 0]
         if i < first_box and not marks[i]:
             marks[i] = does_meet(motion, outlines, i, boxes[walls[k, 1]])
+
+
+@array_kernel
+def list_overlaps(found: Ints, pairs: Ints, marks: Bools, motion: Floats, outlines: Floats) -> int:
+    """Write those pairs of marked bodies that overlap; return how many there are."""
+    count = 0
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        if marks[i] and marks[j] and do_overlap(motion, outlines, i, j):
+            found[count, 0], found[count, 1] = i, j
+            count += 1
+    return count

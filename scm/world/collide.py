@@ -15,8 +15,8 @@ from scm.v2x.messages.contact import Contact
 from scm.vehicles.fleet import Fleet
 from scm.world.alerts import city_event
 from scm.world.cars import Cars
+from scm.world.contact_groups import WALL as A_WALL
 from scm.world.contacts import FIRST_BOX, Contacts, Touches
-from scm.world.contacts import WALL as A_WALL
 from scm.world.stuck import Stuck
 
 WALL = "wall"
@@ -116,8 +116,6 @@ def collide(
         is_subscribed: Whether anybody subscribes to `Contact`.
     """
     indices, motion = everybody(cars, t_ns)
-    if not len(indices):
-        return []
     touches = contacts.step(indices, motion)
     if not len(touches.pairs):
         return []

@@ -94,18 +94,37 @@ def _shape(
     return shape
 
 
-def solids(static: pymunk.Body, city_map: CityMap) -> Iterator[pymunk.Shape]:
-    """Yield the shapes of all that never moves."""
-    for wall in city_map.walls:
-        for a, b in _runs(wall):
-            yield _solid(pymunk.Segment(static, a, b, 0.5 * wall.thickness_m))
+class Solid(NamedTuple):
+    """Something that never moves, map frame [m]: a straight wall, or a box.
+
+    Attributes:
+        points: Both ends of the wall, or the corners of the box.
+        radius: Half the wall's thickness.
+    """
+
+    points: tuple[tuple[float, float], ...]
+    radius: float = 0.0
+
+
+def solids(city_map: CityMap) -> list[Solid]:
+    """Return all that never moves, in the order of `obstacle_boxes`."""
+    found = [Solid(run, 0.5 * wall.thickness_m) for wall in city_map.walls for run in _runs(wall)]
     for box in city_map.boxes:
         if box.mass_kg is None:
             c, s = math.cos(box.yaw_rad), math.sin(box.yaw_rad)
             half = ((1, 1), (-1, 1), (-1, -1), (1, -1))
             sizes = [(0.5 * i * box.length_m, 0.5 * j * box.width_m) for i, j in half]
-            corners = [(box.x_m + c * x - s * y, box.y_m + s * x + c * y) for x, y in sizes]
-            yield _solid(pymunk.Poly(static, corners))
+            found.append(
+                Solid(tuple((box.x_m + c * x - s * y, box.y_m + s * x + c * y) for x, y in sizes))
+            )
+    return found
+
+
+def solid_shape(static: pymunk.Body, solid: Solid) -> pymunk.Shape:
+    """Return the shape of what never moves, on a space's static body."""
+    if len(solid.points) == 2:
+        return _solid(pymunk.Segment(static, *solid.points, solid.radius))
+    return _solid(pymunk.Poly(static, solid.points))
 
 
 def obstacle_boxes(city_map: CityMap, *, round_ends: bool = True) -> Floats:

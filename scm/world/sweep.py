@@ -20,7 +20,7 @@ from scm.vehicles.jit import array_kernel, kernel_function
 
 MAX_OVERLAP = 0.25  # of the smallest half side; pymunk parts bodies the wrong way from 1 on
 DEEP = 2.0  # times that; who overlaps so far was put there, and goes out as the solver says
-MAX_PASSES = 20  # later a body that has to stop earlier does not move at all
+MAX_PASSES = 20  # later a body that has to stop earlier still does not move at all
 ROUNDING_M = 1e-9
 
 
@@ -89,9 +89,15 @@ def is_any_fast(moves: Floats, outlines: Floats) -> bool:
 
 
 @kernel_function
+def goes_on(shares: Floats, outlines: Floats, i: int, at: float) -> bool:
+    """Return whether a body that can be stopped makes more of its move than a share."""
+    return bool(outlines[i, 5] != 0.0 and shares[i] > at)
+
+
+@kernel_function
 def stop(shares: Floats, outlines: Floats, i: int, at: float) -> bool:
     """Limit a body's move to a share; return whether that is less than before."""
-    if outlines[i, 5] == 0.0 or shares[i] <= at:
+    if not goes_on(shares, outlines, i, at):
         return False
     shares[i] = at
     return True
@@ -111,7 +117,10 @@ def stop_pair(
     for k in range(1, samples + 1):
         at_i, at_j = min(k / samples, shares[i]), min(k / samples, shares[j])
         if pair_overlap(starts, moves, outlines, i, j, at_i, at_j) > allowed:
-            last = 0.0 if late else (k - 1) / samples
+            last = (k - 1) / samples
+            # The passes may go on for others alone: then nothing changes here.
+            if late and (goes_on(shares, outlines, i, last) or goes_on(shares, outlines, j, last)):
+                last = 0.0
             first = stop(shares, outlines, i, last)
             return stop(shares, outlines, j, last) or first
     return False

@@ -9,7 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scm.records.city_map import Box, CityMap, MapTag, Wall
 from scm.records.floor import Floor
 from scm.world.boxes import Boxes, arm_of, inertia_of
-from scm.world.contacts import STEP_S, STEPS_IN_SPACE, Contacts
+from scm.world.contact_groups import STEPS_IN_SPACE
+from scm.world.contact_space import STEP_S
+from scm.world.contacts import Contacts
 from scm.world.solids import Hull
 
 HULL = Hull(2.4, 0.0229, -0.14, 0.16, -0.0875, 0.0875, restitution=0.3, friction=0.5)

@@ -12,7 +12,8 @@ from scm.geometry import Pose2
 from scm.records.city_map import Box, CityMap, MapTag, Wall
 from scm.records.floor import Floor
 from scm.vehicles.car import load_car
-from scm.world.contacts import STEP_S, Contacts
+from scm.world.contact_space import STEP_S
+from scm.world.contacts import Contacts
 from scm.world.solids import hull_of
 from scm.world.step import tick
 from scm.world.world import PERIOD_NS, World

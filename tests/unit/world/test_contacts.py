@@ -8,7 +8,8 @@ from scm.records.city_map import Box, CityMap, MapTag, Wall
 from scm.records.floor import Floor
 from scm.v2x.messages.lease_request import LeaseRequest
 from scm.v2x.messages.vehicle_state import VehicleState
-from scm.world.contacts import Contacts, Hull
+from scm.world.contacts import Contacts
+from scm.world.solids import Hull
 
 HULL = Hull(2.4, 0.0229, -0.14, 0.16, -0.0875, 0.0875, restitution=0.3, friction=0.5)
 LENGTH = HULL.front - HULL.rear
