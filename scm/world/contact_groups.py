@@ -168,11 +168,13 @@ class ContactGroups:
 
     def _regroup(self, keys: Ints, motion: Floats, rows: Ints, labels: Ints) -> None:
         """Bring all bodies (rows) into the spaces in which they belong now."""
-        rows = rows[np.argsort(labels[rows], kind="stable")]
-        starts = np.flatnonzero(np.diff(labels[rows], prepend=-1))
-        parts = np.split(keys[rows], starts[1:]) if len(rows) else []
-        groups = [part.tolist() for part in parts if len(part) > 1]
-        loners = [int(part[0]) for part in parts if len(part) == 1]
+        is_alone = np.bincount(labels[rows], minlength=1)[labels[rows]] == 1
+        loners = keys[rows[is_alone]].tolist()
+        together = rows[~is_alone]
+        self._grouped = keys[together]
+        together = together[np.argsort(labels[together], kind="stable")]
+        ends = np.flatnonzero(np.diff(labels[together])) + 1
+        groups = [part.tolist() for part in np.split(keys[together], ends) if len(part)]
         self._groups = self._heirs(groups)
         spaces = [self._loners, *self._groups]
         homes = {
@@ -189,8 +191,6 @@ class ContactGroups:
                 space.enter(key, *poses[key])
                 self._walls_from[key] = np.inf
         self._homes = homes
-        in_group = np.repeat([len(part) > 1 for part in parts], [len(part) for part in parts])
-        self._grouped = keys[np.sort(rows[in_group.astype(np.bool_)])]
 
     def _heirs(self, groups: list[list[int]]) -> list[ContactSpace]:
         """Return a space for each group: that with most of its bodies, or a new one."""

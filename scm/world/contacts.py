@@ -98,7 +98,8 @@ class Contacts:
             marks = near.touching(np.arange(2), np.zeros((2, 6)), outlines, 1)
         for marked in (np.zeros(2, np.bool_), marks):
             near.shares(np.zeros((2, 3)), np.zeros((2, 3)), outlines, walls, marked)
-        join(np.arange(2), *near.overlaps(np.zeros((2, 6)), outlines, marks).T)
+        near.overlaps(np.zeros((2, 6)), outlines, marks)
+        join(np.arange(2), np.arange(1), np.arange(1, 2))
 
     def step(self, indices: Ints, motion: Floats) -> Touches:
         """Solve the contacts of this instant.
@@ -113,7 +114,7 @@ class Contacts:
         found = self._solve(indices[order], motion[order])
         back = np.empty(len(order), np.int64)
         back[order] = np.arange(len(order))
-        pairs = np.where(found.pairs >= 0, order[found.pairs], found.pairs)
+        pairs = np.where(found.pairs >= 0, order[np.maximum(found.pairs, 0)], found.pairs)
         return Touches(
             found.dv[back], found.shift[back], found.turn[back], found.touched[back], pairs
         )
@@ -149,20 +150,20 @@ class Contacts:
         dv, shift, pairs, labels = self._groups.solve(
             keys, motion, outlines[:, 4], marks, overlaps, stopped
         )
-        turn = np.zeros(len(keys))
-        if back is not None:
-            out = np.column_stack((shift, turn))
-            too_far = self._excess(motion[:, :3], out, outlines, marks)
-            out -= back if too_far is None else back + too_far
-            shift, turn = out[:, :2], out[:, 2]
+        out = np.column_stack((shift, np.zeros(len(keys))))
+        places = np.ascontiguousarray(motion[:, :3])  # a view would be compiled for anew
+        too_far = self._excess(places, out, outlines, marks) if out.any() else None
+        for less in (too_far, back):
+            if less is not None:
+                out -= less
         if count:
             self._limit_speed(dv, motion, outlines, marks, labels)
-            self.boxes.push(dv[n:], np.column_stack((shift[n:], turn[n:])))
+            self.boxes.push(dv[n:], out[n:])
         touched = np.zeros(n, np.bool_)
         touched[pairs[(pairs >= 0) & (pairs < n)]] = True
         pairs = np.where(pairs >= n, FIRST_BOX - (pairs - n), pairs)
         met = (pairs >= 0).any(axis=1)
-        return Touches(dv[:n], shift[:n], turn[:n], touched, pairs[met])
+        return Touches(dv[:n], out[:n, :2], out[:n, 2], touched, pairs[met])
 
     def _excess(
         self, starts: Floats, moves: Floats, outlines: Floats, marks: Bools

