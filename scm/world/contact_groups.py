@@ -143,9 +143,10 @@ class ContactGroups:
         dv = self._step(self._walk, motion, row_of, stopped)
         pairs, normals, depths = self._contacts(self._walk, row_of)
         lightness = np.append(self._lightness[keys], 0.0)  # a wall is row -1: the last one
-        # A box that the floor holds is no way out: shifts would creep it along under any push.
-        is_box = keys < len(self._parts.boxes)
-        lightness[:-1][is_box] *= ~is_still(motion[is_box, 3:] + dv[is_box])
+        if self._parts.boxes:
+            # A box that the floor holds is no way out: shifts would creep it along under any push.
+            boxes = np.flatnonzero(keys < len(self._parts.boxes))
+            lightness[boxes[is_still(motion[boxes, 3:] + dv[boxes])]] = 0.0
         return Solution(dv, _shifts(pairs, normals, depths, lightness), pairs, labels)
 
     def _label(self, overlaps: Ints, row_of: Ints, n: int) -> Ints:
