@@ -55,14 +55,14 @@ class _Walk(NamedTuple):
 
     Attributes:
         spaces: Those with anybody inside.
-        slots: Key of each body, and -1 for the static one at each space's end.
-        starts: Where in `slots` each space begins, and the end.
+        places: Key of each body, and -1 for the static one at each space's end.
+        starts: Where in `places` each space begins, and the end.
         ids: Of the bodies, ascending.
         keys: Of the bodies, as `ids`.
     """
 
     spaces: list[ContactSpace]
-    slots: Ints
+    places: Ints
     starts: list[int]
     ids: Ints
     keys: Ints
@@ -232,7 +232,7 @@ class ContactGroups:
 
     def _step(self, walk: _Walk, motion: Floats, row_of: Ints, stopped: Bools) -> Floats:
         """Solve all spaces; return changes of velocity (n, 3)."""
-        rows = np.where(walk.slots >= 0, row_of[walk.slots], -1)
+        rows = np.where(walk.places >= 0, row_of[walk.places], -1)
         inside = rows >= 0
         block = np.zeros((len(rows), 6))
         block[inside] = motion[rows[inside]]
@@ -266,10 +266,10 @@ def _walk_of(spaces: list[ContactSpace]) -> _Walk:
     none = np.empty(0, np.int64)
     ids = np.concatenate([none, *(space.order[0] for space in inside)])
     keys = np.concatenate([none, *(space.order[1] for space in inside)])
-    slots = np.concatenate([none, *(np.append(space.order[1], -1) for space in inside)])
+    places = np.concatenate([none, *(np.append(space.order[1], -1) for space in inside)])
     starts = np.cumsum([0, *(len(space.bodies) + 1 for space in inside)]).tolist()
     sequence = np.argsort(ids)
-    return _Walk(inside, slots, starts, ids[sequence], keys[sequence])
+    return _Walk(inside, places, starts, ids[sequence], keys[sequence])
 
 
 @array_kernel
