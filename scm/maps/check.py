@@ -9,6 +9,7 @@ import msgspec
 from scm.errors import nearest
 from scm.geometry import wrap_angle
 from scm.maps.floor_check import floor_problems
+from scm.maps.neighbours_check import neighbour_problems
 from scm.maps.radio_check import radio_problems
 from scm.maps.route import LanePath
 from scm.maps.rules_check import rule_problems
@@ -35,7 +36,11 @@ def problems_of(city_map: CityMap) -> list[str]:
     Checks that need the lanes' geometry are made only if the numbers and segments are right.
     """
     found = [*_numbers(city_map, ""), *_segments(city_map)]
-    for check in (_unique, _outlines, floor_problems, radio_problems, _references, _spawns, _bays):
+    checks = (
+        _unique, _outlines, floor_problems, radio_problems, neighbour_problems, _references,
+        _spawns, _bays,
+    )  # fmt: skip
+    for check in checks:
         found += check(city_map)
     if not any(".segments" in problem for problem in found):
         found += rule_problems(city_map)

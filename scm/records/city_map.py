@@ -13,6 +13,7 @@ from scm.records.fields import (
     XM,
     YM,
     AtM,
+    CityName,
     GroupName,
     GroupNames,
     HeightM,
@@ -36,6 +37,9 @@ from scm.records.fields import (
 from scm.records.floor import Floor, Record, Wind
 
 Point = tuple[float, float]
+
+NEIGHBOUR_MESSAGES = ("states", "cams", "denms", "cpms", "spatem", "mapem", "events")
+"""What a city may let a neighbour see of it, by name."""
 
 ANY_BAY = "any"
 """As a goal: whichever bay the parking manager gives."""
@@ -380,6 +384,38 @@ class RadioChannel(Record, kw_only=True, frozen=True):
     congestion_control: bool = False
 
 
+class BorderRoad(Record, kw_only=True, frozen=True):
+    """A road over the border: lane `out` of this map ends where lane `to` of the other begins."""
+
+    out: LaneName
+    to: LaneName
+
+
+class Neighbour(Record, kw_only=True, frozen=True):
+    """A city that cars drive on to, where its map lies in this one, and what it may see.
+
+    Attributes:
+        city: Its name on the bus.
+        roads: The roads that lead there.
+        messages: What it may see of this city, of `NEIGHBOUR_MESSAGES`; empty: nothing but the cars
+            that are handed over.
+    """
+
+    city: CityName
+    origin: Annotated[
+        tuple[float, float, float],
+        Meta(
+            description="Origin of its map in this map: x [m], y [m], yaw [rad].",
+            examples=[[12.0, 0.0, 0.0]],
+        ),
+    ] = (0.0, 0.0, 0.0)
+    roads: tuple[BorderRoad, ...] = ()
+    messages: Annotated[
+        tuple[str, ...],
+        Meta(description="What it may see of this city.", examples=[["states", "cams"]]),
+    ] = ()
+
+
 class CityMap(Record, kw_only=True, frozen=True):
     """One city.
 
@@ -395,6 +431,7 @@ class CityMap(Record, kw_only=True, frozen=True):
         boxes: Boxes that cars can push.
         bays: Where cars park.
         cameras: Cameras.
+        neighbours: Cities next to this one; see docs/cities.md.
         radio_range_m: Range of the radio between cars [m].
         speed_advice: Whether drivers come to red lights no sooner than SPATEM lets them pass.
     """
@@ -423,6 +460,7 @@ class CityMap(Record, kw_only=True, frozen=True):
     spawns: tuple[Spawn, ...] = ()
     bays: tuple[Bay, ...] = ()
     cameras: tuple[Camera, ...] = ()
+    neighbours: tuple[Neighbour, ...] = ()
     radio_range_m: float = 20.0
     radio: RadioChannel = RadioChannel()
     speed_advice: bool = False

@@ -18,6 +18,12 @@ CarName = Annotated[str, Meta(description="Name of its car file.", examples=["ni
 CarNames = Annotated[
     tuple[str, ...], Meta(description="Cars, or names of them.", examples=[["n1", "n2"]])
 ]
+CityName = Annotated[
+    str,
+    Meta(
+        pattern=r"^[a-z0-9_-]{1,32}$", description="Name of a city on the bus.", examples=["lab_b"]
+    ),
+]
 ColourName = Annotated[str, Meta(description="Colour.", examples=["green"])]
 CycleS = Annotated[float, Meta(description="How long its cycle is [s].", examples=[40.0])]
 Detail = Annotated[
