@@ -17,7 +17,15 @@ def _run(arguments: argparse.Namespace) -> int:
     print(f"{len(fleet.members)} stations with {fleet.auth}")
     for member in sorted(fleet.members.values(), key=lambda member: member.name):
         print(f"  {member.name:<16} {member.role:<9} {_state(fleet, member.name)}")
+    for name in fleet.neighbours:
+        print(f"  {name:<16} neighbour {_authority(fleet, name)}")
     return 0
+
+
+def _authority(fleet: "Fleet", name: str) -> str:
+    from scm.v2x.certificates import fingerprint_of
+
+    return f"authority {fingerprint_of(fleet.authority_of(name).read_text('utf-8'))}"
 
 
 def _state(fleet: "Fleet", name: str) -> str:

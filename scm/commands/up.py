@@ -70,6 +70,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "eye, camera, record, observer, misbehaviour; see docs/performance.md",
     )
     _twin_arguments(parser)
+    _join_arguments(parser)
     parser.add_argument("--ros2", action="store_true", help="let ROS 2 nodes see the city")
 
 
@@ -87,6 +88,18 @@ def _twin_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _join_arguments(parser: argparse.ArgumentParser) -> None:
+    where = "CITY may be left out where the map has one neighbour; see docs/cities.md"
+    parser.add_argument(
+        "--join", action="append", default=[], metavar="[CITY=]ENDPOINT",
+        help=f"join a neighbour of the map, which waits at this endpoint; {where}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--admit", action="append", default=[], metavar="[CITY=]ENDPOINT",
+        help="wait at this endpoint for a neighbour of the map to join",
+    )  # fmt: skip
+
+
 def options_of(arguments: argparse.Namespace) -> "CityOptions":
     """Return the city that is asked for."""
     from scm.runtime.up import CityOptions
@@ -94,7 +107,7 @@ def options_of(arguments: argparse.Namespace) -> "CityOptions":
     settings = {**vars(arguments), "map_name": arguments.map}
     settings |= {
         name: tuple(settings[name])
-        for name in ("radio", "cameras_of", "trust_proxy", "origin", "without")
+        for name in ("radio", "cameras_of", "trust_proxy", "origin", "without", "join", "admit")
     }
     return CityOptions(**{field.name: settings[field.name] for field in fields(CityOptions)})
 

@@ -228,7 +228,7 @@ def _declare_latched(session: zenoh.Session, key: str) -> Any:
 
 def _listening(endpoint: str) -> zenoh.Session:
     """Return a router with gossip, by which ROS nodes, which are peers, find each other."""
-    config = json.loads(zenoh_config.router(endpoint))
+    config = json.loads(zenoh_config.router([endpoint]))
     config["scouting"] |= {"gossip": {"enabled": True}}
     try:
         with yielding():

@@ -2,8 +2,8 @@
 
 import socket
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from scm.eye.station import eye_station
 from scm.maps.load import is_scan, load_map
 from scm.maps.radio import with_radio
 from scm.records.disturbances import Disturbance
+from scm.runtime.joins import Join, inner_socket, joins_of
 from scm.runtime.live import stop_on_signal
 from scm.runtime.supervisor import Job, PrintLine, Supervisor
 from scm.store.open import open_store
@@ -23,6 +24,8 @@ from scm.traffic.demand.table import load_demand
 from scm.v2x.access import SCRIPT, Guard, guard_of, is_loopback, own_stations
 from scm.v2x.bus import Mailbox
 from scm.v2x.bus_zenoh import ZenohBus
+from scm.v2x.crossing import common_name, gateway_station
+from scm.v2x.fleet_file import issue_gateway_files, load_fleet
 from scm.v2x.key import check_name
 from scm.v2x.messages.presence import Presence
 from scm.v2x.router import DEFAULT_ENDPOINT, Router, free_endpoint
@@ -75,6 +78,7 @@ class CityOptions:
             an operator has agreed; `idle`: whenever they are.
         without: Parts to leave out, of `OPTIONAL`.
         radio: Radio parameters in place of the map's, `key=value` each.
+        join: Neighbours to join, `[CITY=]ENDPOINT` each; likewise `admit`, to wait for.
     """
 
     map_name: str
@@ -100,6 +104,8 @@ class CityOptions:
     twin_sends: str = "agreed"
     without: tuple[str, ...] = ()
     radio: tuple[str, ...] = ()
+    join: tuple[str, ...] = ()
+    admit: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,6 +118,8 @@ class _Plan:
         eyes: Cameras by the station that looks through each.
         has_bays: Whether cars may request bays.
         scan: How a scanned map was read; empty: it is none.
+        joins: Links to neighbours.
+        inner: Socket of the router for their gateways; empty: there are none.
     """
 
     options: CityOptions
@@ -123,6 +131,8 @@ class _Plan:
     eyes: Mapping[str, str]
     has_bays: bool
     scan: str
+    joins: tuple[Join, ...] = ()
+    inner: str = ""
 
 
 def run_city(options: CityOptions, print_line: PrintLine = _print_now) -> int:
@@ -135,7 +145,8 @@ def run_city(options: CityOptions, print_line: PrintLine = _print_now) -> int:
     name_own_folder(options.record_dir / "cars")
     guard = plan.guard
     with (
-        Router(guard.listen, guard.settings) as router,
+        inner_socket(plan.joins) as inner,
+        Router(guard.listen, guard.settings, inner) as router,
         ZenohBus(options.city, "up", guard.connect, credentials=guard.credentials("up")) as bus,
     ):
         print_line(f"scm: city {options.city!r} on map {options.map_name!r}, bus {router.listen}")
@@ -143,7 +154,7 @@ def run_city(options: CityOptions, print_line: PrintLine = _print_now) -> int:
             print_line(f"  {plan.scan}")
         for name in options.without:
             print_line(f"  {name:<12} left out: {OPTIONAL[name]}")
-        _watch(plan, bus, print_line)
+        _watch(replace(plan, inner=inner), bus, print_line)
     if plan.recording.exists():
         print_line(f"recorded in {plan.recording}")
     return 0
@@ -169,10 +180,17 @@ def _plan_of(options: CityOptions) -> _Plan:
         for i, camera in enumerate(city_map.cameras)
     }
     agents = tuple(f"n{options.hosted + i + 1}" for i in range(options.agents))
-    stations = own_stations(eyes, agents)
+    fleet = None if options.fleet is None else load_fleet(options.fleet)
+    joins = joins_of(city_map, options.join, options.admit, fleet)
+    cities = [join.neighbour for join in joins]
+    stations = own_stations(eyes, agents, cities)
+    listen = _free(options.listen)
+    guard = guard_of(options.fleet, options.city, listen, stations, _now(), cities)
+    if joins and fleet is not None:
+        issue_gateway_files(load_fleet(fleet.path), common_name(options.city), _now())
     return _Plan(
         options=options,
-        guard=guard_of(options.fleet, options.city, _free(options.listen), stations, _now()),
+        guard=guard,
         agents=agents,
         port=port,
         recording=recording,
@@ -180,6 +198,7 @@ def _plan_of(options: CityOptions) -> _Plan:
         eyes=eyes,
         has_bays=bool(city_map.bays),
         scan=city_map.source if is_scan(options.map_name) else "",
+        joins=joins,
     )
 
 
@@ -310,12 +329,25 @@ def _parts(plan: _Plan) -> list[Job]:
     if plan.options.twin:
         data = ("--data", str(plan.options.record_dir), "--send", plan.options.twin_sends)
         jobs.append(part("twin", "watches cars: since when one has changed", *data, *stored))
+    jobs += _gateways(plan, scm)
     if plan.options.ros2:
         jobs.append(part("ros2", "ROS 2: topics of all cars, driving by the lease"))
     left = plan.options.without
     jobs = [job for job in jobs if ("eye" if job.name in plan.eyes else job.name) not in left]
     web = _web(plan, [job.name for job in jobs])
     return [*jobs, part("api", "REST, event stream, dashboard", *web, *stored)]
+
+
+def _gateways(plan: _Plan, scm: Callable[..., Sequence[str]]) -> Iterator[Job]:
+    """Yield the links to neighbours; `scm` returns the command of a part."""
+    fleet = () if plan.options.fleet is None else ("--fleet", str(plan.options.fleet))
+    for join in plan.joins:
+        station = gateway_station(join.neighbour)
+        words = ("--neighbour", join.neighbour, *join.words, "--inner", plan.inner, *fleet)
+        command = partial(scm, "gateway", *words, station=station)
+        yield Job(
+            station, "part", f"link to city {join.neighbour}, {' '.join(join.words)}", command
+        )
 
 
 def _web(plan: _Plan, parts: Sequence[str]) -> Sequence[str]:

@@ -8,16 +8,25 @@ below `<key>/@adv`. None of this reveals data: a station receives only what its 
 """
 
 import ipaddress
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
 from scm.errors import AccessError
 from scm.v2x.credentials import Credentials, read_credentials
+from scm.v2x.crossing import (
+    INNER,
+    SHOWN,
+    flow_from,
+    flow_rules,
+    gateway_station,
+    handover_keys,
+    shown_keys,
+)
 from scm.v2x.fleet_file import Fleet, Member, complete, load_fleet
 from scm.v2x.key import prefix
-from scm.v2x.rights import presence_of, rights_of
+from scm.v2x.rights import EVERYTHING, Rights, presence_of, rights_of
 
 ADVANCED = "/@adv/**"
 CITY_PARTS = (
@@ -67,7 +76,12 @@ class Guard:
 
 
 def guard_of(
-    fleet_file: Path | None, city: str, listen: str, stations: Mapping[str, str], now: datetime
+    fleet_file: Path | None,
+    city: str,
+    listen: str,
+    stations: Mapping[str, str],
+    now: datetime,
+    neighbours: Iterable[str] = (),
 ) -> Guard:
     """Return the access settings of a city, with or without a fleet file.
 
@@ -77,23 +91,28 @@ def guard_of(
         listen: The router's endpoint, with a port.
         stations: The city's own (name -> role), see `own_stations`; missing ones are added.
         now: For certificates.
+        neighbours: Cities to which this one has a gateway.
 
     Raises:
         AccessError: when the file is invalid or does not suit the endpoint.
     """
     if fleet_file is None:
         return Guard(listen, listen)
+    neighbours = tuple(neighbours)
     fleet = load_fleet(fleet_file)
     settings_first = router_settings(fleet, city, listen)  # raises before anything is written
     files = credentials_of(fleet, stations, now)
-    settings = {**settings_first, "access_control": access_control(fleet, city)}
+    settings = {**settings_first, "access_control": access_control(fleet, city, neighbours)}
     connect = listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
     return Guard(listen, connect, settings, files)
 
 
-def own_stations(eyes: Iterable[str], agents: Iterable[str]) -> dict[str, str]:
+def own_stations(
+    eyes: Iterable[str], agents: Iterable[str], neighbours: Iterable[str] = ()
+) -> dict[str, str]:
     """Return the stations that a city starts itself, with their roles."""
-    parts, cars = dict.fromkeys((*CITY_PARTS, *eyes), "part"), dict.fromkeys(agents, "vehicle")
+    parts = dict.fromkeys((*CITY_PARTS, *eyes, *map(gateway_station, neighbours)), "part")
+    cars = dict.fromkeys(agents, "vehicle")
     return parts | {SCRIPT: "operator"} | cars
 
 
@@ -160,23 +179,32 @@ def _transport(fleet: Fleet) -> dict[str, object]:
     }
 
 
-def access_control(fleet: Fleet, city: str) -> dict[str, object]:
-    """Return Zenoh's `access_control`: deny everything except what the fleet's roles allow."""
+def access_control(fleet: Fleet, city: str, neighbours: Sequence[str] = ()) -> dict[str, object]:
+    """Return Zenoh's `access_control`: deny everything except what the fleet's roles allow.
+
+    Gateways to `neighbours` may carry what crosses; their own rules choose from it.
+    """
     everyone = [member.name for member in fleet.members.values()]
     rules = [_declarations(city)]
     policies: list[dict[str, object]] = [{"rules": [rules[0]["id"]], "subjects": everyone}]
     for member in fleet.members.values():
-        own = _rules(member, city)
+        own = _rules(member, city) + _rules_abroad(member, city, neighbours)
         rules += own
         policies.append({"rules": [rule["id"] for rule in own], "subjects": [member.name]})
     kind = "usernames" if fleet.auth == "password" else "cert_common_names"
     subjects = [{"id": m.name, kind: [m.identity]} for m in fleet.members.values()]
+    for neighbour in neighbours:
+        carried = flow_rules(f"to {neighbour}", flow_from(neighbour, city, SHOWN))
+        rules += carried
+        policies.append({"rules": [rule["id"] for rule in carried], "subjects": ["gateways"]})
+    if neighbours:
+        subjects.append({"id": "gateways", "link_protocols": [INNER]})
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
         "subjects": subjects,
-        "policies": policies if everyone else [],
+        "policies": policies if subjects else [],
     }
 
 
@@ -214,6 +242,34 @@ def _rules(member: Member, city: str) -> list[_Rule]:
         _rule(f"{name}:receive_reply", "egress", ("reply",), requests + subscribes),
     ]
     return [rule for rule in rules if rule["key_exprs"]]
+
+
+def _rules_abroad(member: Member, city: str, neighbours: Sequence[str]) -> list[_Rule]:
+    """Return what a station of this city may see and request of its neighbours.
+
+    Who watches this city sees what they show; the world also hands cars over; a gateway learns
+    whether the other city is there.
+    """
+    rights, found = rights_of(member.role, member.name), list[_Rule]()
+    for neighbour in neighbours:
+        sees, asks = shown_keys(neighbour, city, SHOWN), handover_keys(neighbour)
+        if member.name == gateway_station(neighbour):
+            abroad = Rights(subscribes=shown_keys(neighbour, city, ()))
+        elif member.role == "part" and member.name == "world":
+            abroad = Rights(subscribes=sees, requests=asks)
+        elif set(EVERYTHING) <= set(rights.subscribes):
+            abroad = Rights(subscribes=sees)
+        else:
+            continue
+        of, see, ask = f"{member.name}:{neighbour}", abroad.subscribes, abroad.requests
+        found += [
+            _rule(f"{of}:subscribe", "ingress", ("declare_subscriber",), list(see)),
+            _rule(f"{of}:receive", "egress", ("put",), list(see)),
+            _rule(f"{of}:request", "ingress", ("query",), list(ask)),
+            _rule(f"{of}:receive_reply", "egress", ("reply",), list(ask)),
+            _rule(f"{of}:declarations", "egress", ("declare_queryable",), list(ask)),
+        ]
+    return [rule for rule in found if rule["key_exprs"]]
 
 
 def _rule(name: str, flow: str, messages: Iterable[str], keys: list[str]) -> _Rule:

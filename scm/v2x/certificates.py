@@ -1,6 +1,6 @@
-"""Certificates of a fleet: its own authority, one certificate per station, one for the router.
+"""Certificates of a fleet: its own authority, one per station, for the router, for the gateways.
 
-ECDSA on P-256. A certificate has one purpose: a station's is not valid for a router.
+ECDSA on P-256. A station's certificate is not valid for a router.
 """
 
 import ipaddress
@@ -41,14 +41,48 @@ def make_authority(name: str, now: datetime) -> Pair:
 
 def issue_station(authority: Pair, name: str, now: datetime, days: int = STATION_DAYS) -> Pair:
     """Return a station's certificate; the router identifies it by the common name `name`."""
-    return _issue(authority, name, now, days, ExtendedKeyUsageOID.CLIENT_AUTH, ())
+    return _issue(authority, name, now, days, [ExtendedKeyUsageOID.CLIENT_AUTH], ())
 
 
 def issue_router(
     authority: Pair, hosts: Sequence[str], now: datetime, days: int = STATION_DAYS
 ) -> Pair:
     """Return the router's certificate, valid for the addresses that stations connect to."""
-    return _issue(authority, "router", now, days, ExtendedKeyUsageOID.SERVER_AUTH, hosts)
+    return _issue(authority, "router", now, days, [ExtendedKeyUsageOID.SERVER_AUTH], hosts)
+
+
+def issue_gateway(
+    authority: Pair, name: str, hosts: Sequence[str], now: datetime, days: int = STATION_DAYS
+) -> Pair:
+    """Return the certificate of a city's gateways, for both ends of a link to a neighbour."""
+    both = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
+    return _issue(authority, name, now, days, both, hosts)
+
+
+def check_authority(pem: str) -> None:
+    """Check that a text is the certificate of an authority, and no more than that.
+
+    Raises:
+        AccessError: when it is not, or holds a private key.
+    """
+    if "PRIVATE KEY" in pem:
+        msg = "it holds a private key, which must stay where it was made; expected a certificate"
+        raise AccessError(msg)
+    try:
+        (found,) = x509.load_pem_x509_certificates(pem.encode())
+        basic = found.extensions.get_extension_for_class(x509.BasicConstraints).value
+    except (ValueError, x509.ExtensionNotFound) as cause:
+        msg = "expected one certificate of an authority in PEM, as `scm fleet authority` writes it"
+        raise AccessError(msg) from cause
+    if not basic.ca:
+        msg = "it is a station's certificate; expected that of the authority"
+        raise AccessError(msg)
+
+
+def fingerprint_of(pem: str) -> str:
+    """Return the SHA-256 fingerprint of a certificate, for people to compare."""
+    digest = x509.load_pem_x509_certificate(pem.encode()).fingerprint(hashes.SHA256())
+    return digest.hex(":").upper()
 
 
 def expiry_of(pem: str) -> datetime:
@@ -61,7 +95,7 @@ def _issue(
     name: str,
     now: datetime,
     days: int,
-    purpose: x509.ObjectIdentifier,
+    purposes: Sequence[x509.ObjectIdentifier],
     hosts: Sequence[str],
 ) -> Pair:
     issuer = x509.load_pem_x509_certificate(authority.certificate.encode())
@@ -75,7 +109,7 @@ def _issue(
         _builder(name, parent, key, now, days)
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .add_extension(_usage(signs_certificates=False), critical=True)
-        .add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
+        .add_extension(x509.ExtendedKeyUsage(purposes), critical=False)
     )
     if hosts:
         names = [_general_name(host) for host in hosts]

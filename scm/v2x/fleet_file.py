@@ -81,8 +81,17 @@ class Fleet:
         return self.folder / f"{name}.toml"
 
     def pem(self, name: str) -> Path:
-        """Return the path of `authority.crt`, `authority.key`, `router.crt` or `router.key`."""
+        """Return the path of `.crt` or `.key` of `authority`, `router` or `gateway`."""
         return self.folder / name
+
+    def authority_of(self, neighbour: str) -> Path:
+        """Return where the certificate of a neighbouring city's authority is."""
+        return self.folder / "neighbours" / f"{neighbour}.crt"
+
+    @property
+    def neighbours(self) -> list[str]:
+        """The cities whose authority is known."""
+        return sorted(path.stem for path in self.authority_of("").parent.glob("*.crt"))
 
 
 def load_fleet(path: Path) -> Fleet:
@@ -202,6 +211,57 @@ def name_hosts(fleet: Fleet, hosts: Iterable[str], now: datetime) -> None:
             write_secret(fleet.pem("router.key"), pair.private_key)
             write_secret(fleet.pem("router.crt"), pair.certificate)
     save_fleet(fleet)
+
+
+def authority_certificate(fleet: Fleet, now: datetime) -> str:
+    """Return the certificate of the fleet's authority, which a neighbouring city needs.
+
+    Raises:
+        AccessError: when the fleet has none: its stations use passwords.
+    """
+    if fleet.auth != "mtls":
+        msg = f"fleet {fleet.path}: its stations use passwords; expected one made with --mtls"
+        raise AccessError(msg)
+    return _authority(fleet, now).certificate
+
+
+def add_neighbour(fleet: Fleet, neighbour: str, certificate: str, now: datetime) -> None:
+    """Trust the authority of a neighbouring city, for its gateway and nothing else.
+
+    Raises:
+        AccessError: when the text is not the certificate of another authority.
+        MessageError: when the name is not valid in a key.
+    """
+    from scm.v2x.certificates import check_authority, fingerprint_of  # noqa: PLC0415  slow to load
+
+    check_name(neighbour, "neighbour")
+    check_authority(certificate)
+    if fingerprint_of(certificate) == fingerprint_of(authority_certificate(fleet, now)):
+        msg = "it is this fleet's own authority; expected that of the neighbour"
+        raise AccessError(msg)
+    write_secret(fleet.authority_of(neighbour), certificate)
+
+
+def remove_neighbour(fleet: Fleet, neighbour: str) -> None:
+    """Forget the authority of a neighbouring city, with effect from the next start.
+
+    Raises:
+        AccessError: when it is not known.
+    """
+    if neighbour not in fleet.neighbours:
+        close = nearest(neighbour, fleet.neighbours)
+        msg = f"fleet {fleet.path}: there is no neighbour named {neighbour!r}{close}"
+        raise AccessError(msg)
+    fleet.authority_of(neighbour).unlink()
+
+
+def issue_gateway_files(fleet: Fleet, common_name: str, now: datetime) -> None:
+    """Write a new certificate of the city's gateways, valid for the addresses of its router."""
+    from scm.v2x.certificates import issue_gateway  # noqa: PLC0415  slow to load, rarely needed
+
+    pair = issue_gateway(_authority(fleet, now), common_name, fleet.hosts, now)
+    write_secret(fleet.pem("gateway.key"), pair.private_key)
+    write_secret(fleet.pem("gateway.crt"), pair.certificate)
 
 
 def _lacks_credentials(fleet: Fleet, name: str, now: datetime) -> bool:

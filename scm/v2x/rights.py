@@ -213,10 +213,12 @@ _OF_PART: dict[str, Rights] = {
         requests=("world/spawn", "v/*/cmd/route", "v/*/remove"),
     ),
     "ros2": _WATCHES + Rights(publishes=("v/*/cmd/drive",), requests=("v/*/lease", "v/*/park")),
+    "gateway": Rights(publishes=("neighbour/*",)),
 }
-"""By the part's name; `eye-<camera>` has the rights of `eye`."""
+"""By the part's name; `eye-<camera>` has the rights of `eye`, `gateway-<city>` of `gateway`."""
 
-_RESERVED = ("eye-", "rsu-")
+_FAMILIES = ("eye", "gateway")
+_RESERVED = ("eye-", "gateway-", "rsu-")
 _PRESENCE = {"vehicle": "v/{me}/alive/*", "part": "part/{me}/alive/*"}
 _CLIENT = "client/{me}/alive/*"
 
@@ -228,7 +230,8 @@ def rights_of(role: str, name: str) -> Rights:
         AccessError: when there is no such role, or no such part of the city.
     """
     if role == "part":
-        kind = "eye" if name.startswith("eye-") else name
+        family = name.partition("-")[0]
+        kind = family if family in _FAMILIES else name
         if kind not in _OF_PART:
             close = nearest(name, list(_OF_PART))
             msg = f"part: got {name!r}, expected one of {sorted(_OF_PART)} or eye-<camera>{close}"

@@ -30,6 +30,8 @@ class Router:
     Args:
         listen: The endpoint.
         access: Access rules from `access.router_settings`; None: everybody on this machine.
+        gateways: A second endpoint, a socket in the file system, for the gateways to neighbouring
+            cities; empty: there are none.
 
     Attributes:
         listen: The endpoint that stations connect to.
@@ -39,7 +41,10 @@ class Router:
     """
 
     def __init__(
-        self, listen: str = DEFAULT_ENDPOINT, access: Mapping[str, Any] | None = None
+        self,
+        listen: str = DEFAULT_ENDPOINT,
+        access: Mapping[str, Any] | None = None,
+        gateways: str = "",
     ) -> None:
         if access is None and not is_local(listen):
             msg = (
@@ -49,6 +54,7 @@ class Router:
             raise AccessError(msg)
         self.listen = listen
         self._access = access
+        self._endpoints = [listen, gateways] if gateways else [listen]
         self._session: zenoh.Session | None = None
 
     def __enter__(self) -> Self:
@@ -58,9 +64,7 @@ class Router:
             RunError: when the endpoint cannot be listened at.
         """
         try:
-            config = zenoh.Config.from_json5(zenoh_config.router(self.listen, self._access))
-            with _environment("ZENOH_RUNTIME", THREADS):
-                self._session = zenoh.open(config)
+            self._session = open_router(zenoh_config.router(self._endpoints, self._access))
         except zenoh.ZError as cause:
             why = zenoh_config.reason(cause)
             msg = f"cannot listen at {self.listen!r}: does another city run there? ({why})"
@@ -76,6 +80,12 @@ class Router:
         if self._session is not None:
             self._session.close()  # type: ignore[no-untyped-call]
             self._session = None
+
+
+def open_router(config: str) -> zenoh.Session:
+    """Return a session that routes, with the threads that a router should have."""
+    with _environment("ZENOH_RUNTIME", THREADS):
+        return zenoh.open(zenoh.Config.from_json5(config))
 
 
 @contextmanager

@@ -5,12 +5,17 @@ There is no discovery on the network: a station knows its router's endpoint. Sha
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 LEASE_MS = 1000
 RETRY_FIRST_MS = 100
 RETRY_MOST_MS = 500
+_RETRY = {
+    "period_init_ms": RETRY_FIRST_MS,
+    "period_max_ms": RETRY_MOST_MS,
+    "period_increase_factor": 2,
+}
 
 LARGEST_BYTES = 32 << 20
 """Of one message: a raw 4K picture. Zenoh's default is 1 GiB, and a thousand may be queued."""
@@ -36,11 +41,7 @@ def client(
                     "endpoints": [endpoint],
                     "timeout_ms": round(connect_timeout_s * 1000),
                     "exit_on_failure": True,
-                    "retry": {
-                        "period_init_ms": RETRY_FIRST_MS,
-                        "period_max_ms": RETRY_MOST_MS,
-                        "period_increase_factor": 2,
-                    },
+                    "retry": _RETRY,
                 },
                 "transport": dict(transport or {}),
             },
@@ -48,12 +49,29 @@ def client(
     )
 
 
-def router(listen: str, access: Mapping[str, Any] | None = None) -> str:
-    """Return the configuration of the router of a city that listens at one endpoint.
+def router(
+    listen: Sequence[str],
+    access: Mapping[str, Any] | None = None,
+    connect: Sequence[str] = (),
+) -> str:
+    """Return the configuration of a router.
 
-    `access` holds the access rules, see `access.router_settings`; None: everybody.
+    Args:
+        listen: Its endpoints.
+        access: The access rules, see `access.router_settings`; None: everybody.
+        connect: Endpoints of other routers. It connects to each as soon as it can, and again when
+            the link is lost; it opens without them.
     """
-    own = {"mode": "router", "listen": {"endpoints": [listen]}}
+    own = {
+        "mode": "router",
+        "listen": {"endpoints": list(listen)},
+        "connect": {
+            "endpoints": list(connect),
+            "timeout_ms": -1,
+            "exit_on_failure": False,
+            "retry": _RETRY,
+        },
+    }
     return json.dumps(_with(_with(_both(), own), access or {}))
 
 

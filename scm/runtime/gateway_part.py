@@ -1,0 +1,113 @@
+"""The part that watches a gateway: whether the neighbouring city is there, and why not."""
+
+from collections.abc import Callable, Sequence
+
+from scm.clock import NS_PER_MS, NS_PER_S, seconds
+from scm.runtime.part import BasePart, Subscription
+from scm.v2x.crossing import common_name, gateway_station
+from scm.v2x.exchange import Incoming, Outgoing
+from scm.v2x.gateway import Border
+from scm.v2x.mailbox import Mailbox
+from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.neighbour_status import NeighbourState, NeighbourStatus
+
+LOST_NS = 3 * NS_PER_S  # three statuses
+EVERY_NS = NS_PER_S
+
+
+class GatewayPart(BasePart):
+    """Reports the state of one neighbour.
+
+    The neighbour is there when its own status arrives, which takes both gateways, both routers and
+    their access rules.
+
+    Args:
+        border: Of its gateway.
+        received: Statuses that the neighbour's gateway publishes.
+        far_names: Returns the common names of who is linked now.
+    """
+
+    role = "part"
+    period_ns = 200 * NS_PER_MS
+    subscriptions: Sequence[Subscription] = ()
+
+    def __init__(
+        self, border: Border, received: Mailbox, far_names: Callable[[], list[str | None]]
+    ) -> None:
+        self.name = gateway_station(border.neighbour)
+        self._border = border
+        self._received = received
+        self._far_names = far_names
+        self._state: NeighbourState = "waiting"
+        self._since_ns: int | None = None
+        self._received_ns: int | None = None
+        self._sees: tuple[str, ...] = ()
+        self._reason = ""
+        self._due_ns = 0
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Publish the state once a second, and at once when it changes."""
+        del inbox
+        for item in self._received.drain():
+            if isinstance(item.message, NeighbourStatus):
+                self._received_ns, self._sees = item.t_ns, item.message.shows
+        is_there = self._received_ns is not None and now_ns - self._received_ns < LOST_NS
+        before = (self._state, self._reason)
+        if is_there:
+            self._change("joined", now_ns)
+        elif self._state == "joined":
+            self._change("lost", now_ns)
+        elif self._since_ns is None:
+            self._since_ns = now_ns
+        self._reason = "" if is_there else self._why()
+        news = (self._state, self._reason) != before
+        if not news and now_ns < self._due_ns:
+            return []
+        self._due_ns = now_ns + EVERY_NS
+        return [self._status(now_ns), *([self._event(now_ns)] if news else [])]
+
+    def _change(self, state: NeighbourState, now_ns: int) -> None:
+        if state != self._state:
+            self._state, self._since_ns = state, now_ns
+
+    def _why(self) -> str:
+        """Return why the neighbour is not joined, as far as its link shows."""
+        border = self._border
+        names = self._far_names()
+        if not names:
+            how = "waits at" if border.listens else "does not answer at"
+            who = "this city" if border.listens else border.neighbour
+            return f"no link: {who} {how} {border.endpoint}"
+        expected = common_name(border.neighbour)
+        strange = [name for name in names if name not in (None, expected)]
+        if strange:
+            return f"refused: the certificate is of {strange[0]!r}, expected {expected!r}"
+        return "linked, but its city sends nothing"
+
+    def _status(self, now_ns: int) -> NeighbourStatus:
+        return NeighbourStatus(
+            neighbour=self._border.neighbour,
+            t_ns=now_ns,
+            state=self._state,
+            since_ns=now_ns if self._since_ns is None else self._since_ns,
+            shows=self._border.shows,
+            sees=self._sees if self._state == "joined" else (),
+            reason=self._reason,
+        )
+
+    def _event(self, now_ns: int) -> CityEvent:
+        city = self._border.neighbour
+        why = f": {self._reason}" if self._reason else ""
+        since_s = seconds(now_ns - (self._received_ns or now_ns))
+        text = {
+            "joined": f"{city} is joined",
+            "lost": f"{city} is lost, nothing for {since_s:.0f} s{why}",
+            "waiting": f"{city} is not joined yet{why}",
+        }[self._state]
+        return CityEvent(
+            severity="info" if self._state == "joined" else "warning",
+            source=self.name,
+            t_ns=now_ns,
+            name=f"neighbour_{self._state}",
+            text=text,
+        )

@@ -1,0 +1,115 @@
+"""What crosses to a neighbouring city: the only table, and the rules that routers make of it.
+
+A city's gateway is a Zenoh router of its own between two links: to its city's router, through a
+socket in the file system, and to the gateway of the neighbour. It denies everything but what
+`[[neighbours]]` of the map chooses, requests for a hand-over, and what says that the other city is
+there. So it does not matter what the neighbour's side calls itself: whatever comes over that link
+has the rights of a neighbour, never those of a station of this city.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from scm.v2x.key import check_name, prefix
+
+SHOWN: dict[str, tuple[str, ...]] = {
+    "states": ("v/*/state",),
+    "cams": ("v2x/tx/*/cam",),
+    "denms": ("v2x/tx/*/denm",),
+    "cpms": ("v2x/tx/*/cpm",),
+    "spatem": ("v2x/tx/*/spatem",),
+    "mapem": ("v2x/tx/*/mapem",),
+    "events": ("event/*/*",),
+}
+"""Keys below a city's prefix, by the names of `messages` in `[[neighbours]]`."""
+
+HANDOVER: tuple[str, ...] = ("world/handover",)
+"""Requests to a neighbour by which cars are handed over."""
+
+GATEWAY = "gateway-"
+"""Station of a gateway: this, and the name of the neighbour."""
+
+INNER = "unixsock-stream"
+
+
+def gateway_station(neighbour: str) -> str:
+    """Return the station of the gateway to a neighbour.
+
+    Raises:
+        MessageError: when the name is too long for a station's.
+    """
+    return check_name(GATEWAY + neighbour, "gateway")
+
+
+def common_name(city: str) -> str:
+    """Return the common name of the certificate of a city's gateways; no station can have it."""
+    return f"gateway@{city}"
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """What comes from the far side of a link, and what goes there; full keys.
+
+    Attributes:
+        comes: Messages that the far side publishes.
+        goes: Messages that it subscribes to.
+        serves: Requests that it answers.
+        asks: Requests that it sends.
+    """
+
+    comes: tuple[str, ...]
+    goes: tuple[str, ...]
+    serves: tuple[str, ...]
+    asks: tuple[str, ...]
+
+    def reversed(self) -> "Flow":
+        """Return the same as seen from the other side."""
+        return Flow(comes=self.goes, goes=self.comes, serves=self.asks, asks=self.serves)
+
+
+def shown_keys(city: str, neighbour: str, names: Iterable[str]) -> tuple[str, ...]:
+    """Return the keys of a city that a neighbour may see, `names` of `SHOWN` being chosen."""
+    keys = [key for name in names for key in SHOWN[name]]
+    return tuple(prefix(city) + key for key in (f"neighbour/{neighbour}", *keys))
+
+
+def handover_keys(city: str) -> tuple[str, ...]:
+    """Return the keys of the hand-over requests to a city."""
+    return tuple(prefix(city) + key for key in HANDOVER)
+
+
+def flow_from(neighbour: str, city: str, names: Iterable[str]) -> Flow:
+    """Return what may come from a neighbour and go there, seen from a city that shows `names`."""
+    return Flow(
+        comes=shown_keys(neighbour, city, SHOWN),
+        goes=shown_keys(city, neighbour, names),
+        serves=handover_keys(neighbour),
+        asks=handover_keys(city),
+    )
+
+
+def flow_rules(name: str, flow: Flow) -> list[dict[str, object]]:
+    """Return Zenoh's rules for a link with this flow; their ids begin with `name`."""
+    sides = (
+        ("ingress", "put", flow.comes),
+        ("egress", "put", flow.goes),
+        ("ingress", "declare_subscriber", flow.goes),
+        ("egress", "declare_subscriber", flow.comes),
+        ("ingress", "query", flow.asks),
+        ("egress", "query", flow.serves),
+        ("ingress", "reply", flow.serves),
+        ("egress", "reply", flow.asks),
+        ("ingress", "declare_queryable", flow.serves),
+        ("egress", "declare_queryable", flow.asks),
+    )
+    return [
+        {
+            "id": f"{name}:{direction}:{message}",
+            "permission": "allow",
+            "flows": [direction],
+            "messages": [message],
+            "key_exprs": list(keys),
+        }
+        for direction, message, keys in sides
+        if keys
+    ]
