@@ -23,6 +23,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from scm.clock import WallClock
     from scm.command import credentials_of
     from scm.maps.load import load_map
     from scm.runtime.gateway_part import GatewayPart
@@ -30,6 +31,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from scm.v2x.crossing import gateway_station
     from scm.v2x.fleet_file import load_fleet
     from scm.v2x.gateway import Border, Gateway
+    from scm.v2x.link_log import LinkLog
     from scm.v2x.mailbox import Mailbox
     from scm.v2x.messages.neighbour_status import NeighbourStatus
 
@@ -47,13 +49,14 @@ def _run(arguments: argparse.Namespace) -> int:
         secrets=None if fleet is None else fleet.folder,
     )
     with (
+        LinkLog(neighbour, WallClock()) as log,
         Gateway(border) as gateway,
         ZenohBus(
             neighbour, gateway_station(neighbour), arguments.connect, credentials=credentials
         ) as abroad,
     ):
         abroad.subscribe(NeighbourStatus, {"neighbour": arguments.city}, received)
-        return run_part(GatewayPart(border, received, gateway.far_names), arguments)
+        return run_part(GatewayPart(border, received, gateway.far_names, log.why), arguments)
 
 
 COMMAND = Command(

@@ -1,8 +1,10 @@
 """The part that watches a gateway: whether the neighbouring city is there, and why not."""
 
+import logging
 from collections.abc import Callable, Sequence
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
+from scm.log import event
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.crossing import common_name, gateway_station
 from scm.v2x.exchange import Incoming, Outgoing
@@ -13,6 +15,8 @@ from scm.v2x.messages.neighbour_status import NeighbourState, NeighbourStatus
 
 LOST_NS = 3 * NS_PER_S  # three statuses
 EVERY_NS = NS_PER_S
+
+_log = logging.getLogger(__name__)
 
 
 class GatewayPart(BasePart):
@@ -25,6 +29,7 @@ class GatewayPart(BasePart):
         border: Of its gateway.
         received: Statuses that the neighbour's gateway publishes.
         far_names: Returns the common names of who is linked now.
+        refusal: Returns why a link was refused lately; empty: none was.
     """
 
     role = "part"
@@ -32,12 +37,17 @@ class GatewayPart(BasePart):
     subscriptions: Sequence[Subscription] = ()
 
     def __init__(
-        self, border: Border, received: Mailbox, far_names: Callable[[], list[str | None]]
+        self,
+        border: Border,
+        received: Mailbox,
+        far_names: Callable[[], list[str | None]],
+        refusal: Callable[[], str] = lambda: "",
     ) -> None:
         self.name = gateway_station(border.neighbour)
         self._border = border
         self._received = received
         self._far_names = far_names
+        self._refusal = refusal
         self._state: NeighbourState = "waiting"
         self._since_ns: int | None = None
         self._received_ns: int | None = None
@@ -74,6 +84,9 @@ class GatewayPart(BasePart):
         """Return why the neighbour is not joined, as far as its link shows."""
         border = self._border
         names = self._far_names()
+        refusal = self._refusal()
+        if not names and refusal:
+            return refusal
         if not names:
             how = "waits at" if border.listens else "does not answer at"
             who = "this city" if border.listens else border.neighbour
@@ -99,6 +112,8 @@ class GatewayPart(BasePart):
         city = self._border.neighbour
         why = f": {self._reason}" if self._reason else ""
         since_s = seconds(now_ns - (self._received_ns or now_ns))
+        level = logging.INFO if self._state == "joined" else logging.WARNING
+        event(_log, f"neighbour_{self._state}", level=level, city=city, reason=self._reason)
         text = {
             "joined": f"{city} is joined",
             "lost": f"{city} is lost, nothing for {since_s:.0f} s{why}",
