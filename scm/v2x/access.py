@@ -18,15 +18,16 @@ from scm.v2x.credentials import Credentials, read_credentials
 from scm.v2x.crossing import (
     INNER,
     SHOWN,
+    Flow,
+    border_keys,
     flow_from,
     flow_rules,
     gateway_station,
-    handover_keys,
     shown_keys,
 )
 from scm.v2x.fleet_file import Fleet, Member, complete, load_fleet
 from scm.v2x.key import prefix
-from scm.v2x.rights import EVERYTHING, Rights, presence_of, rights_of
+from scm.v2x.rights import EVERYTHING, presence_of, rights_of
 
 ADVANCED = "/@adv/**"
 CITY_PARTS = (
@@ -245,31 +246,25 @@ def _rules(member: Member, city: str) -> list[_Rule]:
 
 
 def _rules_abroad(member: Member, city: str, neighbours: Sequence[str]) -> list[_Rule]:
-    """Return what a station of this city may see and request of its neighbours.
+    """Return what a station of this city may do on the keys of its neighbours.
 
     Who watches this city sees what they show; the world also hands cars over; a gateway learns
     whether the other city is there.
     """
-    rights, found = rights_of(member.role, member.name), list[_Rule]()
+    watches = set(EVERYTHING) <= set(rights_of(member.role, member.name).subscribes)
+    found = list[_Rule]()
     for neighbour in neighbours:
-        sees, asks = shown_keys(neighbour, city, SHOWN), handover_keys(neighbour)
+        flow = Flow()
         if member.name == gateway_station(neighbour):
-            abroad = Rights(subscribes=shown_keys(neighbour, city, ()))
-        elif member.role == "part" and member.name == "world":
-            abroad = Rights(subscribes=sees, requests=asks)
-        elif set(EVERYTHING) <= set(rights.subscribes):
-            abroad = Rights(subscribes=sees)
-        else:
-            continue
-        of, see, ask = f"{member.name}:{neighbour}", abroad.subscribes, abroad.requests
-        found += [
-            _rule(f"{of}:subscribe", "ingress", ("declare_subscriber",), list(see)),
-            _rule(f"{of}:receive", "egress", ("put",), list(see)),
-            _rule(f"{of}:request", "ingress", ("query",), list(ask)),
-            _rule(f"{of}:receive_reply", "egress", ("reply",), list(ask)),
-            _rule(f"{of}:declarations", "egress", ("declare_queryable",), list(ask)),
-        ]
-    return [rule for rule in found if rule["key_exprs"]]
+            flow = Flow(goes=shown_keys(neighbour, city, ()))
+        elif (member.role, member.name) == ("part", "world"):
+            both = flow_from(neighbour, city, SHOWN)
+            near = border_keys(city, neighbour, SHOWN)
+            flow = Flow(comes=near, goes=both.comes, asks=both.serves)
+        elif watches:
+            flow = Flow(goes=shown_keys(neighbour, city, SHOWN))
+        found += flow_rules(f"{member.name}:{neighbour}", flow)
+    return found
 
 
 def _rule(name: str, flow: str, messages: Iterable[str], keys: list[str]) -> _Rule:

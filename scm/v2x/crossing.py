@@ -23,8 +23,11 @@ SHOWN: dict[str, tuple[str, ...]] = {
 }
 """Keys below a city's prefix, by the names of `messages` in `[[neighbours]]`."""
 
-HANDOVER: tuple[str, ...] = ("world/handover",)
-"""Requests to a neighbour by which cars are handed over."""
+HANDOVER = "handover/"
+"""Requests to a city by which cars are handed over: this, and the name of who sends them."""
+
+BORDER = "border/"
+"""What a city publishes on its neighbour's keys: its cars near the border, if it shows CAMs."""
 
 GATEWAY = "gateway-"
 """Station of a gateway: this, and the name of the neighbour."""
@@ -57,10 +60,10 @@ class Flow:
         asks: Requests that it sends.
     """
 
-    comes: tuple[str, ...]
-    goes: tuple[str, ...]
-    serves: tuple[str, ...]
-    asks: tuple[str, ...]
+    comes: tuple[str, ...] = ()
+    goes: tuple[str, ...] = ()
+    serves: tuple[str, ...] = ()
+    asks: tuple[str, ...] = ()
 
     def reversed(self) -> "Flow":
         """Return the same as seen from the other side."""
@@ -73,18 +76,24 @@ def shown_keys(city: str, neighbour: str, names: Iterable[str]) -> tuple[str, ..
     return tuple(prefix(city) + key for key in (f"neighbour/{neighbour}", *keys))
 
 
-def handover_keys(city: str) -> tuple[str, ...]:
-    """Return the keys of the hand-over requests to a city."""
-    return tuple(prefix(city) + key for key in HANDOVER)
+def border_keys(city: str, neighbour: str, names: Iterable[str]) -> tuple[str, ...]:
+    """Return the neighbour's keys on which a city publishes, if it shows that."""
+    return (prefix(neighbour) + BORDER + city,) if "cams" in names else ()
+
+
+def handover_key(city: str, sender: str) -> str:
+    """Return the key of the hand-over requests from `sender` to a city."""
+    return prefix(city) + HANDOVER + sender
 
 
 def flow_from(neighbour: str, city: str, names: Iterable[str]) -> Flow:
     """Return what may come from a neighbour and go there, seen from a city that shows `names`."""
+    names = tuple(names)
     return Flow(
-        comes=shown_keys(neighbour, city, SHOWN),
-        goes=shown_keys(city, neighbour, names),
-        serves=handover_keys(neighbour),
-        asks=handover_keys(city),
+        comes=shown_keys(neighbour, city, SHOWN) + border_keys(neighbour, city, SHOWN),
+        goes=shown_keys(city, neighbour, names) + border_keys(city, neighbour, names),
+        serves=(handover_key(neighbour, city),),
+        asks=(handover_key(city, neighbour),),
     )
 
 
@@ -93,14 +102,14 @@ def flow_rules(name: str, flow: Flow) -> list[dict[str, object]]:
     sides = (
         ("ingress", "put", flow.comes),
         ("egress", "put", flow.goes),
-        ("ingress", "declare_subscriber", flow.goes),
-        ("egress", "declare_subscriber", flow.comes),
+        ("ingress", "declare_subscriber", _declared(flow.goes)),
+        ("egress", "declare_subscriber", _declared(flow.comes)),
         ("ingress", "query", flow.asks),
         ("egress", "query", flow.serves),
         ("ingress", "reply", flow.serves),
         ("egress", "reply", flow.asks),
-        ("ingress", "declare_queryable", flow.serves),
-        ("egress", "declare_queryable", flow.asks),
+        ("ingress", "declare_queryable", _declared(flow.serves)),
+        ("egress", "declare_queryable", _declared(flow.asks)),
     )
     return [
         {
@@ -113,3 +122,13 @@ def flow_rules(name: str, flow: Flow) -> list[dict[str, object]]:
         for direction, message, keys in sides
         if keys
     ]
+
+
+def _declared(keys: Iterable[str]) -> list[str]:
+    """Return the keys as a station declares them, which receives them from all its neighbours."""
+    found = []
+    for key in keys:
+        before, _, last = key.rpartition("/")
+        to_all = before.endswith(("/" + HANDOVER.rstrip("/"), "/" + BORDER.rstrip("/")))
+        found.append(f"{before}/*" if to_all else f"{before}/{last}")
+    return found

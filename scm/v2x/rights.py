@@ -140,8 +140,10 @@ _OF_PART: dict[str, Rights] = {
             "v/*/cmd/drive",
             "v2x/tx/*/*",
             "v2x/rx/*/*/*",
+            "border/*",
         ),
         subscribes=(
+            "border/*",
             "v/*/alive/*",
             "v/*/state",
             "v/*/cmd/drive",
@@ -149,8 +151,8 @@ _OF_PART: dict[str, Rights] = {
             "tl/*/mon",
             "tl/*/spat",
         ),
-        requests=("v/*/cmd/*",),
-        services=("world/*", "v/*/lease", "v/*/join", "v/*/remove", "v/*/cmd/*"),
+        requests=("v/*/cmd/*", "handover/*"),
+        services=("world/*", "v/*/lease", "v/*/join", "v/*/remove", "v/*/cmd/*", "handover/*"),
     ),
     "traffic": Rights(
         publishes=("tl/*/spat", "tl/*/site", "tl/*/status", "v2x/tx/*/*"),

@@ -9,7 +9,7 @@ import pytest
 import zenoh
 
 from scm.records.city_map import NEIGHBOUR_MESSAGES
-from scm.v2x.crossing import GATEWAY, HANDOVER, SHOWN, gateway_station, shown_keys
+from scm.v2x.crossing import BORDER, GATEWAY, HANDOVER, SHOWN, gateway_station, shown_keys
 from scm.v2x.key import matches, prefix, variables
 from scm.v2x.message import Request
 from scm.v2x.messages import message_classes
@@ -17,7 +17,7 @@ from scm.v2x.rights import _OF_PART, ROLES, rights_of
 from tests.unit.v2x.two_cities import NEVER, TwoCities, until
 
 A, B = prefix("a"), prefix("b")
-CHOSEN = ("states", "spatem")
+CHOSEN = ("states", "cams", "spatem")
 STATE = "v/n1/state"
 
 pytestmark = pytest.mark.usefixtures("lasting_links")
@@ -52,7 +52,16 @@ MESSAGES = message_keys(lambda kind: not is_request(kind)) | {
 REQUESTS = message_keys(is_request) | {
     example(key) for one in all_rights() for key in (*one.requests, *one.services)
 }
-WIDE = ("**", "v/*/state", "v/*/**", "*/*/state", "world/*", "@adv/**", "v/*/@camera/*", "part/*/alive/*")
+WIDE = (
+    "**",
+    "v/*/state",
+    "v/*/**",
+    "*/*/state",
+    "world/*",
+    "@adv/**",
+    "v/*/@camera/*",
+    "part/*/alive/*",
+)
 
 
 @pytest.fixture(scope="module", params=["open", "mtls"])
@@ -117,10 +126,14 @@ def test_intruder_sees_what_was_chosen_and_nothing_else(honest, intruder):
 
 
 def test_city_receives_nothing_that_an_intruder_publishes_in_its_name(cities, honest, intruder):
-    watching = Seen(honest, A + "**", A + "v/*/@camera/*", A + "eye/*/@picture", B + "v/*/state")
+    own = [A + key for key in ("**", "v/*/@camera/*", "eye/*/@picture", BORDER + "*")]
+    watching = Seen(honest, *own, B + "v/*/state")
+    near = A + BORDER + "b"  # cars of b near the border, for the world of a
+    until(lambda: watching.has(near), also=lambda: intruder.put(near, b"control"))
     fence = B + "v/fence/state"  # what b may say of itself
     until(lambda: watching.has(fence), also=lambda: intruder.put(fence, b"control"))
-    for key in MESSAGES | REQUESTS | {"**", "v/**", "v/*/state", "v/n1/cmd/drive"}:
+    as_others = {BORDER + name for name in ("a", "c", "*")}
+    for key in MESSAGES | REQUESTS | as_others | {"**", "v/**", "v/*/state", "v/n1/cmd/drive"}:
         intruder.put(A + key, b"forged")
         intruder.delete(A + key)
     watching.samples.clear()
@@ -168,7 +181,7 @@ def served(cities, honest):
     calls, declared = [], []
     for name in SERVERS:
         session, keys = cities.raw("a", name), rights_of("part", name).services
-        keys += HANDOVER if name == "world" else ()
+        keys += (HANDOVER + "*",) if name == "world" else ()
         declared += answering(session, [A + key for key in keys], calls)
     yield calls
     for one in declared:
@@ -176,11 +189,12 @@ def served(cities, honest):
 
 
 def test_intruder_may_request_a_hand_over_and_nothing_else(served, honest, intruder):
-    handover = A + HANDOVER[0]
+    handover = A + HANDOVER + "b"
     until(lambda: bool(replies(intruder, handover)))
     until(lambda: bool(replies(honest, A + "world/stop_request")))
     served.clear()
-    for key in sorted(REQUESTS | {"v/*/lease", "world/*", "**", "v/n1/cmd/estop"}):
+    others = {HANDOVER + name for name in ("a", "c", "*")}
+    for key in sorted(REQUESTS | others | {"v/*/lease", "world/*", "**", "v/n1/cmd/estop"}):
         found = replies(intruder, A + key, 0.1)
         assert [str(reply.key_expr) for reply in found if str(reply.key_expr) != handover] == []
     assert set(served) <= {handover}
