@@ -1,10 +1,8 @@
 """The part that watches a gateway: whether the neighbouring city is there, and why not."""
 
-import logging
 from collections.abc import Callable, Sequence
 
 from scm.clock import NS_PER_MS, NS_PER_S, seconds
-from scm.log import event
 from scm.runtime.part import BasePart, Subscription
 from scm.v2x.crossing import common_name, gateway_station
 from scm.v2x.exchange import Incoming, Outgoing
@@ -15,8 +13,6 @@ from scm.v2x.messages.neighbour_status import NeighbourState, NeighbourStatus
 
 LOST_NS = 3 * NS_PER_S  # three statuses
 EVERY_NS = NS_PER_S
-
-_log = logging.getLogger(__name__)
 
 
 class GatewayPart(BasePart):
@@ -53,6 +49,8 @@ class GatewayPart(BasePart):
         self._received_ns: int | None = None
         self._sees: tuple[str, ...] = ()
         self._reason = ""
+        self._reason_ns = 0
+        self._reported: tuple[str, str] | None = None
         self._due_ns = 0
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
@@ -62,19 +60,26 @@ class GatewayPart(BasePart):
             if isinstance(item.message, NeighbourStatus):
                 self._received_ns, self._sees = item.t_ns, item.message.shows
         is_there = self._received_ns is not None and now_ns - self._received_ns < LOST_NS
-        before = (self._state, self._reason)
+        before = self._state
         if is_there:
             self._change("joined", now_ns)
         elif self._state == "joined":
             self._change("lost", now_ns)
         elif self._since_ns is None:
             self._since_ns = now_ns
-        self._reason = "" if is_there else self._why()
-        news = (self._state, self._reason) != before
-        if not news and now_ns < self._due_ns:
-            return []
-        self._due_ns = now_ns + EVERY_NS
-        return [self._status(now_ns), *([self._event(now_ns)] if news else [])]
+        reason = "" if is_there else self._why()
+        if reason != self._reason:
+            self._reason, self._reason_ns = reason, now_ns
+        out: list[Outgoing] = []
+        if self._state != before or now_ns >= self._due_ns:
+            self._due_ns = now_ns + EVERY_NS
+            out.append(self._status(now_ns))
+        # A link that is being made has a new reason at each step.
+        lasts = self._state == "joined" or now_ns - self._reason_ns >= LOST_NS
+        if lasts and (self._state, self._reason) != self._reported:
+            self._reported = (self._state, self._reason)
+            out.append(self._event(now_ns))
+        return out
 
     def _change(self, state: NeighbourState, now_ns: int) -> None:
         if state != self._state:
@@ -112,8 +117,6 @@ class GatewayPart(BasePart):
         city = self._border.neighbour
         why = f": {self._reason}" if self._reason else ""
         since_s = seconds(now_ns - (self._received_ns or now_ns))
-        level = logging.INFO if self._state == "joined" else logging.WARNING
-        event(_log, f"neighbour_{self._state}", level=level, city=city, reason=self._reason)
         text = {
             "joined": f"{city} is joined",
             "lost": f"{city} is lost, nothing for {since_s:.0f} s{why}",

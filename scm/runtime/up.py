@@ -27,6 +27,7 @@ from scm.v2x.bus_zenoh import ZenohBus
 from scm.v2x.crossing import common_name, gateway_station
 from scm.v2x.fleet_file import issue_gateway_files, load_fleet
 from scm.v2x.key import check_name
+from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.presence import Presence
 from scm.v2x.router import DEFAULT_ENDPOINT, Router, free_endpoint
 from scm.vehicles.car_files import name_own_folder
@@ -245,6 +246,8 @@ def _watch(plan: _Plan, bus: ZenohBus, print_line: PrintLine) -> None:
     stop = stop_on_signal()
     for kind in MESSAGE_KINDS:
         bus.subscribe(kind, {}, mailbox)
+    for join in plan.joins:
+        bus.subscribe(CityEvent, {"source": gateway_station(join.neighbour)}, mailbox)
     is_ready, advised = False, set[str]()
     try:
         while not clock.wait_until(clock.now_ns() + LOOK_EVERY_NS, stop):
@@ -253,6 +256,10 @@ def _watch(plan: _Plan, bus: ZenohBus, print_line: PrintLine) -> None:
                 disturbances.receive(item)
                 if isinstance(item.message, Presence):
                     supervisor.receive(item.message)
+                elif isinstance(item.message, CityEvent) and item.message.source.startswith(
+                    GATEWAY
+                ):
+                    print_line(f"  {'neighbour':<12} {item.message.text}")
             disturbances.check_silence(clock.now_ns())
             for one in disturbances.news():
                 if is_ready:  # parts that start are late, and are not all there

@@ -16,6 +16,9 @@ _REASON = re.compile(
     r"(invalid peer certificate|received fatal alert): (.+?)(?: at /|\. Hint:|\.\. Retry|\]|$)"
 )
 _STDOUT = 1
+# Authorities of two fleets may have the same name: then the signature shows it.
+_UNKNOWN_TO_US = ("UnknownIssuer", "BadSignature")
+_UNKNOWN_THERE = ("UnknownCA", "DecryptError")
 
 
 def refusal_in(line: str, neighbour: str) -> str:
@@ -24,11 +27,11 @@ def refusal_in(line: str, neighbour: str) -> str:
     if found is None:
         return ""
     by_us, reason = found[1].startswith("invalid"), found[2]
-    if by_us and reason == "UnknownIssuer":
+    if by_us and reason in _UNKNOWN_TO_US:
         return f"refused: its certificate is not from the authority known for {neighbour}"
     if by_us:
         return f"refused: the certificate of {neighbour}: {reason}"
-    if reason == "UnknownCA":
+    if reason in _UNKNOWN_THERE:
         return f"{neighbour} refuses this city: it knows another authority for it"
     return f"{neighbour} refuses the certificate of this city: {reason}"
 
