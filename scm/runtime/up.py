@@ -256,9 +256,7 @@ def _watch(plan: _Plan, bus: ZenohBus, print_line: PrintLine) -> None:
                 disturbances.receive(item)
                 if isinstance(item.message, Presence):
                     supervisor.receive(item.message)
-                elif isinstance(item.message, CityEvent) and item.message.source.startswith(
-                    GATEWAY
-                ):
+                elif isinstance(item.message, CityEvent):
                     print_line(f"  {'neighbour':<12} {item.message.text}")
             disturbances.check_silence(clock.now_ns())
             for one in disturbances.news():
