@@ -113,7 +113,12 @@ def _is_inner(link: zenoh.Link) -> bool:
 
 def settings_of(border: Border) -> dict[str, Any]:
     """Return what a gateway adds to the configuration of a router."""
-    return {"transport": _transport(border), "access_control": _access_control(border)}
+    outer = border.endpoint.partition("/")[0]
+    return {
+        "transport": _transport(border),
+        "access_control": _access_control(border),
+        **zenoh_config.never_waiting(outer),
+    }
 
 
 def _transport(border: Border) -> Mapping[str, Any]:

@@ -53,8 +53,12 @@ class Router:
             )
             raise AccessError(msg)
         self.listen = listen
-        self._access = access
-        self._endpoints = [listen, gateways] if gateways else [listen]
+        self._access: Mapping[str, Any] | None = access
+        self._endpoints = [listen]
+        if gateways:
+            self._endpoints.append(gateways)
+            inner = zenoh_config.never_waiting(gateways.partition("/")[0])
+            self._access = {**(access or {}), **inner}
         self._session: zenoh.Session | None = None
 
     def __enter__(self) -> Self:

@@ -75,6 +75,21 @@ def router(
     return json.dumps(_with(_with(_both(), own), access or {}))
 
 
+def never_waiting(link: str) -> dict[str, object]:
+    """Return settings that drop what a link of this protocol cannot take at once.
+
+    Otherwise a request that waits for a slow link holds up everything else of its sender.
+    """
+    rule = {
+        "id": f"no waiting for {link}",
+        "link_protocols": [link],
+        "messages": ["put", "delete", "query"],
+        "flows": ["egress"],
+        "overwrite": {"congestion_control": "drop"},
+    }
+    return {"qos": {"network": [rule]}}
+
+
 def _with(settings: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
     """Return settings merged with others, level by level."""
     laid = dict(settings)
