@@ -56,7 +56,8 @@ def _run(arguments: argparse.Namespace) -> int:
         ) as abroad,
     ):
         abroad.subscribe(NeighbourStatus, {"neighbour": arguments.city}, received)
-        return run_part(GatewayPart(border, received, gateway.far_names, log.why), arguments)
+        part = GatewayPart(border, received, gateway.far_names, log.why, gateway.reopen)
+        return run_part(part, arguments)
 
 
 COMMAND = Command(

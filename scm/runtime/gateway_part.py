@@ -12,6 +12,7 @@ from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.neighbour_status import NeighbourState, NeighbourStatus
 
 LOST_NS = 3 * NS_PER_S  # three statuses
+REOPEN_NS = 5 * NS_PER_S
 EVERY_NS = NS_PER_S
 
 
@@ -26,6 +27,7 @@ class GatewayPart(BasePart):
         received: Statuses that the neighbour's gateway publishes.
         far_names: Returns the common names of who is linked now.
         refusal: Returns why a link was refused lately; empty: none was.
+        reopen: Makes the links anew; called when one is there over which nothing comes.
     """
 
     role = "part"
@@ -38,12 +40,15 @@ class GatewayPart(BasePart):
         received: Mailbox,
         far_names: Callable[[], list[str | None]],
         refusal: Callable[[], str] = lambda: "",
+        reopen: Callable[[], None] = lambda: None,
     ) -> None:
         self.name = gateway_station(border.neighbour)
         self._border = border
         self._received = received
         self._far_names = far_names
         self._refusal = refusal
+        self._reopen = reopen
+        self._works_ns: int | None = None
         self._state: NeighbourState = "waiting"
         self._since_ns: int | None = None
         self._received_ns: int | None = None
@@ -68,6 +73,7 @@ class GatewayPart(BasePart):
         elif self._since_ns is None:
             self._since_ns = now_ns
         reason = "" if is_there else self._why()
+        self._check_link(now_ns, is_silent=not is_there and bool(self._far_names()))
         if reason != self._reason:
             self._reason, self._reason_ns = reason, now_ns
         out: list[Outgoing] = []
@@ -84,6 +90,14 @@ class GatewayPart(BasePart):
     def _change(self, state: NeighbourState, now_ns: int) -> None:
         if state != self._state:
             self._state, self._since_ns = state, now_ns
+
+    def _check_link(self, now_ns: int, *, is_silent: bool) -> None:
+        """Make the links anew when one is there for a while and carries nothing."""
+        if not is_silent or self._works_ns is None:
+            self._works_ns = now_ns
+        elif now_ns - self._works_ns >= REOPEN_NS:
+            self._works_ns = now_ns
+            self._reopen()
 
     def _why(self) -> str:
         """Return why the neighbour is not joined, as far as its link shows."""

@@ -80,6 +80,27 @@ class Gateway:
         Raises:
             RunError: when the endpoint cannot be listened at.
         """
+        self._open()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._close()
+
+    def reopen(self) -> None:
+        """Make both links anew.
+
+        After a link was cut and made again within milliseconds, Zenoh 1.10 sometimes routes nothing
+        over it any more, in one direction or both, until it is made once more.
+        """
+        self._close()
+        self._open()
+
+    def _open(self) -> None:
         border = self.border
         here, there = ([border.endpoint], []) if border.listens else ([], [border.endpoint])
         try:
@@ -89,14 +110,8 @@ class Gateway:
             why = zenoh_config.reason(cause)
             msg = f"cannot wait for {border.neighbour} at {border.endpoint!r}: {why}"
             raise RunError(msg) from cause
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def _close(self) -> None:
         if self._session is not None:
             self._session.close()  # type: ignore[no-untyped-call]
             self._session = None
