@@ -19,6 +19,7 @@ from scm.v2x.messages.eye_pose import EyePose
 from scm.v2x.messages.eye_status import EyeStatus
 from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.neighbour_status import NeighbourStatus
 from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.signal_site import SignalSite
 from scm.v2x.messages.signal_status import SignalStatus
@@ -76,6 +77,7 @@ class Picture:
         tags_seen: By (camera, tag id), all of the last minute.
         poses: By (camera, vehicle).
         stations: Everybody who is there, and who was lost lately.
+        neighbours: By neighbouring city.
         disturbances: What makes measurements void; shared with the city.
         event_seq: Number of the newest event in the log; 0: none yet.
     """
@@ -102,6 +104,7 @@ class Picture:
     eye_statuses: dict[str, Held[EyeStatus]] = field(default_factory=dict)
     poses: dict[tuple[str, str], SeenPose] = field(default_factory=dict)
     stations: tuple[StationRow, ...] = ()
+    neighbours: dict[str, Held[NeighbourStatus]] = field(default_factory=dict)
     disturbances: Disturbances = field(default_factory=Disturbances)
     event_seq: int = 0
 

@@ -22,6 +22,7 @@ from scm.v2x.messages.eye_tags import EyeTags
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.neighbour_status import NeighbourStatus
 from scm.v2x.messages.signal_site import SignalSite
 from scm.v2x.messages.signal_status import SignalStatus
 from scm.v2x.messages.spat import Spat
@@ -135,6 +136,17 @@ class ReceivedTraffic:
         self.reports[report.suspect] = report
         if len(self.reports) > MAX_REPORTS:
             self.reports.pop(next(iter(self.reports)))
+
+
+class ReceivedNeighbours:
+    """The newest status of each neighbouring city."""
+
+    def __init__(self) -> None:
+        self.statuses: dict[str, Held[NeighbourStatus]] = {}
+
+    def receive(self, status: NeighbourStatus, t_ns: int) -> None:
+        """Store how a neighbour is."""
+        self.statuses[status.neighbour] = Held(status, t_ns)
 
 
 class ReceivedAutonomy:

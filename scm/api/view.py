@@ -19,6 +19,7 @@ from scm.api.received import (
     CameraWatch,
     ReceivedAutonomy,
     ReceivedEye,
+    ReceivedNeighbours,
     ReceivedSignals,
     ReceivedTraffic,
     ReceivedTwins,
@@ -52,6 +53,7 @@ from scm.v2x.messages.lidar_scan import LidarScan
 from scm.v2x.messages.misbehaviour_report import MisbehaviourReport
 from scm.v2x.messages.misbehaviour_scores import MisbehaviourScores
 from scm.v2x.messages.monitor_status import MonitorStatus
+from scm.v2x.messages.neighbour_status import NeighbourStatus
 from scm.v2x.messages.network_view import NetworkView
 from scm.v2x.messages.occupancy_map import OccupancyMap
 from scm.v2x.messages.part_status import PartStatus
@@ -88,6 +90,7 @@ class CityView(BasePart):
         self._autonomy = ReceivedAutonomy()
         self._room_maps = ReceivedMaps()
         self._twins = ReceivedTwins()
+        self._neighbours = ReceivedNeighbours()
         self._eye_accuracy = EyeAccuracyPart()
         self._eye = ReceivedEye(self._eye_accuracy)
         self._cameras = CameraWatch()
@@ -120,6 +123,7 @@ class CityView(BasePart):
             AutonomyPlan: self._autonomy.receive_plan,
             OccupancyMap: self._room_maps.receive,
             TwinStatus: self._twins.receive,
+            NeighbourStatus: self._neighbours.receive,
             Spat: self._signals.receive_spat,
             SignalSite: self._signals.receive_site,
             SignalStatus: self._signals.receive_status,
@@ -192,6 +196,7 @@ class CityView(BasePart):
             eye_statuses=dict(self._eye.statuses),
             poses=dict(self._eye.poses),
             stations=self._stations.rows(self._now_ns),
+            neighbours=dict(self._neighbours.statuses),
             disturbances=self._disturbances,
             event_seq=self._log.newest_seq,
         )

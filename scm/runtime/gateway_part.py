@@ -10,6 +10,7 @@ from scm.v2x.gateway import Border
 from scm.v2x.mailbox import Mailbox
 from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.neighbour_status import NeighbourState, NeighbourStatus
+from scm.v2x.messages.part_status import PartStatus
 
 LOST_NS = 3 * NS_PER_S  # three statuses
 REOPEN_NS = 5 * NS_PER_S
@@ -79,7 +80,7 @@ class GatewayPart(BasePart):
         out: list[Outgoing] = []
         if self._state != before or now_ns >= self._due_ns:
             self._due_ns = now_ns + EVERY_NS
-            out.append(self._status(now_ns))
+            out += [self._status(now_ns), self._vital_signs(now_ns)]
         # A link that is being made has a new reason at each step.
         lasts = self._state == "joined" or now_ns - self._reason_ns >= LOST_NS
         if lasts and (self._state, self._reason) != self._reported:
@@ -126,6 +127,13 @@ class GatewayPart(BasePart):
             sees=self._sees if self._state == "joined" else (),
             reason=self._reason,
         )
+
+    def _vital_signs(self, now_ns: int) -> PartStatus:
+        """Return the line that the dashboard shows beside this station."""
+        sees = ", ".join(self._sees) or "nothing but cars handed over"
+        detail = f"joined, sees {sees}" if self._state == "joined" else self._state
+        why = f": {self._reason}" if self._reason else ""
+        return PartStatus(station=self.name, t_ns=now_ns, detail=detail + why)
 
     def _event(self, now_ns: int) -> CityEvent:
         city = self._border.neighbour
