@@ -22,6 +22,7 @@ from scm.client.nouns.leases import LeasesNoun
 from scm.client.nouns.map import MapNoun
 from scm.client.nouns.misbehaviour import MisbehaviourNoun
 from scm.client.nouns.mismatch import MismatchNoun
+from scm.client.nouns.neighbours import NeighboursNoun
 from scm.client.nouns.ngsi import NgsiNoun
 from scm.client.nouns.operations import OperationsNoun
 from scm.client.nouns.recordings import RecordingsNoun
@@ -65,6 +66,7 @@ class Client:
         self.map = MapNoun(self.connection)
         self.misbehaviour = MisbehaviourNoun(self.connection)
         self.mismatch = MismatchNoun(self.connection)
+        self.neighbours = NeighboursNoun(self.connection)
         self.ngsi = NgsiNoun(self.connection)
         self.operations = OperationsNoun(self.connection)
         self.recordings = RecordingsNoun(self.connection)
