@@ -18,16 +18,15 @@ from scm.v2x.credentials import Credentials, read_credentials
 from scm.v2x.crossing import (
     INNER,
     SHOWN,
-    Flow,
     border_keys,
-    flow_from,
-    flow_rules,
     gateway_station,
+    link_rules,
+    neighbour_rights,
     shown_keys,
 )
 from scm.v2x.fleet_file import Fleet, Member, complete, load_fleet
 from scm.v2x.key import prefix
-from scm.v2x.rights import EVERYTHING, presence_of, rights_of
+from scm.v2x.rights import EVERYTHING, Rights, presence_of, rights_of
 
 ADVANCED = "/@adv/**"
 CITY_PARTS = (
@@ -195,7 +194,7 @@ def access_control(fleet: Fleet, city: str, neighbours: Sequence[str] = ()) -> d
     kind = "usernames" if fleet.auth == "password" else "cert_common_names"
     subjects = [{"id": m.name, kind: [m.identity]} for m in fleet.members.values()]
     for neighbour in neighbours:
-        carried = flow_rules(f"to {neighbour}", flow_from(neighbour, city, SHOWN))
+        carried = link_rules(f"to {neighbour}", neighbour_rights(neighbour, city, SHOWN))
         rules += carried
         policies.append({"rules": [rule["id"] for rule in carried], "subjects": ["gateways"]})
     if neighbours:
@@ -254,16 +253,16 @@ def _rules_abroad(member: Member, city: str, neighbours: Sequence[str]) -> list[
     watches = set(EVERYTHING) <= set(rights_of(member.role, member.name).subscribes)
     found = list[_Rule]()
     for neighbour in neighbours:
-        flow = Flow()
+        rights = Rights()
         if member.name == gateway_station(neighbour):
-            flow = Flow(goes=shown_keys(neighbour, city, ()))
+            rights = Rights(subscribes=shown_keys(neighbour, city, ()))
         elif (member.role, member.name) == ("part", "world"):
-            both = flow_from(neighbour, city, SHOWN)
+            theirs = neighbour_rights(neighbour, city, SHOWN)
             near = border_keys(city, neighbour, SHOWN)
-            flow = Flow(comes=near, goes=both.comes, asks=both.serves)
+            rights = Rights(publishes=near, subscribes=theirs.publishes, requests=theirs.services)
         elif watches:
-            flow = Flow(goes=shown_keys(neighbour, city, SHOWN))
-        found += flow_rules(f"{member.name}:{neighbour}", flow)
+            rights = Rights(subscribes=shown_keys(neighbour, city, SHOWN))
+        found += link_rules(f"{member.name}:{neighbour}", rights)
     return found
 
 

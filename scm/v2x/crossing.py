@@ -8,9 +8,9 @@ has the rights of a neighbour, never those of a station of this city.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from scm.v2x.key import check_name, prefix
+from scm.v2x.rights import Rights
 
 SHOWN: dict[str, tuple[str, ...]] = {
     "states": ("v/*/state",),
@@ -49,25 +49,14 @@ def common_name(city: str) -> str:
     return f"gateway@{city}"
 
 
-@dataclass(frozen=True, slots=True)
-class Flow:
-    """What comes from the far side of a link, and what goes there; full keys.
-
-    Attributes:
-        comes: Messages that the far side publishes.
-        goes: Messages that it subscribes to.
-        serves: Requests that it answers.
-        asks: Requests that it sends.
-    """
-
-    comes: tuple[str, ...] = ()
-    goes: tuple[str, ...] = ()
-    serves: tuple[str, ...] = ()
-    asks: tuple[str, ...] = ()
-
-    def reversed(self) -> "Flow":
-        """Return the same as seen from the other side."""
-        return Flow(comes=self.goes, goes=self.comes, serves=self.asks, asks=self.serves)
+def other_side(rights: Rights) -> Rights:
+    """Return the rights of the other end of a link, which receives what this one publishes."""
+    return Rights(
+        publishes=rights.subscribes,
+        subscribes=rights.publishes,
+        requests=rights.services,
+        services=rights.requests,
+    )
 
 
 def shown_keys(city: str, neighbour: str, names: Iterable[str]) -> tuple[str, ...]:
@@ -86,30 +75,30 @@ def handover_key(city: str, sender: str) -> str:
     return prefix(city) + HANDOVER + sender
 
 
-def flow_from(neighbour: str, city: str, names: Iterable[str]) -> Flow:
-    """Return what may come from a neighbour and go there, seen from a city that shows `names`."""
+def neighbour_rights(neighbour: str, city: str, names: Iterable[str]) -> Rights:
+    """Return the rights of a neighbour at a city that shows it `names`; full keys."""
     names = tuple(names)
-    return Flow(
-        comes=shown_keys(neighbour, city, SHOWN) + border_keys(neighbour, city, SHOWN),
-        goes=shown_keys(city, neighbour, names) + border_keys(city, neighbour, names),
-        serves=(handover_key(neighbour, city),),
-        asks=(handover_key(city, neighbour),),
+    return Rights(
+        publishes=shown_keys(neighbour, city, SHOWN) + border_keys(neighbour, city, SHOWN),
+        subscribes=shown_keys(city, neighbour, names) + border_keys(city, neighbour, names),
+        requests=(handover_key(city, neighbour),),
+        services=(handover_key(neighbour, city),),
     )
 
 
-def flow_rules(name: str, flow: Flow) -> list[dict[str, object]]:
-    """Return Zenoh's rules for a link with this flow; their ids begin with `name`."""
+def link_rules(name: str, rights: Rights) -> list[dict[str, object]]:
+    """Return Zenoh's rules for a link whose far end has these rights; ids begin with `name`."""
     sides = (
-        ("ingress", "put", flow.comes),
-        ("egress", "put", flow.goes),
-        ("ingress", "declare_subscriber", _declared(flow.goes)),
-        ("egress", "declare_subscriber", _declared(flow.comes)),
-        ("ingress", "query", flow.asks),
-        ("egress", "query", flow.serves),
-        ("ingress", "reply", flow.serves),
-        ("egress", "reply", flow.asks),
-        ("ingress", "declare_queryable", _declared(flow.serves)),
-        ("egress", "declare_queryable", _declared(flow.asks)),
+        ("ingress", "put", rights.publishes),
+        ("egress", "put", rights.subscribes),
+        ("ingress", "declare_subscriber", _declared(rights.subscribes)),
+        ("egress", "declare_subscriber", _declared(rights.publishes)),
+        ("ingress", "query", rights.requests),
+        ("egress", "query", rights.services),
+        ("ingress", "reply", rights.services),
+        ("egress", "reply", rights.requests),
+        ("ingress", "declare_queryable", _declared(rights.services)),
+        ("egress", "declare_queryable", _declared(rights.requests)),
     )
     return [
         {

@@ -14,7 +14,7 @@ import zenoh
 from scm.errors import AccessError, RunError
 from scm.v2x import zenoh_config
 from scm.v2x.access import is_local
-from scm.v2x.crossing import INNER, common_name, flow_from, flow_rules
+from scm.v2x.crossing import INNER, common_name, link_rules, neighbour_rights, other_side
 from scm.v2x.router import open_router
 
 
@@ -158,10 +158,10 @@ def _access_control(border: Border) -> dict[str, object]:
 
     A station of the neighbour with a certificate of the same authority is no gateway.
     """
-    outside = flow_from(border.neighbour, border.city, border.shows)
+    rights = neighbour_rights(border.neighbour, border.city, border.shows)
     rules = {
-        "city": flow_rules("city", outside.reversed()),
-        "neighbour": flow_rules("neighbour", outside),
+        "city": link_rules("city", other_side(rights)),
+        "neighbour": link_rules("neighbour", rights),
     }
     neighbour: dict[str, object] = {"id": "neighbour", "link_protocols": ["tcp"]}
     if border.secrets is not None:
