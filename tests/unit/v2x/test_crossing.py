@@ -227,6 +227,24 @@ def test_intruder_is_not_present_in_the_city_and_does_not_see_who_is(cities, hon
         token.undeclare()
 
 
+@pytest.mark.parametrize("cities", ["mtls"], indirect=True)
+def test_station_of_the_neighbour_is_no_gateway(cities):
+    if "a" not in cities.routers:
+        cities.start("a")
+    honest, gateway = cities.raw("a", "selftest"), cities.rogue_gateway()
+    station = cities.rogue_gateway("world")
+    by_gateway, by_station = Seen(gateway, A + "v/*/state"), Seen(station, A + "v/*/state")
+    of_b = Seen(honest, B + "v/*/state")
+    until(lambda: bool(station.info.links()))
+    station.put(B + "v/forged/state", b"forged")
+    until(lambda: by_gateway.has(A + STATE), also=lambda: honest.put(A + STATE, b"control"))
+    until(lambda: of_b.has(B + STATE), also=lambda: gateway.put(B + STATE, b"control"))
+    station.put(B + "v/forged/state", b"forged")
+    NEVER.wait(0.3)
+    assert by_station.samples == []
+    assert not of_b.has(B + "v/forged/state")
+
+
 def test_every_name_that_a_map_may_choose_stands_for_keys():
     assert set(SHOWN) == set(NEIGHBOUR_MESSAGES)
     published = {key for one in all_rights() for key in one.publishes}

@@ -103,9 +103,18 @@ class TwoCities:
         text = zenoh_config.client(self.guards[city].connect, PATIENCE_S, settings)
         return self.stack.enter_context(zenoh.open(zenoh.Config.from_json5(text)))
 
-    def rogue_gateway(self):
-        """Return a router of city b that linked itself to a, without any rules of its own."""
+    def rogue_gateway(self, station=""):
+        """Return a router of city b that linked itself to a, without any rules of its own.
+
+        With `station` it has the certificate of that station instead of the gateway's.
+        """
         transport = {"transport": settings_of(self.border("b"))["transport"]}
+        if station:
+            own = self.credentials("b", station).client_settings()["link"]["tls"]
+            tls = transport["transport"]["link"]["tls"]
+            for name in ("connect_certificate", "connect_private_key"):
+                del tls[name]
+                tls[f"{name}_base64"] = own[f"{name}_base64"]
         text = zenoh_config.router([], transport, [self.endpoint])
         return self.stack.enter_context(zenoh.open(zenoh.Config.from_json5(text)))
 
