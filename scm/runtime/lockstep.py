@@ -29,7 +29,7 @@ class Lockstep:
 
     Args:
         parts: In the order of their steps.
-        city: Chunk of all keys.
+        city: Chunk of all keys, unless `add` names another city for a part.
         start_ns: Of its clock.
         faults: Of the network between the parts; None: nothing is lost or late.
 
@@ -60,9 +60,15 @@ class Lockstep:
         """The time of the city [ns]."""
         return self.clock.now_ns()
 
-    def add(self, part: Part, state: Repository | None = None) -> None:
-        """Add a part; its first step is due now. `state` stores what must outlive it."""
-        bus = self._network.bus(self._city, part.name)
+    def add(self, part: Part, state: Repository | None = None, city: str = "") -> None:
+        """Add a part; its first step is due now.
+
+        Args:
+            part: The part.
+            state: Stores what must outlive it.
+            city: The city that it belongs to, where several share one clock and one network.
+        """
+        bus = self._network.bus(city or self._city, part.name)
         keeper = None if state is None else DirectWriter(state, part.name, bus.session)
         self._running[self._added] = _Running(part, bus, Station(part, bus, keeper))
         heapq.heappush(self._due, (self.now_ns, self._added))

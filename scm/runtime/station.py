@@ -18,7 +18,7 @@ from scm.store.audit import Deed
 from scm.store.repository import Table
 from scm.v2x.answers import AnswerCache
 from scm.v2x.bus import Bus, Mailbox, RawMailbox, check_reply
-from scm.v2x.exchange import Answer, Call, Incoming, Outgoing, PersistedState, RawSample
+from scm.v2x.exchange import Answer, Call, Incoming, Outgoing, PersistedState, RawSample, ToCity
 from scm.v2x.mailbox import drain_all
 from scm.v2x.message import Delivery, Message, Refused, Request, encode
 from scm.v2x.write_ahead import Batch, BatchStore
@@ -118,9 +118,13 @@ class Station:
         """Deliver what a step returned, in its order; answers wait until they are stored."""
         stored: list[PersistedState] = []
         answers: list[Answer] = []
+        calls: list[Call] = []
         for item in outgoing:
             if isinstance(item, Call):
-                self._bus.call(self._signed(item), self._replies.put)
+                if item.after_store and self._keeper is not None:
+                    calls.append(item)
+                else:
+                    self._call(item)
             elif isinstance(item, Answer):
                 self._log_traced(item)
                 if self._keeper is None:
@@ -130,10 +134,12 @@ class Station:
                     answers.append(item)
             elif isinstance(item, PersistedState):
                 stored.append(item)
+            elif isinstance(item, ToCity):
+                self._bus.publish(item.message, item.city)
             else:
                 self._bus.publish(item)
-        if self._keeper is not None and (stored or answers):
-            self._store(self._keeper, stored, answers)
+        if self._keeper is not None and (stored or answers or calls):
+            self._store(self._keeper, stored, answers, calls)
 
     def close(self) -> None:
         """Store what is pending and send its answers; the bus stays open."""
@@ -148,7 +154,11 @@ class Station:
         return self._keeper.stuck
 
     def _store(
-        self, keeper: BatchStore, stored: Sequence[PersistedState], answers: Sequence[Answer]
+        self,
+        keeper: BatchStore,
+        stored: Sequence[PersistedState],
+        answers: Sequence[Answer],
+        calls: Sequence[Call],
     ) -> None:
         values: list[tuple[Table, str, bytes | None]] = [
             (item.table, item.key, None if item.value is None else msgspec.json.encode(item.value))
@@ -165,12 +175,15 @@ class Station:
             for answer in answers
             if not isinstance(answer.reply, Refused) and _has_effect(answer.to)
         ]
-        if values or deeds:
-            keeper.write(Batch(values, deeds, answers))
+        if values or deeds or calls:
+            keeper.write(Batch(values, deeds, answers, calls))
             self._release()
         else:
             for answer in answers:
                 self._answer(answer)
+
+    def _call(self, call: Call) -> None:
+        self._bus.call(self._signed(call), self._replies.put)
 
     def _signed(self, call: Call) -> Call:
         """Return a call whose request names its actor; this part, unless it names somebody."""
@@ -199,9 +212,11 @@ class Station:
         )
 
     def _release(self) -> None:
-        """Send the answers whose state is stored by now."""
+        """Send the answers and calls whose state is stored by now."""
         if self._keeper is not None:
             for batch in self._keeper.written():
+                for call in batch.calls:
+                    self._call(call)
                 for answer in batch.answers:
                     self._answer(answer)
 

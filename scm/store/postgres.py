@@ -44,6 +44,7 @@ MIGRATIONS: tuple[tuple[LiteralString, ...], ...] = (
     ('CREATE TABLE seen (key TEXT COLLATE "C" PRIMARY KEY, value BYTEA NOT NULL)',),
     ('CREATE TABLE calibrations (key TEXT COLLATE "C" PRIMARY KEY, value BYTEA NOT NULL)',),
     ('CREATE TABLE twins (key TEXT COLLATE "C" PRIMARY KEY, value BYTEA NOT NULL)',),
+    ('CREATE TABLE handovers (key TEXT COLLATE "C" PRIMARY KEY, value BYTEA NOT NULL)',),
 )
 """What each schema version adds to the one before; the table `scm_schema` counts them."""
 

@@ -11,6 +11,8 @@ seen     event/<id>           Acknowledgement  who took note of an event (scm.ap
 calibrations  eye.../<camera>  SightRecord     what a camera sees by (scm.eye.sight)
 twins    twin/version/<car>/<number>  TwinVersion  of a car's file (scm.v2x.messages.twin_status)
 twins    twin/change/<car>/<t_ns>     TwinChange   of a car
+handovers world/out/<car>           OutgoingRecord  a car on its way to the next city (scm.world)
+handovers world/in/<city>/<car>     ArrivalRecord   the last transfer of a car from there
 """
 
 from typing import TypeVar
@@ -35,6 +37,7 @@ class CarRecord(msgspec.Struct, kw_only=True, frozen=True):
         epoch: Of this ownership.
         ttl_ms: How long the lease lives without renewal.
         tag_id: On its roof; None: kept before tags were.
+        circulates: Whether it drives on by itself after a restart.
     """
 
     car_file: str
@@ -47,6 +50,7 @@ class CarRecord(msgspec.Struct, kw_only=True, frozen=True):
     epoch: int
     ttl_ms: int
     tag_id: int | None = None
+    circulates: bool = False
 
 
 class StopRecord(msgspec.Struct, kw_only=True, frozen=True):

@@ -20,6 +20,7 @@ Table = Literal[
     "seen",
     "calibrations",
     "twins",
+    "handovers",
 ]
 Log = Literal["audit"]
 

@@ -33,6 +33,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
     (_TABLE.format("seen"),),
     (_TABLE.format("calibrations"),),
     (_TABLE.format("twins"),),
+    (_TABLE.format("handovers"),),
 )
 """What each schema version adds to the one before; `PRAGMA user_version` counts them."""
 

@@ -42,8 +42,11 @@ class Bus(Protocol):
         """How many arrivals were dropped because they could not be read."""
         ...
 
-    def publish(self, message: Message) -> None:
-        """Send a message on its own key; never blocks on a slow receiver."""
+    def publish(self, message: Message, city: str = "") -> None:
+        """Send a message on its own key; never blocks on a slow receiver.
+
+        `city` is another city, on whose keys it is sent.
+        """
         ...
 
     def subscribe(self, kind: type[Message], where: Mapping[str, str], mailbox: Mailbox) -> None:

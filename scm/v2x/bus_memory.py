@@ -131,7 +131,11 @@ class MemoryNetwork:
         if self.faults is None or sender is receiver:
             deliver(now_ns)
             return
-        for delay_ns in self.faults.delays(sender.station, receiver.station):
+        if sender.city == receiver.city:
+            delays = self.faults.delays(sender.station, receiver.station)
+        else:
+            delays = self.faults.delays(sender.address, receiver.address, over_link=True)
+        for delay_ns in delays:
             if delay_ns:
                 self._sent += 1
                 heapq.heappush(self._delayed, (now_ns + delay_ns, self._sent, deliver))
@@ -234,6 +238,11 @@ class MemoryBus:
         self._closed = False
 
     @property
+    def address(self) -> str:
+        """Its station in its city, as `Faults` names it on a link between cities."""
+        return f"{self.city}/{self.station}"
+
+    @property
     def connected(self) -> bool:
         """Whether it is still open."""
         return not self._closed
@@ -243,15 +252,16 @@ class MemoryBus:
         """How many arrivals were dropped because they could not be read."""
         return self._reader.rejected
 
-    def publish(self, message: Message) -> None:
-        """Send a message on its own key."""
+    def publish(self, message: Message, city: str = "") -> None:
+        """Send a message on its own key, or on that of another city."""
         self._check_open()
         self._network.expire()
-        self._send(message, keep=message.HISTORY_DEPTH if message.DELIVERY is Delivery.EVENT else 0)
+        keep = message.HISTORY_DEPTH if message.DELIVERY is Delivery.EVENT else 0
+        self._send(message, keep, city)
 
-    def _send(self, message: Message, keep: int) -> None:
+    def _send(self, message: Message, keep: int, city: str = "") -> None:
         body, attachment = encode(message)
-        key = key_of(self.city, message)
+        key = key_of(city or self.city, message)
         sample = RawSample(key, body, attachment, self._network.clock.now_ns())
         with self._network.lock:
             if keep:
@@ -352,7 +362,7 @@ class MemoryBus:
         """Send a request and pass the reply (or a `Refused`) to `on_reply` later; never blocks."""
         self._check_open()
         self._network.expire()
-        key = key_of(self.city, call.request)
+        key = key_of(call.city or self.city, call.request)
         body, attachment = encode(call.request)
         now_ns = self._network.clock.now_ns()
         pending = _PendingCall(self, call, on_reply, key, now_ns + nanoseconds(call.timeout_s))

@@ -103,8 +103,8 @@ class ZenohBus:
         """How many arrivals were dropped because they could not be read."""
         return self._reader.rejected
 
-    def publish(self, message: Message) -> None:
-        """Send a message on its own key; never blocks on a slow receiver.
+    def publish(self, message: Message, city: str = "") -> None:
+        """Send a message on its own key, or on that of another city; never blocks.
 
         While disconnected only EVENTs are retained until the connection is back.
         """
@@ -112,16 +112,16 @@ class ZenohBus:
         if self._signed is not None:
             message = self._signed.signed(message, self._clock.now_ns())
         if self._connected or message.DELIVERY is Delivery.EVENT:
-            publisher = self._publisher(message)
+            publisher = self._publisher(message, city or self.city)
             body, attachment = encode(message)
             publisher.put(body, attachment=attachment)
 
-    def _publisher(self, message: Message) -> _Publisher:
-        kind, names = type(message), names_of(message)
+    def _publisher(self, message: Message, city: str) -> _Publisher:
+        kind, names = type(message), (city, *names_of(message))
         publisher = self._publishers.get((kind, names))
         if publisher is not None:
             return publisher
-        key = key_of(self.city, message)
+        key = key_of(city, message)
         with self._lock:
             publisher = self._publishers.get((kind, names))
             if publisher is None:
@@ -281,7 +281,7 @@ class ZenohBus:
     def call(self, call: Call, on_reply: Callable[[Incoming], None]) -> None:
         """Send a request and pass the reply (or a `Refused`) to `on_reply` later; never blocks."""
         self._check_open()
-        key = key_of(self.city, call.request)
+        key = key_of(call.city or self.city, call.request)
         pending = _PendingCall(call, on_reply, key, self._clock)
         if not self._connected:
             pending.finish(no_link(call.request, key))

@@ -10,10 +10,25 @@ from scm.v2x.message import Message, Request
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Call:
-    """Send a request; the reply comes in a later inbox with `call` set."""
+    """Send a request; the reply comes in a later inbox with `call` set.
+
+    Attributes:
+        city: Whose keys it is sent on; empty: the sender's own city.
+        after_store: Send it only when the state of the same step is stored.
+    """
 
     request: Request
     timeout_s: float = 2.0
+    city: str = ""
+    after_store: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ToCity:
+    """Publish a message on another city's keys."""
+
+    city: str
+    message: Message
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,4 +88,4 @@ class PersistedState:
     value: msgspec.Struct | None
 
 
-Outgoing = Message | Call | Answer | PersistedState
+Outgoing = Message | ToCity | Call | Answer | PersistedState

@@ -1,7 +1,8 @@
 """Network faults from a seed, for the memory bus: repeatable bit for bit.
 
 Messages may be lost, duplicated, delayed or reordered. The two sides of a partition receive nothing
-from each other. `Presence` and retained messages are always delivered.
+from each other. `Presence` and retained messages are always delivered. Between two cities stations
+are named `<city>/<station>`, so that a partition can cut the link and leave each city whole.
 """
 
 import random
@@ -41,32 +42,36 @@ class Faults:
 
     Attributes:
         rates: In force now.
+        link_rates: Of messages from one city to another; None: `rates`.
     """
 
     def __init__(self, seed: int, rates: FaultRates | None = None) -> None:
         self._seed = seed
         self._rngs: dict[tuple[str, str], random.Random] = {}
         self.rates = rates or FaultRates()
+        self.link_rates: FaultRates | None = None
         self._partitioned: frozenset[str] = frozenset()
 
     def partition(self, stations: Iterable[str]) -> None:
         """Separate these stations from all others; an empty list ends the partition."""
         self._partitioned = frozenset(stations)
 
-    def delays(self, sender: str, receiver: str) -> tuple[int, ...]:
+    def delays(self, sender: str, receiver: str, *, over_link: bool = False) -> tuple[int, ...]:
         """Return the delays of all copies of one message [ns]; empty: it is lost."""
         if (sender in self._partitioned) != (receiver in self._partitioned):
             return ()
-        rng, rates = self._rngs.get((sender, receiver)), self.rates
+        rng = self._rngs.get((sender, receiver))
+        rates = (self.link_rates if over_link else None) or self.rates
         if rng is None:  # each pair has its own: a further receiver changes nothing for the others
             rng = random.Random(f"{self._seed} {sender} {receiver}")
             self._rngs[sender, receiver] = rng
         if rng.random() < rates.drop:
             return ()
         copies = 2 if rng.random() < rates.duplicate else 1
-        return tuple(self._delay(rng) for _ in range(copies))
+        return tuple(_delay(rng, rates) for _ in range(copies))
 
-    def _delay(self, rng: random.Random) -> int:
-        if rng.random() >= self.rates.late:
-            return 0
-        return nanoseconds(rng.uniform(0.0, self.rates.late_s))
+
+def _delay(rng: random.Random, rates: FaultRates) -> int:
+    if rng.random() >= rates.late:
+        return 0
+    return nanoseconds(rng.uniform(0.0, rates.late_s))

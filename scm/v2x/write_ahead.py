@@ -19,7 +19,7 @@ from scm.log import event
 from scm.store.audit import AuditLog, Deed
 from scm.store.repository import Repository, Table
 from scm.v2x.answers import StoredAnswer
-from scm.v2x.exchange import Answer
+from scm.v2x.exchange import Answer, Call
 
 RETRY_S = 0.5
 CLOSE_S = 2.0
@@ -35,11 +35,13 @@ class Batch:
         values: Table, key and value; None deletes it.
         deeds: For the audit log.
         answers: To be sent when all of it is stored.
+        calls: Likewise.
     """
 
     values: Sequence[tuple[Table, str, bytes | None]]
     deeds: Sequence[Deed]
     answers: Sequence[Answer]
+    calls: Sequence[Call] = ()
 
 
 class BatchStore(Protocol):
