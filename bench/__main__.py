@@ -39,6 +39,7 @@ LONG = (
     "glosa",
     "gym",
     "gym_transfer",
+    "handover",
     "joined",
     "kill",
     "misbehaviour",

@@ -430,5 +430,6 @@ def open_city(
 
 def _lockstep_city(map_name: str, city: str, seed: int) -> Lockstep:
     city_map = load_map(map_name)
-    parts: list[Part] = [WorldPart(city_map, seed), TrafficPart(city_map), MonitorPart(city_map)]
+    world = WorldPart(city_map, seed, city=city)
+    parts: list[Part] = [world, TrafficPart(city_map), MonitorPart(city_map)]
     return Lockstep(parts, city)

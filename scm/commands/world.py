@@ -39,6 +39,7 @@ def _run(arguments: argparse.Namespace) -> int:
             arguments.seed,
             hosted,
             restored=None if state is None else read_restored(state),
+            city=arguments.city,
         )
         # Loaded when its first car comes, a kernel would stop the city for a moment.
         for car in car_names():

@@ -102,16 +102,21 @@ class Lockstep:
         self.bus.publish(message)
 
     def subscribe(
-        self, subscription: Subscription, keep: Callable[[Incoming], bool] | None = None
+        self,
+        subscription: Subscription,
+        keep: Callable[[Incoming], bool] | None = None,
+        city: str = "",
     ) -> Mailbox:
         """Return a mailbox that collects what matches from now on, for the script to drain.
 
         Args:
             subscription: Which messages.
             keep: Which of these are wanted; None: all.
+            city: The city that sends them, where several run; empty: the first one.
         """
         mailbox = Mailbox(SCRIPT_MAILBOX_DEPTH, keep=keep)
-        self.bus.subscribe(subscription.kind, subscription.where, mailbox)
+        bus = self._network.bus(city, "script") if city else self.bus
+        bus.subscribe(subscription.kind, subscription.where, mailbox)
         return mailbox
 
     def run_for(self, span_s: float) -> None:

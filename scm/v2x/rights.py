@@ -140,7 +140,6 @@ _OF_PART: dict[str, Rights] = {
             "v/*/cmd/drive",
             "v2x/tx/*/*",
             "v2x/rx/*/*/*",
-            "border/*",
         ),
         subscribes=(
             "border/*",
@@ -151,7 +150,7 @@ _OF_PART: dict[str, Rights] = {
             "tl/*/mon",
             "tl/*/spat",
         ),
-        requests=("v/*/cmd/*", "handover/*"),
+        requests=("v/*/cmd/*",),
         services=("world/*", "v/*/lease", "v/*/join", "v/*/remove", "v/*/cmd/*", "handover/*"),
     ),
     "traffic": Rights(
@@ -218,6 +217,9 @@ _OF_PART: dict[str, Rights] = {
     "gateway": Rights(publishes=("neighbour/*",)),
 }
 """By the part's name; `eye-<camera>` has the rights of `eye`, `gateway-<city>` of `gateway`."""
+
+OF_NEIGHBOUR = Rights(publishes=("border/{me}",), requests=("handover/{me}",))
+"""What the world of a city next to this one may do on this city's keys; `{me}` is that city."""
 
 _FAMILIES = ("eye", "gateway")
 _RESERVED = ("eye-", "gateway-", "rsu-")

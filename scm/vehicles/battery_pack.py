@@ -108,6 +108,15 @@ class Packs:
         self._drawn[row] = 0.0
         self.drain(np.array([row]), 0.0)
 
+    def drawn_as(self, row: int) -> float:
+        """Return the charge that a row's pack has given since it was new [A*s]."""
+        return float(self._drawn[row])
+
+    def put_drawn(self, row: int, drawn_as: float) -> None:
+        """Set the charge that a row's pack has given [A*s]."""
+        self._drawn[row] = drawn_as
+        self.drain(np.array([row]), 0.0)
+
     def drain(self, rows: Ints, duration: float) -> None:
         """Discharge some cars' packs over a time [s] at the present commands and speeds."""
         if self._numbers is not None:

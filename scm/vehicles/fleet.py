@@ -67,6 +67,7 @@ class Fleet:
             tick, level body frame [m/s^2, rad/s^2], shape (capacity,); written by the contact
             solver.
         columns: Meaning of each column of `parameters`.
+        history: Past commands, if an effect answers late to them.
         threads: Number of threads of `advance` for large fleets; default 1.
         alive, status: Rows in use, and the `VehicleStatus` of each, shape (capacity,).
         x, y, z, roll, pitch, yaw: Rear-axle pose in the world [m, rad]; yaw in (-pi, pi]. The
@@ -103,7 +104,7 @@ class Fleet:
         self.alive: Bools = self._alive[:capacity]
         self._status: Ints = np.zeros(padded, dtype=np.int64)
         self.status: Ints = self._status[:capacity]
-        self._history = history_of(car.terms, self._places, self._offsets, padded)
+        self.history = history_of(car.terms, self._places, self._offsets, padded)
         self.contact_accel_x, self.contact_accel_y, self.contact_yaw_accel = np.zeros((3, capacity))
         for name, variable in WRITTEN.items():
             setattr(self, name, self._view(variable))
@@ -223,8 +224,8 @@ class Fleet:
                 self._set(row, name, actuators[name])
         self._roll(row, shape, speed, yaw_rate)
         self.status[row] = VehicleStatus.OK
-        if self._history is not None and not keep_actuators:
-            self._history.reset(row, throttle, 0.0 if steer_angle is None else None)
+        if self.history is not None and not keep_actuators:
+            self.history.reset(row, throttle, 0.0 if steer_angle is None else None)
         self._run(row, row + 1, 0, SUBSTEP_S)
 
     def place_rows(self, rows: Ints, poses: Floats, speed: Floats) -> None:
@@ -247,8 +248,8 @@ class Fleet:
             values[rows] = 0.0
         self._roll(rows, shape, speed, 0.0)
         self.status[rows] = VehicleStatus.OK
-        if self._history is not None:
-            self._history.reset(rows, 0.0, 0.0)
+        if self.history is not None:
+            self.history.reset(rows, 0.0, 0.0)
         if len(rows):
             first, last = (LANES * (int(row) // LANES) for row in (rows.min(), rows.max()))
             self._run(first, min(last + LANES, self.capacity), 0, SUBSTEP_S)
@@ -267,8 +268,8 @@ class Fleet:
         for array in (self._block, self._numbers):
             array.T[row] = array[:, source]
         self.alive[row], self.status[row] = self.alive[source], self.status[source]
-        if self._history is not None:
-            self._history.copy_row(source, row)
+        if self.history is not None:
+            self.history.copy_row(source, row)
 
     def place_at_rest(self, row: int) -> None:
         """Put a newly placed car at rest on the heights in `floor_height`."""
@@ -360,7 +361,7 @@ class Fleet:
         offsets = np.array([self._offset_of(name) for name in variables], dtype=np.int64)
         out = np.zeros((len(commands[0]), len(offsets), self._alive.size))
         steps = steps_of(step_s, substep)
-        if self._history is None:
+        if self.history is None:
             self._kernel.rollout(
                 self._block, self._numbers, self._alive, self._status, 0, self.capacity, steps,
                 substep, *commands, offsets, out,
@@ -376,6 +377,10 @@ class Fleet:
     def pose(self, row: int) -> Pose2:
         """Return the rear axle's pose in the world."""
         return Pose2(float(self.x[row]), float(self.y[row]), float(self.yaw[row]))
+
+    def variables(self, row: int) -> dict[str, Floats]:
+        """Return all that the kernel keeps of a car, by name: views (width,), of width 1 or 4."""
+        return {name: self._block[i : i + n, row] for name, (i, n) in self._offsets.items()}
 
     def planar_cog(self, row: int) -> tuple[float, float, float, float, float, float]:
         """Return (x, y, yaw, vx, vy, yaw_rate) of the centre of gravity in the world frame."""
@@ -444,7 +449,7 @@ class Fleet:
     def bytes_per_car(self) -> int:
         """Memory per car."""
         arrays = (self._block, self._numbers, self._alive, self._status)
-        past = self._history.bytes_per_car if self._history else 0
+        past = self.history.bytes_per_car if self.history else 0
         return sum(a.nbytes for a in arrays) // self._alive.size + past + 3 * 8
 
     def _check(self, row: int) -> None:
@@ -479,9 +484,9 @@ class Fleet:
         self._block[offset : offset + width, row] = value
 
     def _run(self, first: int, last: int, steps: int, substep: float) -> None:
-        if self._history is not None and steps > 0:
+        if self.history is not None and steps > 0:
             span = steps * substep
-            self._history.apply(self._block, self._numbers, self._alive, first, last, span)
+            self.history.apply(self._block, self._numbers, self._alive, first, last, span)
         self._kernel.advance(
             self._block, self._numbers, self._alive, self._status, first, last, steps, substep
         )

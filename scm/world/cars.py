@@ -127,5 +127,6 @@ def lease_record(car: AnyCar) -> PersistedState:
         epoch=lease.epoch,
         ttl_ms=lease.ttl_ms,
         tag_id=car.tag_id,
+        circulates=isinstance(car, HostedCar) and car.circulates,
     )
     return PersistedState("leases", car.name, record)

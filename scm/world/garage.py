@@ -116,6 +116,10 @@ class Garage:
         """Return the world's numbers of the cars in `rows`."""
         return self._indices.get(name, _NOBODY)
 
+    def packs(self, name: str) -> Packs:
+        """Return the batteries of a fleet in use."""
+        return self._packs[name]
+
     def use_threads(self, count: int) -> None:
         """Advance fleets on several threads, existing and future ones."""
         self._threads = count

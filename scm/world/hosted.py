@@ -27,6 +27,7 @@ class HostedCar:
         row: Its place in its fleet.
         guard: Of its commands, while somebody else holds its lease.
         switches: How its headlights and indicators are switched.
+        circulates: Whether it drives on by itself after a restart: it came from another city.
         slow_news: Sends the low-frequency container of its CAMs.
     """
 
@@ -41,6 +42,7 @@ class HostedCar:
     lease: Lease
     guard: Guard | None = None
     switches: Switches = OFF
+    circulates: bool = False
     slow_news: LowFrequencySender = field(default_factory=LowFrequencySender)
 
     kind = "hosted"

@@ -48,6 +48,10 @@ class Pace:
         self._remember(now_ns)
         return whole
 
+    def until_ns(self, now_ns: int) -> int:
+        """Return the time up to which the cars have been moved [ns]; at the start the present."""
+        return now_ns if self._last_ns is None else self._last_ns - self._owed_ns
+
     @property
     def real_time_factor(self) -> float:
         """Simulated over elapsed time, over the last second; 1 before there is any."""

@@ -10,11 +10,13 @@ from scm.records.city_map import CityMap, Spawn
 from scm.runtime.part import BasePart, IsWanted, Service, Subscription
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.message import Message, Refused
+from scm.v2x.messages.handover_request import HandoverRequest
 from scm.v2x.messages.route_request import RouteRequest
 from scm.v2x.messages.spawn_request import SpawnRequest
 from scm.v2x.messages.stop_request import StopRequest
 from scm.v2x.messages.world_definition import WorldDefinition
 from scm.world.alerts import NAME, city_event
+from scm.world.border_state import MAX_GHOSTS
 from scm.world.driving import send
 from scm.world.hosted import HostedCar
 from scm.world.reception import subscriptions_of
@@ -39,12 +41,13 @@ class WorldPart(BasePart):
         room: Spare capacity: how many more cars may come.
         restored: State stored by an earlier run: its cars replace `hosted`, and those of `hosted`
             that it contains circulate again.
+        city: Its name on the bus, by which the cities next to it know it.
     """
 
     name = NAME
     role = "part"
     period_ns = PERIOD_NS
-    services: Sequence[Service] = SERVICES
+    services: Sequence[Service] = (*SERVICES, Service(HandoverRequest))
 
     def __init__(
         self,
@@ -53,12 +56,14 @@ class WorldPart(BasePart):
         hosted: tuple[tuple[str, str], ...] = (),
         room: int = ROOM,
         restored: RestoredState | None = None,
+        city: str = "city",
     ) -> None:
         self._restored = restored or RestoredState()
         restored_files = {car.car_file for car in self._restored.cars.values()}
         cars = {DEFAULT_CAR, *(car for _, car in hosted), *restored_files}
         capacity = max(len(hosted), len(self._restored.cars)) + room
-        self.world = World(city_map, seed, capacity=capacity, prepare=sorted(cars))
+        capacity += MAX_GHOSTS if city_map.neighbours else 0
+        self.world = World(city_map, seed, capacity=capacity, prepare=sorted(cars), city=city)
         self.subscriptions: Sequence[Subscription] = subscriptions_of(())
         self._to_spawn = hosted
         self._definition: WorldDefinition | None = None
@@ -96,9 +101,9 @@ class WorldPart(BasePart):
         out += restore(world, self._restored, now_ns)
         if self._restored.is_first:
             self._spawn_all(now_ns, out)
-        for name, _ in self._to_spawn:
-            car = world.cars.hosted.get(name)
-            if car is not None and not car.lease.is_leased:
+        at_start = {name for name, _ in self._to_spawn}
+        for car in world.cars.hosted.values():
+            if (car.name in at_start or car.circulates) and not car.lease.is_leased:
                 out += self._circulate(car, now_ns)
         return out
 

@@ -11,12 +11,16 @@ from scm.runtime.part import Subscription
 from scm.v2x.exchange import Answer, Incoming, Outgoing, RawSample
 from scm.v2x.key import names_in
 from scm.v2x.message import Message, Request
+from scm.v2x.messages.border_cars import BorderCars
 from scm.v2x.messages.cam import CamTx
 from scm.v2x.messages.drive_command import DriveCommand
+from scm.v2x.messages.handover_request import HandoverRequest
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.v2x.messages.presence import Presence
 from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.alerts import city_event
+from scm.world.border import receive_cars
+from scm.world.handover import answer, receive_reply
 from scm.world.remote import is_plausible
 from scm.world.requests import reply_to
 from scm.world.transmission import RECEIVED, UNREAD, Frame, relay, transmit
@@ -29,12 +33,16 @@ VEHICLE_ROLE = "v"
 def receive(world: World, now_ns: int, inbox: Sequence[Incoming | RawSample]) -> list[Outgoing]:
     """Handle what arrived, in order; return answers and what follows from them."""
     out: list[Outgoing] = []
-    for item in inbox:
+    for item in (*world.border.pop_early(), *inbox):
         if isinstance(item, RawSample):
             out += _unread_frame(world, item, now_ns)
             continue
         message = item.message
-        if isinstance(message, Request):
+        if item.call is not None:
+            out += receive_reply(world, item, now_ns)
+        elif isinstance(message, HandoverRequest):
+            out += answer(world, item, now_ns)
+        elif isinstance(message, Request):
             reply = reply_to(world, message, now_ns, out)
             out.append(Answer(item, reply))
         elif (handler := _HANDLERS.get(type(message))) is not None:
@@ -114,6 +122,7 @@ _HANDLERS: dict[type[Message], Callable[[World, Any, int], Sequence[Outgoing]]] 
     **dict.fromkeys(RECEIVED, _frame),
     MonitorStatus: _monitor_status,
     Presence: _presence,
+    BorderCars: receive_cars,
 }
 
 OF_CARS: dict[type[Message], str] = {VehicleState: "vehicle", CamTx: "station"}

@@ -227,7 +227,8 @@ def _own(world: World, name: str) -> HostedCar:
 
 def _check_new(world: World, name: str, car_file: str) -> None:
     check_name(name, "vehicle")
-    if world.cars.get(name) is not None or name in (NAME, *world.radio.roadside):
+    others = (NAME, *world.radio.roadside, *world.border.leaving)
+    if world.cars.get(name) is not None or name in others:
         raise _RefusedError("owned", f"vehicle: there is already one named {name!r}")
     if car_file not in car_names():  # no paths: whoever asks may be far away
         known = ", ".join(car_names())

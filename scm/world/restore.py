@@ -6,8 +6,11 @@ same epoch and with the full time to live, since nobody could renew it meanwhile
 join again by themselves, under a newer epoch.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
@@ -15,12 +18,15 @@ from scm.store.records import CarRecord, EpochRecord, StopRecord, record, record
 from scm.store.repository import Repository
 from scm.v2x.exchange import Outgoing, PersistedState
 from scm.world.alerts import NAME, city_event
+from scm.world.border_state import ArrivalRecord, OutgoingRecord, leaving
 from scm.world.cars import lease_record
 from scm.world.driving import hand_over
 from scm.world.hosted import HostedCar
 from scm.world.lease import Lease
 from scm.world.requests import is_free
 from scm.world.world import World
+
+PLACE_EVERY_M = 0.25  # between the places on lanes that are tried
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +38,16 @@ class RestoredState:
         cars: By name.
         highest_epoch: No new lease may have one as low as this.
         stop: The city stop; None: it was never used.
+        outgoing: Cars on their way to the next city, by name.
+        arrivals: The last transfers from other cities, by `<city>/<car>`.
     """
 
     is_first: bool = True
     cars: Mapping[str, CarRecord] = field(default_factory=dict)
     highest_epoch: int = 0
     stop: StopRecord | None = None
+    outgoing: Mapping[str, OutgoingRecord] = field(default_factory=dict)
+    arrivals: Mapping[str, ArrivalRecord] = field(default_factory=dict)
 
 
 def read_restored(store: Repository) -> RestoredState:
@@ -51,13 +61,16 @@ def read_restored(store: Repository) -> RestoredState:
     stop = record(store, "latches", NAME, "stop", StopRecord)
     leavers = [car.epoch for car in cars.values() if not car.hosted]
     highest = max([0 if epochs is None else epochs.highest, *leavers])
-    return RestoredState(epochs is None, cars, highest, stop)
+    outgoing = records(store, "handovers", f"{NAME}/out", OutgoingRecord)
+    arrivals = records(store, "handovers", f"{NAME}/in", ArrivalRecord)
+    return RestoredState(epochs is None, cars, highest, stop, outgoing, arrivals)
 
 
 def restore(world: World, restored: RestoredState, now_ns: int) -> list[Outgoing]:
     """Put the cars of an earlier run back, under the leases that they had."""
     out: list[Outgoing] = []
     world.identities.highest_epoch = max(world.identities.highest_epoch, restored.highest_epoch)
+    out += _restore_border(world, restored, now_ns)
     for name, car in restored.cars.items():
         if car.hosted:
             out += _restore_car(world, name, car, now_ns)
@@ -76,6 +89,7 @@ def _restore_car(world: World, name: str, record: CarRecord, now_ns: int) -> lis
     car = world.host(name, record.car_file, pose, now_ns, record.tag_id)
     out = world.arrival(car, now_ns, record.tag_id)
     car.lease = Lease(record.home, record.home, record.epoch)
+    car.circulates = record.circulates
     if record.owner != record.home:
         out += _lease_again(world, car, record, now_ns)
     return [*out, lease_record(car)]
@@ -95,5 +109,35 @@ def _lease_again(world: World, car: HostedCar, record: CarRecord, now_ns: int) -
 def _place(world: World, preferred: Pose2) -> Pose2 | None:
     if is_free(world, preferred):
         return preferred
-    poses = (world.roads.spawn_pose(place.name) for place in world.city_map.spawns)
+    spawns = (world.roads.spawn_pose(place.name) for place in world.city_map.spawns)
+    pose = next((pose for pose in spawns if is_free(world, pose)), None)
+    return pose or _place_on_lane(world, preferred)
+
+
+def _place_on_lane(world: World, preferred: Pose2) -> Pose2 | None:
+    """Return the free place on a lane that is nearest to one; None: all lanes are full."""
+    poses = [
+        path.at(s)
+        for path in (world.roads.lanes[lane.name] for lane in world.city_map.lanes)
+        for s in np.arange(0.5 * PLACE_EVERY_M, path.length_m, PLACE_EVERY_M)
+    ]
+    poses.sort(key=lambda pose: math.hypot(pose.x - preferred.x, pose.y - preferred.y))
     return next((pose for pose in poses if is_free(world, pose)), None)
+
+
+def _restore_border(world: World, restored: RestoredState, now_ns: int) -> list[Outgoing]:
+    """Send the transfers of an earlier run again, and remember whose were answered."""
+    border = world.border
+    for key, arrival in restored.arrivals.items():
+        city, _, vehicle = key.partition("/")
+        border.arrivals[city, vehicle] = arrival
+    roads = {(road.city, road.to): road for road in border.exits.values()}
+    out: list[Outgoing] = []
+    for name, away in restored.outgoing.items():
+        road = roads.get((away.city, away.request.lane))
+        if road is None:  # the map has changed: the car stays in the store
+            text = f"{name} cannot go on to {away.city}: no road of this map leads there"
+            out.append(city_event("error", "handover_waits", text, now_ns, name))
+        else:
+            border.leaving[name] = leaving(road, away.request, now_ns)
+    return out

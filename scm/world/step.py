@@ -1,6 +1,7 @@
 """One tick of the world, on one page.
 
-    receive -> drivers, guards -> [ dynamics, contacts ] x 4 -> watch -> sensors -> publish -> radio
+    receive -> border -> drivers, guards -> [ dynamics, contacts ] x 4 -> border -> watch -> sensors
+        -> publish -> radio
 
 Each stage is one file beside this one and returns the messages to send. Stages work on the arrays
 of `vehicle_arrays.py`; none loops over all cars in Python. Sensing and contacts get what they need;
@@ -12,8 +13,10 @@ from collections.abc import Sequence
 from scm.clock import seconds
 from scm.v2x.exchange import Incoming, Outgoing
 from scm.v2x.messages.contact import Contact
+from scm.world.border import approach, report_cars
 from scm.world.collide import collide
 from scm.world.driving import steer
+from scm.world.handover import depart
 from scm.world.pace import CONTACT_STEP_NS
 from scm.world.publish import publish
 from scm.world.reception import receive
@@ -29,8 +32,11 @@ def tick(world: World, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]
     world.subscribers.begin_tick()
     return [
         *receive(world, now_ns, inbox),  # requests, commands, reports, frames since the last tick
+        *approach(world, now_ns),  # cars wait at the border until the next city has room
         *steer(world, now_ns),  # leaseholders through their guards, drivers all in one call
         *move(world, now_ns),
+        *depart(world, now_ns),  # cars over the border become transfers
+        *report_cars(world, now_ns),
         *watch(world, now_ns),
         *sense(world.cars, world.sensors, world.contacts.boxes, world.subscribers, now_ns),
         *publish(world, now_ns),

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS
 from scm.geometry import Pose2
+from scm.maps.border import with_roads_beyond
 from scm.maps.route import roads_of
 from scm.maps.segments import wall_segments
 from scm.maps.vehicle_tags import bound_tag, reserved_tags
@@ -34,6 +35,7 @@ from scm.vehicles.rays.scene import Scene
 from scm.vehicles.sensor import Sensor, all_sensors
 from scm.world import lease as rules
 from scm.world.alerts import NAME, Alerts, city_event
+from scm.world.border_state import border_of
 from scm.world.cam_triggers import CamTriggers
 from scm.world.cars import AnyCar, Cars, Identities, lease_record
 from scm.world.channel_load import ChannelLoad
@@ -57,6 +59,7 @@ RATES_HZ = {
     "second": 1.0,
     "radio": 1.0,
     "denm": 10.0,
+    "border": 10.0,
     "battery": 1.0,
     "stuck": 5.0,
 }
@@ -83,6 +86,7 @@ class World:
         capacity: Most cars at a time.
         loss: Share of radio frames that get lost; 0: as the map says.
         prepare: Car files whose kernels are compiled now and not when their first car comes.
+        city: Its name on the bus, by which the cities next to it know it.
 
     Attributes:
         ground: The floor under the wheels, and the wind.
@@ -99,6 +103,7 @@ class World:
         ignored: Messages without effect: unknown cars, commands without the lease.
         alerts: What is wrong with cars and was reported.
         identities: What tells cars apart.
+        border: Cars that come to the border, and those just behind it.
     """
 
     def __init__(
@@ -108,16 +113,18 @@ class World:
         capacity: int = 256,
         loss: float = 0.0,
         prepare: Iterable[str] = (DEFAULT_CAR,),
+        city: str = "city",
     ) -> None:
         self.city_map = city_map
         self.seed = seed
-        self.roads = roads_of(city_map)
+        self.roads = roads_of(with_roads_beyond(city_map))
         self.ground = Ground(city_map, seed)
         self.cars = Cars(VehicleArrays(capacity), Garage(capacity, self.ground.fit))
         self.contacts = Contacts(city_map)
         self.impulses = ContactImpulses()
         radio = replace(city_map.radio, loss=loss) if loss else city_map.radio
         self.drivers = DriverBatch(lane_graph_of(self.roads), capacity, seed=seed, radio=radio)
+        self.border = border_of(city_map, city, self.drivers.lane_graph.numbers)
         self.trips = Trips(self.drivers, spread=True)
         channel, roadside = self.drivers.channel, roadside_places(city_map)
         self.radio = RadioState(

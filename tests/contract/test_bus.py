@@ -37,8 +37,8 @@ class MemoryCity:
         self.network = MemoryNetwork(self.clock)
         self.buses = ExitStack()
 
-    def bus(self, station):
-        return self.buses.enter_context(self.network.bus("test", station))
+    def bus(self, station, city="test"):
+        return self.buses.enter_context(self.network.bus(city, station))
 
     def pass_time(self, span_s):
         self.clock.set_ns(self.clock.now_ns() + nanoseconds(span_s))
@@ -57,8 +57,8 @@ class ZenohCity:
         self.buses = ExitStack()
         self.router = Router(free_endpoint())
 
-    def bus(self, station):
-        return self.buses.enter_context(ZenohBus("test", station, self.router.listen))
+    def bus(self, station, city="test"):
+        return self.buses.enter_context(ZenohBus(city, station, self.router.listen))
 
     def pass_time(self, span_s):
         threading.Event().wait(span_s)
@@ -584,3 +584,27 @@ def test_after_unsubscribing_nothing_more_arrives(city):
     sender.publish(picture())
     gather(city, going, 1)
     assert ended.drain() == []
+
+
+def test_message_to_another_city_comes_on_that_citys_keys_alone(city):
+    here, there = city.bus("world"), city.bus("world", "other")
+    own, others = Mailbox(8), Mailbox(8)
+    here.subscribe(Trip, {}, own)
+    there.subscribe(Trip, {}, others)
+    received = gather(city, others, 1, also=lambda: here.publish(trip(), "other"))
+    assert received[0].message == trip()
+    assert nothing_more(city, own)
+
+
+def test_call_to_another_city_is_answered_there(city):
+    here, there = city.bus("world"), city.bus("world", "other")
+    own, others, replies = Mailbox(8), Mailbox(8), Mailbox(8)
+    here.serve(PlanRequest, {}, own)
+    there.serve(PlanRequest, {}, others)
+    city.pass_time(0.5)
+    here.call(Call(plan(), city="other"), replies.put)
+    (request,) = gather(city, others, 1)
+    there.answer(Answer(request, PlanReply(junction="x1", plan="calm")))
+    (reply,) = gather(city, replies, 1)
+    assert reply.message == PlanReply(junction="x1", plan="calm")
+    assert own.drain() == []

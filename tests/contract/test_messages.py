@@ -98,6 +98,13 @@ PLAIN_NUMBERS = {
     "after": "an identity",
     "windows": "a count",
     "saliency": "of the steering command, see its docstring",
+    "values": "of a variable, whose name stands beside it",
+    "knots": "mixed, see vehicles.command_delay",
+    "newest": "a count",
+    "integral": "a share of the greatest throttle",
+    "origin": "a pose, see its docstring",
+    "border": "a pose, see its docstring",
+    "drawn_as": "in ampere seconds",
 }
 UNITS = tuple(
     f"_{unit}"

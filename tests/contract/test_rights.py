@@ -165,4 +165,4 @@ def test_an_operator_may_ask_every_request_that_is_no_car_s_own():
         for kind in requests
         if not covers(selector("city", kind, {}).removeprefix(prefix("city")), EVERY_REQUEST)
     }
-    assert left_out == {"JoinRequest"}
+    assert left_out == {"JoinRequest", "HandoverRequest"}

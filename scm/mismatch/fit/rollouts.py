@@ -324,7 +324,7 @@ class _Tether:
         self._state = (fleet._block, fleet._numbers, fleet._alive, fleet._status)  # noqa: SLF001
         self._cog = np.array([places[n][0] for n in (*COG, "x", "y")], dtype=np.int64)
         self._saved = np.array([fleet._offset_of(n) for n in MOTION_VARIABLES])  # noqa: SLF001
-        self._remembers = fleet._history is not None  # noqa: SLF001
+        self._remembers = fleet.history is not None
         self.parts = REMEMBERED if self._remembers else COMMANDED
         self._steps = whole_steps(STEP_S / self.parts, SUBSTEP_S)
         self._by_turn = any("wheel_angle" in reads(term.function) for term in fleet.car.terms)

@@ -13,10 +13,12 @@ import numpy as np
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import MapError
 from scm.geometry import Pose2
+from scm.maps.border import BEYOND
 from scm.maps.segments import wall_segments
 from scm.records.city_map import RadioChannel
 from scm.v2x.etsi.cam_spatem import SpatemBody
 from scm.v2x.etsi.denm import DenmBody
+from scm.v2x.messages.handover_request import HandedDriver
 from scm.v2x.messages.monitor_status import MonitorStatus
 from scm.vehicles.driver import CarLimits
 from scm.vehicles.drivers import driver_state as col
@@ -51,6 +53,7 @@ class DriverBatch:
         signals: The received signal states.
         threads: Number of threads for large batches; results do not depend on it.
         horizon: Distance before a line at which speed is chosen for its next green [m]; 0: never.
+        limit: (capacity,) highest speed that is allowed beside all rules [m/s]; write here.
     """
 
     def __init__(
@@ -84,7 +87,9 @@ class DriverBatch:
         self._kinds: dict[CarLimits, int] = {}
         self._entered = np.zeros(capacity, np.bool_)
         self._sent = np.zeros(capacity, np.bool_)
+        self._requested = np.full(capacity, np.inf)
         self._routes_used = 0
+        self.limit: Floats = np.full(capacity, np.inf)
         self.throttle: Floats = self._commands[0]
         self.steering: Floats = self._commands[1]
 
@@ -212,6 +217,8 @@ class DriverBatch:
             MapError: when there is no such lane.
         """
         numbers = [self._number(name) for name in lanes]
+        if after == "stop":  # a route to the border goes on beyond it
+            numbers += self.lane_graph.beyond(numbers[-1])
         ints, floats = self._state.ints[index], self._state.floats[index]
         at = self._store_route(numbers, index)
         ints[col.ROUTE], ints[col.COUNT], ints[col.INDEX] = at, len(numbers), first
@@ -219,7 +226,7 @@ class DriverBatch:
         ints[col.GOAL] = col.NO_GOAL if after == "loop" else len(numbers) - 1
         ints[col.GOING_LINE], ints[col.RULE_LINE], ints[col.ARRIVED] = -1, -1, 0
         floats[col.S], floats[col.DONE] = s, 0.0
-        floats[col.REQUESTED_SPEED] = np.inf if speed is None else speed
+        self._requested[index] = np.inf if speed is None else speed
         fill_window(self.lane_graph.arrays, self._state, index, numbers[first])
         self._sent[index] = True
 
@@ -290,9 +297,31 @@ class DriverBatch:
 
     def planned_lanes(self, index: int) -> tuple[str, ...]:
         """Return a car's lanes from the current one on, as far as they are chosen."""
-        return tuple(
-            self.lane_graph.names[n] for n in self._state.lane_window[index, col.HERE :] if n >= 0
+        window = self._state.lane_window[index, col.HERE :]
+        names = (self.lane_graph.names[n] for n in window if n >= 0)
+        return tuple(name for name in names if not name.endswith(BEYOND))
+
+    def handed(self, index: int, now_ns: int) -> HandedDriver:
+        """Return what a driver remembers that does not depend on the map."""
+        ints, floats = self._state.ints[index], self._state.floats[index]
+        speed = float(self._requested[index])
+        return HandedDriver(
+            wheels_rad=float(floats[col.ANGLE]),
+            commanded_rad=float(floats[col.STEER]),
+            setpoint_mps=float(floats[col.SPEED_SETPOINT]),
+            integral=float(floats[col.INTEGRAL]),
+            decided_ns=now_ns - int(ints[col.LAST_NS]),
+            seed=int(ints[col.SEED]),
+            speed_mps=speed if np.isfinite(speed) else None,
+            then="stop" if ints[col.AFTER] == col.STOP else "circulate",
         )
+
+    def continue_from(self, index: int, driver: HandedDriver, now_ns: int) -> None:
+        """Let a car's driver continue from what another one remembers."""
+        ints, floats = self._state.ints[index], self._state.floats[index]
+        floats[col.ANGLE], floats[col.STEER] = driver.wheels_rad, driver.commanded_rad
+        floats[col.SPEED_SETPOINT], floats[col.INTEGRAL] = driver.setpoint_mps, driver.integral
+        ints[col.LAST_NS], ints[col.SEED] = now_ns - driver.decided_ns, driver.seed
 
     def is_in_junction(self, indices: Ints) -> Bools:
         """Return which of some cars (k,) have their centre where stopping is forbidden."""
@@ -383,6 +412,8 @@ class DriverBatch:
 
     def _decide(self, cars: Ints, now_ns: int, signals: SignalTable, *, stop: bool) -> None:
         update_cells(self._received, now_ns)
+        allowed = np.minimum(self._requested[cars], self.limit[cars])
+        self._state.floats[cars, col.REQUESTED_SPEED] = allowed
 
         def part(cars: Ints, scratch: Scratch) -> None:
             decide(

@@ -13,6 +13,7 @@ import numpy as np
 
 from scm.arrays import Floats, Ints
 from scm.geometry import Pose2
+from scm.maps.border import BEYOND
 from scm.maps.polyline import advance
 from scm.maps.route import Roads
 from scm.records.city_map import Lane
@@ -114,6 +115,10 @@ class LaneGraph:
                 return None
             found.append(at)
         return None
+
+    def beyond(self, lane: int) -> list[int]:
+        """Return what lies beyond the border at the end of a lane, if it leads out of the city."""
+        return [self.numbers[n] for n in self.roads.successors(self.names[lane]) if n[-1] == BEYOND]
 
     def sharpest_change(self, wheelbase: float) -> float:
         """Return the largest jump of the steering angle between segments of the map [rad]."""

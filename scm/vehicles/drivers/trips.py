@@ -15,6 +15,7 @@ from scm.clock import NS_PER_S
 from scm.errors import LeaseError, MapError
 from scm.geometry import Pose2
 from scm.maps.route import OnLane
+from scm.v2x.messages.handover_request import HandedDriver
 from scm.v2x.messages.route_request import RouteReply, RouteRequest
 from scm.v2x.messages.trip import Trip
 from scm.vehicles.drivers.driver_batch import DriverBatch
@@ -129,6 +130,33 @@ class Trips:
         """Remove a car; its vehicle index is free for another one."""
         self._halt(index)
         self._trips.pop(index, None)
+
+    def enter(
+        self, index: int, vehicle: str, lane: str, s: float, driver: HandedDriver, now_ns: int
+    ) -> None:
+        """Let a car that comes from another city drive on from a place on its first lane here.
+
+        It circulates, or drives to the end of that lane if its trip was to end there or no way
+        leads on.
+
+        Raises:
+            MapError: when there is no such lane.
+        """
+        graph, speed = self._drivers.lane_graph, driver.speed_mps
+        route: tuple[str, ...] = (graph.roads.check_lane(lane),)
+        if driver.then == "circulate" and graph.goes_round[graph.numbers[lane]]:
+            route = self._drivers.circulate(index, lane, s, speed)
+            length_m = None
+        else:
+            self._drivers.send(index, route, s, "stop", speed)
+            length_m = graph.roads.length_of(lane) - s
+        self._note(index, vehicle, route, length_m, now_ns, "").speed_mps = speed
+
+    def leave(self, index: int, now_ns: int) -> None:
+        """End the trip of a car that drives into another city: it has arrived there."""
+        if self._under_way[index]:
+            self._unsent.append(self._report(index, now_ns, arrived_ns=now_ns))
+        self._halt(index)
 
     def check_arrivals(self, now_ns: int) -> None:
         """Handle new arrivals; call it after each decision of the batch."""

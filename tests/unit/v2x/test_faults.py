@@ -130,3 +130,12 @@ def test_what_is_on_its_way_to_a_station_that_left_is_lost():
     net.network.expire()
     assert requests.drain() == net.heard.drain() == []
     assert [item.message.code for item in replies.drain()] == ["offline"]
+
+
+def test_link_between_cities_has_rates_of_its_own():
+    faults = Faults(1, FaultRates(drop=1.0))
+    faults.link_rates = FaultRates()
+    assert faults.delays("west/world", "east/world", over_link=True) == (0,)
+    assert faults.delays("world", "traffic") == ()
+    faults.link_rates = None
+    assert faults.delays("west/world", "east/world", over_link=True) == ()

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import msgspec
+import numpy as np
 import pytest
 
 from scm.maps.load import load_map
@@ -155,7 +156,7 @@ def test_a_retry_after_a_kill_gets_the_answer_and_no_second_car(reborn):
     assert sorted(reborn.world.cars.hosted) == ["n1", "n2", first.vehicle]
 
 
-def test_a_car_for_which_no_place_is_left_is_told_of_and_forgotten():
+def test_car_whose_place_and_all_spawns_are_occupied_comes_back_on_a_lane():
     reborn = Reborn(hosted=())
     for _ in MAP.spawns:
         reborn.city.call(SpawnRequest())
@@ -163,9 +164,22 @@ def test_a_car_for_which_no_place_is_left_is_told_of_and_forgotten():
     record = read_restored(reborn.store).cars[car.name]
     reborn.store.put("leases", "world/zz", msgspec.json.encode(record))
     reborn.kill()
-    assert "zz" not in reborn.world.cars.hosted
-    assert len(reborn.world.cars.hosted) == len(MAP.spawns)
-    assert "zz" not in read_restored(reborn.store).cars
+    pose = reborn.world.cars.hosted["zz"].pose
+    assert 0.4 < np.hypot(pose.x - record.x_m, pose.y - record.y_m) < 1.0
+    assert reborn.world.roads.nearest(pose).lateral == pytest.approx(0.0, abs=0.01)
+    reborn.city.close()
+
+
+def test_cars_for_which_no_place_is_left_are_reported_and_forgotten():
+    reborn = Reborn(hosted=())
+    reborn.city.call(SpawnRequest(vehicle="n1"))
+    record = read_restored(reborn.store).cars["n1"]
+    for number in range(80):
+        reborn.store.put("leases", f"world/z{number}", msgspec.json.encode(record))
+    reborn.kill()
+    there = len(reborn.world.cars.hosted)
+    assert len(MAP.spawns) < there < 80
+    assert len(read_restored(reborn.store).cars) == there
     reborn.city.close()
 
 

@@ -1,0 +1,272 @@
+"""Hand cars over to the next city and take them from it, each exactly once.
+
+A car that passes the border with its rear axle leaves: its record becomes one of an outgoing
+transfer, in one write, and only then the transfer is sent. It is repeated until it is answered. The
+next city stores car and transfer in one write before it answers; the same transfer again gets the
+same answer. So a car is at any time in this city, on the way, or in the next one, whatever dies.
+"""
+
+from dataclasses import replace as with_fields
+
+from msgspec.structs import replace
+
+from scm.clock import NS_PER_MS, seconds
+from scm.errors import RunError, ScmError
+from scm.geometry import Pose2
+from scm.maps.border import Exit
+from scm.v2x.exchange import Answer, Incoming, Outgoing, PersistedState
+from scm.v2x.message import Refused
+from scm.v2x.messages.handover_request import HandedCar, HandoverReply, HandoverRequest
+from scm.vehicles.drivers.limits import limits_of
+from scm.vehicles.handed import parameters_of, past_of, put_state, variables_of
+from scm.vehicles.lights import Switches
+from scm.world.admission import MAX_EPOCH, problem_of
+from scm.world.alerts import city_event
+from scm.world.border import (
+    REQUEST_EVERY_NS,
+    STOP_BEFORE_M,
+    VALID_MS,
+    forget_ghosts,
+    is_clear,
+    reported,
+    request_of,
+    show_ghost,
+)
+from scm.world.border_state import ArrivalRecord, Leaving, OutgoingRecord, leaving
+from scm.world.hosted import HostedCar
+from scm.world.lease import grant
+from scm.world.world import World
+
+CATCH_UP_NS = 100 * NS_PER_MS  # a car that was on its way for longer has stood still meanwhile
+HERE = Pose2(0.0, 0.0, 0.0)
+
+
+def depart(world: World, now_ns: int) -> list[Outgoing]:
+    """Send away the cars whose rear axles have passed the border; repeat what was not answered."""
+    border, out = world.border, list[Outgoing]()
+    for name, claim in list(border.approaching.items()):
+        car = world.cars.hosted.get(name)
+        if car is None or not car.is_sent or claim.until_ns <= now_ns:
+            continue
+        if claim.road.end.inverse().apply(car.pose.x, car.pose.y)[0] >= 0.0:
+            del border.approaching[name]
+            out += _leave(world, car, claim.road, now_ns)
+    for away in border.leaving.values():
+        call = away.tries.due(now_ns)
+        if call is not None:
+            city, first = away.road.city, away.tries.tries == 1
+            out.append(with_fields(call, city=city, after_store=first))
+    return out
+
+
+def _leave(world: World, car: HostedCar, road: Exit, now_ns: int) -> list[Outgoing]:
+    """Turn a car into an outgoing transfer."""
+    state = state_of(world, car, road, now_ns)
+    request = replace(request_of(world, car, road), phase="commit", state=state)
+    border, seen = world.border, reported(world, car, HERE)
+    world.trips.leave(car.index, now_ns)
+    out = world.remove(car.name)
+    world.identities.highest_epoch = max(world.identities.highest_epoch, request.epoch)
+    border.leaving[car.name] = leaving(road, request, now_ns)
+    show_ghost(world, road.city, seen, now_ns)  # until the next city reports it
+    record = OutgoingRecord(city=road.city, request=request)
+    text = f"{car.name} drives on to {road.city}"
+    return [
+        *out,
+        world.identities.epoch_record(),
+        PersistedState("handovers", f"out/{car.name}", record),
+        city_event("info", "vehicle_handed_over", text, now_ns, car.name),
+    ]
+
+
+def state_of(world: World, car: HostedCar, road: Exit, now_ns: int) -> HandedCar:
+    """Return the whole state of a car, for the city that a road leads to."""
+    packs = world.cars.garage.packs(car.car_file)
+    return HandedCar(
+        t_ns=world.pace.until_ns(now_ns),
+        variables=variables_of(car.fleet, car.row),
+        parameters=parameters_of(car.fleet, car.row),
+        origin=(*road.origin.inverse(),),
+        driver=world.drivers.handed(car.index, now_ns),
+        past=past_of(car.fleet, car.row),
+        drawn_as=packs.drawn_as(car.row),
+        tag_id=car.tag_id,
+        headlights=car.switches.headlights,
+        indicators=car.switches.indicators,
+    )
+
+
+def receive_reply(world: World, item: Incoming, now_ns: int) -> list[Outgoing]:
+    """Handle the answer of the next city to a request for a place, or to a transfer."""
+    if item.call is None or not isinstance(item.call.request, HandoverRequest):
+        return []
+    request = item.call.request
+    if request.phase == "reserve":
+        return _place_answered(world, request, item, now_ns)
+    away = world.border.leaving.get(request.vehicle)
+    if away is None or away.request.epoch != request.epoch:
+        return []
+    away.tries.receive(item)
+    if away.tries.reply is None:
+        return []
+    if isinstance(away.tries.reply, Refused):
+        return _return(world, away, away.tries.reply, now_ns)
+    del world.border.leaving[request.vehicle]
+    return [PersistedState("handovers", f"out/{request.vehicle}", None)]
+
+
+def _place_answered(
+    world: World, request: HandoverRequest, item: Incoming, now_ns: int
+) -> list[Outgoing]:
+    claim, reply = world.border.approaching.get(request.vehicle), item.message
+    if claim is None:
+        return []
+    if isinstance(reply, HandoverReply):
+        valid_ms = min(VALID_MS, reply.valid_ms)
+        claim.until_ns, claim.why = claim.sent_ns + valid_ms * NS_PER_MS, ""
+        return []
+    if not isinstance(reply, Refused) or claim.until_ns > now_ns or claim.why == reply.code:
+        return []
+    claim.why = reply.code
+    text = f"{request.vehicle} waits at the border to {claim.road.city}: {reply.detail}"
+    return [city_event("warning", "handover_waits", text, now_ns, request.vehicle)]
+
+
+def _return(world: World, away: Leaving, refusal: Refused, now_ns: int) -> list[Outgoing]:
+    """Put a car back at the border that the next city has refused for good, or try again later."""
+    request, road, state = away.request, away.road, away.request.state
+    again = leaving(road, request, now_ns + REQUEST_EVERY_NS)
+    again.tries.tries = 1  # it is stored already
+    world.border.leaving[request.vehicle] = again
+    forget_ghosts(world, now_ns, request.vehicle)
+    limits = limits_of(world.cars.garage.car(request.car))
+    pose = road.end @ Pose2(-limits.front - 2.0 * STOP_BEFORE_M, 0.0, 0.0)
+    if state is None or not is_clear(world, pose, limits.length):
+        return []
+    try:
+        car = _add(world, request, state, pose, now_ns)
+    except RunError:  # the city is full: the car stays on its way
+        return []
+    del world.border.leaving[request.vehicle]
+    s = road.length_m - limits.front - 2.0 * STOP_BEFORE_M
+    world.trips.enter(car.index, car.name, road.lane, s, state.driver, now_ns)
+    text = f"{car.name} is back at the border to {road.city}: {refusal.detail}"
+    return [
+        *world.arrival(car, now_ns, car.tag_id),
+        PersistedState("handovers", f"out/{car.name}", None),
+        city_event("warning", "handover_refused", text, now_ns, car.name),
+    ]
+
+
+def is_early(world: World, request: HandoverRequest, now_ns: int) -> bool:
+    """Return whether a car comes from a moment that this world reaches with its next tick."""
+    state = request.state
+    return state is not None and world.pace.until_ns(now_ns) < state.t_ns <= now_ns
+
+
+def reply_to_handover(
+    world: World, request: HandoverRequest, now_ns: int, out: list[Outgoing]
+) -> HandoverReply | Refused:
+    """Reserve a place behind the border for a car, or take it; a refusal says why."""
+    border, key = world.border, (request.city, request.vehicle)
+    reply = HandoverReply(city=request.city, vehicle=request.vehicle, epoch=request.epoch)
+    if not 0 < request.epoch < MAX_EPOCH:
+        return Refused(code="invalid", detail=f"epoch: got {request.epoch}, expected 1 to 2^62")
+    before = border.arrivals.get(key)
+    if before is not None and request.epoch <= before.epoch:
+        return _again(request, before, reply)
+    problem = problem_of(world, request, now_ns)
+    if request.phase == "reserve":
+        if problem is not None:
+            return problem
+        until_ns = now_ns + (VALID_MS + VALID_MS // 2) * NS_PER_MS  # on our clock, the way included
+        border.reserved[request.lane] = key, until_ns
+        return replace(reply, valid_ms=VALID_MS)
+    if problem is None and request.state is not None:
+        problem = _enter(world, request, request.state, now_ns, out)
+    record = ArrivalRecord(epoch=request.epoch)
+    if problem is not None:
+        record = ArrivalRecord(epoch=request.epoch, refused=problem.code, detail=problem.detail)
+    border.arrivals[key] = record
+    out.append(PersistedState("handovers", f"in/{request.city}/{request.vehicle}", record))
+    return problem or reply
+
+
+def _again(
+    request: HandoverRequest, before: ArrivalRecord, reply: HandoverReply
+) -> HandoverReply | Refused:
+    """Return the answer to a transfer that was answered before, or to an older one."""
+    if request.epoch < before.epoch or request.phase == "reserve":
+        detail = f"epoch: got {request.epoch}, expected more than {before.epoch}"
+        return Refused(code="stale", detail=detail)
+    return Refused(code=before.refused, detail=before.detail) if before.refused else reply
+
+
+def _enter(
+    world: World, request: HandoverRequest, state: HandedCar, now_ns: int, out: list[Outgoing]
+) -> Refused | None:
+    """Continue a car that comes from another city, where and as it was."""
+    name, border = request.vehicle, world.border
+    forget_ghosts(world, now_ns, name)
+    try:
+        car = _add(world, request, state, Pose2(*request.border), now_ns)
+        put_state(car.fleet, car.row, state)
+        until_ns = world.pace.until_ns(now_ns)
+        late_ns = until_ns - state.t_ns
+        if 0 < late_ns <= CATCH_UP_NS:
+            car.fleet.advance_rows(car.row, car.row + 1, seconds(late_ns))
+        if car.has_diverged:
+            raise RunError("state: its numbers are beyond every physical range")
+        _locate(world, car)
+        s, _ = world.roads.lane(request.lane).project(car.pose.x, car.pose.y)
+        world.trips.enter(car.index, name, request.lane, s, state.driver, now_ns)
+        world.drivers.continue_from(car.index, state.driver, until_ns)
+    except ScmError as cause:
+        out += world.remove(name)
+        return Refused(code="invalid", detail=str(cause))
+    border.reserved.pop(request.lane, None)
+    out += world.arrival(car, now_ns, car.tag_id)
+    text = f"{name}, a {request.car}, came from {request.city}"
+    out.append(city_event("info", "vehicle_arrived", text, now_ns, name))
+    return None
+
+
+def _add(
+    world: World, request: HandoverRequest, state: HandedCar, pose: Pose2, now_ns: int
+) -> HostedCar:
+    """Put a handed car onto the map with all that does not depend on where it is.
+
+    Raises:
+        RunError: when no room is left for it.
+    """
+    tags = world.identities.tags
+    tag_id = state.tag_id if tags.is_free(state.tag_id) else None
+    car = world.host(request.vehicle, request.car, pose, now_ns, tag_id)
+    epoch = max(car.lease.epoch, request.epoch + 1)
+    car.lease = grant(car.lease.home, epoch)
+    car.circulates = state.driver.then == "circulate"
+    car.switches = Switches(state.headlights, state.indicators)
+    world.cars.garage.packs(car.car_file).put_drawn(car.row, state.drawn_as)
+    world.cars.arrays.driven[car.index] = True
+    return car
+
+
+def _locate(world: World, car: HostedCar) -> None:
+    """Write where a car is into the arrays, for its driver's first decision here."""
+    vehicles, fleet, row, index = world.cars.arrays, car.fleet, car.row, car.index
+    vehicles.put(index, car.pose)
+    vehicles.speed[index], vehicles.yaw_rate[index] = car.speed, fleet.yaw_rate[row]
+    vehicles.throttle[index], vehicles.steering[index] = fleet.throttle[row], fleet.steering[row]
+
+
+def answer(world: World, item: Incoming, now_ns: int) -> list[Outgoing]:
+    """Answer a request of the city next to this one, or let it wait for the next tick."""
+    request = item.message
+    if not isinstance(request, HandoverRequest):
+        return []
+    if request.phase == "commit" and is_early(world, request, now_ns):
+        world.border.early.append(item)
+        return []
+    out: list[Outgoing] = []
+    reply = reply_to_handover(world, request, now_ns, out)
+    return [*out, Answer(item, reply)]
