@@ -244,6 +244,24 @@ def test_car_of_the_next_city_counts_as_the_car_ahead():
     assert abs(there.speed) < 0.01
 
 
+def test_car_slows_down_for_a_car_behind_the_border_before_it_crosses():
+    cities = two((), maps=LOOP)
+    west, east = (cities.worlds[city].world for city in ("west", "east"))
+    cities.tick()
+    reply_to(east, SpawnRequest(vehicle="e1", spawn="0.50,-0.8,0"), cities.run.now_ns)
+    reply_to(west, SpawnRequest(vehicle="w1", spawn="border"), cities.run.now_ns)
+    car = west.cars.hosted["w1"]
+    west.trips.circulate(car.index, "w1", car.pose, cities.run.now_ns)
+    west.cars.arrays.driven[car.index] = True
+    fastest = last = 0.0
+    while "w1" in west.cars.hosted:
+        last = car.speed
+        fastest = max(fastest, last)
+        cities.run.run_for(0.02)
+    assert fastest > 0.25
+    assert last < 0.2
+
+
 def test_car_stops_behind_a_car_that_stands_just_behind_the_border():
     cities = two((), maps=LOOP)
     west, east = (cities.worlds[city].world for city in ("west", "east"))
