@@ -218,9 +218,6 @@ _OF_PART: dict[str, Rights] = {
 }
 """By the part's name; `eye-<camera>` has the rights of `eye`, `gateway-<city>` of `gateway`."""
 
-OF_NEIGHBOUR = Rights(publishes=("border/{me}",), requests=("handover/{me}",))
-"""What the world of a city next to this one may do on this city's keys; `{me}` is that city."""
-
 _FAMILIES = ("eye", "gateway")
 _RESERVED = ("eye-", "gateway-", "rsu-")
 _PRESENCE = {"vehicle": "v/{me}/alive/*", "part": "part/{me}/alive/*"}
