@@ -55,6 +55,21 @@ class _Model:
     cars: int = 0
     under_way: deque[tuple[Readings, Ints]] = field(default_factory=deque)
 
+    def add(self, new: Readings, lives: Ints) -> None:
+        """Add readings to those of the same instant, or in order of time."""
+        at = len(self.under_way)
+        while at and self.under_way[at - 1][0].t_ns > new.t_ns:
+            at -= 1
+        if not at or self.under_way[at - 1][0].t_ns < new.t_ns:
+            self.under_way.insert(at, (new, lives))
+            return
+        old, old_lives = self.under_way[at - 1]
+        indices = np.concatenate((old.indices, new.indices))
+        order = np.argsort(indices, kind="stable")
+        values = np.vstack((old.values, new.values))[order]
+        merged = Readings(self.car, new.t_ns, indices[order], values)
+        self.under_way[at - 1] = merged, np.concatenate((old_lives, lives))[order]
+
 
 class Bank:
     """The devices of one kind in all cars.
@@ -122,6 +137,33 @@ class Bank:
         self._next[index] = NEVER
         self._life[index] += 1
         self.wanted[index] = False
+
+    def pending(self, index: int) -> tuple[tuple[int, bytes], ...]:
+        """Return a car's readings that have not come out yet: time of measurement and values."""
+        if not self.is_fitted(index):
+            return ()
+        found = list[tuple[int, bytes]]()
+        for readings, lives in self._models[self._model[index]].under_way:
+            own = (readings.indices == index) & (lives == self._life[index])
+            found += [(readings.t_ns, values.tobytes()) for values in readings.values[own]]
+        return tuple(found)
+
+    def hand_out(self, index: int) -> None:
+        """Forget a car's `pending` readings: its device goes on in another process."""
+        if index < len(self._life):
+            self._life[index] += 1
+
+    def take_in(self, index: int, row: int, pending: Iterable[tuple[int, bytes]]) -> None:
+        """Go on with the device of a car that is in a row of its truth from now on."""
+        if not self.is_fitted(index):
+            return
+        self._row[index] = row
+        self._life[index] += 1
+        self._second[index] = NOBODY
+        model = self._models[self._model[index]]
+        for t_ns, values in pending:
+            one = Readings(model.car, t_ns, np.array([index]), np.frombuffer(values).reshape(1, -1))
+            model.add(one, self._life[[index]])
 
     def is_fitted(self, index: int) -> bool:
         """Return whether the car at an index has such a device."""

@@ -117,6 +117,10 @@ class Packs:
         self._drawn[row] = drawn_as
         self.drain(np.array([row]), 0.0)
 
+    def memory(self, row: int) -> tuple[Floats, ...]:
+        """Return views of all that is stored of a row."""
+        return tuple(values[row : row + 1] for values in (self._drawn, self.volts, self.charge))
+
     def drain(self, rows: Ints, duration: float) -> None:
         """Discharge some cars' packs over a time [s] at the present commands and speeds."""
         if self._numbers is not None:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from scm.arrays import Bools, Floats, Ints
+from scm.arrays import AnyArray, Bools, Floats, Ints
 from scm.errors import TermError
 from scm.vehicles.jit import array_kernel
 from scm.vehicles.term import Term, reads
@@ -44,6 +44,10 @@ class CommandHistory:
         self._knots[row] = 0.0
         self._newest[row] = 0
         self._before[row] = throttle, math.nan if steering is None else steering
+
+    def memory(self, row: int) -> tuple[AnyArray, ...]:
+        """Return views of one car's history."""
+        return self._knots[row], self._newest[row : row + 1], self._before[row]
 
     def copy_row(self, source: int, row: int | slice) -> None:
         """Copy one car's history to another row, or to several."""

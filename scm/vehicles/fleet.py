@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from scm.arrays import Bools, Floats, Ints
+from scm.arrays import AnyArray, Bools, Floats, Ints
 from scm.errors import RunError, TermError, nearest
 from scm.geometry import Pose2
 from scm.vehicles.body14 import GRAVITY, sprung_part
@@ -40,7 +40,6 @@ from scm.vehicles.shape import Shape, shape_function
 from scm.vehicles.vehicle_status import VehicleStatus
 
 SUBSTEP_S = 1e-3
-
 
 _TILES_A_THREAD = 8  # below, a second thread costs more than it does
 
@@ -155,15 +154,29 @@ class Fleet:
         Raises:
             RunError: when all rows are in use.
         """
-        free = np.flatnonzero(~self.alive)
-        if len(free) == 0:
-            msg = f"fleet of {self.car.name}: all {self.capacity} rows are in use"
-            raise RunError(msg)
-        row = int(free[0])
+        row = self.take_row()
         self.parameters[row] = self._nominal
-        self.alive[row] = True
         self.place(row, pose, speed)
         return row
+
+    def take_row(self) -> int:
+        """Return a free row, for a car whose `memory` is to be written.
+
+        Raises:
+            RunError: when all rows are in use.
+        """
+        free = np.flatnonzero(~self.alive)
+        if not len(free):
+            raise RunError(f"fleet of {self.car.name}: all {self.capacity} rows are in use")
+        self.alive[free[0]] = True
+        return int(free[0])
+
+    def memory(self, row: int) -> tuple[AnyArray, ...]:
+        """Return views of all that is stored of a row: what is written there makes the same car."""
+        struck = (self.contact_accel_x, self.contact_accel_y, self.contact_yaw_accel)
+        own = tuple(values[row : row + 1] for values in (self._status, *struck))
+        past = () if self._history is None else self._history.memory(row)
+        return (self._block[:, row], self._numbers[:, row], *own, *past)
 
     def remove(self, row: int) -> None:
         """Remove a car; its row is free again.

@@ -1,11 +1,12 @@
 """Events of the world, and conditions that are reported once: warnings, batteries, lanes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 from scm.v2x.etsi.events import CarWarnings, DenmReceiver
 from scm.v2x.messages.city_event import CityEvent
+from scm.v2x.messages.denm import DenmTx
 from scm.world.stuck import Stuck
 
 NAME = "world"
@@ -34,11 +35,13 @@ class WarningState:
         braked: Indices of hosted cars that have braked hard since the last check.
         warners: What hosted cars warn of, by name.
         denms: What all stations warn of.
+        due: DENMs of hosted cars to be sent in this tick, by station.
     """
 
     braked: set[int] = field(default_factory=set)
     warners: dict[str, CarWarnings] = field(default_factory=dict)
     denms: DenmReceiver = field(default_factory=DenmReceiver)
+    due: Sequence[DenmTx] = ()
 
 
 class LowBatteries:
@@ -46,6 +49,14 @@ class LowBatteries:
 
     def __init__(self) -> None:
         self._low: set[str] = set()
+
+    def is_low(self, name: str) -> bool:
+        """Return whether a car was reported and has not been recharged since."""
+        return name in self._low
+
+    def note(self, name: str, *, is_low: bool) -> None:
+        """Note that a car was reported elsewhere, or that it was not."""
+        (self._low.add if is_low else self._low.discard)(name)
 
     def news(self, charges: Mapping[str, float | None]) -> list[str]:
         """Return who is low since the last call, of all cars; a charge is None where unknown."""

@@ -71,6 +71,10 @@ class ImpulseAccelerations:
         self._struck.clear()
         self._share = 1.0 / duration if duration > 0.0 else 0.0
 
+    def carry(self, fleet: Fleet, row: int) -> None:
+        """Forget at the next tick what a car brought from another process."""
+        self._struck.append((fleet, np.array([row])))
+
     def add(self, fleet: Fleet, rows: Ints, dv: Floats) -> None:
         """Add changes of velocity x, y and yaw rate (k, 3), map frame, of different rows."""
         yaw = fleet.yaw[rows]

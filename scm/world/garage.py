@@ -7,7 +7,7 @@ from typing import cast
 
 import numpy as np
 
-from scm.arrays import Floats, Ints
+from scm.arrays import AnyArray, Floats, Ints
 from scm.geometry import Pose2
 from scm.log import event
 from scm.vehicles.battery_pack import Packs
@@ -15,6 +15,7 @@ from scm.vehicles.car import Car, load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
 from scm.vehicles.vehicle_status import VehicleStatus
+from scm.world.hosted import ELSEWHERE
 from scm.world.solids import Hull, hull_of
 from scm.world.vehicle_arrays import VehicleArrays
 
@@ -42,6 +43,7 @@ class Garage:
         self._packs: dict[str, Packs] = {}
         self._rows: dict[str, Ints] = {}
         self._indices: dict[str, Ints] = {}
+        self._elsewhere: dict[str, Ints] = {}
         self._threads = 1
         self._preparing = threading.Lock()
 
@@ -99,14 +101,42 @@ class Garage:
         self._indices[name] = np.append(self.indices(name), index)
         return fleet, row
 
-    def scrap(self, name: str, row: int) -> None:
-        """Remove a car from the floor."""
+    def scrap(self, name: str, row: int, index: int) -> None:
+        """Remove a car from the floor, or forget that it is elsewhere."""
+        if row == ELSEWHERE:
+            self._elsewhere[name] = self._elsewhere[name][self._elsewhere[name] != index]
+            return
         self.fleets[name].remove(row)
         others = self._rows[name] != row
         self._rows[name], self._indices[name] = (
             self._rows[name][others],
             self._indices[name][others],
         )
+
+    def note_elsewhere(self, name: str, index: int) -> None:
+        """Note that another process simulates a car of a file."""
+        self._elsewhere[name] = np.append(self.elsewhere(name), index)
+
+    def elsewhere(self, name: str) -> Ints:
+        """Return the world's numbers of a file's cars that another process simulates."""
+        return self._elsewhere.get(name, _NOBODY)
+
+    def hand_out(self, name: str, row: int, index: int) -> None:
+        """Remove a car whose memory was copied: from now on another process simulates it."""
+        self.scrap(name, row, index)
+        self.note_elsewhere(name, index)
+
+    def take_in(self, name: str, index: int) -> int:
+        """Return a row for a car that another process simulated; its memory is to be written."""
+        self.scrap(name, ELSEWHERE, index)
+        row, at = self.prepare(name).take_row(), int(np.searchsorted(self.indices(name), index))
+        self._rows[name] = np.insert(self.rows(name), at, row)
+        self._indices[name] = np.insert(self.indices(name), at, index)
+        return row
+
+    def memory(self, name: str, row: int) -> tuple[AnyArray, ...]:
+        """Return views of all that is stored of a row: dynamics and battery."""
+        return (*self.fleets[name].memory(row), *self._packs[name].memory(row))
 
     def rows(self, name: str) -> Ints:
         """Return the rows in use of a fleet, in the order its cars came."""

@@ -17,6 +17,8 @@ from scm.vehicles.vehicle_status import VehicleStatus
 from scm.world.lease import Lease
 from scm.world.vehicle_arrays import MODES, VehicleArrays
 
+ELSEWHERE = -1
+
 
 @dataclass(slots=True, eq=False)
 class HostedCar:
@@ -24,7 +26,7 @@ class HostedCar:
 
     Attributes:
         index: Its vehicle index, in all arrays of the city.
-        row: Its place in its fleet.
+        row: Its place in its fleet; `ELSEWHERE` while another process simulates it.
         guard: Of its commands, while somebody else holds its lease.
         switches: How its headlights and indicators are switched.
         circulates: Whether it drives on by itself after a restart: it came from another city.
@@ -50,11 +52,18 @@ class HostedCar:
     @property
     def pose(self) -> Pose2:
         """Of the rear axle, map frame."""
+        if self.row == ELSEWHERE:
+            of = self.index
+            return Pose2(
+                float(self.vehicles.x[of]), float(self.vehicles.y[of]), float(self.vehicles.yaw[of])
+            )
         return self.fleet.pose(self.row)
 
     @property
     def speed(self) -> float:
         """Along the body [m/s]."""
+        if self.row == ELSEWHERE:
+            return float(self.vehicles.speed[self.index])
         return float(self.fleet.speed[self.row])
 
     @property
@@ -80,4 +89,4 @@ class HostedCar:
     @property
     def has_diverged(self) -> bool:
         """Whether its numbers left every physical range: it is frozen."""
-        return bool(self.fleet.status[self.row] != VehicleStatus.OK)
+        return self.row != ELSEWHERE and bool(self.fleet.status[self.row] != VehicleStatus.OK)

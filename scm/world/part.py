@@ -18,7 +18,7 @@ from scm.v2x.messages.world_definition import WorldDefinition
 from scm.world.alerts import NAME, city_event
 from scm.world.border_state import MAX_GHOSTS
 from scm.world.driving import send
-from scm.world.hosted import HostedCar
+from scm.world.hosted import ELSEWHERE, HostedCar
 from scm.world.reception import subscriptions_of
 from scm.world.requests import SERVICES, reply_to
 from scm.world.restore import RestoredState, restore
@@ -71,6 +71,15 @@ class WorldPart(BasePart):
 
     def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
         """Advance to `now_ns`; the first step also publishes the definition and spawns the cars."""
+        first = self.begin(now_ns)
+        joined = set(self.world.cars.remote)
+        sent = tick(self.world, now_ns, inbox)
+        if joined != set(self.world.cars.remote):
+            self.subscriptions = subscriptions_of(self.world.cars.remote)
+        return [*first, *sent]
+
+    def begin(self, now_ns: int) -> list[Outgoing]:
+        """Return what is sent before a tick: the definition when it is due, and the first cars."""
         first: list[Outgoing] = []
         if self._definition is None:
             self._definition = WorldDefinition(
@@ -81,11 +90,7 @@ class WorldPart(BasePart):
         elif now_ns >= self._definition_due_ns:
             first = [self._definition]
             self._definition_due_ns = now_ns + DEFINITION_EVERY_NS
-        joined = set(self.world.cars.remote)
-        sent = tick(self.world, now_ns, inbox)
-        if joined != set(self.world.cars.remote):
-            self.subscriptions = subscriptions_of(self.world.cars.remote)
-        return [*first, *sent]
+        return first
 
     def attach(self, is_wanted: IsWanted) -> None:
         """Check for subscribers before making costly messages."""
@@ -103,7 +108,8 @@ class WorldPart(BasePart):
             self._spawn_all(now_ns, out)
         at_start = {name for name, _ in self._to_spawn}
         for car in world.cars.hosted.values():
-            if (car.name in at_start or car.circulates) and not car.lease.is_leased:
+            is_here = not car.lease.is_leased and car.row != ELSEWHERE
+            if (car.name in at_start or car.circulates) and is_here:
                 out += self._circulate(car, now_ns)
         return out
 

@@ -51,7 +51,7 @@ def publish(world: World, now_ns: int) -> list[Outgoing]:
     if world.subscribers.any(VehicleState):
         turn = _whose_turn(world)
         world.cars.arrays.seq[turn] += 1
-        out += states_of(world, turn, now_ns)
+        out += states_of(world, turn[~world.cars.arrays.elsewhere[turn]], now_ns)
     out += world.impulses.reports.pop(now_ns)
     for remote in world.cars.remote.values():
         contact = remote.contact(now_ns)
@@ -61,7 +61,7 @@ def publish(world: World, now_ns: int) -> list[Outgoing]:
         out.append(snapshot(world, now_ns))
     world.trips.every_ns = max(TRIP_NS, len(world.cars.hosted) * NS_PER_S // TRIPS_A_SECOND)
     out += world.trips.reports(now_ns)
-    if world.every["second"].is_due(now_ns):
+    if world.every["second"].is_due(now_ns) and world.leads:
         out += _each_second(world, now_ns)
     return out
 
@@ -130,7 +130,7 @@ def snapshot(world: World, now_ns: int) -> WorldSnapshot:
 
 def _hosted_in_snapshot(world: World, now_ns: int) -> Iterator[SnapshotVehicle]:
     vehicles, signal = world.cars.arrays, world.cars.garage.signal
-    of = np.flatnonzero(vehicles.hosted)
+    of = np.flatnonzero(vehicles.hosted & ~vehicles.elsewhere)
     columns = (
         vehicles.x, vehicles.y, vehicles.yaw, vehicles.speed, vehicles.throttle,
         signal("steer_angle"), signal("roll"), signal("pitch"), vehicles.mode,

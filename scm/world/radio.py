@@ -7,7 +7,7 @@ roadside units at their junctions. The drivers of hosted cars receive theirs in
 
 import heapq
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -205,6 +205,10 @@ class DelayQueue:
         self._count += 1
         heapq.heappush(self._waiting, (due_ns, self._count, frame))
 
+    def later_than(self, now_ns: int) -> int:
+        """Return how many frames arrive after a time."""
+        return sum(due_ns > now_ns for due_ns, _, _ in self._waiting)
+
     def arrived(self, now_ns: int) -> list[Message]:
         """Return and forget the frames that have arrived by now."""
         frames = []
@@ -226,6 +230,8 @@ class RadioState:
         in_flight: Frames that arrive later.
         published: The counts at the last `RadioStatus`.
         warnings: Warnings on the air.
+        counts_elsewhere, waiting_elsewhere: What other regions of the city count, and how many
+            frames arrive later there.
     """
 
     link: Radio
@@ -236,3 +242,10 @@ class RadioState:
     in_flight: DelayQueue = field(default_factory=DelayQueue)
     published: RadioCounts = field(default_factory=RadioCounts)
     warnings: WarningState = field(default_factory=WarningState)
+    counts_elsewhere: RadioCounts = field(default_factory=RadioCounts)
+    waiting_elsewhere: int = 0
+
+    def counts(self) -> RadioCounts:
+        """Return the counts of the whole city."""
+        here, elsewhere = astuple(self.link.counts), astuple(self.counts_elsewhere)
+        return RadioCounts(*map(sum, zip(here, elsewhere, strict=True)))

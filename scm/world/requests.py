@@ -85,6 +85,8 @@ def _spawn(world: World, request: SpawnRequest, now_ns: int, out: list[Outgoing]
 
 def _join(world: World, request: JoinRequest, now_ns: int, out: list[Outgoing]) -> JoinReply:
     name, before = request.vehicle, world.cars.remote.get(request.vehicle)
+    if world.ownership is not None:
+        raise _RefusedError("invalid", "a city that is cut into regions has no cars of agents yet")
     if request.kind not in KINDS:
         raise _RefusedError("invalid", f"kind: got {request.kind!r}, expected remote or real")
     owner = world.sessions.get(request.session, name)
@@ -149,6 +151,8 @@ def _route(world: World, request: RouteRequest, now_ns: int, out: list[Outgoing]
     if request.speed_mps is not None and not request.speed_mps > 0.0:
         raise _RefusedError("invalid", f"speed_mps: got {request.speed_mps}, expected above 0")
     del out
+    if world.cars.arrays.elsewhere[car.index]:
+        raise _RefusedError("not_found", f"{car.name} is in another region, which answers for it")
     return send(world, car, request, now_ns)
 
 

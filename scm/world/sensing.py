@@ -76,12 +76,13 @@ def sense(
 
 def _wanted(vehicles: VehicleArrays, subscribers: Subscribers, kind: type[Message]) -> Bools:
     """Return by vehicle index whether anybody subscribes to such messages of its car."""
+    here = vehicles.used & ~vehicles.elsewhere
     if subscribers.all(kind, "vehicle"):
-        return vehicles.used
+        return here
     wanted = np.zeros(vehicles.capacity, np.bool_)
     if not subscribers.any(kind):
         return wanted
-    used = np.flatnonzero(vehicles.used)
+    used = np.flatnonzero(here)
     names = [vehicles.names[index] for index in used.tolist()]
     wanted[used] = subscribers.of(kind, "vehicle", names)
     return wanted
@@ -89,12 +90,17 @@ def _wanted(vehicles: VehicleArrays, subscribers: Subscribers, kind: type[Messag
 
 def _scene(cars: Cars, boxes: Boxes, walls: WallGrid) -> Scene:
     """Return all that LIDARs can see now: walls, boxes, cars."""
+    vehicles = cars.arrays
     outlines: list[Floats] = [boxes.outline()]
     owners: list[Ints] = [np.full(len(boxes), -1)]
     for name in cars.garage.fleets:
         if len(own := cars.garage.indices(name)):
             outlines.append(outline(cars.garage.car(name), cars.garage.poses(name)))
             owners.append(own)
+        if len(others := cars.garage.elsewhere(name)):
+            poses = np.column_stack([v[others] for v in (vehicles.x, vehicles.y, vehicles.yaw)])
+            outlines.append(outline(cars.garage.car(name), poses))
+            owners.append(others)
     for car in cars.remote.values():
         outlines.append(outline(car.car, np.array([car.pose])))
         owners.append(np.array([car.index]))

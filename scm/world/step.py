@@ -1,7 +1,11 @@
 """One tick of the world, on one page.
 
-    receive -> border -> drivers, guards -> [ dynamics, contacts ] x 4 -> border -> watch -> sensors
-        -> publish -> radio
+    receive -> border -> drivers, guards -> [ dynamics, contacts ] x 4 -> border -> watch -> warn
+                                                                                   advance
+    sensors -> publish -> radio                                                    report
+
+Between the two halves all cars stand where this tick brings them: there the regions of a city that
+is cut tell each other of their cars (`regions/`).
 
 Each stage is one file beside this one and returns the messages to send. Stages work on the arrays
 of `vehicle_arrays.py`; none loops over all cars in Python. Sensing and contacts get what they need;
@@ -22,15 +26,21 @@ from scm.world.publish import publish
 from scm.world.reception import receive
 from scm.world.sensing import sense
 from scm.world.transmission import send_radio
+from scm.world.warnings import warn
 from scm.world.watch import watch
 from scm.world.world import World
 
 
 def tick(world: World, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
     """Bring the world to `now_ns`; return what it sends."""
+    return [*advance(world, now_ns, inbox), *report(world, now_ns)]
+
+
+def advance(world: World, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+    """Handle what arrived and move all cars to `now_ns`; return what follows from it."""
     world.tick += 1
     world.subscribers.begin_tick()
-    return [
+    out = [
         *receive(world, now_ns, inbox),  # requests, commands, reports, frames since the last tick
         *approach(world, now_ns),  # cars wait at the border until the next city has room
         *steer(world, now_ns),  # leaseholders through their guards, drivers all in one call
@@ -38,6 +48,14 @@ def tick(world: World, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]
         *depart(world, now_ns),  # cars over the border become transfers
         *report_cars(world, now_ns),
         *watch(world, now_ns),
+    ]
+    warn(world, now_ns)
+    return out
+
+
+def report(world: World, now_ns: int) -> list[Outgoing]:
+    """Return what sensors measure, what cars and city report, and what goes over the radio."""
+    return [
         *sense(world.cars, world.sensors, world.contacts.boxes, world.subscribers, now_ns),
         *publish(world, now_ns),
         *send_radio(world, now_ns),

@@ -9,11 +9,13 @@ against what it touched last. A hosted driver releases the throttle of a stuck c
 from time to time.
 """
 
+import operator
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
-from scm.arrays import Bools, Floats, Ints
+from scm.arrays import AnyArray, Bools, Floats, Ints
 from scm.clock import NS_PER_MS, NS_PER_S
 
 MIN_THROTTLE = 0.05  # a Nigel with this drives twice as far as MOVED_M in STUCK_AFTER_NS
@@ -77,6 +79,31 @@ class Stuck:
         at_ns = (t_ns - self._since_ns) % (REST_NS + TRY_NS)
         rests: Bools = self._stuck & (at_ns < REST_NS)
         return rests
+
+    def memory(self, index: int) -> tuple[AnyArray, ...]:
+        """Return views of all that is stored of a car, except what it touches."""
+        of = slice(index, index + 1)
+        return self._x[of], self._y[of], self._since_ns[of], self._stuck[of]
+
+    def touched(self, index: int, now_ns: int) -> tuple[tuple[int, int], ...]:
+        """Return when and what a car has touched in the last moment: slots, or as in `Touches`."""
+        found = list[tuple[int, int]]()
+        for t_ns, slots, pairs in self._touches:
+            if t_ns < now_ns - TOUCH_MEMORY_NS:
+                continue
+            for row in np.flatnonzero(slots == index).tolist():
+                a, b = pairs.T
+                others = np.concatenate((b[a == row], a[b == row])).tolist()
+                found += [(t_ns, int(slots[o]) if o >= 0 else o) for o in others]
+        return tuple(found)
+
+    def remember(self, index: int, touched: Sequence[tuple[int, int]]) -> None:
+        """Add what `touched` returned in another process."""
+        for t_ns, other in touched:
+            slots = np.array([index, other] if other >= 0 else [index])
+            pairs = np.array([[0, 1 if other >= 0 else other]])
+            self._touches.append((t_ns, slots, pairs))
+        self._touches = deque(sorted(self._touches, key=operator.itemgetter(0)))
 
     def forget(self, index: int) -> None:
         """Forget a car that leaves."""

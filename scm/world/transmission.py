@@ -31,7 +31,7 @@ from scm.v2x.messages.vehicle_state import VehicleState
 from scm.world.cars import AnyCar
 from scm.world.publish import states_of
 from scm.world.radio import Burst, Receivers
-from scm.world.warnings import due_denms, log_warning, note_hard_braking
+from scm.world.warnings import log_warning
 from scm.world.world import World
 
 Frame = CamTx | CpmTx | DenmTx | MapemTx | SpatemTx | SremTx | SsemTx
@@ -59,15 +59,14 @@ def send_radio(world: World, now_ns: int) -> list[Outgoing]:
     out: list[Outgoing] = [*world.radio.in_flight.arrived(now_ns)]
     if world.radio.load.is_due(now_ns):
         _measure(world, now_ns)
-    if world.every["radio"].is_due(now_ns):
+    if world.every["radio"].is_due(now_ns) and world.leads:
         out.append(status(world, now_ns))
     due = world.radio.cams.due(world.cars.arrays, now_ns, world.radio.load.control)
     if len(due):
         out += _send_cams(world, due, now_ns)
-    note_hard_braking(world)
-    if world.every["denm"].is_due(now_ns):
-        for frame in due_denms(world, now_ns):
-            out += _send_denm(world, frame, now_ns)
+    for frame in world.radio.warnings.due:
+        out += _send_denm(world, frame, now_ns)
+    world.radio.warnings.due = ()
     return out
 
 
@@ -77,6 +76,8 @@ def transmit(world: World, frame: Frame, now_ns: int) -> list[Outgoing]:
     if burst is None:
         return []
     out = _deliver_to_drivers(world, frame, now_ns)
+    if not world.leads:
+        return []
     receivers = receivers_of(world)
     reached = _reached(world, burst, RECEIVED[type(frame)], receivers)
     return out + _deliver(world, burst, [frame], reached, receivers)
@@ -91,7 +92,7 @@ def relay(
         MessageError: when it cannot be read.
     """
     burst = _burst_of(world, kind, station, now_ns)
-    if burst is None:
+    if burst is None or not world.leads:
         return []
     receivers = receivers_of(world)
     reached = _reached(world, burst, RECEIVED[kind], receivers)
@@ -111,8 +112,8 @@ def _burst_of(world: World, kind: type[Frame], station: str, now_ns: int) -> Bur
         return None
     place = antenna_of(world, station)
     if place is None:
-        world.radio.link.counts.sent += 1
-        world.radio.link.counts.unknown += 1
+        world.radio.link.counts.sent += world.leads
+        world.radio.link.counts.unknown += world.leads
         return None
     x, y = np.array([place[0]]), np.array([place[1]])
     world.radio.load.note(kind_of(kind), x, y)
@@ -151,7 +152,7 @@ def kind_of(kind: type[Frame]) -> str:
 
 def status(world: World, now_ns: int) -> RadioStatus:
     """Return the counts of frames since the last time, and how busy the channel is."""
-    counts, before = world.radio.link.counts, world.radio.published
+    counts, before = world.radio.counts(), world.radio.published
     new = {f.name: getattr(counts, f.name) - getattr(before, f.name) for f in fields(counts)}
     for name, value in new.items():
         setattr(before, name, getattr(before, name) + value)
@@ -164,7 +165,7 @@ def status(world: World, now_ns: int) -> RadioStatus:
     stations = max(1, len(all_of_them) - 1)
     return RadioStatus(
         t_ns=now_ns,
-        waiting=len(world.radio.in_flight),
+        waiting=len(world.radio.in_flight) + world.radio.waiting_elsewhere,
         late_ms=late_ns / NS_PER_MS / max(1, new["late"]),
         busy_mean=float(all_of_them.sum()) / stations,
         busy_most=float(all_of_them.max()),
@@ -199,8 +200,10 @@ def _send_cams(world: World, due: Ints, now_ns: int) -> list[Outgoing]:
     world.drivers.receive_cams(
         due, now_ns, bumper_x, bumper_y, yaw, vehicles.speed[due], vehicles.yaw_rate[due]
     )
-    made, out = _deliver_cams(world, due, x, y, now_ns)
-    unmade = world.radio.cams.low_frequency_due(due, now_ns) & ~made
+    own = ~vehicles.elsewhere[due]
+    made = np.zeros(len(due), np.bool_)
+    made[own], out = _deliver_cams(world, due[own], x[own], y[own], now_ns)
+    unmade = world.radio.cams.low_frequency_due(due, now_ns) & own & ~made
     bumpers = np.column_stack((bumper_x, bumper_y))[unmade].tolist()
     for index, bumper in zip(due[unmade].tolist(), bumpers, strict=True):
         world.cars.hosted[vehicles.names[index]].slow_news.note_sent(now_ns, *bumper)
@@ -216,6 +219,8 @@ def _send_denm(world: World, frame: DenmTx, now_ns: int) -> list[Outgoing]:
     )
     world.radio.load.note("denm", x, y)
     out = _deliver_to_drivers(world, frame, now_ns)
+    if world.cars.arrays.elsewhere[index]:
+        return []
     receivers, burst = receivers_of(world), Burst("denm", [frame.station], x, y, now_ns)
     reached = _reached(world, burst, DenmRx, receivers)
     return out + _deliver(world, burst, [frame], reached, receivers, also_sent=True)

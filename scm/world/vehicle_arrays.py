@@ -8,6 +8,7 @@ from collections.abc import Collection
 
 import numpy as np
 
+from scm.arrays import AnyArray
 from scm.errors import RunError
 from scm.geometry import Pose2
 from scm.maps.room import distances_m
@@ -52,7 +53,8 @@ class VehicleArrays:
 
     Attributes:
         names: Of the car with each index; empty where there is none.
-        used: Whether a car has the index; `hosted`: and the world simulates it.
+        used: Whether a car has the index; `hosted`: and the world simulates it; `elsewhere`: in
+            another process, which owns its region: only its motion is known here.
         x, y, yaw: Pose of the rear axle, map frame, at the end of the last tick.
         front: From the rear axle to the front bumper [m].
         speed, yaw_rate: Along the body, about the vertical; 0 for remote cars.
@@ -68,9 +70,10 @@ class VehicleArrays:
     def __init__(self, capacity: int) -> None:
         self.capacity = capacity
         self.names = [""] * capacity
-        self.used, self.hosted, self.driven, self.arrived, self.hazard, self.diverged = (
-            np.zeros(capacity, np.bool_) for _ in range(6)
-        )
+        (
+            self.used, self.hosted, self.elsewhere, self.driven, self.arrived, self.hazard,
+            self.diverged,
+        ) = (np.zeros(capacity, np.bool_) for _ in range(7))  # fmt: skip
         self.x, self.y, self.yaw, self.speed, self.yaw_rate, self.throttle, self.steering = (
             np.zeros(capacity) for _ in range(7)
         )
@@ -102,13 +105,22 @@ class VehicleArrays:
         """Release an index and reset what its car was doing."""
         self.names[index] = ""
         for flags in (
-            self.used, self.hosted, self.driven, self.arrived, self.hazard, self.diverged,
+            self.used, self.hosted, self.elsewhere, self.driven, self.arrived, self.hazard,
+            self.diverged,
         ):  # fmt: skip
             flags[index] = False
         for values in (self.speed, self.yaw_rate, self.throttle, self.steering):
             values[index] = 0.0
         self.mode[index], self.seq[index] = IDLE, 0
         self._numbers.release(index)
+
+    def memory(self, index: int) -> tuple[AnyArray, ...]:
+        """Return views of what is stored of a hosted car, except its motion."""
+        of = slice(index, index + 1)
+        return (
+            self.driven[of], self.arrived[of], self.hazard[of], self.diverged[of],
+            self.throttle[of], self.steering[of], self.mode[of], self.seq[of],
+        )  # fmt: skip
 
     def nearest_m(self, pose: Pose2, *, ahead_s: float = 0.0) -> float:
         """Return how far the nearest car is [m], as `maps.room` counts; infinity: there is none."""

@@ -35,6 +35,13 @@ _CALLED = {
 }
 
 
+def warn(world: World, now_ns: int) -> None:
+    """Find out what hosted cars have to warn of; `WarningState.due` holds it until it is sent."""
+    note_hard_braking(world)
+    if world.every["denm"].is_due(now_ns):
+        world.radio.warnings.due = due_denms(world, now_ns)
+
+
 def note_hard_braking(world: World) -> None:
     """Note who brakes hard; every tick, since a Nigel stops within a tenth of a second."""
     vehicles = world.cars.arrays
@@ -88,7 +95,8 @@ def log_warning(world: World, frame: DenmTx, now_ns: int) -> list[Outgoing]:
 def _stranded(world: World) -> Bools:
     """Return by slot which hosted cars stand though they should not."""
     vehicles = world.cars.arrays
-    stands: Bools = vehicles.hosted & (np.abs(vehicles.speed) < STANDSTILL_MPS)
+    stands: Bools = vehicles.hosted & ~vehicles.elsewhere
+    stands &= np.abs(vehicles.speed) < STANDSTILL_MPS
     if world.stop.engaged:
         return stands & vehicles.diverged
     stranded = vehicles.hazard | vehicles.diverged

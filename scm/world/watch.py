@@ -55,7 +55,8 @@ def _watch_batteries(world: World, now_ns: int) -> list[CityEvent]:
 def _watch_stuck(world: World, now_ns: int) -> list[CityEvent]:
     out: list[CityEvent] = []
     vehicles, stuck = world.cars.arrays, world.alerts.stuck
-    throttle = np.where(vehicles.hosted & ~vehicles.diverged, vehicles.throttle, 0.0)
+    pushes = vehicles.hosted & ~vehicles.elsewhere & ~vehicles.diverged
+    throttle = np.where(pushes, vehicles.throttle, 0.0)
     for car in world.cars.remote.values():
         if car.alive and car.state is not None:
             throttle[car.index] = car.state.throttle
@@ -67,8 +68,8 @@ def _watch_stuck(world: World, now_ns: int) -> list[CityEvent]:
         )
         stuck.against[index] = against
         others = ", ".join("a wall" if other == WALL else other for other in against)
-        pushes = f"pushes against {others}" if against else "is commanded to drive, touches nothing"
-        text = f"{name} is stuck: it {pushes} and stays"
+        does = f"pushes against {others}" if against else "is commanded to drive, touches nothing"
+        text = f"{name} is stuck: it {does} and stays"
         out.append(city_event("warning", "stuck", text, now_ns, name))
     for index in free.tolist():
         name = vehicles.names[index]

@@ -29,6 +29,7 @@ from scm.vehicles.drivers.lane_graph import lane_graph_of
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.trips import Trips
 from scm.vehicles.external_vehicles import ExternalVehicles
+from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
 from scm.vehicles.rays.grid import WallGrid
 from scm.vehicles.rays.scene import Scene
@@ -42,9 +43,10 @@ from scm.world.channel_load import ChannelLoad
 from scm.world.collide import ContactImpulses
 from scm.world.contacts import Contacts
 from scm.world.garage import Garage
-from scm.world.hosted import HostedCar
+from scm.world.hosted import ELSEWHERE, HostedCar
 from scm.world.pace import Every, Pace
 from scm.world.radio import Radio, RadioState, Receivers, roadside_places
+from scm.world.regions.ownership import Ownership
 from scm.world.remote import RemoteCar
 from scm.world.sensing import SCANNER, SensorState
 from scm.world.solids import outline
@@ -104,6 +106,7 @@ class World:
         alerts: What is wrong with cars and was reported.
         identities: What tells cars apart.
         border: Cars that come to the border, and those just behind it.
+        ownership: Which region of a city that is cut owns which car; None: it is not cut.
     """
 
     def __init__(
@@ -147,6 +150,7 @@ class World:
             ExternalVehicles(capacity),
             walls,
         )
+        self.ownership: Ownership | None = None
         self.subscribers = Subscribers()
         self.sessions: dict[str, str] = {}
         self.pace = Pace(PERIOD_NS)
@@ -156,6 +160,11 @@ class World:
         self.alerts = Alerts(Stuck(capacity))
         first_tag = city_map.first_vehicle_tag_id
         self.identities = Identities(Numbers(first_tag, never=reserved_tags(city_map)))
+
+    @property
+    def leads(self) -> bool:
+        """Whether it sends what is about no car: a whole city does, or its first region."""
+        return self.ownership is None or self.ownership.number == 0
 
     def use_threads(self, count: int) -> None:
         """Use several threads for dynamics and drivers: for lockstep, on otherwise idle cores.
@@ -180,8 +189,7 @@ class World:
         model = self.cars.garage.car(car_name)
         index = self._add(name, car_name, pose, hosted=True)
         offset = self.identities.scan_offset()
-        fleet, row = self.cars.garage.park(car_name, pose, index)
-        self.ground.place_at_rest(fleet, row)
+        fleet, row = self._park(car_name, pose, index)
         self.drivers.enter(index, limits_of(model), number(self.seed, name, "driver"))
         for kind, bank in self.sensors.banks.items():
             bank.fit(index, name, model, fleet, row, now_ns, offset if kind == SCANNER else 0.0)
@@ -197,6 +205,16 @@ class World:
             lease=rules.grant(NAME, self.identities.first_epoch(now_ns)),
         )
         return car
+
+    def _park(self, car_name: str, pose: Pose2, index: int) -> tuple[Fleet, int]:
+        """Put a car on the floor, unless another region does; return its fleet and row."""
+        if self.ownership is not None and not self.ownership.enter(index, pose):
+            self.cars.arrays.elsewhere[index] = True
+            self.cars.garage.note_elsewhere(car_name, index)
+            return self.cars.garage.prepare(car_name), ELSEWHERE
+        fleet, row = self.cars.garage.park(car_name, pose, index)
+        self.ground.place_at_rest(fleet, row)
+        return fleet, row
 
     def admit(
         self,
@@ -248,7 +266,7 @@ class World:
         if name in self.cars.hosted:
             car = self.cars.hosted.pop(name)
             self.cars.leased.pop(name, None)
-            self.cars.garage.scrap(car.car_file, car.row)
+            self.cars.garage.scrap(car.car_file, car.row, car.index)
             return self._forget(car)
         if name in self.cars.remote:
             return self._forget(self.cars.remote.pop(name))

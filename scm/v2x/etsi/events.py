@@ -79,11 +79,32 @@ class Event(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Sent:
+class SentDenm:
+    """A warning that is repeated: how often, until when, and when next."""
+
     body: DenmBody
     interval_ns: int
     ends_ns: int
     next_ns: int
+
+
+class WarningMemory(NamedTuple):
+    """All that a `CarWarnings` remembers.
+
+    Attributes:
+        hit_ns, braked_ns: When the car warned of a hit, and of its braking.
+        since_ns: Since when it stands where it should not.
+        stands: The event of that, and when it was renewed.
+        count: Of its events so far.
+        sent: What it still sends.
+    """
+
+    hit_ns: int | None
+    braked_ns: int | None
+    since_ns: int | None
+    stands: tuple[ActionId, int] | None
+    count: int
+    sent: tuple[SentDenm, ...]
 
 
 class DenmSender:
@@ -94,7 +115,17 @@ class DenmSender:
         self._station = station_id(station)
         self._station_type = station_type
         self._count = first
-        self._sent: dict[ActionId, _Sent] = {}
+        self._sent: dict[ActionId, SentDenm] = {}
+
+    @property
+    def memory(self) -> tuple[int, tuple[SentDenm, ...]]:
+        """The number of its next event, and what it still sends; may be written."""
+        return self._count, tuple(self._sent.values())
+
+    @memory.setter
+    def memory(self, value: tuple[int, tuple[SentDenm, ...]]) -> None:
+        self._count, sent = value
+        self._sent = {one.body.management_container.action_id: one for one in sent}
 
     def trigger(self, event: Event, now_ns: int) -> ActionId:
         """Start a warning; return its action id."""
@@ -144,7 +175,7 @@ class DenmSender:
                 bodies.append(sent.body)
         return bodies
 
-    def _own(self, action: ActionId) -> _Sent:
+    def _own(self, action: ActionId) -> SentDenm:
         sent = self._sent.get(action)
         if sent is None or sent.body.management_container.termination is not None:
             msg = f"DENM: expected an event of this station that still lasts, got {action}"
@@ -152,7 +183,7 @@ class DenmSender:
         return sent
 
     def _send(self, body: DenmBody, event: Event, now_ns: int) -> None:
-        self._sent[body.management_container.action_id] = _Sent(
+        self._sent[body.management_container.action_id] = SentDenm(
             body, event.interval_ms * NS_PER_MS, now_ns + event.valid_s * NS_PER_S, now_ns
         )
 
@@ -171,7 +202,7 @@ class DenmSender:
             station_id=self._station,
             management_container=management,
         )
-        self._sent[before.action_id] = _Sent(ended, interval_ns, ends_ns, now_ns)
+        self._sent[before.action_id] = SentDenm(ended, interval_ns, ends_ns, now_ns)
 
     def _body(self, action: ActionId, event: Event, now_ns: int) -> DenmBody:
         place = position_of(event.x_m, event.y_m)
@@ -323,6 +354,17 @@ class CarWarnings:
         self._braked_ns: int | None = None
         self._since_ns: int | None = None
         self._stands: tuple[ActionId, int] | None = None
+
+    @property
+    def memory(self) -> WarningMemory:
+        """All that it remembers; write what another one read to go on with it."""
+        own = (self._hit_ns, self._braked_ns, self._since_ns, self._stands)
+        return WarningMemory(*own, *self._sender.memory)
+
+    @memory.setter
+    def memory(self, value: WarningMemory) -> None:
+        self._hit_ns, self._braked_ns, self._since_ns, self._stands = value[:4]
+        self._sender.memory = value.count, value.sent
 
     @property
     def is_busy(self) -> bool:

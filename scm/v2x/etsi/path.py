@@ -46,6 +46,16 @@ class LowFrequencySender:
         self._path = array("d")  # x, y, t of each place, the newest last
         self._sent_ns: int | None = None
 
+    @property
+    def memory(self) -> tuple[int | None, bytes]:
+        """When it was sent last, and the path; write what another sender read to go on with it."""
+        return self._sent_ns, self._path.tobytes()
+
+    @memory.setter
+    def memory(self, value: tuple[int | None, bytes]) -> None:
+        self._sent_ns, path = value
+        self._path = array("d", path)
+
     def due(self, state: VehicleState, front_m: float) -> LowFrequencyContainer | None:
         """Return the container for a CAM that is sent now, or None if it is not due.
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scm.arrays import Bools, Floats, Ints
+from scm.arrays import AnyArray, Bools, Floats, Ints
 from scm.errors import MapError
 from scm.geometry import Pose2
 from scm.maps.border import BEYOND
@@ -110,6 +110,11 @@ class DriverBatch:
             )
 
     @property
+    def sizes(self) -> Floats:
+        """Length and width of each car's outline [m], (capacity, 2); 0: no car."""
+        return self._received.size
+
+    @property
     def lane(self) -> Ints:
         """Lane of each car, as an index into `lane_graph.names`; -1 before it was sent."""
         return self._state.lane_window[:, col.HERE]
@@ -192,6 +197,29 @@ class DriverBatch:
         self._state.lane_window[index] = -1
         self._state.ints[index, col.COUNT] = 0
         self._commands[:, index] = 0.0
+
+    def memory(self, index: int) -> tuple[AnyArray, ...]:
+        """Return views of all that a driver remembers, except its route and what it receives."""
+        state = self._state
+        sent = self._sent[index : index + 1]
+        return (
+            state.floats[index], state.ints[index], state.lane_window[index],
+            self._commands[:, index], sent,
+        )  # fmt: skip
+
+    def route(self, index: int) -> Ints:
+        """Return the numbers of the lanes of a car's route."""
+        at, count = self._state.ints[index, [col.ROUTE, col.COUNT]].tolist()
+        return self._state.routes[at : at + count].copy()
+
+    def follow(self, index: int, route: Ints) -> None:
+        """Give a car whose `memory` was written the route that belongs to it."""
+        at = self._store_route(route.tolist(), index)
+        self._state.ints[index, [col.ROUTE, col.COUNT]] = at, len(route)
+
+    def look_at(self, near: Bools) -> None:
+        """Limit the cars that these drivers look at, by vehicle index: those elsewhere are far."""
+        self._received.near[:] = near
 
     def send(
         self,

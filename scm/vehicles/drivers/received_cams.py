@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from scm.arrays import Floats, Ints
+from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_S
 from scm.records.city_map import CityMap
 from scm.vehicles.array_struct import ArrayStruct
@@ -39,6 +39,7 @@ class ReceivedCams(ArrayStruct):
         t_ns: (m, capacity) time of sending.
         cams: (m, capacity, 5).
         size: (capacity, 2) length and width [m]; 0: no car.
+        near: (capacity,) whether any driver here may have to look at the car.
         at: (capacity, 5) estimated place now, from the newest CAM.
         cell_first: Start of each cell's stations in `in_cell`, and the end.
         in_cell: Stations, cell by cell.
@@ -52,6 +53,7 @@ class ReceivedCams(ArrayStruct):
     t_ns: Ints
     cams: Floats
     size: Floats
+    near: Bools
     at: Floats
     cell_first: Ints
     in_cell: Ints
@@ -71,6 +73,7 @@ def no_cams(city_map: CityMap, capacity: int, history: int, channel: Channel) ->
         t_ns=np.zeros((history, capacity), np.int64),
         cams=np.zeros((history, capacity, 5)),
         size=np.zeros((capacity, 2)),
+        near=np.ones(capacity, np.bool_),
         at=np.zeros((capacity, 5)),
         cell_first=np.zeros(across * up + 1, np.int64),
         in_cell=np.zeros(capacity, np.int64),
@@ -116,10 +119,12 @@ def update_cells(received: ReceivedCams, now_ns: int) -> None:
         age_ns = now_ns - received.t_ns[place, station]
         if age_ns > MAX_CAM_AGE_NS:
             continue
+        floor[LARGEST] = max(floor[LARGEST], 0.5 * math.sqrt(length * length + width * width))
+        if not received.near[station]:
+            continue
         x, y, cos, sin, speed = extrapolate(received.cams[place, station], 1e-9 * age_ns, length)
         at = received.at[station]
         at[AT_X], at[AT_Y], at[AT_COS], at[AT_SIN], at[AT_SPEED] = x, y, cos, sin, speed
-        floor[LARGEST] = max(floor[LARGEST], 0.5 * math.sqrt(length * length + width * width))
         row, column = cell_number(floor, y, LOW_Y, CELLS_Y), cell_number(floor, x, LOW_X, CELLS_X)
         received.cell_of[station] = row * across + column
         first[row * across + column + 1] += 1

@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from scm.arrays import AnyArray
 from scm.clock import NS_PER_S
 from scm.errors import LeaseError, MapError
 from scm.geometry import Pose2
@@ -28,7 +29,9 @@ _NOW_NS = -(2**62)
 
 
 @dataclass(slots=True)
-class _ActiveTrip:
+class ActiveTrip:
+    """What is known of a car's present trip, or of its last one."""
+
     vehicle: str
     trip_id: str
     route: tuple[str, ...]
@@ -58,7 +61,7 @@ class Trips:
         self.every_ns = every_ns
         self._drivers = drivers
         self._spread = spread
-        self._trips: dict[int, _ActiveTrip] = {}
+        self._trips: dict[int, ActiveTrip] = {}
         self._due_ns = np.zeros(drivers.capacity, np.int64)
         self._under_way = np.zeros(drivers.capacity, np.bool_)
         self._unsent: list[Trip] = []
@@ -158,6 +161,19 @@ class Trips:
             self._unsent.append(self._report(index, now_ns, arrived_ns=now_ns))
         self._halt(index)
 
+    def memory(self, index: int) -> tuple[AnyArray, ...]:
+        """Return views of all that is stored of a car, except its trip."""
+        return self._due_ns[index : index + 1], self._under_way[index : index + 1]
+
+    def trip(self, index: int) -> ActiveTrip | None:
+        """Return a car's trip, or its last one."""
+        return self._trips.get(index)
+
+    def resume(self, index: int, trip: ActiveTrip | None) -> None:
+        """Give a car whose `memory` was written the trip that belongs to it."""
+        if trip is not None:
+            self._trips[index] = trip
+
     def check_arrivals(self, now_ns: int) -> None:
         """Handle new arrivals; call it after each decision of the batch."""
         for index in np.flatnonzero(self._under_way & self._drivers.arrived).tolist():
@@ -211,11 +227,11 @@ class Trips:
         length_m: float | None,
         now_ns: int,
         trip_id: str,
-    ) -> _ActiveTrip:
+    ) -> ActiveTrip:
         before = self._trips.get(index)
         count = 1 + (before.count if before is not None and before.vehicle == vehicle else 0)
         trip_id = trip_id or f"{vehicle}-{count}"
-        trip = _ActiveTrip(vehicle, trip_id, tuple(route), length_m, now_ns, count)
+        trip = ActiveTrip(vehicle, trip_id, tuple(route), length_m, now_ns, count)
         self._trips[index] = trip
         self._due_ns[index] = _NOW_NS
         self._under_way[index] = True

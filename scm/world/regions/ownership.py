@@ -1,0 +1,180 @@
+"""Which region owns which car: that of its place, and one for all that may touch one another.
+
+    owner = region of the place of the lowest index in the car's group
+    group = cars whose outlines, grown by the leeway on each side, overlap, directly or by others
+    leeway = MARGIN_M + AHEAD_S * MAX_GAIN * speed of the fastest car of the city
+
+Owners are decided from where all cars are at the end of a tick, and own from the next exchange to
+the one after it: within `AHEAD_S` no two cars of two regions can touch. All regions know all
+motions, so all come to the same result and none has to ask. The leeway is large enough since no
+contact makes a car faster than `MAX_GAIN` times what struck it.
+"""
+
+import math
+
+import numpy as np
+
+from scm.arrays import Bools, Floats, Ints
+from scm.errors import RunError
+from scm.geometry import Pose2
+from scm.vehicles.jit import array_kernel, kernel_function
+from scm.world.regions.cut import BAND_M, Cut
+from scm.world.sweep import overlap_of
+
+MARGIN_M = 0.01
+MAX_GAIN = 2.0  # one hit, as of boxes in `contacts`
+AHEAD_S = 0.04  # two ticks
+NOBODY = -1
+
+
+class Ownership:
+    """Who owns the cars of a city, as one of its regions sees it.
+
+    Attributes:
+        number: Of this region.
+        owner: (capacity,) region that simulates each car now; -1: there is no such car.
+        next: (capacity,) region that will after the next exchange.
+        moved: How many cars have come or gone here.
+        missed: Pairs of cars of two regions that were seen to overlap; the leeway was too small.
+    """
+
+    def __init__(self, cut: Cut, number: int, capacity: int) -> None:
+        self.cut, self.number = cut, number
+        self.owner: Ints = np.full(capacity, NOBODY, np.int64)
+        self.next: Ints = np.full(capacity, NOBODY, np.int64)
+        self.moved = 0
+        self.missed = 0
+
+    def enter(self, index: int, pose: Pose2) -> bool:
+        """Note a new car; return whether it is this region's."""
+        region = self.cut.region_of(pose.x, pose.y)
+        self.owner[index] = self.next[index] = region
+        return region == self.number
+
+    def leave(self, index: int) -> None:
+        """Forget a car."""
+        self.owner[index] = self.next[index] = NOBODY
+
+    def decide(self, order: Ints, places: Floats, sizes: Floats, fastest_mps: float) -> None:
+        """Decide who owns the cars next.
+
+        Args:
+            order: (n,) indices of all cars, ascending.
+            places: (n, 3) x, y, yaw of the middles of their outlines.
+            sizes: (n, 2) half lengths and half widths of these.
+            fastest_mps: Speed of the fastest of them.
+
+        Raises:
+            RunError: when one is so fast that it may reach another region's cars unseen.
+        """
+        leeway = MARGIN_M + AHEAD_S * MAX_GAIN * fastest_mps
+        widest = float(np.hypot(sizes[:, 0], sizes[:, 1]).max(initial=0.0))
+        if 2.0 * (leeway + widest) > BAND_M:
+            msg = f"regions: a car drives {fastest_mps:.1f} m/s, and may cross a cut unseen"
+            raise RunError(msg)
+        regions: Ints = np.empty(len(order), np.int64)
+        near: Bools = np.empty(len(order), np.bool_)
+        look_up(self.cut.frame, self.cut.cells, self.cut.near, places, regions, near)
+        if near.any():
+            owner = self.owner[order]
+            head: Ints = np.zeros(1 << max(6, (2 * len(order) - 1).bit_length()), np.int64)
+            room = np.zeros((3, len(order)), np.int64)
+            cell = 2.0 * (widest + leeway)
+            self.missed += group(regions, owner, near, places, sizes, leeway, cell, head, room)
+        self.next[order] = regions
+
+
+@array_kernel
+def look_up(
+    frame: Floats, cells: Ints, near_cut: Bools, places: Floats, regions: Ints, near: Bools
+) -> None:
+    """Write the region of each place (n, 3), and whether another one is near."""
+    rows, columns = cells.shape
+    for i in range(places.shape[0]):
+        row = int(min(max((places[i, 1] - frame[1]) / frame[2], 0.0), rows - 1.0))
+        column = int(min(max((places[i, 0] - frame[0]) / frame[2], 0.0), columns - 1.0))
+        regions[i], near[i] = cells[row, column], near_cut[row, column]
+
+
+@kernel_function
+def gap_of(places: Floats, sizes: Floats, i: int, j: int, far: float) -> float:
+    """Return how far two outlines are apart [m], at the least; below 0 they overlap.
+
+    It is `far` where their middles are farther apart than that.
+    """
+    dx, dy = places[j, 0] - places[i, 0], places[j, 1] - places[i, 1]
+    if dx * dx + dy * dy >= far * far:
+        return far
+    ci, si = math.cos(places[i, 2]), math.sin(places[i, 2])
+    cj, sj = math.cos(places[j, 2]), math.sin(places[j, 2])
+    c, s = ci * cj + si * sj, ci * sj - si * cj
+    x, y = ci * dx + si * dy, ci * dy - si * dx
+    return -overlap_of(x, y, c, s, sizes[j, 0], sizes[j, 1], sizes[i, 0], sizes[i, 1])
+
+
+@array_kernel
+def group(
+    regions: Ints, owner: Ints, near: Bools, places: Floats, sizes: Floats, leeway: float,
+    cell: float, head: Ints, room: Ints,
+) -> int:  # fmt: skip
+    """Give all cars of a group that reaches over a cut the region of its first car.
+
+    Groups are found from the cars near a cut; no other group reaches over one.
+
+    Args:
+        regions: (n,) of the cars' places; changes.
+        owner: (n,) who owns them now.
+        near: (n,) whether a cut is near.
+        places: (n, 3) x, y, yaw.
+        sizes: (n, 2) half lengths and widths.
+        leeway: Of each outline on each side.
+        cell: Edge of a cell, twice the reach of the largest.
+        head: Room to work in, a power of two long.
+        room: (3, n) likewise: next in a cell, cars of a group, and which were found.
+
+    Returns:
+        How often two cars of different owners overlap.
+    """
+    after, queue, found = room[0], room[1], room[2]
+    sort_into_cells(places, cell, head, after)
+    missed = 0
+    for seed in range(places.shape[0]):
+        if not near[seed] or found[seed] > 0:
+            continue
+        queue[0], found[seed] = seed, 1
+        done, count, first = 0, 1, seed
+        while done < count:
+            i = queue[done]
+            done += 1
+            first = min(first, i)
+            for k in range(9):
+                j = head[bucket_of(places, i, cell, k, head.shape[0])]
+                while j >= 0:
+                    gap = gap_of(places, sizes, i, j, cell) if j != i else cell
+                    missed += int(gap < 0.0 and owner[i] != owner[j])
+                    if gap < 2.0 * leeway and found[j] == 0:
+                        queue[count], found[j] = j, 1
+                        count += 1
+                    j = after[j]
+        region = regions[first]
+        for k in range(count):
+            regions[queue[k]] = region
+    return missed
+
+
+@kernel_function
+def sort_into_cells(places: Floats, cell: float, head: Ints, after: Ints) -> None:
+    """Link the cars of each cell: `head` has the last one, `after` the one before each."""
+    for bucket in range(head.shape[0]):
+        head[bucket] = -1
+    for i in range(places.shape[0]):
+        bucket = bucket_of(places, i, cell, 4, head.shape[0])
+        after[i], head[bucket] = head[bucket], i
+
+
+@kernel_function
+def bucket_of(places: Floats, i: int, cell: float, k: int, size: int) -> int:
+    """Return the bucket of one of the nine cells around a car; 4: its own."""
+    column = math.floor(places[i, 0] / cell) + k % 3 - 1
+    row = math.floor(places[i, 1] / cell) + k // 3 - 1
+    return (column * 73856093 ^ row * 19349663) & (size - 1)
