@@ -45,6 +45,7 @@ LONG = (
     "misbehaviour",
     "mismatch",
     "recording_faults",
+    "regions",
     "serial",
     "stop",
     "sumo",

@@ -200,10 +200,10 @@ class DriverBatch:
 
     def memory(self, index: int) -> tuple[AnyArray, ...]:
         """Return views of all that a driver remembers, except its route and what it receives."""
-        state = self._state
-        sent = self._sent[index : index + 1]
+        state, sent, at = self._state, self._sent[index : index + 1], col.ROUTE
+        ints = state.ints[index]
         return (
-            state.floats[index], state.ints[index], state.lane_window[index],
+            state.floats[index], ints[:at], ints[at + 1 :], state.lane_window[index],
             self._commands[:, index], sent,
         )  # fmt: skip
 

@@ -1,10 +1,10 @@
-"""All regions of a city in one process, as the one part that a whole world is.
+"""A region as a part of the city, and all regions in one process as the one part of a whole world.
 
-For lockstep: it gets what a world gets and sends what a world sends, bit by bit. Regions meet here
-only by the encoded messages that they would send over a network.
+`RegionsPart` is for lockstep: it gets what a world gets and sends what a world sends, bit by bit.
+Its regions meet only by the encoded messages that `RegionPart` sends to another process.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from msgspec.structs import replace
 
@@ -15,10 +15,48 @@ from scm.v2x.messages.world_snapshot import WorldSnapshot
 from scm.world.alerts import NAME
 from scm.world.part import ROOM, WorldPart
 from scm.world.reception import subscriptions_of
-from scm.world.regions.cut import cut_map
+from scm.world.regions.cut import Cut, cut_map
 from scm.world.regions.region import Region
 from scm.world.requests import SERVICES
 from scm.world.world import PERIOD_NS, World
+
+Exchange = Callable[[Sequence[bytes]], Sequence[bytes]]
+"""Sends a message to each region, by number, and returns one of each other region."""
+
+
+class RegionPart(WorldPart):
+    """One region, ready for a bus; the others are in processes of their own.
+
+    Args:
+        city_map: The city.
+        cut: Of the map, the same in all regions.
+        number: Of this region.
+        exchange: Connects it to the others.
+        seed: Of all noise and of lost radio frames; the same in all regions.
+        hosted: (name, car file) of all cars of the city to spawn at the start; they circulate.
+        room: Spare capacity: how many more cars may come.
+    """
+
+    def __init__(
+        self,
+        city_map: CityMap,
+        cut: Cut,
+        number: int,
+        exchange: Exchange,
+        seed: int = 0,
+        hosted: tuple[tuple[str, str], ...] = (),
+        room: int = ROOM,
+    ) -> None:
+        super().__init__(city_map, seed, hosted, room)
+        self.region = Region(self.world, cut, number)
+        self._exchange = exchange
+
+    def step(self, now_ns: int, inbox: Sequence[Incoming]) -> list[Outgoing]:
+        """Advance to `now_ns` together with the other regions, each in its process."""
+        first = [one for one in self.begin(now_ns) if self.region.speaks_of(one)]
+        moved, messages = self.region.advance(now_ns, inbox)
+        heard = self._exchange(messages)
+        return [*first, *moved, *self.region.report(now_ns, heard)]
 
 
 class RegionsPart(BasePart):

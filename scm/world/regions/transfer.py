@@ -4,6 +4,7 @@ Arrays go as they lie in memory, so the car drives on bit by bit as it would hav
 regions know alike does not go: names, leases, tags, guards, switches, CAMs, what its car file says.
 """
 
+import hashlib
 import math
 from collections.abc import Sequence
 
@@ -91,6 +92,15 @@ def read(world: World, car: HostedCar, now_ns: int) -> CarTransfer:
         is_low=world.alerts.low_batteries.is_low(name),
         warnings=None if warner is None else warner.memory,
     )
+
+
+def digest(world: World, car: HostedCar, now_ns: int) -> bytes:
+    """Return a digest of all that is known of a car that is simulated here: equal, if all is."""
+    vehicles = world.cars.arrays
+    motion = (vehicles.x, vehicles.y, vehicles.yaw, vehicles.speed, vehicles.yaw_rate)
+    place = np.array([values[car.index] for values in motion])
+    whole = msgspec.msgpack.encode(read(world, car, now_ns)) + place.tobytes()
+    return hashlib.blake2b(whole, digest_size=16).digest()
 
 
 def hand_out(world: World, car: HostedCar, now_ns: int) -> CarTransfer:

@@ -3,7 +3,6 @@
 from collections import Counter
 
 import msgspec
-import numpy as np
 import pytest
 
 from scm.maps.load import load_map
@@ -12,10 +11,9 @@ from scm.runtime.part import BasePart
 from scm.traffic.monitor.part import MonitorPart
 from scm.traffic.signals.part import TrafficPart
 from scm.v2x.exchange import Answer
-from scm.vehicles.drivers.driver_state import ROUTE
 from scm.world.part import WorldPart
 from scm.world.regions.part import RegionsPart
-from scm.world.regions.transfer import memory_of
+from scm.world.regions.transfer import digest
 
 CITY, CARS, SECONDS, SEED = "grid:5x4:3", 120, 6.0, 3
 EVERY = 10  # ticks between two looks at the memory
@@ -39,7 +37,7 @@ class Recorder(BasePart):
         out = self._part.step(now_ns, inbox)
         self.sent.append(Counter(words(one) for one in out))
         if len(self.sent) % EVERY == 0:
-            self.cars.append(cars_of(self._worlds))
+            self.cars.append(cars_of(self._worlds, now_ns))
         return out
 
 
@@ -49,22 +47,17 @@ def words(outgoing):
     return type(said).__name__, msgspec.msgpack.encode(said)
 
 
-def cars_of(worlds):
-    """Return the memory of each car, by name, in the world that simulates it."""
+def cars_of(worlds, now_ns):
+    """Return a digest of each car's whole state, by name, from the world that simulates it."""
     found = {}
     for world in worlds:
-        vehicles = world.cars.arrays
-        for name, car in world.cars.hosted.items():
-            if vehicles.elsewhere[car.index]:
-                continue
-            index, state = car.index, world.drivers._state
-            route, at = world.drivers.route(index), state.ints[index, ROUTE]
-            state.ints[index, ROUTE] = 0  # where it lies in the table differs, and means nothing
-            memory = [view.tobytes() for view in memory_of(world, car)]
-            state.ints[index, ROUTE] = at
-            motion = [getattr(vehicles, key)[index] for key in ("x", "y", "yaw", "speed")]
-            assert name not in found
-            found[name] = (*memory, route.tobytes(), np.array(motion).tobytes())
+        here = {
+            name: digest(world, car, now_ns)
+            for name, car in world.cars.hosted.items()
+            if not world.cars.arrays.elsewhere[car.index]
+        }
+        assert not here.keys() & found.keys()
+        found |= here
     return found
 
 
