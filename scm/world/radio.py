@@ -247,5 +247,5 @@ class RadioState:
 
     def counts(self) -> RadioCounts:
         """Return the counts of the whole city."""
-        here, elsewhere = astuple(self.link.counts), astuple(self.counts_elsewhere)
-        return RadioCounts(*map(sum, zip(here, elsewhere, strict=True)))
+        parts = astuple(self.link.counts), astuple(self.counts_elsewhere)
+        return RadioCounts(*map(sum, zip(*parts, strict=True)))

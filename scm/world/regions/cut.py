@@ -21,6 +21,7 @@ from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scm.arrays import Bools, Floats, Ints
 from scm.errors import MapError
@@ -36,6 +37,9 @@ BAND_M = 2.0  # beside a cut, where cars of two regions may touch
 SCALE = 1000  # METIS wants whole numbers
 MAX_REGIONS = 64
 NONE = -1
+
+
+Regions = NDArray[np.int8]
 
 
 class Units(NamedTuple):
@@ -61,12 +65,13 @@ class Cut:
     Attributes:
         regions: How many.
         frame: x and y of the lower left of the cells, and their edge [m].
-        cells: (rows, columns) region of each place.
+        cells: (rows, columns) region of each place; small numbers, since many are looked up.
         near: (rows, columns) whether another region is within `BAND_M`.
     """
 
     def __init__(self, regions: int, frame: Floats, cells: Ints) -> None:
-        self.regions, self.frame, self.cells = regions, frame, np.ascontiguousarray(cells)
+        self.regions, self.frame = regions, frame
+        self.cells: Regions = np.ascontiguousarray(cells.astype(np.int8))
         reach = math.ceil(BAND_M / float(frame[2]))
         around = [_spread(cells == number, reach) for number in range(regions)]
         self.near: Bools = np.sum(around, axis=0) > 1

@@ -1,7 +1,8 @@
 """What the regions of a city tell each other once a tick, and its encoding."""
 
 from collections.abc import Sequence
-from dataclasses import astuple
+from dataclasses import fields
+from operator import attrgetter
 
 import msgspec
 import numpy as np
@@ -13,6 +14,9 @@ from scm.world.regions.transfer import CarTransfer
 
 MOTION = ("x", "y", "yaw", "speed", "yaw_rate")
 """What all regions know of every car: names of `VehicleArrays`."""
+counts_of = attrgetter(*(field.name for field in fields(RadioCounts)))
+"""Returns the counts of a radio as a tuple."""
+NO_COUNTS: tuple[int, ...] = counts_of(RadioCounts())
 _INDEX, _NUMBER = np.dtype("<i4"), np.dtype("<f8")
 
 
@@ -34,7 +38,7 @@ class RegionNews(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
     indices: bytes
     motion: bytes
     denms: tuple[DenmTx, ...] = ()
-    counts: tuple[int, ...] = astuple(RadioCounts())
+    counts: tuple[int, ...] = NO_COUNTS
     waiting: int = 0
 
 

@@ -11,6 +11,7 @@ contact makes a car faster than `MAX_GAIN` times what struck it.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from scm.arrays import Bools, Floats, Ints
 from scm.errors import RunError
 from scm.geometry import Pose2
 from scm.vehicles.jit import array_kernel, kernel_function
-from scm.world.regions.cut import BAND_M, Cut
+from scm.world.regions.cut import BAND_M, Cut, Regions
 from scm.world.sweep import overlap_of
 
 MARGIN_M = 0.01
@@ -27,19 +28,48 @@ AHEAD_S = 0.04  # two ticks
 NOBODY = -1
 
 
+class CarsSeen(NamedTuple):
+    """Cars of all regions, and what one region sees of them; all but `order` by vehicle index.
+
+    Attributes:
+        order: (n,) their indices, ascending.
+        x, y, yaw: Of their rear axles.
+        front: From there to the front bumper [m].
+        size: Length and width [m].
+        seen: Whether drivers of this region may have to look at the car; changes.
+    """
+
+    order: Ints
+    x: Floats
+    y: Floats
+    yaw: Floats
+    front: Floats
+    size: Floats
+    seen: Bools
+
+
 class Ownership:
     """Who owns the cars of a city, as one of its regions sees it.
 
+    Args:
+        cut: The cut.
+        number: Of this region.
+        capacity: Of vehicle indices.
+        sight_m: How far beyond the region its drivers look; None: everywhere.
+
     Attributes:
         number: Of this region.
+        sight: (rows, columns) which cells of the cut that is.
         owner: (capacity,) region that simulates each car now; -1: there is no such car.
         next: (capacity,) region that will after the next exchange.
         moved: How many cars have come or gone here.
         missed: Pairs of cars of two regions that were seen to overlap; the leeway was too small.
     """
 
-    def __init__(self, cut: Cut, number: int, capacity: int) -> None:
+    def __init__(self, cut: Cut, number: int, capacity: int, sight_m: float | None) -> None:
         self.cut, self.number = cut, number
+        everywhere = np.ones(cut.cells.shape, np.bool_)
+        self.sight: Bools = everywhere if sight_m is None else cut.within(number, sight_m)
         self.owner: Ints = np.full(capacity, NOBODY, np.int64)
         self.next: Ints = np.full(capacity, NOBODY, np.int64)
         self.moved = 0
@@ -55,45 +85,70 @@ class Ownership:
         """Forget a car."""
         self.owner[index] = self.next[index] = NOBODY
 
-    def decide(self, order: Ints, places: Floats, sizes: Floats, fastest_mps: float) -> None:
-        """Decide who owns the cars next.
+    def decide(self, cars: CarsSeen, fastest_mps: float) -> None:
+        """Decide who owns the cars next, and which of them are within sight of this region.
 
         Args:
-            order: (n,) indices of all cars, ascending.
-            places: (n, 3) x, y, yaw of the middles of their outlines.
-            sizes: (n, 2) half lengths and half widths of these.
+            cars: All cars of the city, by ascending vehicle index; `seen` is written.
             fastest_mps: Speed of the fastest of them.
 
         Raises:
             RunError: when one is so fast that it may reach another region's cars unseen.
         """
+        count = len(cars.order)
         leeway = MARGIN_M + AHEAD_S * MAX_GAIN * fastest_mps
-        widest = float(np.hypot(sizes[:, 0], sizes[:, 1]).max(initial=0.0))
+        places, sizes = np.empty((count, 3)), np.empty((count, 2))
+        regions: Ints = np.empty(count, np.int64)
+        near: Bools = np.empty(count, np.bool_)
+        frame, cut = self.cut.frame, self.cut
+        widest = survey(frame, cut.cells, cut.near, self.sight, cars, places, sizes, regions, near)
         if 2.0 * (leeway + widest) > BAND_M:
             msg = f"regions: a car drives {fastest_mps:.1f} m/s, and may cross a cut unseen"
             raise RunError(msg)
-        regions: Ints = np.empty(len(order), np.int64)
-        near: Bools = np.empty(len(order), np.bool_)
-        look_up(self.cut.frame, self.cut.cells, self.cut.near, places, regions, near)
         if near.any():
-            owner = self.owner[order]
-            head: Ints = np.zeros(1 << max(6, (2 * len(order) - 1).bit_length()), np.int64)
-            room = np.zeros((3, len(order)), np.int64)
-            cell = 2.0 * (widest + leeway)
-            self.missed += group(regions, owner, near, places, sizes, leeway, cell, head, room)
-        self.next[order] = regions
+            head: Ints = np.zeros(1 << max(6, (2 * count - 1).bit_length()), np.int64)
+            room, cell = np.zeros((3, count), np.int64), 2.0 * (widest + leeway)
+            self.missed += group(
+                regions, self.owner[cars.order], near, places, sizes, leeway, cell, head, room
+            )
+        self.next[cars.order] = regions
 
 
 @array_kernel
-def look_up(
-    frame: Floats, cells: Ints, near_cut: Bools, places: Floats, regions: Ints, near: Bools
-) -> None:
-    """Write the region of each place (n, 3), and whether another one is near."""
-    rows, columns = cells.shape
-    for i in range(places.shape[0]):
-        row = int(min(max((places[i, 1] - frame[1]) / frame[2], 0.0), rows - 1.0))
-        column = int(min(max((places[i, 0] - frame[0]) / frame[2], 0.0), columns - 1.0))
+def survey(
+    frame: Floats, cells: Regions, near_cut: Bools, sight: Bools, cars: CarsSeen, places: Floats,
+    sizes: Floats, regions: Ints, near: Bools,
+) -> float:  # fmt: skip
+    """Write where the cars' outlines are, and what the cut says of these places.
+
+    Args:
+        frame: Of the cut, as are `cells` and `near_cut`.
+        cells: See `frame`.
+        near_cut: See `frame`.
+        sight: (rows, columns) what is within sight of this region.
+        cars: The cars (n,); `seen` is written where one is within sight.
+        places: (n, 3) gets x, y, yaw of the middles of their outlines.
+        sizes: (n, 2) gets half lengths and half widths of these.
+        regions: (n,) gets the regions of the places.
+        near: (n,) gets whether another region is near.
+
+    Returns:
+        Half the diagonal of the largest outline [m].
+    """
+    rows, columns, widest = cells.shape[0], cells.shape[1], 0.0
+    for i in range(cars.order.shape[0]):
+        car = cars.order[i]
+        length, width, yaw = 0.5 * cars.size[car, 0], 0.5 * cars.size[car, 1], cars.yaw[car]
+        ahead = cars.front[car] - length
+        x, y = cars.x[car] + ahead * math.cos(yaw), cars.y[car] + ahead * math.sin(yaw)
+        places[i, 0], places[i, 1], places[i, 2] = x, y, yaw
+        sizes[i, 0], sizes[i, 1] = length, width
+        widest = max(widest, math.sqrt(length * length + width * width))
+        row = int(min(max((y - frame[1]) / frame[2], 0.0), rows - 1.0))
+        column = int(min(max((x - frame[0]) / frame[2], 0.0), columns - 1.0))
         regions[i], near[i] = cells[row, column], near_cut[row, column]
+        cars.seen[car] = sight[row, column]
+    return widest
 
 
 @kernel_function

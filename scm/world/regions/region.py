@@ -10,11 +10,9 @@ message: they say what is known of a car here, so each region sends all of them 
 """
 
 from collections.abc import Sequence
-from dataclasses import astuple
 
 import numpy as np
 
-from scm.arrays import Bools, Floats, Ints
 from scm.v2x.exchange import Answer, Incoming, Outgoing, PersistedState
 from scm.v2x.messages.denm import DenmTx
 from scm.vehicles.drivers.channel import IDEAL
@@ -23,8 +21,8 @@ from scm.vehicles.drivers.lane_graph import LaneGraph
 from scm.vehicles.drivers.stop_lines import LOOK_AHEAD
 from scm.world.radio import RadioCounts
 from scm.world.regions.cut import Cut
-from scm.world.regions.exchange import MOTION, RegionNews, decode, encode
-from scm.world.regions.ownership import Ownership, look_up
+from scm.world.regions.exchange import MOTION, NO_COUNTS, RegionNews, counts_of, decode, encode
+from scm.world.regions.ownership import CarsSeen, Ownership
 from scm.world.regions.transfer import CarTransfer, hand_out, take_in
 from scm.world.step import advance, report
 from scm.world.world import World
@@ -48,11 +46,11 @@ class Region:
     def __init__(self, world: World, cut: Cut, number: int) -> None:
         self.world = world
         self._cut = cut
-        self.ownership = world.ownership = Ownership(cut, number, world.cars.arrays.capacity)
-        self._sees: Bools | None = None
         # On a lossy channel it matters who is received at all, wherever that is.
-        if world.drivers.channel.numbers[IDEAL] > 0.0:
-            self._sees = cut.within(number, farthest_look_m(world.drivers.lane_graph))
+        ideal = world.drivers.channel.numbers[IDEAL] > 0.0
+        sight_m = farthest_look_m(world.drivers.lane_graph) if ideal else None
+        capacity = world.cars.arrays.capacity
+        self.ownership = world.ownership = Ownership(cut, number, capacity, sight_m)
 
     def advance(self, now_ns: int, inbox: Sequence[Incoming]) -> tuple[list[Outgoing], list[bytes]]:
         """Move the own cars to `now_ns`; return what they send, and a message for each region."""
@@ -66,7 +64,7 @@ class Region:
             indices=own.astype("<i4").tobytes(),
             motion=np.stack([getattr(vehicles, name)[own] for name in MOTION]).tobytes(),
             denms=tuple(world.radio.warnings.due),
-            counts=astuple(world.radio.link.counts),
+            counts=counts_of(world.radio.link.counts),
             waiting=world.radio.in_flight.later_than(now_ns),
         )
         return out, encode(news, self._hand_out(now_ns))
@@ -80,7 +78,7 @@ class Region:
         world, vehicles = self.world, self.world.cars.arrays
         heard = [decode(body, world.tick, vehicles.capacity) for body in messages]
         due: list[DenmTx] = list(world.radio.warnings.due)
-        world.radio.waiting_elsewhere, counts = 0, np.zeros(len(astuple(RadioCounts())), int)
+        world.radio.waiting_elsewhere, counts = 0, np.zeros(len(NO_COUNTS), int)
         for news, _ in heard:
             indices = np.frombuffer(news.indices, "<i4")
             motion = np.frombuffer(news.motion).reshape(len(MOTION), -1)
@@ -125,27 +123,15 @@ class Region:
 
     def _decide(self) -> None:
         """Decide who owns which car next, and which of them drivers here have to look at."""
-        vehicles = self.world.cars.arrays
+        vehicles, drivers = self.world.cars.arrays, self.world.drivers
         order = np.flatnonzero(vehicles.hosted)
         if not len(order):
             return
-        places, sizes = self._outlines(order)
-        fastest = float(np.abs(vehicles.speed[order]).max())
-        self.ownership.decide(order, places, sizes, fastest)
-        if self._sees is not None:
-            near = ~vehicles.elsewhere
-            regions: Ints = np.empty(len(order), np.int64)
-            seen: Bools = np.empty(len(order), np.bool_)
-            look_up(self._cut.frame, self._cut.cells, self._sees, places, regions, seen)
-            near[order] |= seen
-            self.world.drivers.look_at(near)
-
-    def _outlines(self, order: Ints) -> tuple[Floats, Floats]:
-        """Return the places (n, 3) and half sizes (n, 2) of the cars' outlines."""
-        vehicles, sizes = self.world.cars.arrays, 0.5 * self.world.drivers.sizes[order]
-        ahead, yaw = vehicles.front[order] - sizes[:, 0], vehicles.yaw[order]
-        x, y = vehicles.x[order] + ahead * np.cos(yaw), vehicles.y[order] + ahead * np.sin(yaw)
-        return np.column_stack((x, y, yaw)), sizes
+        seen = np.ones(vehicles.capacity, np.bool_)
+        place = vehicles.x, vehicles.y, vehicles.yaw, vehicles.front
+        fastest_mps = float(np.nanmax(np.abs(vehicles.speed)))
+        self.ownership.decide(CarsSeen(order, *place, drivers.sizes, seen), fastest_mps)
+        drivers.look_at(seen | ~vehicles.elsewhere)
 
 
 def subject_of(outgoing: Outgoing) -> str:
