@@ -87,15 +87,15 @@ class Stuck:
 
     def touched(self, index: int, now_ns: int) -> tuple[tuple[int, int], ...]:
         """Return when and what a car has touched in the last moment: slots, or as in `Touches`."""
-        found = list[tuple[int, int]]()
+        found = set[tuple[int, int]]()
         for t_ns, slots, pairs in self._touches:
             if t_ns < now_ns - TOUCH_MEMORY_NS:
                 continue
             for row in np.flatnonzero(slots == index).tolist():
                 a, b = pairs.T
                 others = np.concatenate((b[a == row], a[b == row])).tolist()
-                found += [(t_ns, int(slots[o]) if o >= 0 else o) for o in others]
-        return tuple(found)
+                found.update((t_ns, int(slots[o]) if o >= 0 else o) for o in others)
+        return tuple(sorted(found))
 
     def remember(self, index: int, touched: Sequence[tuple[int, int]]) -> None:
         """Add what `touched` returned in another process."""

@@ -12,6 +12,7 @@ Terminations are sent until the event would have expired.
 Source: EN 302 637-3 v1.3.1, 6 and 8.
 """
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -120,7 +121,7 @@ class DenmSender:
     @property
     def memory(self) -> tuple[int, tuple[SentDenm, ...]]:
         """The number of its next event, and what it still sends; may be written."""
-        return self._count, tuple(self._sent.values())
+        return self._count, tuple(dataclasses.replace(one) for one in self._sent.values())
 
     @memory.setter
     def memory(self, value: tuple[int, tuple[SentDenm, ...]]) -> None:
