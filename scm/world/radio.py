@@ -8,6 +8,7 @@ roadside units at their junctions. The drivers of hosted cars receive theirs in
 import heapq
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -204,6 +205,10 @@ class DelayQueue:
         """Add a frame that arrives at a time."""
         self._count += 1
         heapq.heappush(self._waiting, (due_ns, self._count, frame))
+
+    def waiting(self) -> list[tuple[int, Message]]:
+        """Return all frames with their arrival times, in order of arrival."""
+        return [(due_ns, frame) for due_ns, _, frame in sorted(self._waiting, key=itemgetter(0, 1))]
 
     def later_than(self, now_ns: int) -> int:
         """Return how many frames arrive after a time."""

@@ -68,12 +68,22 @@ class Ownership:
 
     def __init__(self, cut: Cut, number: int, capacity: int, sight_m: float | None) -> None:
         self.cut, self.number = cut, number
-        everywhere = np.ones(cut.cells.shape, np.bool_)
-        self.sight: Bools = everywhere if sight_m is None else cut.within(number, sight_m)
+        self._sight_m = sight_m
+        self.sight: Bools = self._in_sight()
         self.owner: Ints = np.full(capacity, NOBODY, np.int64)
         self.next: Ints = np.full(capacity, NOBODY, np.int64)
         self.moved = 0
         self.missed = 0
+
+    def become(self, number: int) -> None:
+        """Be another region from now on."""
+        self.number = number
+        self.sight = self._in_sight()
+
+    def _in_sight(self) -> Bools:
+        if self._sight_m is None:
+            return np.ones(self.cut.cells.shape, np.bool_)
+        return self.cut.within(self.number, self._sight_m)
 
     def enter(self, index: int, pose: Pose2) -> bool:
         """Note a new car; return whether it is this region's."""

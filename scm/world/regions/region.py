@@ -91,7 +91,7 @@ class Region:
         if world.radio.warnings.due or any(news.denms for news, _ in heard):
             world.radio.warnings.due = sorted(due, key=lambda frame: frame.station)
         self._take_in([transfer for _, transfers in heard for transfer in transfers])
-        self._decide()
+        self.look()
         return report(world, now_ns)
 
     def speaks_of(self, outgoing: Outgoing) -> bool:
@@ -121,7 +121,7 @@ class Region:
             self.ownership.moved += 1
         self.ownership.owner[:] = self.ownership.next
 
-    def _decide(self) -> None:
+    def look(self) -> None:
         """Decide who owns which car next, and which of them drivers here have to look at."""
         vehicles, drivers = self.world.cars.arrays, self.world.drivers
         order = np.flatnonzero(vehicles.hosted)
