@@ -96,7 +96,7 @@ class WarningMemory(NamedTuple):
         hit_ns, braked_ns: When the car warned of a hit, and of its braking.
         since_ns: Since when it stands where it should not.
         stands: The event of that, and when it was renewed.
-        count: Of its events so far.
+        triggered: How many events it has had.
         sent: What it still sends.
     """
 
@@ -104,7 +104,7 @@ class WarningMemory(NamedTuple):
     braked_ns: int | None
     since_ns: int | None
     stands: tuple[ActionId, int] | None
-    count: int
+    triggered: int
     sent: tuple[SentDenm, ...]
 
 
@@ -365,7 +365,7 @@ class CarWarnings:
     @memory.setter
     def memory(self, value: WarningMemory) -> None:
         self._hit_ns, self._braked_ns, self._since_ns, self._stands = value[:4]
-        self._sender.memory = value.count, value.sent
+        self._sender.memory = value.triggered, value.sent
 
     @property
     def is_busy(self) -> bool:

@@ -125,7 +125,7 @@ def units_of(roads: Roads) -> Units:
     names = list(roads.lanes)
     flow = _flow(roads, names)
     first = dict[str, int]()
-    places, lane_of = [], []
+    places, lane_of = list[tuple[float, float]](), list[int]()
     for number, name in enumerate(names):
         first[name] = len(places)
         length = roads.length_of(name)
@@ -143,7 +143,7 @@ def units_of(roads: Roads) -> Units:
     numbers = np.where(alone, of.max(initial=NONE) + pieces, of)
     _, of = np.unique(numbers, return_inverse=True)
     speeds = np.array([roads.definition(name).speed_limit_mps for name in names])
-    weights = np.bincount(of, (flow / speeds)[lanes] * STEP_M)
+    weights = np.bincount(of, (flow / speeds)[lanes] * STEP_M).astype(np.float64)
     borders = dict[tuple[int, int], float]()
     for a, b in links:
         if of[a] != of[b]:

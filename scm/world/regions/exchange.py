@@ -50,7 +50,8 @@ class RegionMessage(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
 
 
 _encode = msgspec.msgpack.Encoder().encode
-_news, _message = (msgspec.msgpack.Decoder(kind) for kind in (RegionNews, RegionMessage))
+_news = msgspec.msgpack.Decoder(RegionNews)
+_message = msgspec.msgpack.Decoder(RegionMessage)
 
 
 def encode(news: RegionNews, transfers: Sequence[Sequence[CarTransfer]]) -> list[bytes]:
@@ -64,7 +65,7 @@ def encode(news: RegionNews, transfers: Sequence[Sequence[CarTransfer]]) -> list
 
 
 def decode(body: bytes, tick: int, capacity: int) -> tuple[RegionNews, tuple[CarTransfer, ...]]:
-    """Return what a region told in a tick.
+    """Return what a region sent in a tick.
 
     Args:
         body: As `encode` made it.
@@ -76,7 +77,7 @@ def decode(body: bytes, tick: int, capacity: int) -> tuple[RegionNews, tuple[Car
     """
     try:
         message = _message.decode(body)
-        news: RegionNews = _news.decode(message.news)
+        news = _news.decode(message.news)
     except msgspec.MsgspecError as cause:
         raise MessageError(f"message of a region: {cause}") from cause
     where = f"message of region {news.region}"

@@ -242,4 +242,4 @@ def bucket_of(places: Floats, i: int, cell: float, k: int, size: int) -> int:
     """Return the bucket of one of the nine cells around a car; 4: its own."""
     column = math.floor(places[i, 0] / cell) + k % 3 - 1
     row = math.floor(places[i, 1] / cell) + k // 3 - 1
-    return (column * 73856093 ^ row * 19349663) & (size - 1)
+    return int((column * 73856093 ^ row * 19349663) & (size - 1))

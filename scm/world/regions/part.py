@@ -55,8 +55,8 @@ class RegionPart(WorldPart):
         """Advance to `now_ns` together with the other regions, each in its process."""
         first = [one for one in self.begin(now_ns) if self.region.speaks_of(one)]
         moved, messages = self.region.advance(now_ns, inbox)
-        heard = self._exchange(messages)
-        return [*first, *moved, *self.region.report(now_ns, heard)]
+        received = self._exchange(messages)
+        return [*first, *moved, *self.region.report(now_ns, received)]
 
 
 class RegionsPart(BasePart):
@@ -108,8 +108,8 @@ class RegionsPart(BasePart):
             out += moved
             sent.append(messages)
         for number, region in enumerate(self.regions):
-            heard = [messages[number] for n, messages in enumerate(sent) if n != number]
-            out += region.report(now_ns, heard)
+            received = [messages[number] for n, messages in enumerate(sent) if n != number]
+            out += region.report(now_ns, received)
         return with_one_snapshot(self.regions[0].world, out)
 
 

@@ -24,7 +24,7 @@ class Pipes:
         Raises:
             RunError: when another region has ended.
         """
-        heard = []
+        received = []
         for meeting in range(len(messages)):
             other = (meeting - self._number) % len(messages)
             if other == self._number:
@@ -32,14 +32,14 @@ class Pipes:
             try:
                 if self._number < other:
                     self._ends[other].send_bytes(messages[other])
-                heard.append(self._ends[other].recv_bytes())
+                received.append(self._ends[other].recv_bytes())
                 if self._number > other:
                     self._ends[other].send_bytes(messages[other])
             except (EOFError, OSError) as cause:
                 raise RunError(
                     f"region {other} has ended: {cause or 'its pipe is closed'}"
                 ) from cause
-        return heard
+        return received
 
 
 def pipes(regions: int) -> list[Pipes]:

@@ -76,10 +76,10 @@ class Region:
             MessageError: when a message is not of this tick, or wrong.
         """
         world, vehicles = self.world, self.world.cars.arrays
-        heard = [decode(body, world.tick, vehicles.capacity) for body in messages]
+        received = [decode(body, world.tick, vehicles.capacity) for body in messages]
         due: list[DenmTx] = list(world.radio.warnings.due)
         world.radio.waiting_elsewhere, counts = 0, np.zeros(len(NO_COUNTS), int)
-        for news, _ in heard:
+        for news, _ in received:
             indices = np.frombuffer(news.indices, "<i4")
             motion = np.frombuffer(news.motion).reshape(len(MOTION), -1)
             for name, values in zip(MOTION, motion, strict=True):
@@ -88,9 +88,9 @@ class Region:
             world.radio.waiting_elsewhere += news.waiting
             counts += news.counts
         world.radio.counts_elsewhere = RadioCounts(*counts.tolist())
-        if world.radio.warnings.due or any(news.denms for news, _ in heard):
+        if world.radio.warnings.due or any(news.denms for news, _ in received):
             world.radio.warnings.due = sorted(due, key=lambda frame: frame.station)
-        self._take_in([transfer for _, transfers in heard for transfer in transfers])
+        self._take_in([transfer for _, transfers in received for transfer in transfers])
         self.look()
         return report(world, now_ns)
 

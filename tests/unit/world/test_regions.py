@@ -52,7 +52,9 @@ class Recorder(BasePart):
         self.name, self.role, self.period_ns = part.name, part.role, part.period_ns
         self.services = part.services
         self.sent, self.cars = [], []
-        part.attach(lambda kind, where: kind is not LidarScan or where.get("vehicle", "n1") in SCANNED)
+        part.attach(
+            lambda kind, where: kind is not LidarScan or where.get("vehicle", "n1") in SCANNED
+        )
 
     @property
     def subscriptions(self):
@@ -67,9 +69,9 @@ class Recorder(BasePart):
 
 
 def words(outgoing):
-    """Return all that an outgoing item says, with every bit of its floats."""
-    said = outgoing.reply if isinstance(outgoing, Answer) else outgoing
-    return type(said).__name__, msgspec.msgpack.encode(said)
+    """Return the content of an outgoing item, with every bit of its floats."""
+    content = outgoing.reply if isinstance(outgoing, Answer) else outgoing
+    return type(content).__name__, msgspec.msgpack.encode(content)
 
 
 def cars_of(worlds, now_ns):
