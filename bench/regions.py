@@ -3,8 +3,8 @@
 Run with `python -m bench regions`, or `python -m bench regions [cars] [seconds]`. Cars circulate on
 a grid of streets with signals; each region is a process with its own copy of the traffic part. The
 digests of all cars' whole states are compared at each second. Times are those of the world's steps
-alone, means over the ticks after the first second; those of regions include their waiting. The model
-of more nodes takes processor times, which other programs on the machine change less.
+alone, means over the ticks after the first second; those of regions include their waiting. The
+model of more nodes takes processor times, which other programs on the machine change less.
 """
 
 import multiprocessing
@@ -180,12 +180,15 @@ def model(own_s: float, all_s: float, handling_s: float, bytes_a_car: float) -> 
 
 def report(name: str, costs: Sequence[Cost]) -> None:
     for number, cost in enumerate(costs):
-        print(
-            f"{name:<10} region {number}: {cost.tick_s * 1e3:6.2f} ms a tick, of it waiting "
-            f"{cost.waits_s * 1e3:5.2f}, {cost.used_s * 1e3:.2f} ms of a processor; {cost.owned:.0f} cars, {cost.sent_bytes / 1e3:.1f} kB to "
-            f"each other region, {cost.moved} came or went, {cost.missed} missed",
-            flush=True,
+        times = (
+            f"{cost.tick_s * 1e3:6.2f} ms a tick, of it waiting {cost.waits_s * 1e3:5.2f}, "
+            f"{cost.used_s * 1e3:.2f} ms of processors"
         )
+        cars = (
+            f"{cost.owned:.0f} cars, {cost.moved} came or went, {cost.missed} missed, "
+            f"{cost.sent_bytes / 1e3:.1f} kB to each other region"
+        )
+        print(f"{name:<10} region {number}: {times}; {cars}", flush=True)
 
 
 def main(cars: int = CARS, span_s: float = SPAN_S) -> None:

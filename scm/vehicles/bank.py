@@ -153,7 +153,7 @@ class Bank:
         if index < len(self._life):
             self._life[index] += 1
 
-    def take_in(self, index: int, row: int, pending: Iterable[tuple[int, bytes]]) -> None:
+    def accept(self, index: int, row: int, pending: Iterable[tuple[int, bytes]]) -> None:
         """Go on with the device of a car that is in a row of its truth from now on."""
         if not self.is_fitted(index):
             return

@@ -126,7 +126,7 @@ class Garage:
         self.scrap(name, row, index)
         self.note_elsewhere(name, index)
 
-    def take_in(self, name: str, index: int) -> int:
+    def accept(self, name: str, index: int) -> int:
         """Return a row for a car that another process simulated; its memory is to be written."""
         self.scrap(name, ELSEWHERE, index)
         row, at = self.prepare(name).take_row(), int(np.searchsorted(self.indices(name), index))

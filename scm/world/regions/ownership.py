@@ -55,21 +55,21 @@ class Ownership:
         cut: The cut.
         number: Of this region.
         capacity: Of vehicle indices.
-        sight_m: How far beyond the region its drivers look; None: everywhere.
+        look_m: How far beyond the region its drivers look; None: everywhere.
 
     Attributes:
         number: Of this region.
-        sight: (rows, columns) which cells of the cut that is.
+        visible: (rows, columns) which cells of the cut that is.
         owner: (capacity,) region that simulates each car now; -1: there is no such car.
         next: (capacity,) region that will after the next exchange.
         moved: How many cars have come or gone here.
         missed: Pairs of cars of two regions that were seen to overlap; the leeway was too small.
     """
 
-    def __init__(self, cut: Cut, number: int, capacity: int, sight_m: float | None) -> None:
+    def __init__(self, cut: Cut, number: int, capacity: int, look_m: float | None) -> None:
         self.cut, self.number = cut, number
-        self._sight_m = sight_m
-        self.sight: Bools = self._in_sight()
+        self._look_m = look_m
+        self.visible: Bools = self._visible_cells()
         self.owner: Ints = np.full(capacity, NOBODY, np.int64)
         self.next: Ints = np.full(capacity, NOBODY, np.int64)
         self.moved = 0
@@ -78,12 +78,12 @@ class Ownership:
     def become(self, number: int) -> None:
         """Be another region from now on."""
         self.number = number
-        self.sight = self._in_sight()
+        self.visible = self._visible_cells()
 
-    def _in_sight(self) -> Bools:
-        if self._sight_m is None:
+    def _visible_cells(self) -> Bools:
+        if self._look_m is None:
             return np.ones(self.cut.cells.shape, np.bool_)
-        return self.cut.within(self.number, self._sight_m)
+        return self.cut.within(self.number, self._look_m)
 
     def enter(self, index: int, pose: Pose2) -> bool:
         """Note a new car; return whether it is this region's."""
@@ -96,7 +96,7 @@ class Ownership:
         self.owner[index] = self.next[index] = NOBODY
 
     def decide(self, cars: CarsSeen, fastest_mps: float) -> None:
-        """Decide who owns the cars next, and which of them are within sight of this region.
+        """Decide who owns the cars next, and which of them its drivers may look at.
 
         Args:
             cars: All cars of the city, by ascending vehicle index; `seen` is written.
@@ -111,7 +111,9 @@ class Ownership:
         regions: Ints = np.empty(count, np.int64)
         near: Bools = np.empty(count, np.bool_)
         frame, cut = self.cut.frame, self.cut
-        widest = survey(frame, cut.cells, cut.near, self.sight, cars, places, sizes, regions, near)
+        widest = survey(
+            frame, cut.cells, cut.near, self.visible, cars, places, sizes, regions, near
+        )
         if 2.0 * (leeway + widest) > BAND_M:
             msg = f"regions: a car drives {fastest_mps:.1f} m/s, and may cross a cut unseen"
             raise RunError(msg)
@@ -126,7 +128,7 @@ class Ownership:
 
 @array_kernel
 def survey(
-    frame: Floats, cells: Regions, near_cut: Bools, sight: Bools, cars: CarsSeen, places: Floats,
+    frame: Floats, cells: Regions, near_cut: Bools, visible: Bools, cars: CarsSeen, places: Floats,
     sizes: Floats, regions: Ints, near: Bools,
 ) -> float:  # fmt: skip
     """Write where the cars' outlines are, and what the cut says of these places.
@@ -135,8 +137,8 @@ def survey(
         frame: Of the cut, as are `cells` and `near_cut`.
         cells: See `frame`.
         near_cut: See `frame`.
-        sight: (rows, columns) what is within sight of this region.
-        cars: The cars (n,); `seen` is written where one is within sight.
+        visible: (rows, columns) what drivers of this region may look at.
+        cars: The cars (n,); `seen` is written.
         places: (n, 3) gets x, y, yaw of the middles of their outlines.
         sizes: (n, 2) gets half lengths and half widths of these.
         regions: (n,) gets the regions of the places.
@@ -157,7 +159,7 @@ def survey(
         row = int(min(max((y - frame[1]) / frame[2], 0.0), rows - 1.0))
         column = int(min(max((x - frame[0]) / frame[2], 0.0), columns - 1.0))
         regions[i], near[i] = cells[row, column], near_cut[row, column]
-        cars.seen[car] = sight[row, column]
+        cars.seen[car] = visible[row, column]
     return widest
 
 

@@ -23,7 +23,7 @@ from scm.world.radio import RadioCounts
 from scm.world.regions.cut import Cut
 from scm.world.regions.exchange import MOTION, NO_COUNTS, RegionNews, counts_of, decode, encode
 from scm.world.regions.ownership import CarsSeen, Ownership
-from scm.world.regions.transfer import CarTransfer, hand_out, take_in
+from scm.world.regions.transfer import CarTransfer, accept, hand_out
 from scm.world.step import advance, report
 from scm.world.world import World
 
@@ -48,9 +48,9 @@ class Region:
         self._cut = cut
         # On a lossy channel it matters who is received at all, wherever that is.
         ideal = world.drivers.channel.numbers[IDEAL] > 0.0
-        sight_m = farthest_look_m(world.drivers.lane_graph) if ideal else None
+        look_m = farthest_look_m(world.drivers.lane_graph) if ideal else None
         capacity = world.cars.arrays.capacity
-        self.ownership = world.ownership = Ownership(cut, number, capacity, sight_m)
+        self.ownership = world.ownership = Ownership(cut, number, capacity, look_m)
 
     def advance(self, now_ns: int, inbox: Sequence[Incoming]) -> tuple[list[Outgoing], list[bytes]]:
         """Move the own cars to `now_ns`; return what they send, and a message for each region."""
@@ -90,7 +90,7 @@ class Region:
         world.radio.counts_elsewhere = RadioCounts(*counts.tolist())
         if world.radio.warnings.due or any(news.denms for news, _ in received):
             world.radio.warnings.due = sorted(due, key=lambda frame: frame.station)
-        self._take_in([transfer for _, transfers in received for transfer in transfers])
+        self._accept([transfer for _, transfers in received for transfer in transfers])
         self.look()
         return report(world, now_ns)
 
@@ -115,9 +115,9 @@ class Region:
             ownership.moved += 1
         return leaving
 
-    def _take_in(self, transfers: Sequence[CarTransfer]) -> None:
+    def _accept(self, transfers: Sequence[CarTransfer]) -> None:
         for transfer in sorted(transfers, key=lambda one: one.index):
-            take_in(self.world, transfer)
+            accept(self.world, transfer)
             self.ownership.moved += 1
         self.ownership.owner[:] = self.ownership.next
 

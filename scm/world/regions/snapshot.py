@@ -17,7 +17,7 @@ from scm.v2x.message import decode, encode
 from scm.world.radio import RadioCounts
 from scm.world.regions.exchange import counts_of
 from scm.world.regions.region import Region
-from scm.world.regions.transfer import CarTransfer, read, take_in
+from scm.world.regions.transfer import CarTransfer, accept, read
 from scm.world.transmission import RECEIVED
 
 _KINDS = {kind.__name__: kind for kind in RECEIVED.values()}
@@ -96,7 +96,7 @@ def take_over(standby: Region, body: bytes) -> None:
     _check_cars(standby, state.region, state.cars)
     standby.ownership.become(state.region)
     for car in state.cars:
-        take_in(world, car)
+        accept(world, car)
     world.radio.link.counts = RadioCounts(*state.counts)
     world.radio.published = RadioCounts(*state.published)
     for frame in state.late:

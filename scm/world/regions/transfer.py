@@ -123,7 +123,7 @@ def hand_out(world: World, car: HostedCar, now_ns: int) -> CarTransfer:
     return transfer
 
 
-def take_in(world: World, transfer: CarTransfer) -> None:
+def accept(world: World, transfer: CarTransfer) -> None:
     """Put a car on the floor here that another region has handed out.
 
     Raises:
@@ -135,19 +135,19 @@ def take_in(world: World, transfer: CarTransfer) -> None:
         raise MessageError(f"transfer of vehicle index {index}: expected a car that is elsewhere")
     name = vehicles.names[index]
     car = world.cars.hosted[name]
-    car.row = world.cars.garage.take_in(car.car_file, index)
+    car.row = world.cars.garage.accept(car.car_file, index)
     vehicles.elsewhere[index] = False
     _write(memory_of(world, car), transfer.memory, name)
     world.drivers.follow(index, np.frombuffer(transfer.route, np.int64))
     world.trips.resume(index, transfer.trip)
     for kind, bank in world.sensors.banks.items():
-        bank.take_in(index, car.row, [(t, v) for k, t, v in transfer.pending if k == kind])
+        bank.accept(index, car.row, [(t, v) for k, t, v in transfer.pending if k == kind])
     world.impulses.accelerations.carry(car.fleet, car.row)
     car.slow_news.memory = transfer.path
-    _take_in_events(world, name, transfer)
+    _accept_events(world, name, transfer)
 
 
-def _take_in_events(world: World, name: str, transfer: CarTransfer) -> None:
+def _accept_events(world: World, name: str, transfer: CarTransfer) -> None:
     index, warnings, impulses = transfer.index, world.radio.warnings, world.impulses
     world.alerts.stuck.remember(index, transfer.touched)
     if transfer.against is not None:
