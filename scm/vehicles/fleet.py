@@ -154,12 +154,12 @@ class Fleet:
         Raises:
             RunError: when all rows are in use.
         """
-        row = self.take_row()
+        row = self.claim_row()
         self.parameters[row] = self._nominal
         self.place(row, pose, speed)
         return row
 
-    def take_row(self) -> int:
+    def claim_row(self) -> int:
         """Return a free row, for a car whose `memory` is to be written.
 
         Raises:

@@ -129,7 +129,7 @@ class Garage:
     def accept(self, name: str, index: int) -> int:
         """Return a row for a car that another process simulated; its memory is to be written."""
         self.scrap(name, ELSEWHERE, index)
-        row, at = self.prepare(name).take_row(), int(np.searchsorted(self.indices(name), index))
+        row, at = self.prepare(name).claim_row(), int(np.searchsorted(self.indices(name), index))
         self._rows[name] = np.insert(self.rows(name), at, row)
         self._indices[name] = np.insert(self.indices(name), at, index)
         return row

@@ -88,21 +88,21 @@ class Stuck:
     def touched(self, index: int, now_ns: int) -> tuple[tuple[int, int], ...]:
         """Return when and what a car has touched in the last moment: slots, or as in `Touches`."""
         found = set[tuple[int, int]]()
-        for t_ns, slots, pairs in self._touches:
+        for t_ns, indices, pairs in self._touches:
             if t_ns < now_ns - TOUCH_MEMORY_NS:
                 continue
-            for row in np.flatnonzero(slots == index).tolist():
+            for row in np.flatnonzero(indices == index).tolist():
                 a, b = pairs.T
                 others = np.concatenate((b[a == row], a[b == row])).tolist()
-                found.update((t_ns, int(slots[o]) if o >= 0 else o) for o in others)
+                found.update((t_ns, int(indices[o]) if o >= 0 else o) for o in others)
         return tuple(sorted(found))
 
     def remember(self, index: int, touched: Sequence[tuple[int, int]]) -> None:
         """Add what `touched` returned in another process."""
         for t_ns, other in touched:
-            slots = np.array([index, other] if other >= 0 else [index])
+            indices = np.array([index, other] if other >= 0 else [index])
             pairs = np.array([[0, 1 if other >= 0 else other]])
-            self._touches.append((t_ns, slots, pairs))
+            self._touches.append((t_ns, indices, pairs))
         self._touches = deque(sorted(self._touches, key=operator.itemgetter(0)))
 
     def forget(self, index: int) -> None:
