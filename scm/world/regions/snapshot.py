@@ -79,7 +79,7 @@ def snapshot(region: Region, now_ns: int) -> bytes:
     )
 
 
-def take_over(standby: Region, body: bytes) -> None:
+def resume_region(standby: Region, body: bytes) -> None:
     """Let a standby go on as the region that a snapshot is of, from the tick that it is of.
 
     Raises:

@@ -9,7 +9,7 @@ from scm.world.hosted import ELSEWHERE
 from scm.world.part import WorldPart
 from scm.world.regions.cut import Cut, cut_map
 from scm.world.regions.region import Region
-from scm.world.regions.snapshot import snapshot, take_over
+from scm.world.regions.snapshot import snapshot, resume_region
 from scm.world.regions.transfer import digest
 
 MAP, CARS, SEED, TICK = load_map("grid:4x3:3"), 48, 2, 20 * NS_PER_MS
@@ -64,10 +64,10 @@ def test_standby_goes_on_from_a_snapshot_bit_by_bit(regions):
     first, second, standby, body, stored = regions
     assert standby.digests() == {}
     with pytest.raises(MessageError, match="snapshot of a region"):
-        take_over(standby.region, body[:-1])
+        resume_region(standby.region, body[:-1])
     with pytest.raises(MessageError, match=f"expected tick {LOST}, got {TAKEN}"):
-        take_over(second.region, body)
-    take_over(standby.region, body)
+        resume_region(second.region, body)
+    resume_region(standby.region, body)
     for message in stored:  # the ticks since the snapshot, for the second time
         standby.advance()
         standby.report([message])
