@@ -9,7 +9,7 @@ from scm.world.hosted import ELSEWHERE
 from scm.world.part import WorldPart
 from scm.world.regions.cut import Cut, cut_map
 from scm.world.regions.region import Region
-from scm.world.regions.snapshot import snapshot, resume_region
+from scm.world.regions.snapshot import resume_region, snapshot
 from scm.world.regions.transfer import digest
 
 MAP, CARS, SEED, TICK = load_map("grid:4x3:3"), 48, 2, 20 * NS_PER_MS
