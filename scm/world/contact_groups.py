@@ -105,6 +105,16 @@ class ContactGroups:
         self._links, self._links_until = self._links[others], self._links_until[others]
         self._leave([key])
 
+    def forget(self) -> None:
+        """Take all bodies out of their spaces, with all that these remember of contacts."""
+        if self.is_idle:
+            return
+        self._leave(list(self._homes))
+        self._groups = []
+        self._until[:] = 0
+        self._links = self._links_until = np.empty(0, np.int64)
+        self._members = self._leads = self._grouped = np.empty(0, np.int64)
+
     @property
     def is_idle(self) -> bool:
         """Whether nobody has touched anything lately."""

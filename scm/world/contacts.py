@@ -83,6 +83,13 @@ class Contacts:
         """Remove a car's body."""
         self._groups.remove(index + len(self.boxes))
 
+    def forget(self) -> None:
+        """Forget who touched whom: what follows depends on where cars are and how they move alone.
+
+        Without that a car could not go on in another process as it would have here.
+        """
+        self._groups.forget()
+
     def is_free(self, hull: Hull, pose: Pose2) -> bool:
         """Return whether a car with its centre of gravity at a pose touches no wall and no box."""
         motion = np.vstack(([*pose, 0.0, 0.0, 0.0], self.boxes.motion))

@@ -67,6 +67,7 @@ def move(world: World, now_ns: int) -> list[Outgoing]:
     steps = world.pace.steps(now_ns)
     step_s = seconds(CONTACT_STEP_NS)
     world.impulses.accelerations.begin(steps * step_s)
+    world.contacts.forget()
     is_subscribed = world.subscribers.any(Contact)
     out: list[Outgoing] = []
     for left in range(steps, 0, -1):
