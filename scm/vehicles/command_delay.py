@@ -46,21 +46,13 @@ class CommandHistory:
         self._before[row] = throttle, math.nan if steering is None else steering
 
     def memory(self, row: int) -> tuple[AnyArray, ...]:
-        """Return views of one car's history."""
+        """Return views of one car's history: knots, number of the newest, commands before."""
         return self._knots[row], self._newest[row : row + 1], self._before[row]
 
     def copy_row(self, source: int, row: int | slice) -> None:
         """Copy one car's history to another row, or to several."""
         for array in (self._knots, self._newest, self._before):
             array[row] = array[source]
-
-    def past_of(self, row: int) -> tuple[Floats, int, Floats]:
-        """Return a car's knots (n, 3), which is the newest, and the commands before (2,)."""
-        return self._knots[row], int(self._newest[row]), self._before[row]
-
-    def put_past(self, row: int, knots: Floats, newest: int, before: Floats) -> None:
-        """Replace a car's history by what `past_of` returned."""
-        self._knots[row], self._newest[row], self._before[row] = knots, newest, before
 
     def apply(
         self, block: Floats, numbers: Floats, alive: Bools, first: int, last: int, span: float

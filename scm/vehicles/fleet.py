@@ -175,7 +175,7 @@ class Fleet:
         """Return views of all that is stored of a row: what is written there makes the same car."""
         struck = (self.contact_accel_x, self.contact_accel_y, self.contact_yaw_accel)
         own = tuple(values[row : row + 1] for values in (self._status, *struck))
-        past = () if self._history is None else self._history.memory(row)
+        past = () if self.history is None else self.history.memory(row)
         return (self._block[:, row], self._numbers[:, row], *own, *past)
 
     def remove(self, row: int) -> None:

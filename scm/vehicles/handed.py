@@ -8,8 +8,6 @@ import hashlib
 import math
 from functools import cache
 
-import numpy as np
-
 from scm.errors import RunError
 from scm.geometry import Pose2, wrap_angle
 from scm.v2x.messages.handover_request import CommandPast, HandedCar, NamedValues
@@ -50,10 +48,10 @@ def past_of(fleet: Fleet, row: int) -> CommandPast | None:
     """Return a car's past commands; None: its actuators answer at once."""
     if fleet.history is None:
         return None
-    knots, newest, before = fleet.history.past_of(row)
+    knots, newest, before = fleet.history.memory(row)
     first, second = (None if math.isnan(value) else value for value in before.tolist())
     rows = tuple((t, a, b) for t, a, b in knots.tolist())
-    return CommandPast(knots=rows, newest=newest, before=(first, second))
+    return CommandPast(knots=rows, newest=int(newest[0]), before=(first, second))
 
 
 def put_state(fleet: Fleet, row: int, state: HandedCar) -> None:
@@ -102,8 +100,8 @@ def _put_parameters(fleet: Fleet, row: int, parameters: tuple[NamedValues, ...])
 
 
 def _put_past(history: CommandHistory, row: int, past: CommandPast) -> None:
-    knots = history.past_of(row)[0]
+    knots, newest, before = history.memory(row)
     if len(past.knots) != len(knots) or not 0 <= past.newest < 2**60:
         raise RunError(f"past.knots: got {len(past.knots)}, expected {len(knots)}")
-    before_here = [math.nan if value is None else value for value in past.before]
-    history.put_past(row, np.array(past.knots), past.newest, np.array(before_here))
+    knots[:], newest[:] = past.knots, past.newest
+    before[:] = [math.nan if value is None else value for value in past.before]

@@ -1,8 +1,8 @@
 """One tick of the world, on one page.
 
-    receive -> border -> drivers, guards -> [ dynamics, contacts ] x 4 -> border -> watch -> warn
-                                                                                   advance
-    sensors -> publish -> radio                                                    report
+    advance    receive -> border -> drivers, guards -> [ dynamics, contacts ] x 4 -> border
+               -> watch -> warn
+    report     sensors -> publish -> radio
 
 Between the two halves all cars stand where this tick brings them: there the regions of a city that
 is cut tell each other of their cars (`regions/`).

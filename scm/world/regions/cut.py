@@ -105,6 +105,9 @@ def cut_map(city_map: CityMap, regions: int, *, by: str | None = None) -> Cut:
     if regions > 1 and any(box.mass_kg is not None for box in city_map.boxes):
         msg = f"map {city_map.name}: expected no boxes that cars can push where a city is cut"
         raise MapError(msg)
+    if regions > 1 and city_map.neighbours:
+        msg = f"map {city_map.name}: expected no [[neighbours]] where a city is cut"
+        raise MapError(msg)
     units = units_of(roads_of(city_map))
     if len(units.weights) < regions:
         found = f"{len(units.weights)} places where it can be cut"

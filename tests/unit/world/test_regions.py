@@ -215,3 +215,15 @@ def test_cut_shares_traffic_and_leaves_junctions_whole(by, regions):
 def test_map_that_cannot_be_cut_says_why(regions):
     with pytest.raises(MapError, match="regions"):
         cut_map(load_map("grid:3x3"), regions)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("proving_ground", "boxes that cars can push"),
+        ("examples/cities/half_loop_east.toml", "neighbours"),
+    ],
+)
+def test_a_map_that_regions_do_not_know_whole_is_refused(name, says):
+    with pytest.raises(MapError, match=says):
+        cut_map(load_map(name), 2)
