@@ -23,7 +23,7 @@ from scm.world.handover import reply_to_handover, state_of
 from scm.world.part import WorldPart
 from scm.world.requests import reply_to
 
-HISTORIES = 200
+HISTORIES = 80
 ENDLESS = {"west": endless_road("west", "east"), "east": endless_road("east", "west")}
 
 
