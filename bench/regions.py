@@ -124,8 +124,8 @@ def drive(part: WorldPart, city_map: CityMap, cars: int, span_s: float) -> Timed
 
 
 def late(values: Sequence[float]) -> float:
-    """Return the mean after the first second, in which all that is lazy is made."""
-    return float(np.mean(values[round(1.0 / TICK_S) :]))
+    """Return the mean after the first second, in which all that is lazy is made; 0: no values."""
+    return float(np.mean(values[round(1.0 / TICK_S) :])) if values else 0.0
 
 
 def region_process(
@@ -139,8 +139,8 @@ def region_process(
     part = RegionPart(city_map, cut_map(city_map, regions), number, exchange, room=cars)
     timed, owns = drive(part, city_map, cars, span_s), part.region.ownership
     cost = Cost(
-        late(timed.spent), late(exchange.waits) if exchange.waits else 0.0,
-        late(exchange.sent), float(np.mean(timed.owned)), owns.moved, owns.missed,
+        late(timed.spent), late(timed.used), late(exchange.waits), late(exchange.sent),
+        float(np.mean(timed.owned)), owns.moved, owns.missed,
     )  # fmt: skip
     result.send((cost, timed.digests))
 
