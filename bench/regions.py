@@ -1,15 +1,17 @@
 """A city in regions beside one world: equal cars, the cost of cutting, and more nodes by a model.
 
-Run with `python -m bench regions`, or `python -m bench regions [cars] [seconds]`. Cars circulate on
+    python -m bench regions [--cars 4000] [--seconds 60]
+
+Cars circulate on
 a grid of streets with signals; each region is a process with its own copy of the traffic part. The
 digests of all cars' whole states are compared at each second. Times are those of the world's steps
 alone, means over the ticks after the first second; those of regions include their waiting. The
 model of more nodes takes processor times, which other programs on the machine change less.
 """
 
+import argparse
 import multiprocessing
 import os
-import sys
 import time
 from collections.abc import Sequence
 from multiprocessing.connection import Connection
@@ -191,7 +193,13 @@ def report(name: str, costs: Sequence[Cost]) -> None:
         print(f"{name:<10} region {number}: {times}; {cars}", flush=True)
 
 
-def main(cars: int = CARS, span_s: float = SPAN_S) -> None:
+def main() -> None:
+    """Run the city in one world and in regions, and print what each takes."""
+    parser = argparse.ArgumentParser(prog="python -m bench regions", description=__doc__)
+    parser.add_argument("--cars", type=int, default=CARS)
+    parser.add_argument("--seconds", type=float, default=SPAN_S)
+    given = parser.parse_args()
+    cars, span_s = given.cars, given.seconds
     city_map = grid_for(cars)
     threads = min(2, os.cpu_count() or 1)
     part = WorldPart(city_map, room=cars)
@@ -228,5 +236,4 @@ def main(cars: int = CARS, span_s: float = SPAN_S) -> None:
 
 
 if __name__ == "__main__":
-    words = sys.argv[1:]
-    main(int(words[0]) if words else CARS, float(words[1]) if len(words) > 1 else SPAN_S)
+    main()
