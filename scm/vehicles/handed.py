@@ -58,7 +58,8 @@ def put_state(fleet: Fleet, row: int, state: HandedCar) -> None:
     """Continue a car from the state that it had in another city.
 
     Raises:
-        RunError: when a variable has another number of values here.
+        RunError: when a variable has another number of values here, or a parameter is out of
+            bounds.
     """
     _put_parameters(fleet, row, state.parameters)
     _put_variables(fleet, row, state.variables, Pose2(*state.origin))
@@ -91,12 +92,18 @@ def _put_variables(
 
 def _put_parameters(fleet: Fleet, row: int, parameters: tuple[NamedValues, ...]) -> None:
     """Give a car the numbers of its physics, as far as its effects here have them."""
-    places = {name: column for column, name in enumerate(fleet.parameter_names)}
+    places = {column.name: (at, column.param) for at, column in enumerate(fleet.columns)}
     for one in parameters:
         if len(one.values) != 1:
             raise RunError(f"parameters: {one.name}: got {len(one.values)} values, expected 1")
-        if one.name in places:
-            fleet.parameters[row, places[one.name]] = one.values[0]
+        if one.name not in places:
+            continue
+        at, param = places[one.name]
+        (low, high), value = param.bounds, one.values[0]
+        if not low <= value <= high:
+            msg = f"parameters: {param.key} = {value:g}: expected {low:g} to {high:g} {param.unit}"
+            raise RunError(msg)
+        fleet.parameters[row, at] = value
 
 
 def _put_past(history: CommandHistory, row: int, past: CommandPast) -> None:

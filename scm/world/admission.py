@@ -22,6 +22,8 @@ MAX_GAP_M, MAX_KINK_RAD = 0.05, math.radians(3.0)  # between the lanes on both s
 MAX_AWAY_M = 1.0  # of a car from where its lane begins
 MAX_DECIDED_NS = 60 * NS_PER_S  # since a driver that drives has decided last
 MAX_EPOCH = 2**62
+MAX_NUMBER = 1e9  # of a car's state, in SI units
+MAX_ORIGIN_YAW_RAD = 7.0
 ROOM_M = 0.45  # that must be free behind the border before a car may come
 
 
@@ -94,8 +96,14 @@ def _state(world: World, request: HandoverRequest) -> Refused | None:
 
 def _flaw(state: HandedCar, border: tuple[float, float, float]) -> str:
     """Return what is wrong with a car's state, which comes from outside; empty: nothing."""
-    if not all(map(math.isfinite, _numbers(state))):
-        return "expected finite numbers"
+    if not all(abs(number) <= MAX_NUMBER for number in _numbers(state)):
+        return "its numbers are beyond every physical range"
+    if abs(state.origin[2]) > MAX_ORIGIN_YAW_RAD:
+        return f"origin: got a yaw of {state.origin[2]:g} rad, expected at most one turn"
+    if state.drawn_as < 0.0:
+        return f"drawn_as: got {state.drawn_as:g}, expected at least 0"
+    if state.driver.speed_mps is not None and not state.driver.speed_mps > 0.0:
+        return f"driver.speed_mps: got {state.driver.speed_mps:g}, expected above 0"
     if not 0 <= state.driver.decided_ns <= MAX_DECIDED_NS:
         return f"driver.decided_ns: got {state.driver.decided_ns}, expected at most a minute"
     if not 0 <= state.tag_id <= LAST_TAG_ID:
@@ -104,13 +112,14 @@ def _flaw(state: HandedCar, border: tuple[float, float, float]) -> str:
     if any(len(here.get(name, ())) != 1 for name in ("x_cog", "y_cog", "yaw")):
         return "expected one value of x_cog, y_cog and yaw"
     x, y = Pose2(*state.origin).apply(here["x_cog"][0], here["y_cog"][0])
-    if math.hypot(x - border[0], y - border[1]) > MAX_AWAY_M:
+    if not math.hypot(x - border[0], y - border[1]) <= MAX_AWAY_M:
         return f"({x:.2f}, {y:.2f}) m is not at the border"
     return ""
 
 
 def _numbers(state: HandedCar) -> Iterator[float]:
-    for one in (*state.variables, *state.parameters):
+    """Yield all numbers of a state but parameters, which have bounds of their own."""
+    for one in state.variables:
         yield from one.values
     driver = state.driver
     yield from (*state.origin, driver.wheels_rad, driver.commanded_rad, driver.setpoint_mps)

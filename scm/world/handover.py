@@ -221,7 +221,7 @@ def _enter(
         s, _ = world.roads.lane(request.lane).project(car.pose.x, car.pose.y)
         world.trips.enter(car.index, name, request.lane, s, state.driver, now_ns)
         world.drivers.continue_from(car.index, state.driver, until_ns)
-    except ScmError as cause:
+    except (ScmError, ValueError, ArithmeticError) as cause:  # it comes from outside
         out += world.remove(name)
         return Refused(code="invalid", detail=str(cause))
     border.reserved.pop(request.lane, None)

@@ -408,7 +408,7 @@ def test_transfer_of_a_whole_car_is_taken(east):
         (lambda _: {"variables": ()}, "expected one value of x_cog"),
         (with_speed(0.0, 0.0), "vx_world: got 2 values, expected 1"),
         (with_speed(1e300), "beyond every physical range"),
-        (lambda _: {"drawn_as": math.inf}, "expected finite numbers"),
+        (lambda _: {"drawn_as": math.inf}, "beyond every physical range"),
         (lambda _: {"origin": (5.0, 0.0, 0.0)}, "is not at the border"),
         (lambda _: {"tag_id": 10**9}, "expected 0 to 586"),
         (lambda state: {"driver": replace(state.driver, decided_ns=-(2**62))}, "decided_ns"),
