@@ -11,7 +11,7 @@ from functools import cache
 from scm.errors import RunError
 from scm.geometry import Pose2, wrap_angle
 from scm.v2x.messages.handover_request import CommandPast, HandedCar, NamedValues
-from scm.vehicles.car import load_car
+from scm.vehicles.car import Car, load_car
 from scm.vehicles.command_delay import CommandHistory
 from scm.vehicles.fleet import Fleet
 
@@ -26,7 +26,11 @@ def digest_of(car_file: str) -> str:
     Raises:
         CarError: when there is no such car file.
     """
-    car = load_car(car_file)
+    return digest_of_car(load_car(car_file))
+
+
+def digest_of_car(car: Car) -> str:
+    """Return likewise the hash of a car file that was read."""
     terms = " ".join(term.name for term in car.terms)
     values = "".join(f"{key}={car.values[key].value}\n" for key in sorted(car.values))
     return hashlib.blake2s(f"{terms}\n{values}".encode(), digest_size=8).hexdigest()

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from scm.clock import NS_PER_S
-from scm.errors import nearest
+from scm.errors import ScmError, nearest
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.vehicle_tags import LAST_TAG_ID
 from scm.v2x.key import is_name
@@ -12,7 +12,6 @@ from scm.v2x.message import Refused
 from scm.v2x.messages.handover_request import HandedCar, HandoverRequest
 from scm.vehicles.car import car_names
 from scm.vehicles.drivers.limits import limits_of
-from scm.vehicles.handed import digest_of
 from scm.world.alerts import NAME
 from scm.world.border import is_clear
 from scm.world.border_state import MAX_GHOSTS
@@ -61,11 +60,15 @@ def _maps(world: World, request: HandoverRequest) -> Refused | None:
 
 def _car(world: World, request: HandoverRequest) -> Refused | None:
     """Check that the car's file is the same on both sides."""
-    del world
-    if request.car not in car_names():
-        detail = f"no car file {request.car!r} here{nearest(request.car, car_names())}"
+    try:
+        if not world.cars.garage.is_known(request.car):
+            detail = f"no car file {request.car!r} here{nearest(request.car, car_names())}"
+            return Refused(code="unknown_car", detail=detail)
+        digest = world.cars.garage.digest(request.car)
+    except ScmError:  # its text has paths of this computer
+        detail = f"car file {request.car!r} cannot be read here"
         return Refused(code="unknown_car", detail=detail)
-    if request.digest != digest_of(request.car):
+    if request.digest != digest:
         detail = f"car file {request.car!r} has other effects or numbers here"
         return Refused(code="unknown_car", detail=detail)
     return None
@@ -90,31 +93,32 @@ def _state(world: World, request: HandoverRequest) -> Refused | None:
         return None
     problem = "expected the car, got nothing"
     if request.state is not None:
-        problem = _flaw(request.state, request.border)
+        problem = next(_flaws(request.state, request.border), "")
     return Refused(code="invalid", detail=f"state: {problem}") if problem else None
 
 
-def _flaw(state: HandedCar, border: tuple[float, float, float]) -> str:
-    """Return what is wrong with a car's state, which comes from outside; empty: nothing."""
+def _flaws(state: HandedCar, border: tuple[float, float, float]) -> Iterator[str]:
+    """Yield what is wrong with a car's state, which comes from outside."""
+    driver = state.driver
     if not all(abs(number) <= MAX_NUMBER for number in _numbers(state)):
-        return "its numbers are beyond every physical range"
+        yield "its numbers are beyond every physical range"
     if abs(state.origin[2]) > MAX_ORIGIN_YAW_RAD:
-        return f"origin: got a yaw of {state.origin[2]:g} rad, expected at most one turn"
+        yield f"origin: got a yaw of {state.origin[2]:g} rad, expected at most one turn"
     if state.drawn_as < 0.0:
-        return f"drawn_as: got {state.drawn_as:g}, expected at least 0"
-    if state.driver.speed_mps is not None and not state.driver.speed_mps > 0.0:
-        return f"driver.speed_mps: got {state.driver.speed_mps:g}, expected above 0"
-    if not 0 <= state.driver.decided_ns <= MAX_DECIDED_NS:
-        return f"driver.decided_ns: got {state.driver.decided_ns}, expected at most a minute"
+        yield f"drawn_as: got {state.drawn_as:g}, expected at least 0"
+    if driver.speed_mps is not None and driver.speed_mps <= 0.0:
+        yield f"driver.speed_mps: got {driver.speed_mps:g}, expected above 0"
+    if not 0 <= driver.decided_ns <= MAX_DECIDED_NS:
+        yield f"driver.decided_ns: got {driver.decided_ns}, expected at most a minute"
     if not 0 <= state.tag_id <= LAST_TAG_ID:
-        return f"tag_id: got {state.tag_id}, expected 0 to {LAST_TAG_ID}"
+        yield f"tag_id: got {state.tag_id}, expected 0 to {LAST_TAG_ID}"
     here = {one.name: one.values for one in state.variables}
     if any(len(here.get(name, ())) != 1 for name in ("x_cog", "y_cog", "yaw")):
-        return "expected one value of x_cog, y_cog and yaw"
+        yield "expected one value of x_cog, y_cog and yaw"
+        return
     x, y = Pose2(*state.origin).apply(here["x_cog"][0], here["y_cog"][0])
-    if not math.hypot(x - border[0], y - border[1]) <= MAX_AWAY_M:
-        return f"({x:.2f}, {y:.2f}) m is not at the border"
-    return ""
+    if math.hypot(x - border[0], y - border[1]) > MAX_AWAY_M:
+        yield f"({x:.2f}, {y:.2f}) m is not at the border"
 
 
 def _numbers(state: HandedCar) -> Iterator[float]:

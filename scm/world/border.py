@@ -12,14 +12,13 @@ import numpy as np
 
 from scm.arrays import Bools, Floats, Ints
 from scm.clock import NS_PER_MS, NS_PER_S
-from scm.errors import RunError
+from scm.errors import RunError, ScmError
 from scm.geometry import Pose2
 from scm.maps.border import Exit
 from scm.v2x.exchange import Call, ToCity
 from scm.v2x.key import is_name
 from scm.v2x.messages.border_cars import BorderCar, BorderCars
 from scm.v2x.messages.handover_request import HandoverRequest
-from scm.vehicles.car import car_names
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.speed_control import stopping_speed
 from scm.vehicles.handed import digest_of
@@ -148,8 +147,12 @@ def receive_cars(world: World, message: BorderCars, now_ns: int) -> tuple[()]:
         return ()
     is_in_step = abs(message.t_ns - now_ns) < MAX_SKEW_NS
     for one in message.cars:
-        if world.cars.get(one.vehicle) is None and _is_plausible(world, one):
+        if world.cars.get(one.vehicle) is not None or not _is_plausible(world, one):
+            continue
+        try:
             show_ghost(world, message.city, one, message.t_ns if is_in_step else now_ns)
+        except ScmError:
+            world.ignored += 1
     forget_ghosts(world, now_ns)
     return ()
 
@@ -162,19 +165,23 @@ def _is_plausible(world: World, one: BorderCar) -> bool:
 
 
 def show_ghost(world: World, city: str, one: BorderCar, t_ns: int) -> None:
-    """Show a car behind the border to the drivers here; without room or car file it stays out."""
+    """Show a car behind the border to the drivers here; without room or car file it stays out.
+
+    Raises:
+        CarError: when its car file here is wrong.
+    """
     border, vehicles, key = world.border, world.cars.arrays, (city, one.vehicle)
     pose = Pose2(one.x_m, one.y_m, one.yaw_rad)
     if key not in border.ghosts:
         if len(border.ghosts) >= MAX_GHOSTS or not is_name(one.vehicle):
             return
-        if one.car not in car_names():  # no path: it comes from outside
+        if not world.cars.garage.is_known(one.car):
             return
+        limits = limits_of(world.cars.garage.car(one.car))
         try:
             index = vehicles.add(f"{city}/{one.vehicle}", pose, hosted=False)
         except RunError:
             return
-        limits = limits_of(world.cars.garage.car(one.car))
         vehicles.front[index] = limits.front
         world.drivers.leave(index)
         world.drivers.show(index, limits.length, limits.width)

@@ -11,9 +11,10 @@ from scm.arrays import AnyArray, Floats, Ints
 from scm.geometry import Pose2
 from scm.log import event
 from scm.vehicles.battery_pack import Packs
-from scm.vehicles.car import Car, load_car
+from scm.vehicles.car import Car, car_names, load_car
 from scm.vehicles.fleet import Fleet
 from scm.vehicles.ground import Ground
+from scm.vehicles.handed import digest_of_car
 from scm.vehicles.vehicle_status import VehicleStatus
 from scm.world.hosted import ELSEWHERE
 from scm.world.solids import Hull, hull_of
@@ -38,6 +39,7 @@ class Garage:
         self._capacity = capacity
         self._fit = fit
         self._cars: dict[str, Car] = {}
+        self._digests: dict[str, str] = {}
         self._hulls: dict[tuple[str, bool], Hull] = {}
         self.fleets: dict[str, Fleet] = {}
         self._packs: dict[str, Packs] = {}
@@ -56,9 +58,27 @@ class Garage:
         if name not in self._cars:
             car = load_car(name)
             self._cars[name] = self._fit(car)
+            self._digests[name] = digest_of_car(car)
             if given := [t.name for t in self._cars[name].terms if t not in car.terms]:
                 event(_log, "car_given_effects", car=name, effects=",".join(given))
         return self._cars[name]
+
+    def is_known(self, name: str) -> bool:
+        """Return whether a text from outside is the name of a car file, and no path.
+
+        Raises:
+            CarError: when the folder of car files cannot be read.
+        """
+        return name in self._cars or name in car_names()
+
+    def digest(self, name: str) -> str:
+        """Return a hash of a car file as `car` has read it, without what the floor adds.
+
+        Raises:
+            CarError: when there is none of that name, or it is wrong.
+        """
+        self.car(name)
+        return self._digests[name]
 
     def hull(self, name: str, *, movable: bool = True) -> Hull:
         """Return what cars of a file are to others, one for all of them.

@@ -3,10 +3,14 @@
 import pytest
 from msgspec.structs import replace
 
+from scm.v2x.messages.border_cars import BorderCar, BorderCars
 from scm.v2x.messages.handover_request import HandoverReply, NamedValues
+from scm.vehicles import car as car_files
+from scm.vehicles.car import load_car
+from scm.world.border import receive_cars
 from scm.world.handover import reply_to_handover
 from scm.world.part import WorldPart
-from tests.unit.world.test_handover import ENDLESS, handed
+from tests.unit.world.test_handover import ENDLESS, asks, handed
 
 
 @pytest.fixture
@@ -62,3 +66,54 @@ def test_numbers_that_this_city_does_not_know_are_left_out(east):
     more = NamedValues(name="wings", values=(1.0, 2.0))
     request = handed(lambda state: {"variables": (*state.variables, more)})
     assert isinstance(reply_to_handover(east, request, 0, []), HandoverReply)
+
+
+@pytest.fixture
+def broken(tmp_path, monkeypatch):
+    """Return the name of a car file that was saved half-finished while the city runs."""
+    monkeypatch.setenv("SCM_CARS", str(tmp_path))
+    (tmp_path / "mine.toml").write_text("[body]\nmass_kg = ")
+    return "mine"
+
+
+def at_the_border(car):
+    pose = {"x_m": 1.65, "y_m": 0.0, "yaw_rad": 0.0}
+    return BorderCar(vehicle=f"of_{car}", car=car, speed_mps=0.2, yaw_rate_radps=0.0, **pose)
+
+
+def test_car_whose_file_is_broken_here_is_refused(east, broken):
+    reply = asks(east, car=broken)
+    assert reply.code == "unknown_car"
+    assert reply.detail == "car file 'mine' cannot be read here"
+
+
+def test_car_is_refused_while_the_folder_of_car_files_is_away(east, tmp_path, monkeypatch):
+    monkeypatch.setenv("SCM_CARS", str(tmp_path / "nowhere"))
+    assert asks(east, car="mine").code == "unknown_car"
+
+
+def test_car_behind_the_border_whose_file_is_broken_here_is_ignored(east, broken):
+    cars = (at_the_border(broken), at_the_border("nigel"))
+    receive_cars(east, BorderCars(city="west", t_ns=0, cars=cars), 0)
+    assert east.ignored == 1
+    assert list(east.border.ghosts) == [("west", "of_nigel")]
+    assert east.cars.arrays.used.sum() == 1
+
+
+def test_car_file_is_read_once_however_often_a_city_asks(east, monkeypatch):
+    asks(east)
+    monkeypatch.setattr(car_files, "car_files", lambda: pytest.fail("looked at the disk"))
+    monkeypatch.setattr("scm.world.garage.load_car", lambda _: pytest.fail("read it again"))
+    assert isinstance(asks(east), HandoverReply)
+    receive_cars(east, BorderCars(city="west", t_ns=0, cars=(at_the_border("nigel"),)), 0)
+    assert len(east.border.ghosts) == 1
+
+
+def test_digest_is_that_of_the_file_that_the_cars_here_are_of(east, tmp_path, monkeypatch):
+    text = load_car("nigel").path.read_text()
+    monkeypatch.setenv("SCM_CARS", str(tmp_path))
+    (tmp_path / "mine.toml").write_text(text)
+    before = east.cars.garage.digest("mine")
+    (tmp_path / "mine.toml").write_text(text + "\n[")
+    assert east.cars.garage.digest("mine") == before
+    assert isinstance(asks(east, car="mine", digest=before), HandoverReply)
