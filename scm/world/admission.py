@@ -21,9 +21,27 @@ MAX_GAP_M, MAX_KINK_RAD = 0.05, math.radians(3.0)  # between the lanes on both s
 MAX_AWAY_M = 1.0  # of a car from where its lane begins
 MAX_DECIDED_NS = 60 * NS_PER_S  # since a driver that drives has decided last
 MAX_EPOCH = 2**62
+MAX_NAME = 200  # characters of a lane or a car file
 MAX_NUMBER = 1e9  # of a car's state, in SI units
 MAX_ORIGIN_YAW_RAD = 7.0
 ROOM_M = 0.45  # that must be free behind the border before a car may come
+
+
+def stranger(world: World, request: HandoverRequest) -> Refused | None:
+    """Return why a request is of no car of a neighbour, so that nothing is stored for it."""
+    cities = [neighbour.city for neighbour in world.city_map.neighbours]
+    if request.city not in cities:
+        known = ", ".join(cities) or "none"
+        detail = f"{request.city} is no neighbour of {world.border.city}: expected one of {known}"
+        return Refused(code="not_neighbour", detail=detail)
+    if not is_name(request.vehicle):
+        detail = f"vehicle: {request.vehicle[:MAX_NAME]!r} is no valid name"
+        return Refused(code="invalid", detail=detail)
+    for what in ("lane", "car", "digest"):
+        if len(name := getattr(request, what)) > MAX_NAME:
+            detail = f"{what}: got {len(name)} characters, expected at most {MAX_NAME}"
+            return Refused(code="invalid", detail=detail)
+    return None
 
 
 def problem_of(world: World, request: HandoverRequest, now_ns: int) -> Refused | None:
@@ -37,11 +55,6 @@ def problem_of(world: World, request: HandoverRequest, now_ns: int) -> Refused |
 
 def _maps(world: World, request: HandoverRequest) -> Refused | None:
     """Check that both maps have the same border."""
-    cities = [neighbour.city for neighbour in world.city_map.neighbours]
-    if request.city not in cities:
-        known = ", ".join(cities) or "none"
-        detail = f"{request.city} is no neighbour of {world.border.city}: expected one of {known}"
-        return Refused(code="not_neighbour", detail=detail)
     lanes = {lane.name: lane for lane in world.city_map.lanes}
     if request.lane not in lanes:
         detail = f"no lane {request.lane!r} in {world.border.city}"
@@ -77,8 +90,6 @@ def _car(world: World, request: HandoverRequest) -> Refused | None:
 def _name(world: World, request: HandoverRequest) -> Refused | None:
     """Check that the name is free, and not on its way from here."""
     name = request.vehicle
-    if not is_name(name):
-        return Refused(code="invalid", detail=f"vehicle: {name!r} is no valid name")
     in_use = world.cars.get(name) is not None or name in (NAME, *world.radio.roadside)
     if in_use or name in world.border.leaving:
         detail = f"there is already a car named {name!r} in {world.border.city}"

@@ -14,6 +14,7 @@ from scm.v2x.request_retry import RetriedRequest
 PATIENCE_S = 1e9
 """A transfer is repeated until it is answered, however long the link is down."""
 TRY_S = 0.5
+MAX_ARRIVALS = 4096  # cars of each city whose last transfer is remembered
 MAX_GHOSTS = 32  # cars behind the border; each takes a vehicle index
 
 
@@ -90,6 +91,19 @@ class Border:
     reserved: dict[str, tuple[tuple[str, str], int]] = field(default_factory=dict)
     early: list[Incoming] = field(default_factory=list)
     ghosts: dict[tuple[str, str], tuple[int, int]] = field(default_factory=dict)
+
+    def remember(self, key: tuple[str, str], arrival: ArrivalRecord) -> list[tuple[str, str]]:
+        """Remember a car's last transfer from a city; return those of the city to be forgotten.
+
+        Of more than `MAX_ARRIVALS` cars of a city the ones that came longest ago are forgotten: no
+        transfer is as old, since one car a road is on its way at a time.
+        """
+        self.arrivals.pop(key, None)
+        self.arrivals[key] = arrival
+        forgotten = [one for one in self.arrivals if one[0] == key[0]][:-MAX_ARRIVALS]
+        for one in forgotten:
+            del self.arrivals[one]
+        return forgotten
 
     def pop_early(self) -> list[Incoming]:
         """Return and forget the transfers that waited for this tick."""

@@ -20,7 +20,7 @@ from scm.v2x.messages.handover_request import HandedCar, HandoverReply, Handover
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.handed import parameters_of, past_of, put_state, variables_of
 from scm.vehicles.lights import Switches
-from scm.world.admission import MAX_EPOCH, problem_of
+from scm.world.admission import MAX_EPOCH, problem_of, stranger
 from scm.world.alerts import city_event
 from scm.world.border import (
     REQUEST_EVERY_NS,
@@ -172,6 +172,9 @@ def reply_to_handover(
     reply = HandoverReply(city=request.city, vehicle=request.vehicle, epoch=request.epoch)
     if not 0 < request.epoch < MAX_EPOCH:
         return Refused(code="invalid", detail=f"epoch: got {request.epoch}, expected 1 to 2^62")
+    refused = stranger(world, request)
+    if refused is not None:
+        return refused
     before = border.arrivals.get(key)
     if before is not None and request.epoch <= before.epoch:
         return _again(request, before, reply)
@@ -187,7 +190,8 @@ def reply_to_handover(
     record = ArrivalRecord(epoch=request.epoch)
     if problem is not None:
         record = ArrivalRecord(epoch=request.epoch, refused=problem.code, detail=problem.detail)
-    border.arrivals[key] = record
+    for city, vehicle in border.remember(key, record):
+        out.append(PersistedState("handovers", f"in/{city}/{vehicle}", None))
     out.append(PersistedState("handovers", f"in/{request.city}/{request.vehicle}", record))
     return problem or reply
 

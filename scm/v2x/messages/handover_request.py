@@ -116,7 +116,7 @@ class HandoverRequest(Request, kw_only=True, frozen=True):
 
     city: CityName
     phase: Literal["reserve", "commit"]
-    vehicle: VehicleName
+    vehicle: Annotated[VehicleName, Meta(pattern=r"^[a-z0-9_-]{1,32}$")]
     epoch: int
     lane: LaneName
     border: Pose

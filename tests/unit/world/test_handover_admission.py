@@ -3,11 +3,13 @@
 import pytest
 from msgspec.structs import replace
 
+from scm.errors import MessageError
+from scm.v2x.message import decode, encode
 from scm.v2x.messages.border_cars import BorderCar, BorderCars
-from scm.v2x.messages.handover_request import HandoverReply, NamedValues
-from scm.vehicles import car as car_files
+from scm.v2x.messages.handover_request import HandoverReply, HandoverRequest, NamedValues
 from scm.vehicles.car import load_car
 from scm.world.border import receive_cars
+from scm.world.border_state import ArrivalRecord
 from scm.world.handover import reply_to_handover
 from scm.world.part import WorldPart
 from tests.unit.world.test_handover import ENDLESS, asks, handed
@@ -102,7 +104,7 @@ def test_car_behind_the_border_whose_file_is_broken_here_is_ignored(east, broken
 
 def test_car_file_is_read_once_however_often_a_city_asks(east, monkeypatch):
     asks(east)
-    monkeypatch.setattr(car_files, "car_files", lambda: pytest.fail("looked at the disk"))
+    monkeypatch.setattr("scm.vehicles.car.car_files", lambda: pytest.fail("looked at the disk"))
     monkeypatch.setattr("scm.world.garage.load_car", lambda _: pytest.fail("read it again"))
     assert isinstance(asks(east), HandoverReply)
     receive_cars(east, BorderCars(city="west", t_ns=0, cars=(at_the_border("nigel"),)), 0)
@@ -117,3 +119,44 @@ def test_digest_is_that_of_the_file_that_the_cars_here_are_of(east, tmp_path, mo
     (tmp_path / "mine.toml").write_text(text + "\n[")
     assert east.cars.garage.digest("mine") == before
     assert isinstance(asks(east, car="mine", digest=before), HandoverReply)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"vehicle": "w\0"},
+        {"vehicle": "w" * 33},
+        {"city": "north"},
+        {"lane": "x" * 201},
+        {"car": "x" * 201},
+        {"digest": "x" * 201},
+    ],
+)
+def test_nothing_is_stored_for_a_transfer_of_a_stranger(east, changes):
+    out = []
+    reply = reply_to_handover(east, replace(handed(), **changes), 0, out)
+    assert reply.detail
+    assert len(reply.detail) < 300
+    assert not out
+    assert not east.border.arrivals
+
+
+@pytest.mark.parametrize("name", ["w\0", "W1", "w" * 33, ""])
+def test_request_with_an_invalid_name_is_no_message(name):
+    body, _ = encode(replace(handed(), vehicle=name))
+    with pytest.raises(MessageError, match=r"vehicle"):
+        decode(HandoverRequest, body)
+
+
+def test_of_many_cars_of_a_city_the_ones_that_came_last_are_remembered(east, monkeypatch):
+    monkeypatch.setattr("scm.world.border_state.MAX_ARRIVALS", 3)
+    east.border.arrivals["north", "n1"] = ArrivalRecord(epoch=1)
+    request, stored = replace(handed(), digest="0"), {}
+    for name in ("w1", "w2", "w3", "w1", "w4"):
+        one, out = replace(request, vehicle=name, epoch=request.epoch + len(stored)), []
+        reply_to_handover(east, one, 0, out)
+        stored |= {record.key: record.value for record in out}
+    names = [key[1] for key in east.border.arrivals]
+    assert names == ["n1", "w3", "w1", "w4"]
+    assert stored["in/west/w2"] is None
+    assert all(stored[f"in/west/{name}"] is not None for name in ("w1", "w3", "w4"))
