@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 
-from scm.clock import NS_PER_S
+from scm.clock import NS_PER_MS, NS_PER_S
 from scm.errors import ScmError, nearest
 from scm.geometry import Pose2, wrap_angle
 from scm.maps.vehicle_tags import LAST_TAG_ID
@@ -20,7 +20,7 @@ from scm.world.world import World
 MAX_GAP_M, MAX_KINK_RAD = 0.05, math.radians(3.0)  # between the lanes on both sides of a border
 MAX_AWAY_M = 1.0  # of a car from where its lane begins
 MAX_DECIDED_NS = 60 * NS_PER_S  # since a driver that drives has decided last
-MAX_EPOCH = 2**62
+MAX_AHEAD_MS = 7 * 24 * 3600 * 1000  # of an epoch: cars that come here later must have higher ones
 MAX_NAME = 200  # characters of a lane or a car file
 MAX_NUMBER = 1e9  # of a car's state, in SI units
 MAX_ORIGIN_YAW_RAD = 7.0
@@ -46,6 +46,10 @@ def stranger(world: World, request: HandoverRequest) -> Refused | None:
 
 def problem_of(world: World, request: HandoverRequest, now_ns: int) -> Refused | None:
     """Return why a car cannot come, or None."""
+    latest = now_ns // NS_PER_MS + MAX_AHEAD_MS
+    if not 0 < request.epoch <= latest:
+        detail = f"epoch: got {request.epoch}, expected 1 to {latest}: compare the clocks"
+        return Refused(code="invalid", detail=detail)
     for check in (_maps, _car, _name, _state, _room):
         problem = check(world, request)
         if problem is not None:

@@ -14,6 +14,8 @@ from scm.world.handover import reply_to_handover
 from scm.world.part import WorldPart
 from tests.unit.world.test_handover import ENDLESS, asks, handed
 
+DAY_MS = 24 * 3600 * 1000
+
 
 @pytest.fixture
 def east():
@@ -160,3 +162,17 @@ def test_of_many_cars_of_a_city_the_ones_that_came_last_are_remembered(east, mon
     assert names == ["n1", "w3", "w1", "w4"]
     assert stored["in/west/w2"] is None
     assert all(stored[f"in/west/{name}"] is not None for name in ("w1", "w3", "w4"))
+
+
+@pytest.mark.parametrize("phase", ["reserve", "commit"])
+@pytest.mark.parametrize("epoch", [-1, 0, 8 * DAY_MS, 2**62 - 1, 2**63 - 1])
+def test_epoch_that_is_no_time_is_refused_and_leaves_those_of_newcomers_alone(east, epoch, phase):
+    reply = reply_to_handover(east, replace(handed(), epoch=epoch, phase=phase), 0, [])
+    assert "compare the clocks" in reply.detail
+    assert east.identities.first_epoch(0) == 1
+
+
+def test_epoch_of_a_city_whose_clock_is_days_ahead_is_taken(east):
+    request = replace(handed(), epoch=1_000 + 6 * DAY_MS)
+    assert isinstance(reply_to_handover(east, request, 1_000_000_000, []), HandoverReply)
+    assert "w1" in east.cars.hosted
