@@ -46,15 +46,18 @@ def stranger(world: World, request: HandoverRequest) -> Refused | None:
 
 def problem_of(world: World, request: HandoverRequest, now_ns: int) -> Refused | None:
     """Return why a car cannot come, or None."""
+    for lane, (_, until_ns) in list(world.border.reserved.items()):
+        if until_ns <= now_ns:
+            del world.border.reserved[lane]
     latest = now_ns // NS_PER_MS + MAX_AHEAD_MS
     if not 0 < request.epoch <= latest:
         detail = f"epoch: got {request.epoch}, expected 1 to {latest}: compare the clocks"
         return Refused(code="invalid", detail=detail)
-    for check in (_maps, _car, _name, _state, _room):
+    for check in (_maps, _car, _name, _state, _room, _place):
         problem = check(world, request)
         if problem is not None:
             return problem
-    return _place(world, request, now_ns)
+    return None
 
 
 def _maps(world: World, request: HandoverRequest) -> Refused | None:
@@ -63,6 +66,9 @@ def _maps(world: World, request: HandoverRequest) -> Refused | None:
     if request.lane not in lanes:
         detail = f"no lane {request.lane!r} in {world.border.city}"
         return Refused(code="invalid", detail=detail + nearest(request.lane, list(lanes)))
+    if any(request.lane in lane.next for lane in world.city_map.lanes):
+        detail = f"lane {request.lane!r} does not begin at a border: a lane here leads into it"
+        return Refused(code="invalid", detail=detail)
     start, end = Pose2(*lanes[request.lane].start), Pose2(*request.border)
     gap_m = math.hypot(start.x - end.x, start.y - end.y)
     if gap_m > MAX_GAP_M or abs(wrap_angle(start.yaw - end.yaw)) > MAX_KINK_RAD:
@@ -165,13 +171,13 @@ def _room(world: World, request: HandoverRequest) -> Refused | None:
     return None
 
 
-def _place(world: World, request: HandoverRequest, now_ns: int) -> Refused | None:
+def _place(world: World, request: HandoverRequest) -> Refused | None:
     """Check that the place behind the border is free and reserved for nobody else."""
     lane = request.lane
-    holder, until_ns = world.border.reserved.get(lane, (None, 0))
-    if holder not in (None, (request.city, request.vehicle)) and until_ns > now_ns:
-        detail = f"{holder[1]} comes first" if holder is not None else ""
-        return Refused(code="occupied", detail=detail)
+    own = request.city, request.vehicle
+    holder, _ = world.border.reserved.get(lane, (own, 0))
+    if holder != own:
+        return Refused(code="occupied", detail=f"{holder[1]} comes first")
     length_m = limits_of(world.cars.garage.car(request.car)).length
     room_m = length_m if request.phase == "commit" else max(ROOM_M, 1.5 * length_m)
     if not is_clear(world, Pose2(*request.border), room_m):

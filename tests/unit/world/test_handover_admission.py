@@ -3,6 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
+from bench.handover import half_loop
 from scm.errors import MessageError
 from scm.v2x.message import decode, encode
 from scm.v2x.messages.border_cars import BorderCar, BorderCars
@@ -15,6 +16,9 @@ from scm.world.part import WorldPart
 from tests.unit.world.test_handover import ENDLESS, asks, handed
 
 DAY_MS = 24 * 3600 * 1000
+
+
+HALF = half_loop("east")
 
 
 @pytest.fixture
@@ -176,3 +180,33 @@ def test_epoch_of_a_city_whose_clock_is_days_ahead_is_taken(east):
     request = replace(handed(), epoch=1_000 + 6 * DAY_MS)
     assert isinstance(reply_to_handover(east, request, 1_000_000_000, []), HandoverReply)
     assert "w1" in east.cars.hosted
+
+
+def test_lane_that_another_lane_leads_into_is_no_border():
+    inner = next(lane for lane in HALF.lanes if lane.name == "east_out")
+    world = WorldPart(HALF, 0, room=2, city="east").world
+    reply = asks(world, lane=inner.name, border=(*inner.start,))
+    assert reply.code == "invalid"
+    assert "does not begin at a border" in reply.detail
+    assert not world.border.reserved
+    first = next(lane for lane in HALF.lanes if lane.name == "east_in")
+    assert isinstance(asks(world, lane=first.name, border=(*first.start,)), HandoverReply)
+
+
+def test_place_that_was_reserved_once_takes_no_room():
+    lanes = [lane for lane in HALF.lanes if lane.name in ("east_in", "east_side")]
+    world = WorldPart(HALF, 0, room=1, city="east").world
+    first, second = ({"lane": lane.name, "border": (*lane.start,)} for lane in lanes)
+    assert isinstance(asks(world, **first), HandoverReply)
+    assert asks(world, vehicle="w2", **second).code == "full"
+    request = HandoverRequest(
+        city="west",
+        phase="reserve",
+        vehicle="w2",
+        epoch=5,
+        car="nigel",
+        digest=world.cars.garage.digest("nigel"),
+        **second,
+    )
+    assert isinstance(reply_to_handover(world, request, 4_000_000_000, []), HandoverReply)
+    assert list(world.border.reserved) == ["east_side"]
