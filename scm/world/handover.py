@@ -39,6 +39,7 @@ from scm.world.world import World
 
 CATCH_UP_NS = 100 * NS_PER_MS  # a car that was on its way for longer has stood still meanwhile
 HERE = Pose2(0.0, 0.0, 0.0)
+UNDECIDED = Refused(code="timeout", detail="no decision about the transfer came")
 
 
 def depart(world: World, now_ns: int) -> list[Outgoing]:
@@ -106,13 +107,23 @@ def receive_reply(world: World, item: Incoming, now_ns: int) -> list[Outgoing]:
     away = world.border.leaving.get(request.vehicle)
     if away is None or away.request.epoch != request.epoch:
         return []
-    away.tries.receive(item)
-    if away.tries.reply is None:
+    reply = item.message
+    if not isinstance(reply, HandoverReply) or _transfer(reply) != _transfer(request):
+        away.tries.receive(with_fields(item, message=UNDECIDED))
         return []
-    if isinstance(away.tries.reply, Refused):
-        return _return(world, away, away.tries.reply, now_ns)
+    away.tries.receive(item)
+    if reply.refused == "stale":
+        text = f"{request.vehicle} is on its way to {away.road.city}, which knows a later transfer of it: {reply.detail}"
+        return [city_event("error", "handover_stale", text, now_ns, request.vehicle)]
+    if reply.refused:
+        refusal = Refused(code=reply.refused, detail=reply.detail)
+        return _return(world, away, refusal, now_ns)
     del world.border.leaving[request.vehicle]
     return [PersistedState("handovers", f"out/{request.vehicle}", None)]
+
+
+def _transfer(message: HandoverRequest | HandoverReply) -> tuple[str, str, int]:
+    return message.city, message.vehicle, message.epoch
 
 
 def _place_answered(
@@ -168,6 +179,21 @@ def reply_to_handover(
     world: World, request: HandoverRequest, now_ns: int, out: list[Outgoing]
 ) -> HandoverReply | Refused:
     """Reserve a place behind the border for a car, or take it; a refusal says why."""
+    reply = _decide(world, request, now_ns, out)
+    if request.phase == "reserve" or isinstance(reply, HandoverReply):
+        return reply
+    return HandoverReply(
+        city=request.city,
+        vehicle=request.vehicle,
+        epoch=request.epoch,
+        refused=reply.code,
+        detail=reply.detail,
+    )
+
+
+def _decide(
+    world: World, request: HandoverRequest, now_ns: int, out: list[Outgoing]
+) -> HandoverReply | Refused:
     border, key = world.border, (request.city, request.vehicle)
     reply = HandoverReply(city=request.city, vehicle=request.vehicle, epoch=request.epoch)
     refused = stranger(world, request)

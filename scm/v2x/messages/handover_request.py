@@ -77,11 +77,16 @@ class HandedCar(Struct, kw_only=True, frozen=True):
 
 
 class HandoverReply(Message, kw_only=True, frozen=True):
-    """The place is reserved, or the car is in the next city and stored there.
+    """The place is reserved, or the transfer is decided: the car is stored there, or refused.
+
+    A refused place is answered with `Refused`, a refused transfer with this message: it is final,
+    and must not be mistaken for a failure of the bus.
 
     Attributes:
         epoch: Of the transfer that is answered.
         valid_ms: How long the place is reserved.
+        refused: The code of a refused transfer; empty: the car came.
+        detail: Of the refusal, one sentence for people.
     """
 
     KEY: ClassVar[str] = "handover/{city}/reply"
@@ -90,6 +95,8 @@ class HandoverReply(Message, kw_only=True, frozen=True):
     vehicle: VehicleName
     epoch: int
     valid_ms: int = 0
+    refused: str = ""
+    detail: str = ""
 
 
 class HandoverRequest(Request, kw_only=True, frozen=True):

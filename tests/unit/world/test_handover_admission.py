@@ -5,15 +5,17 @@ from msgspec.structs import replace
 
 from bench.handover import half_loop
 from scm.errors import MessageError
-from scm.v2x.message import decode, encode
+from scm.v2x.exchange import Call, Incoming
+from scm.v2x.message import Refused, decode, encode
 from scm.v2x.messages.border_cars import BorderCar, BorderCars
+from scm.v2x.messages.city_event import CityEvent
 from scm.v2x.messages.handover_request import HandoverReply, HandoverRequest, NamedValues
 from scm.vehicles.car import load_car
 from scm.world.border import receive_cars
 from scm.world.border_state import ArrivalRecord
-from scm.world.handover import reply_to_handover
+from scm.world.handover import receive_reply, reply_to_handover
 from scm.world.part import WorldPart
-from tests.unit.world.test_handover import ENDLESS, asks, handed
+from tests.unit.world.test_handover import ENDLESS, asks, handed, two, until
 
 DAY_MS = 24 * 3600 * 1000
 
@@ -210,3 +212,67 @@ def test_place_that_was_reserved_once_takes_no_room():
     )
     assert isinstance(reply_to_handover(world, request, 4_000_000_000, []), HandoverReply)
     assert list(world.border.reserved) == ["east_side"]
+
+
+@pytest.fixture
+def leaver():
+    """Return a world whose car w1 is on its way to a city that does not answer."""
+    cities = two()
+    west = cities.worlds["west"].world
+    until(cities, lambda: west.border.approaching and west.border.approaching["w1"].until_ns)
+    until(cities, lambda: west.cars.hosted["w1"].pose.x > 1.59)
+    cities.cut()
+    until(cities, lambda: west.border.leaving)
+    return west
+
+
+def answered(world, reply, now_ns=60_000_000_000):
+    """Return what a world does about an answer to its transfer of w1."""
+    away = world.border.leaving["w1"]
+    call = away.tries.due(now_ns) or Call(away.request, 0.5)
+    return receive_reply(world, Incoming(reply, now_ns, call), now_ns)
+
+
+def decision(world, **changes):
+    request = world.border.leaving["w1"].request
+    reply = HandoverReply(city="west", vehicle="w1", epoch=request.epoch)
+    return replace(reply, **changes)
+
+
+@pytest.mark.parametrize("code", ["invalid", "owned", "stale", "timeout", "offline", "forbidden"])
+def test_refusal_that_is_none_of_the_next_city_leaves_the_car_on_its_way(leaver, code):
+    assert not answered(leaver, Refused(code=code, detail="the reply: not JSON"))
+    away = leaver.border.leaving["w1"]
+    assert "w1" not in leaver.cars.hosted
+    assert away.tries.next_ns is not None
+    assert away.tries.due(away.tries.next_ns).request == away.request
+
+
+@pytest.mark.parametrize(
+    "changes", [{"city": "north"}, {"vehicle": "w2"}, {"epoch": 1}, {"epoch": 1, "refused": "full"}]
+)
+def test_decision_about_another_transfer_leaves_the_car_on_its_way(leaver, changes):
+    assert not answered(leaver, decision(leaver, **changes))
+    assert leaver.border.leaving["w1"].tries.next_ns is not None
+    assert "w1" not in leaver.cars.hosted
+
+
+def test_refused_transfer_brings_the_car_back_and_an_accepted_one_forgets_it(leaver):
+    away = leaver.border.leaving["w1"]
+    answered(leaver, decision(leaver, refused="full", detail="east is full"))
+    assert "w1" in leaver.cars.hosted
+    leaver.remove("w1")
+    leaver.border.leaving["w1"] = away
+    away.tries.reply = None
+    (stored,) = answered(leaver, decision(leaver))
+    assert (stored.key, stored.value) == ("out/w1", None)
+    assert not leaver.border.leaving
+
+
+def test_car_whose_transfer_is_stale_stays_in_the_store_for_a_person(leaver):
+    (event,) = answered(leaver, decision(leaver, refused="stale", detail="epoch: got 3"))
+    assert isinstance(event, CityEvent)
+    assert (event.name, event.severity) == ("handover_stale", "error")
+    assert "w1" in leaver.border.leaving
+    assert "w1" not in leaver.cars.hosted
+    assert leaver.border.leaving["w1"].tries.due(2**62) is None
