@@ -14,6 +14,7 @@ from scm.clock import NS_PER_MS, seconds
 from scm.errors import RunError, ScmError
 from scm.geometry import Pose2
 from scm.maps.border import Exit
+from scm.maps.vehicle_tags import bound_tag
 from scm.v2x.exchange import Answer, Incoming, Outgoing, PersistedState
 from scm.v2x.message import Refused
 from scm.v2x.messages.handover_request import HandedCar, HandoverReply, HandoverRequest
@@ -108,18 +109,25 @@ def receive_reply(world: World, item: Incoming, now_ns: int) -> list[Outgoing]:
     if away is None or away.request.epoch != request.epoch:
         return []
     reply = item.message
-    if not isinstance(reply, HandoverReply) or _transfer(reply) != _transfer(request):
-        away.tries.receive(with_fields(item, message=UNDECIDED))
-        return []
-    away.tries.receive(item)
-    if reply.refused == "stale":
-        text = f"{request.vehicle} is on its way to {away.road.city}, which knows a later transfer of it: {reply.detail}"
-        return [city_event("error", "handover_stale", text, now_ns, request.vehicle)]
+    if isinstance(reply, HandoverReply) and _transfer(reply) == _transfer(request):
+        away.tries.receive(item)
+        return _transfer_answered(world, away, reply, now_ns)
+    away.tries.receive(with_fields(item, message=UNDECIDED))
+    return []
+
+
+def _transfer_answered(
+    world: World, away: Leaving, reply: HandoverReply, now_ns: int
+) -> list[Outgoing]:
+    name, city = reply.vehicle, away.road.city
+    if reply.refused == "stale":  # the car may be there or anywhere: a person has to look
+        text = f"{name} is on its way to {city}, which knows a later transfer: {reply.detail}"
+        return [city_event("error", "handover_stale", text, now_ns, name)]
     if reply.refused:
         refusal = Refused(code=reply.refused, detail=reply.detail)
         return _return(world, away, refusal, now_ns)
-    del world.border.leaving[request.vehicle]
-    return [PersistedState("handovers", f"out/{request.vehicle}", None)]
+    del world.border.leaving[name]
+    return [PersistedState("handovers", f"out/{name}", None)]
 
 
 def _transfer(message: HandoverRequest | HandoverReply) -> tuple[str, str, int]:
@@ -267,8 +275,9 @@ def _add(
     Raises:
         RunError: when no room is left for it.
     """
-    tags = world.identities.tags
-    tag_id = state.tag_id if tags.is_free(state.tag_id) else None
+    tags, worn = world.identities.tags, state.tag_id
+    may_have = not tags.is_reserved(worn) or bound_tag(world.city_map, request.vehicle) == worn
+    tag_id = worn if may_have and tags.is_free(worn) else None
     car = world.host(request.vehicle, request.car, pose, now_ns, tag_id)
     epoch = max(car.lease.epoch, request.epoch + 1)
     car.lease = grant(car.lease.home, epoch)

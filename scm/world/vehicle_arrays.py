@@ -36,6 +36,10 @@ class Numbers:
         """Return whether nobody has a number."""
         return number not in self._used
 
+    def is_reserved(self, number: int) -> bool:
+        """Return whether a number is one of those that `acquire` never returns."""
+        return number in self._never
+
     def claim(self, number: int) -> int:
         """Keep a number that nobody has from others, and return it."""
         self._used.add(number)

@@ -5,6 +5,7 @@ from msgspec.structs import replace
 
 from bench.handover import half_loop
 from scm.errors import MessageError
+from scm.records.city_map import VehicleTag
 from scm.v2x.exchange import Call, Incoming
 from scm.v2x.message import Refused, decode, encode
 from scm.v2x.messages.border_cars import BorderCar, BorderCars
@@ -276,3 +277,21 @@ def test_car_whose_transfer_is_stale_stays_in_the_store_for_a_person(leaver):
     assert "w1" in leaver.border.leaving
     assert "w1" not in leaver.cars.hosted
     assert leaver.border.leaving["w1"].tries.due(2**62) is None
+
+
+@pytest.mark.parametrize(("owner", "keeps"), [("w1", True), ("e9", False)])
+def test_tag_that_the_map_gives_to_another_car_is_not_kept(owner, keeps):
+    bound = VehicleTag(vehicle=owner, tag_id=40)
+    world = WorldPart(replace(ENDLESS["east"], vehicle_tags=(bound,)), 0, room=2, city="east").world
+    assert isinstance(reply_to_handover(world, tagged(40), 0, []), HandoverReply)
+    assert (world.cars.hosted["w1"].tag_id == 40) == keeps
+
+
+def test_tag_of_the_floor_is_not_kept(east):
+    floor = east.city_map.tag.tag_id
+    assert isinstance(reply_to_handover(east, tagged(floor), 0, []), HandoverReply)
+    assert east.cars.hosted["w1"].tag_id != floor
+
+
+def tagged(tag_id):
+    return handed(lambda _: {"tag_id": tag_id})
