@@ -155,6 +155,7 @@ def in_regions(regions: int, cars: int, span_s: float) -> tuple[list[Cost], list
         given = (number, cars, span_s, own, regions, there)
         spawned.Process(target=region_process, args=given, daemon=True).start()
         there.close()
+        own.close()
         results.append(here)
     costs, parts = zip(*(one.recv() for one in results), strict=True)
     return list(costs), [

@@ -30,6 +30,8 @@ def _run(arguments: argparse.Namespace) -> int:
         name_hosts,
     )
 
+    if arguments.out.exists():
+        raise AccessError(f"{arguments.out}: is there already; expected a new file")
     now = datetime.fromtimestamp(seconds(WallClock().now_ns()), UTC)
     check_hosts(arguments.host)
     is_new = not arguments.fleet.exists()

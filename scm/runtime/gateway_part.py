@@ -81,9 +81,9 @@ class GatewayPart(BasePart):
         if self._state != before or now_ns >= self._due_ns:
             self._due_ns = now_ns + EVERY_NS
             out += [self._status(now_ns), self._vital_signs(now_ns)]
-        # A link that is being made has a new reason at each step.
-        lasts = self._state == "joined" or now_ns - self._reason_ns >= LOST_NS
-        if lasts and (self._state, self._reason) != self._reported:
+        # A link that is being made has a new reason at each step: only one that lasts is an event.
+        lasts = now_ns - self._reason_ns >= LOST_NS
+        if (lasts or self._state != before) and (self._state, self._reason) != self._reported:
             self._reported = (self._state, self._reason)
             out.append(self._event(now_ns))
         return out

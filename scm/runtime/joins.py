@@ -33,9 +33,9 @@ class Join:
 
 
 def joins_of(
-    city_map: CityMap, join: Iterable[str], admit: Iterable[str], fleet: Fleet | None
+    city: str, city_map: CityMap, join: Iterable[str], admit: Iterable[str], fleet: Fleet | None
 ) -> tuple[Join, ...]:
-    """Return the links that were requested, each `[CITY=]ENDPOINT`.
+    """Return the links of a city that were requested, each `[NEIGHBOUR=]ENDPOINT`.
 
     Raises:
         RunError: when the map has no such neighbour, or one is named twice.
@@ -50,6 +50,9 @@ def joins_of(
         before, mark, after = text.partition("=")
         endpoint = after if mark else before
         neighbour = _neighbour(option, text, before if mark else "", known)
+        if neighbour == city:
+            msg = f"{option}: got {text!r}, but this city itself is named {city!r} (--city)"
+            raise RunError(msg)
         if neighbour in found:
             msg = f"{option}: got {text!r}, but {neighbour} is joined already; expected each once"
             raise RunError(msg)

@@ -182,7 +182,7 @@ def _plan_of(options: CityOptions) -> _Plan:
     }
     agents = tuple(f"n{options.hosted + i + 1}" for i in range(options.agents))
     fleet = None if options.fleet is None else load_fleet(options.fleet)
-    joins = joins_of(city_map, options.join, options.admit, fleet)
+    joins = joins_of(options.city, city_map, options.join, options.admit, fleet)
     cities = [join.neighbour for join in joins]
     stations = own_stations(eyes, agents, cities)
     listen = _free(options.listen)

@@ -3,6 +3,7 @@
 It is a process of its own: what a slow or dead link holds up there is not held up in the city.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,8 @@ from scm.v2x import zenoh_config
 from scm.v2x.access import is_local
 from scm.v2x.crossing import INNER, common_name, link_rules, neighbour_rights, other_side
 from scm.v2x.router import open_router
+
+_ENDPOINT = re.compile(r"(?:tcp|tls)/[^/\s]+:([0-9]{1,5})")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +55,10 @@ def check_endpoint(endpoint: str, auth: str | None) -> None:
     Raises:
         AccessError: when it does not suit.
     """
+    parts = _ENDPOINT.fullmatch(endpoint)
+    if parts is None or not 0 < int(parts[1]) < 65536:
+        msg = f"got {endpoint!r}, expected tls/HOST:PORT, or tcp/127.0.0.1:PORT on this machine"
+        raise AccessError(msg)
     if auth == "password":
         msg = "the fleet has passwords; expected one with certificates (--mtls), or no fleet file"
         raise AccessError(msg)

@@ -103,6 +103,7 @@ def report_cars(world: World, now_ns: int) -> list[ToCity]:
     border = world.border
     if not border.exits or not world.every["border"].is_due(now_ns):
         return []
+    forget_ghosts(world, now_ns)
     out = []
     for neighbour in world.city_map.neighbours:
         roads = [road for road in border.exits.values() if road.city == neighbour.city]
@@ -147,14 +148,19 @@ def receive_cars(world: World, message: BorderCars, now_ns: int) -> tuple[()]:
         return ()
     is_in_step = abs(message.t_ns - now_ns) < MAX_SKEW_NS
     for one in message.cars:
-        if world.cars.get(one.vehicle) is not None or not _is_plausible(world, one):
+        if _has_come(world, message.city, one.vehicle) or not _is_plausible(world, one):
             continue
         try:
             show_ghost(world, message.city, one, message.t_ns if is_in_step else now_ns)
         except ScmError:
             world.ignored += 1
-    forget_ghosts(world, now_ns)
     return ()
+
+
+def _has_come(world: World, city: str, name: str) -> bool:
+    """Return whether a car of the next city is here by now; one of that name may be another."""
+    arrival = world.border.arrivals.get((city, name))
+    return arrival is not None and not arrival.refused and world.cars.get(name) is not None
 
 
 def _is_plausible(world: World, one: BorderCar) -> bool:

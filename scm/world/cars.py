@@ -1,6 +1,6 @@
 """All cars of the city: as arrays, by their dynamics, and by name; and what tells them apart."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 
 from scm.clock import NS_PER_MS
@@ -67,10 +67,10 @@ class Cars:
         _, self.arrays.front[index] = self.garage.car(car_name).vector("body.footprint_x_m")
         return index
 
-    def free_name(self) -> str:
-        """Return the first name of the form `n1` that no car has."""
+    def free_name(self, taken: Container[str] = ()) -> str:
+        """Return the first name of the form `n1` that no car has and that is not `taken`."""
         number = 1
-        while self.get(f"n{number}") is not None:
+        while self.get(f"n{number}") is not None or f"n{number}" in taken:
             number += 1
         return f"n{number}"
 

@@ -8,6 +8,7 @@ same answer. So a car is at any time in this city, on the way, or in the next on
 
 from dataclasses import replace as with_fields
 
+import numpy as np
 from msgspec.structs import replace
 
 from scm.clock import NS_PER_MS, seconds
@@ -39,6 +40,8 @@ from scm.world.lease import grant
 from scm.world.world import World
 
 CATCH_UP_NS = 100 * NS_PER_MS  # a car that was on its way for longer has stood still meanwhile
+ASIDE_M = 0.5  # of the middle of its lane: a car farther away is on another road
+BACK_EVERY_M = 0.05
 HERE = Pose2(0.0, 0.0, 0.0)
 UNDECIDED = Refused(code="timeout", detail="no decision about the transfer came")
 
@@ -48,9 +51,10 @@ def depart(world: World, now_ns: int) -> list[Outgoing]:
     border, out = world.border, list[Outgoing]()
     for name, claim in list(border.approaching.items()):
         car = world.cars.hosted.get(name)
-        if car is None or not car.is_sent or claim.until_ns <= now_ns:
+        if car is None or not car.is_sent:
             continue
-        if claim.road.end.inverse().apply(car.pose.x, car.pose.y)[0] >= 0.0:
+        ahead_m, left_m = claim.road.end.inverse().apply(car.pose.x, car.pose.y)
+        if ahead_m >= 0.0 and abs(left_m) < ASIDE_M:  # it could not stop: the next city decides
             del border.approaching[name]
             out += _leave(world, car, claim.road, now_ns)
     for away in border.leaving.values():
@@ -152,22 +156,28 @@ def _place_answered(
 
 
 def _return(world: World, away: Leaving, refusal: Refused, now_ns: int) -> list[Outgoing]:
-    """Put a car back at the border that the next city has refused for good, or try again later."""
+    """Put a car that the next city has refused for good back onto its lane, or try again later.
+
+    It stands at the place nearest to the border that is free: others may stand there by now.
+    """
     request, road, state = away.request, away.road, away.request.state
     again = leaving(road, request, now_ns + REQUEST_EVERY_NS)
     again.tries.tries = 1  # it is stored already
     world.border.leaving[request.vehicle] = again
     forget_ghosts(world, now_ns, request.vehicle)
     limits = limits_of(world.cars.garage.car(request.car))
-    pose = road.end @ Pose2(-limits.front - 2.0 * STOP_BEFORE_M, 0.0, 0.0)
-    if state is None or not is_clear(world, pose, limits.length):
+    nearest_m = road.length_m - limits.front - 2.0 * STOP_BEFORE_M
+    lane = world.roads.lanes[road.lane]
+    places = np.arange(nearest_m, limits.rear, -BACK_EVERY_M).tolist()
+    s = next((s for s in places if is_clear(world, lane.at(s), limits.length)), None)
+    if state is None or s is None:
         return []
+    pose = lane.at(s)
     try:
         car = _add(world, request, state, pose, now_ns)
     except RunError:  # the city is full: the car stays on its way
         return []
     del world.border.leaving[request.vehicle]
-    s = road.length_m - limits.front - 2.0 * STOP_BEFORE_M
     world.trips.enter(car.index, car.name, road.lane, s, state.driver, now_ns)
     text = f"{car.name} is back at the border to {road.city}: {refusal.detail}"
     return [

@@ -72,7 +72,7 @@ def reply_to(
 
 
 def _spawn(world: World, request: SpawnRequest, now_ns: int, out: list[Outgoing]) -> SpawnReply:
-    name = request.vehicle or world.cars.free_name()
+    name = request.vehicle or world.cars.free_name(world.border.leaving)
     _check_new(world, name, request.car)
     car = world.host(name, request.car, _place(world, request.spawn, request.car), now_ns)
     out += world.arrival(car, now_ns)

@@ -327,6 +327,9 @@ class World:
         self.trips.forget(index)
         self.drivers.leave(index)
         self.radio.cams.forget(index)
+        self.border.approaching.pop(car.name, None)
+        if self.ownership is not None:
+            self.ownership.leave(index)
         self.alerts.stuck.forget(index)
         self.sensors.remove(index)
         self.impulses.event_ns.pop(car.name, None)

@@ -70,6 +70,7 @@ class Ownership:
         self.cut, self.number = cut, number
         self._look_m = look_m
         self.visible: Bools = self._visible_cells()
+        self._home = cut.within(number, BAND_M)
         self.owner: Ints = np.full(capacity, NOBODY, np.int64)
         self.next: Ints = np.full(capacity, NOBODY, np.int64)
         self.moved = 0
@@ -84,6 +85,20 @@ class Ownership:
         if self._look_m is None:
             return np.ones(self.cut.cells.shape, np.bool_)
         return self.cut.within(self.number, self._look_m)
+
+    def reaches_far(self, x: Floats, y: Floats) -> bool:
+        """Return whether this region has cars far beyond it, as of a queue over a cut.
+
+        Args:
+            x: Of the rear axles, by vehicle index; likewise `y`.
+            y: See `x`.
+        """
+        own = np.flatnonzero((self.owner == self.number) | (self.next == self.number))
+        left, low, edge = self.cut.frame.tolist()
+        rows, columns = self._home.shape
+        row = np.clip((y[own] - low) / edge, 0, rows - 1).astype(np.int64)
+        column = np.clip((x[own] - left) / edge, 0, columns - 1).astype(np.int64)
+        return not bool(self._home[row, column].all())
 
     def enter(self, index: int, pose: Pose2) -> bool:
         """Note a new car; return whether it is this region's."""

@@ -41,6 +41,14 @@ class Pipes:
                 ) from cause
         return received
 
+    def close(self) -> None:
+        """Close the ends in this process, so that the others notice when the region ends.
+
+        To be called where the region's process was started, which has ends of its own.
+        """
+        for end in self._ends.values():
+            end.close()
+
 
 def pipes(regions: int) -> list[Pipes]:
     """Return the exchange of each region, to be given to its process."""

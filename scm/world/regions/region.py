@@ -131,6 +131,8 @@ class Region:
         place = vehicles.x, vehicles.y, vehicles.yaw, vehicles.front
         fastest_mps = float(np.nanmax(np.abs(vehicles.speed)))
         self.ownership.decide(CarsSeen(order, *place, drivers.sizes, seen), fastest_mps)
+        if self.ownership.reaches_far(vehicles.x, vehicles.y):
+            seen[:] = True
         drivers.look_at(seen | ~vehicles.elsewhere)
 
 

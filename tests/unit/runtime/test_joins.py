@@ -21,15 +21,20 @@ def with_neighbours(*names):
 
 
 def test_only_neighbour_needs_no_name():
-    assert joins_of(with_neighbours("lab_b"), [HERE], [], None) == (Join("lab_b", HERE, False),)
-    assert joins_of(with_neighbours("lab_b"), [], [HERE], None)[0].words == ("--admit", HERE)
+    assert joins_of("lab_a", with_neighbours("lab_b"), [HERE], [], None) == (
+        Join("lab_b", HERE, False),
+    )
+    assert joins_of("lab_a", with_neighbours("lab_b"), [], [HERE], None)[0].words == (
+        "--admit",
+        HERE,
+    )
 
 
 def test_one_of_several_neighbours_is_named():
-    found = joins_of(with_neighbours("b", "c"), [f"c={HERE}"], ["b=tcp/127.0.0.1:1"], None)
+    found = joins_of("lab_a", with_neighbours("b", "c"), [f"c={HERE}"], ["b=tcp/127.0.0.1:1"], None)
     assert [(join.neighbour, join.listens) for join in found] == [("c", False), ("b", True)]
     with pytest.raises(RunError, match="expected CITY=ENDPOINT with one of b, c"):
-        joins_of(with_neighbours("b", "c"), [HERE], [], None)
+        joins_of("lab_a", with_neighbours("b", "c"), [HERE], [], None)
 
 
 @pytest.mark.parametrize(
@@ -38,34 +43,41 @@ def test_one_of_several_neighbours_is_named():
         ((), [HERE], r"no \[\[neighbours\]\]"),
         (("lab_b",), [f"lab_c={HERE}"], "one of lab_b"),
         (("lab_b",), [HERE, HERE], "lab_b is joined already"),
+        (("lab_a",), [HERE], "this city itself is named 'lab_a'"),
     ],
 )
 def test_neighbour_that_the_map_does_not_have_is_refused(names, join, expected):
     with pytest.raises(RunError, match=expected):
-        joins_of(with_neighbours(*names), join, [], None)
+        joins_of("lab_a", with_neighbours(*names), join, [], None)
 
 
 @pytest.mark.parametrize("endpoint", ["tcp/192.168.2.7:7448", "tcp/0.0.0.0:7448", FAR, "ws/x:1"])
 def test_link_that_leaves_this_machine_needs_certificates(endpoint):
     with pytest.raises(AccessError, match=f"got '{endpoint}'"):
-        joins_of(with_neighbours("lab_b"), [endpoint], [], None)
+        joins_of("lab_a", with_neighbours("lab_b"), [endpoint], [], None)
+
+
+@pytest.mark.parametrize("endpoint", ["tcp/127.0.0.1", "tcp/127.0.0.1:x", "tls/", "tcp/h:99999"])
+def test_endpoint_without_a_host_or_port_is_refused(endpoint):
+    with pytest.raises(AccessError, match=f"got '{endpoint}', expected tls/HOST:PORT"):
+        joins_of("lab_a", with_neighbours("lab_b"), [endpoint], [], None)
 
 
 def test_fleet_with_certificates_needs_tls_and_the_authority_of_the_neighbour(tmp_path):
     fleet = Fleet(tmp_path / "fleet.toml", "mtls")
     city_map = with_neighbours("lab_b")
     with pytest.raises(AccessError, match="expected tls/HOST:PORT"):
-        joins_of(city_map, [HERE], [], fleet)
+        joins_of("lab_a", city_map, [HERE], [], fleet)
     with pytest.raises(AccessError, match="scm fleet neighbour lab_b FILE"):
-        joins_of(city_map, [FAR], [], fleet)
+        joins_of("lab_a", city_map, [FAR], [], fleet)
     add_neighbour(fleet, "lab_b", make_authority("b", NOW).certificate, NOW)
-    assert joins_of(city_map, [FAR], [], fleet) == (Join("lab_b", FAR, False),)
+    assert joins_of("lab_a", city_map, [FAR], [], fleet) == (Join("lab_b", FAR, False),)
 
 
 def test_fleet_with_passwords_joins_no_city(tmp_path):
     fleet = Fleet(tmp_path / "fleet.toml", "password")
     with pytest.raises(AccessError, match="passwords"):
-        joins_of(with_neighbours("lab_b"), [HERE], [], fleet)
+        joins_of("lab_a", with_neighbours("lab_b"), [HERE], [], fleet)
 
 
 def test_two_labs_exchange_their_authorities_by_commands(tmp_path, capsys, monkeypatch):

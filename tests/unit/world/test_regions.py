@@ -133,6 +133,19 @@ def test_city_in_regions_equals_one_world_bit_by_bit(whole, regions, by):
     assert all(region.world.cars.arrays.elsewhere.any() for region in part.regions)
 
 
+def test_removed_car_belongs_to_no_region():
+    part = RegionsPart(load_map(CITY), 2, SEED, hosted(4), room=4)
+    with Lockstep([part]) as city:
+        city.run_for(0.1)
+        for region in part.regions:  # it is about to go over
+            index = region.world.cars.hosted["n2"].index
+            region.ownership.next[index] = 1 - region.ownership.owner[index]
+        city.call(RemoveRequest(vehicle="n2"))
+        city.run_for(0.1)
+    for region in part.regions:
+        assert region.ownership.owner[index] == region.ownership.next[index] == -1
+
+
 def test_agents_cars_are_refused_where_a_city_is_cut():
     part = RegionsPart(load_map(CITY), 2, SEED)
     with Lockstep([part]) as city:
@@ -181,6 +194,18 @@ def test_cars_that_may_touch_have_the_owner_of_the_first_of_them():
     first, second = cut.cells[row, column], cut.cells[row, column + 1]
     assert owners[0] == [first] * 2 + [second] * 3  # at rest they stay apart
     assert owners[1] == [first] * 4 + [second]
+
+
+def test_region_whose_queue_reaches_far_beyond_it_looks_everywhere():
+    cut = cut_map(load_map(CITY), 2)
+    left, low, edge = cut.frame
+    places = np.argwhere(cut.cells == 1)
+    farthest = places[np.argmax([not cut.within(0, 4.0)[row, column] for row, column in places])]
+    ownership = Ownership(cut, 0, 1, None)
+    ownership.owner[0] = ownership.next[0] = 0
+    for place, far in ((np.argwhere(cut.cells == 0)[0], False), (farthest, True)):
+        y, x = np.array([low, left]) + edge * (place + 0.5)
+        assert ownership.reaches_far(np.array([x]), np.array([y])) == far
 
 
 def test_too_fast_a_car_ends_the_run_with_its_speed():
