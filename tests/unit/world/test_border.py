@@ -2,6 +2,7 @@
 
 import pytest
 
+from scm.geometry import Pose2
 from scm.v2x.messages.border_cars import BorderCar, BorderCars
 from scm.v2x.messages.spawn_request import SpawnReply, SpawnRequest
 from scm.world.border import GHOST_NS, receive_cars
@@ -38,10 +39,12 @@ def test_refused_car_comes_back_behind_those_who_stand_at_the_border():
     east = cities.worlds["east"].world
     reply_to(east, SpawnRequest(vehicle="w1", spawn="s2"), cities.run.now_ns)  # so it is refused
     until(cities, lambda: west.border.leaving)
-    spawned = reply_to(west, SpawnRequest(vehicle="w2", spawn="1.40,0.0,0"), cities.run.now_ns)
+    spawned = reply_to(west, SpawnRequest(vehicle="w2", spawn="s0"), cities.run.now_ns)
     assert isinstance(spawned, SpawnReply)
+    second = west.cars.hosted["w2"]
+    second.fleet.place(second.row, Pose2(1.3, 0.0, 0.0))
     until(cities, lambda: "w1" in west.cars.hosted, 3.0)
-    gap = west.cars.hosted["w2"].pose.x - west.cars.hosted["w1"].pose.x
+    gap = second.pose.x - west.cars.hosted["w1"].pose.x
     assert 0.25 < gap < 0.4
     assert not west.border.leaving
 
