@@ -12,6 +12,11 @@ Pose = Annotated[
     Meta(description="x [m], y [m], yaw [rad].", examples=[[12.0, 0.5, 0.0]]),
 ]
 
+HandedName = Annotated[
+    str,
+    Meta(pattern=r"^[a-z0-9_-]{1,32}$", description="Name of a car.", examples=["n1"]),
+]
+
 
 class NamedValues(Struct, kw_only=True, frozen=True):
     """One variable or parameter of a car's physics, by the name that the physics page gives it."""
@@ -123,7 +128,7 @@ class HandoverRequest(Request, kw_only=True, frozen=True):
 
     city: CityName
     phase: Literal["reserve", "commit"]
-    vehicle: Annotated[VehicleName, Meta(pattern=r"^[a-z0-9_-]{1,32}$")]
+    vehicle: HandedName
     epoch: int
     lane: LaneName
     border: Pose
