@@ -67,10 +67,10 @@ class Cars:
         _, self.arrays.front[index] = self.garage.car(car_name).vector("body.footprint_x_m")
         return index
 
-    def free_name(self, taken: Container[str] = ()) -> str:
-        """Return the first name of the form `n1` that no car has and that is not `taken`."""
+    def free_name(self, others: Container[str] = ()) -> str:
+        """Return the first name of the form `n1` that no car has, nor any of `others`."""
         number = 1
-        while self.get(f"n{number}") is not None or f"n{number}" in taken:
+        while self.get(f"n{number}") is not None or f"n{number}" in others:
             number += 1
         return f"n{number}"
 
