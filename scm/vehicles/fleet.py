@@ -340,18 +340,13 @@ class Fleet:
             RunError: when there are no such rows, or duration or substep is negative or no number.
         """
         if not 0 <= first <= last <= self.capacity:
-            msg = f"rows {first} to {last}: expected rows between 0 and {self.capacity}"
-            raise RunError(msg)
+            raise RunError(f"rows {first} to {last}: expected rows between 0 and {self.capacity}")
         self._run(first, last, whole_steps(duration, substep), substep)
 
     def rollout(
-        self,
-        throttle: Floats,
-        steering: Floats,
-        step_s: float,
-        variables: Sequence[str] = ("x", "y", "yaw", "speed"),
-        substep: float = SUBSTEP_S,
-    ) -> dict[str, Floats]:
+        self, throttle: Floats, steering: Floats, step_s: float,
+        variables: Sequence[str] = ("x", "y", "yaw", "speed"), substep: float = SUBSTEP_S,
+    ) -> dict[str, Floats]:  # fmt: skip
         """Simulate all cars with recorded commands in one call, each with its own numbers.
 
         Args:
@@ -454,8 +449,7 @@ class Fleet:
         param = self.columns[column].param
         low, high = param.bounds
         if not low <= value <= high:
-            msg = f"{param.key} = {value}: expected {low:g} to {high:g} {param.unit}"
-            raise TermError(msg)
+            raise TermError(f"{param.key} = {value}: expected {low:g} to {high:g} {param.unit}")
         self.parameters[row, column] = value
 
     @property
@@ -473,8 +467,7 @@ class Fleet:
     def _offset_of(self, name: str) -> int:
         if name not in self._variable_offsets:
             hint = nearest(name, sorted(self._variable_offsets))
-            msg = f"rollout: {name!r} is no variable of each car{hint}"
-            raise RunError(msg)
+            raise RunError(f"rollout: {name!r} is no variable of each car{hint}")
         return self._variable_offsets[name]
 
     def _parameter(self, row: int | Ints, name: str) -> Any:

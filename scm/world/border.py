@@ -21,7 +21,6 @@ from scm.v2x.messages.border_cars import BorderCar, BorderCars
 from scm.v2x.messages.handover_request import HandoverRequest
 from scm.vehicles.drivers.limits import limits_of
 from scm.vehicles.drivers.speed_control import stopping_speed
-from scm.vehicles.handed import digest_of
 from scm.vehicles.jit import plain
 from scm.world.border_state import MAX_GHOSTS, Approaching
 from scm.world.cars import AnyCar
@@ -94,7 +93,7 @@ def request_of(world: World, car: HostedCar, road: Exit) -> HandoverRequest:
         lane=road.to,
         border=(*road.border,),
         car=car.car_file,
-        digest=digest_of(car.car_file),
+        digest=world.cars.garage.digest(car.car_file),
     )
 
 

@@ -46,6 +46,7 @@ PLACES = {
     "owner": ("ann", "n2", "world"),
     "car": ("nigel",),
     "kind": ("remote",),
+    "neighbour": ("east",),
 }
 BITS = ("0" * 16, "1" * 16, "01" * 8)  # of the one field that has a pattern: status bits
 MADE_BY_THE_BUS_OR_ONCE = {"presence", "world_definition"}

@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 
 from scm.arrays import AnyArray, Bools, Floats, Ints
-from scm.errors import MapError
 from scm.geometry import Pose2
 from scm.maps.border import BEYOND
 from scm.maps.segments import wall_segments
@@ -314,8 +313,7 @@ class DriverBatch:
         self._state.ints[index, col.ARRIVED] = 0
         self._state.floats[index, col.DONE] = 0.0
         if self._state.ints[index, col.AFTER] != col.CIRCULATE:
-            msg = f"vehicle index {index} was not sent to circulate"
-            raise ValueError(msg)
+            raise ValueError(f"vehicle index {index} was not sent to circulate")
         lane = self.lane_graph.names[self.lane[index]]
         return self.lane_graph.round_from(lane) or self.planned_lanes(index)
 
@@ -466,16 +464,12 @@ class DriverBatch:
         if self._pool is None or len(self._scratch) != self.threads:
             self._pool = ThreadPoolExecutor(self.threads)
             self._scratch = [new_scratch() for _ in range(self.threads)]
-        for _ in self._pool.map(part, np.array_split(cars, self.threads), self._scratch):
-            pass
+        list(self._pool.map(part, np.array_split(cars, self.threads), self._scratch))
 
     def _number(self, lane: str) -> int:
-        number = self.lane_graph.numbers.get(lane)
-        if number is None:
-            self.lane_graph.roads.successors(lane)  # raises with the reason
-            msg = f"no lane {lane!r}"
-            raise MapError(msg)
-        return number
+        if lane not in self.lane_graph.numbers:
+            self.lane_graph.roads.check_lane(lane)  # raises with the reason
+        return self.lane_graph.numbers[lane]
 
     def _store_route(self, numbers: list[int], index: int) -> int:
         """Append a route to the route table and return where it begins."""
@@ -495,9 +489,8 @@ class DriverBatch:
             before[ints[k, col.ROUTE] : ints[k, col.ROUTE] + ints[k, col.COUNT]] for k in indices
         ]
         used = sum(len(route) for route in in_use)
-        routes = np.zeros(
-            max(64 if self.capacity < 64 else MIN_ROUTE_ENTRIES, 2 * (used + more)), np.int64
-        )
+        least = 64 if self.capacity < 64 else MIN_ROUTE_ENTRIES
+        routes = np.zeros(max(least, 2 * (used + more)), np.int64)
         self._routes_used = 0
         for index, route in zip(indices, in_use, strict=True):
             at = self._routes_used
