@@ -5,6 +5,7 @@ Two cities of a router and a gateway each, joined through a proxy that stalls, t
 the station whose messages are timed. Run: `python -m bench joined`.
 """
 
+import argparse
 import subprocess
 import sys
 import tempfile
@@ -101,6 +102,8 @@ class Bench:
 
 
 def main() -> None:
+    """Measure local messages beside each kind of link."""
+    argparse.ArgumentParser(prog="python -m bench joined", description=__doc__).parse_args()
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
         bench = Bench(Path(folder), stack)
         while not bench.crossed:
