@@ -72,7 +72,7 @@ def endless_road(city: str, other: str, length_m: float = 1.6) -> CityMap:
 
 
 class TwoCities:
-    """Two cities on one clock and one network, with a link that fails as it is told to.
+    """Two cities on one clock and one network, with a link whose faults are chosen.
 
     Args:
         maps: Of both, by name.
@@ -126,7 +126,7 @@ class TwoCities:
         """Cut the link."""
         self.faults.partition([f"{CITIES[0]}/world"])
 
-    def mend(self) -> None:
+    def restore_link(self) -> None:
         """Bring the link back, without faults."""
         self.faults.partition([])
         self.faults.link_rates = CALM
@@ -200,7 +200,7 @@ def is_about_to_cross(cities: TwoCities, within_m: float) -> bool:
 
 def moment(cities: TwoCities, rng: random.Random, *, bring: bool = False) -> Counter[str]:
     """Let things go wrong about the tick in which a car crosses; return what did."""
-    cities.mend()
+    cities.restore_link()
     if bring:
         cities.tick()
         cities.bring(rng.choice(cities.names))
@@ -220,7 +220,7 @@ def moment(cities: TwoCities, rng: random.Random, *, bring: bool = False) -> Cou
 
 def misfortune(cities: TwoCities, rng: random.Random) -> str:
     """Let one thing go wrong now, or everything be well again; return what."""
-    what = rng.choice(("kill", "kill", "cut", "weather", "mend"))
+    what = rng.choice(("kill", "kill", "cut", "weather", "restore"))
     if what == "kill":
         cities.kill(rng.choice(CITIES))
     elif what == "cut":
@@ -233,7 +233,7 @@ def misfortune(cities: TwoCities, rng: random.Random) -> str:
             late_s=rng.choice((0.05, 0.5, 5.0)),
         )
     else:
-        cities.mend()
+        cities.restore_link()
     return what
 
 
@@ -261,7 +261,7 @@ def main() -> None:
         if number % 100 == 99:
             spent_s = time.perf_counter() - began
             print(f"{number + 1} moments, {crossings} crossings, {spent_s:.0f} s", flush=True)
-    cities.mend()
+    cities.restore_link()
     for _ in range(250):
         cities.tick()
     missing = [name for name in cities.names if cities.where(name) is None]

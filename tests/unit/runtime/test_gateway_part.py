@@ -103,14 +103,14 @@ def test_link_over_which_nothing_comes_is_made_anew(watched):
             "refused: its certificate is not from the authority known for b",
         ),
         (
-            "DEBUG Unable to connect! received fatal alert: UnknownCA at /root/u.rs:226.. Retry",
+            "DEBUG Unable to connect! received fatal alert: UnknownCA at /src/u.rs:226.. Retry",
             "b refuses this city: it knows another authority for it",
         ),
         (
             'Unable: [h]: invalid peer certificate: certificate not valid for name "h"; x at /r',
             'refused: the certificate of b: certificate not valid for name "h"; x',
         ),
-        ("DEBUG Unable to connect: Connection refused (os error 111) at /root/x.rs", ""),
+        ("DEBUG Unable to connect: Connection refused (os error 111) at /src/x.rs", ""),
     ],
 )
 def test_reason_of_a_refusal_is_read_from_the_log_of_zenoh(line, expected):

@@ -149,7 +149,7 @@ def test_city_sees_of_its_neighbour_only_what_can_be_chosen(honest, intruder):
     fence = B + "v/fence/state"
     until(lambda: watching.has(fence), also=lambda: intruder.put(fence, b"control"))
     for key in MESSAGES | REQUESTS:
-        intruder.put(B + key, b"unasked")
+        intruder.put(B + key, b"intruder")
     watching.samples.clear()
     until(lambda: watching.has(fence), also=lambda: intruder.put(fence, b"control"))
     crossable = shown_keys("b", "a", SHOWN)

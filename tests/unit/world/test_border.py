@@ -28,7 +28,7 @@ def test_car_that_cannot_stop_any_more_is_handed_over_though_its_place_has_lapse
         cities.tick()
     assert "w1" not in west.cars.hosted
     assert "w1" in west.border.leaving
-    cities.mend()
+    cities.restore_link()
     until(cities, lambda: cities.where("w1") == "east", 3.0)
     assert whole(cities)
 

@@ -62,7 +62,7 @@ def test_no_car_is_lost_or_doubled_whatever_fails():
             now = cities.where(name)
             crossed += now not in (None, city)
             before[name] = now or city
-    cities.mend()
+    cities.restore_link()
     until(cities, lambda: all(cities.where(name) for name in cities.names))
     assert whole(cities)
     assert crossed > HISTORIES // 3  # else the histories have shown nothing
@@ -146,7 +146,7 @@ def test_car_waits_at_the_border_while_the_next_city_is_away_and_then_drives_on(
     assert 1.5 < front <= 1.6
     assert abs(car.speed) < 0.01
     assert cities.worlds["west"].world.border.approaching["w1"].why in ("timeout", "offline")
-    cities.mend()
+    cities.restore_link()
     until(cities, lambda: cities.where("w1") == "east", 5.0)
     assert whole(cities)
 
@@ -163,7 +163,7 @@ def test_transfer_under_way_outlives_both_worlds_and_the_link():
     for _ in range(100):
         cities.tick()
     assert cities.where("w1") is None
-    cities.mend()
+    cities.restore_link()
     until(cities, lambda: cities.where("w1") == "east", 3.0)
     until(cities, lambda: not cities.worlds["west"].world.border.leaving, 3.0)
     assert whole(cities)

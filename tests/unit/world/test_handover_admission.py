@@ -280,14 +280,14 @@ def test_car_whose_transfer_is_stale_stays_in_the_store_for_a_person(leaver):
 
 
 @pytest.mark.parametrize(("owner", "keeps"), [("w1", True), ("e9", False)])
-def test_tag_that_the_map_gives_to_another_car_is_not_kept(owner, keeps):
+def test_tag_that_the_map_gives_to_another_car_is_replaced(owner, keeps):
     bound = VehicleTag(vehicle=owner, tag_id=40)
     world = WorldPart(replace(ENDLESS["east"], vehicle_tags=(bound,)), 0, room=2, city="east").world
     assert isinstance(reply_to_handover(world, tagged(40), 0, []), HandoverReply)
     assert (world.cars.hosted["w1"].tag_id == 40) == keeps
 
 
-def test_tag_of_the_floor_is_not_kept(east):
+def test_tag_of_the_floor_is_replaced(east):
     floor = east.city_map.tag.tag_id
     assert isinstance(reply_to_handover(east, tagged(floor), 0, []), HandoverReply)
     assert east.cars.hosted["w1"].tag_id != floor

@@ -155,7 +155,7 @@ def test_agents_cars_are_refused_where_a_city_is_cut():
 
 
 @pytest.mark.parametrize(
-    ("spoil", "says"),
+    ("change", "message"),
     [
         (lambda body: body[:-3], "message of a region"),
         (lambda body: news(region=1, tick=9), "expected tick 1, got 9"),
@@ -163,11 +163,11 @@ def test_agents_cars_are_refused_where_a_city_is_cut():
         (lambda body: news(region=1, tick=1, indices=b"\xff" * 4, motion=b"8" * 40), "from 0 to"),
     ],
 )
-def test_wrong_message_of_a_region_is_refused_with_its_reason(spoil, says):
+def test_wrong_message_of_a_region_is_refused_with_its_reason(change, message):
     body = news(region=1, tick=1)
     assert decode(body, 1, 8)[0].region == 1
-    with pytest.raises(MessageError, match=says):
-        decode(spoil(body), 1, 8)
+    with pytest.raises(MessageError, match=message):
+        decode(change(body), 1, 8)
 
 
 def news(**given):
